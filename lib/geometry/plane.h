@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+/// Points of the plane as complex numbers x + j y, the notation of the positioning equations.
+/// (std::complex would check every product for infinities.)
+namespace vlp {
+
+/// a b: `b` turned by the angle of `a` and stretched by its length.
+inline Eigen::Vector2d times(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return {a.x() * b.x() - a.y() * b.y(), a.x() * b.y() + a.y() * b.x()};
+}
+
+/// conj(a) b: the real part is the dot product, the imaginary part the cross product.
+inline Eigen::Vector2d conj_times(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return {a.x() * b.x() + a.y() * b.y(), a.x() * b.y() - a.y() * b.x()};
+}
+
+/// The matrix of multiplication by `a`.
+inline Eigen::Matrix2d times_matrix(const Eigen::Vector2d& a) {
+  return (Eigen::Matrix2d() << a.x(), -a.y(), a.y(), a.x()).finished();
+}
+
+}  // namespace vlp

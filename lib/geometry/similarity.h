@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <limits>
+#include <optional>
+
+#include "plane.h"
+
+namespace vlp {
+
+/// A planar similarity in complex notation: p = offset + factor * z. Its scale is |factor|, its
+/// angle arg factor; it never mirrors.
+struct Similarity {
+  Eigen::Vector2d offset;
+  Eigen::Vector2d factor;
+};
+
+/// The similarity that takes from(i) to to(i), i < count, with the least sum of squared
+/// distances in the `to` plane; with two points it is exact. Closed form: with primes for means,
+///   factor = sum conj(from_i - from')(to_i - to') / sum |from_i - from'|^2,
+///   offset = to' - factor * from'.
+/// `from` and `to` are callables that return an Eigen::Vector2d, in any units. Nothing for fewer
+/// than two pairs, or when, to rounding, all `from` or all `to` are one point or the best factor
+/// is zero, as it is for a regular polygon's mirror image.
+template <typename From, typename To>
+std::optional<Similarity> fit_similarity(std::size_t count, const From& from, const To& to) {
+  if (count < 2) return std::nullopt;
+  Eigen::Vector2d from_mean = Eigen::Vector2d::Zero(), to_mean = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    from_mean += from(i);
+    to_mean += to(i);
+  }
+  from_mean /= static_cast<double>(count);
+  to_mean /= static_cast<double>(count);
+  Eigen::Vector2d product = Eigen::Vector2d::Zero();
+  double spread = 0, from_magnitude = 0, to_magnitude = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector2d difference = from(i) - from_mean;
+    product += conj_times(difference, to(i) - to_mean);
+    spread += difference.squaredNorm();
+    from_magnitude += from(i).squaredNorm();
+    to_magnitude += to(i).squaredNorm();
+  }
+  // Below this the differences are the rounding of the coordinates.
+  constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
+  if (!(spread > rounding * rounding * from_magnitude) ||
+      !(product.squaredNorm() > rounding * rounding * spread * to_magnitude)) {
+    return std::nullopt;
+  }
+  const Eigen::Vector2d factor = product / spread;
+  return Similarity{to_mean - times(factor, from_mean), factor};
+}
+
+}  // namespace vlp

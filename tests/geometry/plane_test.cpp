@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/plane.h"
+
+#include <gtest/gtest.h>
+
+#include <complex>
+
+#include "support/near.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+using Complex = std::complex<double>;
+
+Complex complex_of(const Eigen::Vector2d& a) { return {a.x(), a.y()}; }
+Eigen::Vector2d vector_of(const Complex& a) { return {a.real(), a.imag()}; }
+
+struct Pair {
+  Eigen::Vector2d a, b;
+};
+
+Pair random_pair(Random& random) {
+  const auto coordinate = [&random] { return random.uniform(-3, 3); };
+  const double ax = coordinate(), ay = coordinate(), bx = coordinate(), by = coordinate();
+  return {{ax, ay}, {bx, by}};
+}
+
+// Products of numbers up to 3 differ by the rounding of 18 at most.
+constexpr double kRounding = 4e-15;
+
+TEST(Plane, TimesIsTheComplexProduct) {
+  Random random(1);
+  for (int trial = 0; trial < 100; ++trial) {
+    const auto [a, b] = random_pair(random);
+    const Complex expected = complex_of(a) * complex_of(b);
+    EXPECT_THAT(times(a, b), IsNear(vector_of(expected), kRounding));
+  }
+}
+
+TEST(Plane, ConjTimesConjugatesTheFirstFactor) {
+  Random random(2);
+  for (int trial = 0; trial < 100; ++trial) {
+    const auto [a, b] = random_pair(random);
+    const Complex expected = std::conj(complex_of(a)) * complex_of(b);
+    EXPECT_THAT(conj_times(a, b), IsNear(vector_of(expected), kRounding));
+  }
+}
+
+TEST(Plane, ConjTimesIsDotAndCrossProduct) {
+  EXPECT_EQ(conj_times({1, 2}, {3, 5}), Eigen::Vector2d(1 * 3 + 2 * 5, 1 * 5 - 2 * 3));
+}
+
+TEST(Plane, TimesMatrixMultiplies) {
+  Random random(3);
+  for (int trial = 0; trial < 100; ++trial) {
+    const auto [a, b] = random_pair(random);
+    EXPECT_THAT(times_matrix(a) * b, IsNear(times(a, b), kRounding));
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,18 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Core>
+
+namespace vlp {
+
+/// Matches an Eigen vector or matrix whose every entry is within `tolerance` of `expected`'s.
+MATCHER_P2(IsNear, expected, tolerance, "is near the expected matrix") {
+  const double worst = (arg - expected).cwiseAbs().maxCoeff();
+  *result_listener << "worst difference " << worst;
+  return worst <= tolerance;  // false for NaN
+}
+
+}  // namespace vlp
