@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+
+#include "distortion.h"
+#include "lens_model.h"
+
+namespace vlp {
+
+/// A lens: camera rays to pixels and back. The centre of the top-left pixel is (0, 0).
+///   OPENCVn, PINHOLE   pixel = f * distorted(x/z, y/z) + c       (Distortion; none for PINHOLE)
+///   STEREOGRAPHIC      pixel = f * 2 (x, y) / (|p| + z) + c
+/// with f = (fx, fy), c = (cx, cy). These are mrcal's LENSMODEL_... of the same names (mrcal
+/// documentation, "Lens models"). Built once; const and safe to share between threads.
+class Lens {
+ public:
+  /// `parameters` in mrcal's order. Throws std::invalid_argument when their number is not
+  /// parameter_count(model), one is not finite or a focal length is not positive.
+  Lens(LensModel model, std::span<const double> parameters);
+
+  LensModel model() const { return model_; }
+  /// fx, fy in pixels.
+  const Eigen::Vector2d& focal_px() const { return focal_px_; }
+  /// cx, cy in pixels.
+  const Eigen::Vector2d& center_px() const { return center_px_; }
+
+  /// The pixel of a point (any length unit but zero). Nothing for a point that the lens model
+  /// does not describe: at or behind the camera's plane z = 0 (STEREOGRAPHIC: straight behind),
+  /// beyond Distortion::valid_radius, or not finite.
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const;
+
+  struct Projection {
+    Eigen::Vector2d pixel;
+    Eigen::Matrix<double, 2, 3> d_pixel_d_point;
+    /// A column per parameter, in mrcal's order.
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 16> d_pixel_d_parameters;
+  };
+  /// As project(), with both Jacobians.
+  std::optional<Projection> project_with_jacobians(const Eigen::Vector3d& x_in_camera) const;
+
+  struct Ray {
+    /// Not of unit length: z = 1 but for STEREOGRAPHIC, where z <= 1 and may be negative.
+    Eigen::Vector3d direction;
+    Eigen::Matrix<double, 3, 2> d_direction_d_pixel;
+  };
+  /// The ray of a pixel. OPENCVn by Newton's method with step halving, until the last step
+  /// leaves an error below 1e-12 (the Jacobian, taken before it, is good to 1e-6 of itself).
+  /// Nothing where it does not converge to a ray that project() accepts: pixels that no ray
+  /// reaches, or that are not finite.
+  std::optional<Ray> unproject(const Eigen::Vector2d& pixel) const;
+
+ private:
+  std::optional<Eigen::Vector2d> undistort(const Eigen::Vector2d& distorted,
+                                           Eigen::Matrix2d& d_distorted_d_z) const;
+
+  LensModel model_;
+  Eigen::Vector2d focal_px_;
+  Eigen::Vector2d center_px_;
+  Distortion distortion_;
+  double valid_radius_squared_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace vlp {
+
+/// The lens models of mrcal that the toolbox evaluates itself. Parameters stand in mrcal's order:
+///   fx fy cx cy  then, for OPENCVn, the first n of  k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
+enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv12 };
+
+/// mrcal's name, for example "LENSMODEL_OPENCV8".
+std::string_view name_of(LensModel model);
+
+/// The model of that name; nothing when the name is not one of the six.
+std::optional<LensModel> lens_model_from_name(std::string_view name);
+
+/// Every name, separated by commas, for messages.
+std::string lens_model_names();
+
+/// Focal lengths, centre and distortion together: 4, 4, 8, 9, 12 or 16.
+std::size_t parameter_count(LensModel model);
+
+}  // namespace vlp

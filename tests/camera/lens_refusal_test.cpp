@@ -1,0 +1,107 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+// Bad parameters, pixels and points.
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <stdexcept>
+
+#include "camera/random_lens.h"
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Lens plain_lens(LensModel model) { return {model, parameters_with(model, {})}; }
+
+class LensRefusal : public testing::TestWithParam<LensModel> {};
+
+TEST_P(LensRefusal, OfPixelsThatAreNotFinite) {
+  const Lens lens = plain_lens(GetParam());
+  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+    EXPECT_FALSE(lens.unproject({bad, 0}));
+    EXPECT_FALSE(lens.unproject({0, bad}));
+  }
+}
+
+TEST_P(LensRefusal, OfPointsThatAreNotFinite) {
+  const Lens lens = plain_lens(GetParam());
+  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+    for (int i = 0; i < 3; ++i) {
+      Vector3d point(0.1, 0.2, 1);
+      point(i) = bad;
+      if (i == 2 && bad == kInfinity) continue;  // straight ahead for a division by z
+      EXPECT_FALSE(lens.project(point)) << point.transpose();
+      EXPECT_FALSE(lens.project_with_jacobians(point)) << point.transpose();
+    }
+  }
+}
+
+TEST_P(LensRefusal, OfResultsThatAreNotFinite) {
+  const Lens lens = plain_lens(GetParam());
+  for (const double huge : {1e150, 1e160, 1e305, 1e308}) {
+    const auto ray = lens.unproject({huge, -huge});
+    EXPECT_TRUE(!ray || ray->direction.allFinite()) << huge;
+    const auto pixel = lens.project({huge, 1, 1});
+    EXPECT_TRUE(!pixel || pixel->allFinite()) << huge;
+  }
+}
+
+TEST_P(LensRefusal, OfTheCameraItself) {
+  EXPECT_FALSE(plain_lens(GetParam()).project(Vector3d::Zero()));
+}
+
+TEST_P(LensRefusal, OfParametersThatAreNotItsOwnNumberOrNotFinite) {
+  const auto good = parameters_with(GetParam(), {});
+  EXPECT_NO_THROW(Lens(GetParam(), good));
+  auto parameters = good;
+  parameters.push_back(0);
+  EXPECT_THROW(Lens(GetParam(), parameters), std::invalid_argument);
+  parameters.resize(good.size() - 1);
+  EXPECT_THROW(Lens(GetParam(), parameters), std::invalid_argument);
+  EXPECT_THROW(Lens(GetParam(), {}), std::invalid_argument);
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    for (const double bad : {kNan, kInfinity, -kInfinity}) {
+      parameters = good;
+      parameters[i] = bad;
+      EXPECT_THROW(Lens(GetParam(), parameters), std::invalid_argument) << i;
+    }
+  }
+  for (const std::size_t i : {0U, 1U}) {
+    for (const double bad : {0.0, -520.0}) {
+      parameters = good;
+      parameters[i] = bad;
+      EXPECT_THROW(Lens(GetParam(), parameters), std::invalid_argument) << i;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, LensRefusal, testing::ValuesIn(kEveryModel),
+                         testing::PrintToStringParamName());
+
+TEST(Lens, SaysHowManyParametersItTakes) {
+  const std::vector<double> parameters(9, 1.0);
+  EXPECT_THAT([&] { Lens(LensModel::opencv8, parameters); },
+              testing::ThrowsMessage<std::invalid_argument>(
+                  testing::AllOf(testing::HasSubstr("LENSMODEL_OPENCV8"), testing::HasSubstr("12"),
+                                 testing::HasSubstr("9"))));
+}
+
+TEST(Lens, SeesNothingBehindItButForTheStereographic) {
+  for (const LensModel model : kEveryModel) {
+    const Lens lens = plain_lens(model);
+    const bool all_round = model == LensModel::stereographic;
+    for (const Vector3d& point : {Vector3d(0.1, 0.2, -1), Vector3d(1, 0, 0), Vector3d(1, 2, -1)}) {
+      EXPECT_EQ(lens.project(point).has_value(), all_round) << name_of(model);
+      EXPECT_EQ(lens.project_with_jacobians(point).has_value(), all_round) << name_of(model);
+    }
+    EXPECT_FALSE(lens.project({0, 0, -1})) << name_of(model);
+  }
+}
+
+}  // namespace
+}  // namespace vlp

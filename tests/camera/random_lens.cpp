@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "camera/random_lens.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace vlp {
+namespace {
+
+const double kTan60 = std::sqrt(3);
+
+/// Bounds of the twelve distortion coefficients: wide-angle barrel to pincushion, with prisms and
+/// decentring larger than those of a real lens.
+constexpr double kBounds[][2] = {{-0.35, 0.2},  {-0.1, 0.2},   {-2e-3, 2e-3}, {-2e-3, 2e-3},
+                                 {-0.02, 0.03}, {-0.05, 0.4},  {-0.05, 0.15}, {-0.01, 0.02},
+                                 {-2e-3, 2e-3}, {-5e-4, 5e-4}, {-2e-3, 2e-3}, {-5e-4, 5e-4}};
+
+}  // namespace
+
+std::vector<double> random_parameters(LensModel model, Random& random) {
+  for (;;) {
+    std::vector<double> parameters{random.uniform(300, 900), random.uniform(300, 900),
+                                   random.uniform(350, 450), random.uniform(250, 350)};
+    Distortion distortion;
+    for (std::size_t i = 0; i + 4 < parameter_count(model); ++i) {
+      distortion.k[i] = random.uniform(kBounds[i][0], kBounds[i][1]);
+      parameters.push_back(distortion.k[i]);
+    }
+    if (distortion.valid_radius() > 1.1 * kTan60) return parameters;
+  }
+}
+
+Eigen::Vector3d random_point(Random& random) {
+  const double off_axis_rad = random.uniform(0, std::numbers::pi / 3);
+  const double around_rad = random.uniform(-std::numbers::pi, std::numbers::pi);
+  return random.uniform(1, 10) * Eigen::Vector3d(std::sin(off_axis_rad) * std::cos(around_rad),
+                                                 std::sin(off_axis_rad) * std::sin(around_rad),
+                                                 std::cos(off_axis_rad));
+}
+
+std::vector<double> parameters_with(LensModel model, const std::vector<double>& distortion) {
+  std::vector<double> parameters{520, 520, 399.5, 299.5};
+  parameters.insert(parameters.end(), distortion.begin(), distortion.end());
+  parameters.resize(parameter_count(model));
+  return parameters;
+}
+
+double angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+}  // namespace vlp
