@@ -1,0 +1,84 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/board.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "rig/file.h"
+#include "rig/yaml_reader.h"
+#include "rig/yaml_writer.h"
+
+namespace vlp {
+namespace {
+
+constexpr const char* kFormat = "vlp-board/1";
+constexpr std::array kFamilies{"tag36h11",         "tag25h9",         "tag16h5",
+                               "tagCircle21h7",    "tagCircle49h12",  "tagCustom48h12",
+                               "tagStandard41h12", "tagStandard52h13"};
+// In the order of BoardCorner.
+constexpr std::array kCorners{"bottom-left", "bottom-right", "top-left", "top-right"};
+
+std::string name_of(const IdOrder& order) {
+  return std::string(order.column_major ? "column" : "row") + "-major-from-" +
+         kCorners[static_cast<std::size_t>(order.from)];
+}
+
+IdOrder read_id_order(const YamlValue& value) {
+  std::string names;
+  for (const bool column_major : {false, true}) {
+    for (std::size_t corner = 0; corner < kCorners.size(); ++corner) {
+      const IdOrder order{column_major, static_cast<BoardCorner>(corner)};
+      if (value.text() == name_of(order)) return order;
+      names += (names.empty() ? "" : ", ") + name_of(order);
+    }
+  }
+  throw value.unknown("the orders are: " + names);
+}
+
+std::string read_family(const YamlValue& value) {
+  std::string family = value.text();
+  if (std::find(kFamilies.begin(), kFamilies.end(), family) != kFamilies.end()) return family;
+  std::string names;
+  for (const char* name : kFamilies) names += (names.empty() ? "" : ", ") + std::string(name);
+  throw value.unknown("the families are: " + names);
+}
+
+}  // namespace
+
+Board read_board(const std::filesystem::path& file) {
+  constexpr int most_tags = 1000;
+  YamlMap document = read_yaml(file, kFormat);
+  Board board;
+  board.family = read_family(document.required("family"));
+  board.cols = document.required("cols").integer_within(1, most_tags);
+  board.rows = document.required("rows").integer_within(1, most_tags);
+  board.tag_size_m = document.required("tag_size_m").number_within(1e-4, 2, "m");
+  board.tag_spacing = document.required("tag_spacing").number_within(0.01, 10, "(gap / tag)");
+  board.border_bits = document.required("border_bits").integer_within(1, 2);
+  board.corner_squares = document.required("corner_squares").boolean();
+  board.first_id = document.required("first_id").integer_within(0, std::numeric_limits<int>::max());
+  board.id_order = read_id_order(document.required("id_order"));
+  document.finish();
+  return board;
+}
+
+void write_board(const std::filesystem::path& file, const Board& board) {
+  YAML::Emitter out;
+  out << YAML::BeginMap;
+  emit_word(out, "format", kFormat);
+  emit_word(out, "family", board.family);
+  emit_integer(out, "cols", board.cols);
+  emit_integer(out, "rows", board.rows);
+  emit_number(out, "tag_size_m", board.tag_size_m);
+  emit_number(out, "tag_spacing", board.tag_spacing);
+  emit_integer(out, "border_bits", board.border_bits);
+  emit_word(out, "corner_squares", board.corner_squares ? "true" : "false");
+  emit_integer(out, "first_id", board.first_id);
+  emit_word(out, "id_order", name_of(board.id_order));
+  out << YAML::EndMap << YAML::Newline;
+  write_file(file, out.c_str());
+}
+
+}  // namespace vlp

@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../camera/lens_model.h"
+#include "../geometry/types.h"
+
+namespace vlp {
+
+/// Along what the rolling shutter moves: the stripes of a lamp lie along it.
+enum class Readout { rows, columns };
+
+struct Camera {
+  std::string id;
+  /// Width and height.
+  std::array<int, 2> imager_px;
+  LensModel lens_model;
+  /// In mrcal's order, see LensModel.
+  std::vector<double> intrinsics;
+  std::optional<double> pixel_pitch_m;
+  /// Time from one row (or column) of the read-out to the next.
+  std::optional<double> row_time_s;
+  std::optional<Readout> readout;
+};
+
+/// What the intrinsic calibration says of itself.
+struct IntrinsicsReport {
+  int views;
+  int corners;
+  int outliers;
+  /// Per axis, over the corners that are not outliers.
+  double rms_px;
+  /// Deflection of the board's centre from flat, along x and y (mrcal's calobject_warp).
+  std::optional<std::array<double, 2>> board_warp_m;
+  /// Worst standard deviation of a projection over the image.
+  std::optional<double> uncertainty_px;
+};
+
+/// How the rotation centre is applied (Chen and Guan, section 3.1, and theory of the same):
+/// `shift` subtracts it in the undistorted plane (eq. 9), `tilt` turns every ray so that the
+/// zenith becomes +Z, which is right at other places and heights, too.
+enum class RotationModel { shift, tilt };
+
+struct RotationCenter {
+  RotationModel model;
+  /// Where the axis of rotation meets the undistorted image: f * (x/z, y/z) + c.
+  Eigen::Vector2d center_px;
+  /// The direction of up, unit length.
+  Eigen::Vector3d zenith_in_camera;
+  /// Of center_px, in px^2.
+  std::optional<Matrix2> covariance;
+};
+
+/// The dispersion calibration (Chen and Guan, section 3.2).
+struct Dispersion {
+  /// What is left of the image centre's error after the rotation centre is applied, in the
+  /// undistorted image of the level camera: f * (x/z, y/z) is too large by it.
+  Eigen::Vector2d offset_px;
+  /// Radius of the dispersion circle, and its centre: mean fix minus truth, in the world.
+  double radius_m;
+  Eigen::Vector2d center_m;
+  int captures;
+};
+
+/// How a part came to be.
+struct HistoryEntry {
+  /// Key of the part: "camera", "rotation_center", "dispersion".
+  std::string part;
+  std::string program;
+  std::string version;
+  std::string options;
+  struct Input {
+    std::string file;
+    std::string sha256;
+  };
+  std::vector<Input> inputs;
+};
+
+/// All that is known of a camera; each stage of the calibration adds a part.
+struct Calibration {
+  Camera camera;
+  std::optional<IntrinsicsReport> intrinsics_report;
+  std::optional<RotationCenter> rotation_center;
+  std::optional<Dispersion> dispersion;
+  std::vector<HistoryEntry> history;
+};
+
+/// Reads `vlp-calibration/1`; keys are the names of the fields above. Throws InputError: unknown
+/// or missing keys, parameters that are not the lens model's, a zenith that is not a unit vector
+/// or not in front of the camera, a part that the history names but the file lacks (cut short).
+Calibration read_calibration(const std::filesystem::path& file);
+
+/// Writes what read_calibration() reads, whole or not at all, and in an order in which a file cut
+/// short anywhere lacks something that read_calibration() needs. Throws InputError.
+void write_calibration(const std::filesystem::path& file, const Calibration& calibration);
+
+}  // namespace vlp

@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+
+#include "rig/calibration.h"
+#include "rig/file.h"
+#include "rig/yaml_writer.h"
+
+namespace vlp {
+namespace {
+
+void begin_part(YAML::Emitter& out, const char* key) {
+  out << YAML::Key << key << YAML::Value << YAML::BeginMap;
+}
+
+/// The keys that must be there come last, see write_calibration().
+void emit_camera(YAML::Emitter& out, const Camera& camera) {
+  begin_part(out, "camera");
+  emit_text(out, "id", camera.id);
+  if (camera.pixel_pitch_m) emit_number(out, "pixel_pitch_m", *camera.pixel_pitch_m);
+  if (camera.row_time_s) emit_number(out, "row_time_s", *camera.row_time_s);
+  if (camera.readout) {
+    emit_word(out, "readout", *camera.readout == Readout::rows ? "rows" : "columns");
+  }
+  emit_integers(out, "imager_px", camera.imager_px);
+  emit_word(out, "lens_model", name_of(camera.lens_model));
+  emit_numbers(out, "intrinsics", camera.intrinsics);
+  out << YAML::EndMap;
+}
+
+void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) {
+  begin_part(out, "intrinsics_report");
+  emit_integer(out, "views", report.views);
+  emit_integer(out, "corners", report.corners);
+  emit_integer(out, "outliers", report.outliers);
+  emit_number(out, "rms_px", report.rms_px);
+  if (report.board_warp_m) emit_numbers(out, "board_warp_m", *report.board_warp_m);
+  if (report.uncertainty_px) emit_number(out, "uncertainty_px", *report.uncertainty_px);
+  out << YAML::EndMap;
+}
+
+void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
+  begin_part(out, "rotation_center");
+  emit_word(out, "model", center.model == RotationModel::tilt ? "tilt" : "shift");
+  emit_numbers(out, "center_px", center.center_px);
+  emit_numbers(out, "zenith_in_camera", center.zenith_in_camera);
+  if (center.covariance) {
+    const Matrix2& c = *center.covariance;
+    out << YAML::Key << "covariance" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+    emit_row(out, std::array{c(0, 0), c(0, 1)});
+    emit_row(out, std::array{c(1, 0), c(1, 1)});
+    out << YAML::EndSeq;
+  }
+  out << YAML::EndMap;
+}
+
+void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
+  begin_part(out, "dispersion");
+  emit_numbers(out, "offset_px", dispersion.offset_px);
+  emit_number(out, "radius_m", dispersion.radius_m);
+  emit_numbers(out, "center_m", dispersion.center_m);
+  emit_integer(out, "captures", dispersion.captures);
+  out << YAML::EndMap;
+}
+
+void emit_history(YAML::Emitter& out, const std::vector<HistoryEntry>& history) {
+  out << YAML::Key << "history" << YAML::Value << YAML::BeginSeq;
+  for (const HistoryEntry& entry : history) {
+    out << YAML::BeginMap;
+    emit_word(out, "part", entry.part);
+    emit_word(out, "program", entry.program);
+    emit_text(out, "version", entry.version);
+    emit_text(out, "options", entry.options);
+    out << YAML::Key << "inputs" << YAML::Value << YAML::BeginSeq;
+    for (const auto& input : entry.inputs) {
+      out << YAML::Flow << YAML::BeginMap;
+      emit_text(out, "file", input.file);
+      emit_text(out, "sha256", input.sha256);
+      out << YAML::EndMap;
+    }
+    out << YAML::EndSeq << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
+}
+
+}  // namespace
+
+void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {
+  YAML::Emitter out;
+  out << YAML::BeginMap;
+  emit_word(out, "format", "vlp-calibration/1");
+  if (!calibration.history.empty()) emit_history(out, calibration.history);
+  if (calibration.intrinsics_report) emit_intrinsics_report(out, *calibration.intrinsics_report);
+  if (calibration.rotation_center) emit_rotation_center(out, *calibration.rotation_center);
+  if (calibration.dispersion) emit_dispersion(out, *calibration.dispersion);
+  emit_camera(out, calibration.camera);
+  out << YAML::EndMap << YAML::Newline;
+  write_file(file, out.c_str());
+}
+
+}  // namespace vlp

@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+namespace vlp {
+
+/// What a standard deviation of a pixel can be; any other is a mistake.
+inline constexpr double kMinSigma_px = 1e-4;
+inline constexpr double kMaxSigma_px = 1e3;
+
+/// One identified lamp in a frame.
+struct Detection {
+  /// Id in the lamp map.
+  int lamp;
+  /// Image of the lamp's centre; the centre of the top-left pixel is (0, 0).
+  Eigen::Vector2d pixel;
+  /// Standard deviation of `pixel` per axis, when the detector states it: from
+  /// kMinSigma_px to kMaxSigma_px.
+  std::optional<double> sigma_px;
+};
+
+}  // namespace vlp

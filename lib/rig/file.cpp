@@ -1,0 +1,141 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Every failure names the file the user asked for.
+[[noreturn]] void fail(const fs::path& wanted) {
+  throw InputError(wanted, std::string("cannot be written: ") + std::strerror(errno));
+}
+
+/// A file open for writing that closes itself.
+class OutputFile {
+ public:
+  OutputFile(int descriptor, const fs::path& wanted) : wanted_(wanted), descriptor_(descriptor) {
+    if (descriptor < 0) fail(wanted);
+  }
+  ~OutputFile() { ::close(descriptor_); }
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  void write(std::string_view content) {
+    while (!content.empty()) {
+      const ssize_t written = ::write(descriptor_, content.data(), content.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) fail(wanted_);
+      content.remove_prefix(static_cast<std::size_t>(written));
+    }
+  }
+  void sync() {
+    if (::fsync(descriptor_) != 0) fail(wanted_);
+  }
+
+ private:
+  const fs::path& wanted_;
+  int descriptor_;
+};
+
+/// Where a symbolic link leads, though nothing may be there yet.
+fs::path without_links(fs::path path) {
+  std::error_code error;
+  const fs::path wanted = path;
+  for (int most_links = 40; fs::is_symlink(fs::symlink_status(path, error)); --most_links) {
+    if (most_links == 0) throw InputError(wanted, "is a link that leads to itself");
+    path = path.parent_path() / fs::read_symlink(path, error);
+  }
+  return path;
+}
+
+/// Opens a file with a name that nobody else has, not even another thread, beside `target`.
+int create_beside(const fs::path& target, fs::path& temporary) {
+  constexpr std::size_t most_bytes = 200;  // of the 255 of a file name
+  const std::string name = "." + target.filename().string().substr(0, most_bytes) + ".tmp-" +
+                           std::to_string(::getpid()) + "-";
+  for (int number = 0;; ++number) {
+    temporary = target.parent_path() / (name + std::to_string(number));
+    const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0 || errno != EEXIST) return descriptor;
+  }
+}
+
+/// Makes a rename last through a power cut. Not every file system can; the file is whole anyway.
+void sync_folder(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+bool is_special(const fs::path& path) {
+  std::error_code error;
+  const auto status = fs::status(path, error);
+  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+}  // namespace
+
+std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) throw InputError(path, "is a folder, not a file");
+  errno = 0;
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw InputError(path, std::string("cannot be opened: ") + std::strerror(errno));
+  std::string content;
+  for (char block[65536]; stream.read(block, sizeof block), stream.gcount() > 0;) {
+    content.append(block, static_cast<std::size_t>(stream.gcount()));
+    if (content.size() > max_bytes) {
+      throw InputError(path, "is longer than " + std::to_string(max_bytes >> 20) +
+                                 " MiB: is it the right file?");
+    }
+  }
+  if (stream.bad()) throw InputError(path, "cannot be read");
+  if (content.empty()) throw InputError(path, "is empty");
+  std::size_t line = 1;
+  for (const char character : content) {
+    const auto byte = static_cast<unsigned char>(character);
+    if (byte == '\n') ++line;
+    if (byte < 0x20 && byte != '\n' && byte != '\r' && byte != '\t') {
+      throw InputError(path, line, "", "is not a text file");
+    }
+  }
+  if (content.back() != '\n') {
+    throw InputError(path, line, "",
+                     "the last line has no end: is the file cut short? "
+                     "If it is whole, end it with a newline");
+  }
+  return content;
+}
+
+void write_file(const fs::path& path, std::string_view content) {
+  if (is_special(path)) {
+    OutputFile(::open(path.c_str(), O_WRONLY | O_CLOEXEC), path).write(content);
+    return;
+  }
+  const fs::path target = without_links(path);
+  fs::path temporary;
+  OutputFile file(create_beside(target, temporary), path);
+  try {
+    file.write(content);
+    file.sync();
+    if (::rename(temporary.c_str(), target.c_str()) != 0) fail(path);
+  } catch (...) {
+    ::unlink(temporary.c_str());
+    throw;
+  }
+  sync_folder(target.has_parent_path() ? target.parent_path() : ".");
+}
+
+}  // namespace vlp

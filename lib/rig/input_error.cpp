@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/input_error.h"
+
+#include <algorithm>
+
+namespace vlp {
+namespace {
+
+/// One line that a terminal shows as it is.
+std::string printable(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+}  // namespace
+
+InputError::InputError(const std::filesystem::path& file, const std::string& problem)
+    : InputError(file, 0, "", problem) {}
+
+InputError::InputError(const std::filesystem::path& file, std::size_t line, const std::string& key,
+                       const std::string& problem)
+    : std::runtime_error(printable(file.string() + (line > 0 ? ":" + std::to_string(line) : "") +
+                                   ": " + (key.empty() ? "" : key + ": ") + problem)) {}
+
+}  // namespace vlp

@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/lamp_map.h"
+
+#include <limits>
+
+#include "rig/file.h"
+#include "rig/yaml_reader.h"
+#include "rig/yaml_writer.h"
+
+namespace vlp {
+namespace {
+
+constexpr const char* kFormat = "vlp-lamps/1";
+constexpr double kTooHigh_m = 200;  // a ceiling above this was given in millimetres
+constexpr double kCoincident_m = 1e-3;
+
+std::optional<double> optional_within(YamlMap& map, const std::string& key, double min, double max,
+                                      std::string_view unit) {
+  const auto value = map.optional(key);
+  return value ? std::optional(value->number_within(min, max, unit)) : std::nullopt;
+}
+
+Lamp read_lamp(YamlMap map) {
+  Lamp lamp;
+  lamp.id = map.required("id").integer_within(0, std::numeric_limits<int>::max());
+  const auto position = map.required("position_m");
+  lamp.position_m = Eigen::Vector3d(position.numbers(3).data());
+  position.list()[2].number_within(-kTooHigh_m, kTooHigh_m, "m");
+  lamp.diameter_m = optional_within(map, "diameter_m", 1e-3, 10, "m");
+  lamp.frequency_hz = optional_within(map, "frequency_hz", 50, 1e6, "Hz");
+  lamp.duty = optional_within(map, "duty", 0.01, 0.99, "(a share of the period)");
+  map.finish();
+  return lamp;
+}
+
+void check_against(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item) {
+  for (const Lamp& other : earlier) {
+    if (other.id == lamp.id) {
+      throw item.error("id " + std::to_string(lamp.id) + " stands twice");
+    }
+    if ((other.position_m - lamp.position_m).norm() < kCoincident_m) {
+      throw item.error("lamp " + std::to_string(lamp.id) + " is where lamp " +
+                       std::to_string(other.id) + " is");
+    }
+  }
+}
+
+}  // namespace
+
+LampMap read_lamp_map(const std::filesystem::path& file) {
+  YamlMap document = read_yaml(file, kFormat);
+  const YamlValue list = document.required("lamps");
+  document.finish();
+  LampMap map;
+  for (const YamlValue& item : list.list()) {
+    const Lamp lamp = read_lamp(item.map());
+    check_against(map.lamps, lamp, item);
+    map.lamps.push_back(lamp);
+  }
+  if (map.lamps.empty()) throw list.error("holds no lamp");
+  return map;
+}
+
+void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {
+  YAML::Emitter out;
+  out << YAML::BeginMap;
+  emit_word(out, "format", kFormat);
+  out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
+  for (const Lamp& lamp : map.lamps) {
+    out << YAML::Flow << YAML::BeginMap;
+    emit_integer(out, "id", lamp.id);
+    emit_numbers(out, "position_m", lamp.position_m);
+    if (lamp.diameter_m) emit_number(out, "diameter_m", *lamp.diameter_m);
+    if (lamp.frequency_hz) emit_number(out, "frequency_hz", *lamp.frequency_hz);
+    if (lamp.duty) emit_number(out, "duty", *lamp.duty);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::EndMap << YAML::Newline;
+  write_file(file, out.c_str());
+}
+
+}  // namespace vlp

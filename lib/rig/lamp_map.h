@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+namespace vlp {
+
+struct Lamp {
+  int id;
+  /// Centre of the lamp in the world frame (Z up).
+  Eigen::Vector3d position_m;
+  std::optional<double> diameter_m;
+  /// Of the square wave that modulates the lamp.
+  std::optional<double> frequency_hz;
+  /// The lit share of a period.
+  std::optional<double> duty;
+};
+
+/// The lamps of a room, in the order of the file. Ids are unique, no two lamps coincide.
+struct LampMap {
+  std::vector<Lamp> lamps;
+};
+
+/// Reads `vlp-lamps/1`:
+///   format: vlp-lamps/1
+///   lamps:
+///     - {id: 1, position_m: [0.5, -0.3, 2.1], diameter_m: 0.18, frequency_hz: 2000, duty: 0.5}
+/// Throws InputError: unknown or missing keys, an id that stands twice, two lamps within 1 mm,
+/// figures that cannot be in the right unit.
+LampMap read_lamp_map(const std::filesystem::path& file);
+
+/// Writes what read_lamp_map() reads, whole or not at all. Throws InputError.
+void write_lamp_map(const std::filesystem::path& file, const LampMap& map);
+
+}  // namespace vlp

@@ -1,0 +1,145 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/yaml_reader.h"
+
+#include <yaml-cpp/eventhandler.h>
+
+#include <algorithm>
+#include <set>
+#include <sstream>
+
+#include "rig/file.h"
+#include "rig/yaml_text.h"
+
+namespace vlp {
+namespace {
+
+/// Looks through a file before anything is built of it. Aliases are refused because a few lines
+/// of them can stand for gigabytes, depth because yaml-cpp recurses.
+class Inspection : public YAML::EventHandler {
+ public:
+  explicit Inspection(const std::filesystem::path& file) : file_(file) {}
+
+  bool found_document() const { return found_document_; }
+
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    if (found_document_) refuse(mark, "a second YAML document begins; the file should hold one");
+    found_document_ = true;
+  }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    refuse(mark, "an alias (*) is not read here: write out what it stands for");
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    go_deeper(mark);
+  }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    go_deeper(mark);
+  }
+  void OnSequenceEnd() override { --depth_; }
+  void OnMapEnd() override { --depth_; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+
+ private:
+  void go_deeper(const YAML::Mark& mark) {
+    constexpr int deepest = 20;
+    if (++depth_ > deepest) refuse(mark, "is nested too deep: is it the right file?");
+  }
+  [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& problem) const {
+    throw InputError(file_, line_of(mark), "", problem);
+  }
+  const std::filesystem::path& file_;
+  bool found_document_ = false;
+  int depth_ = 0;
+};
+
+YAML::Node parse(const std::filesystem::path& file, const std::string& text) {
+  const std::size_t valid = utf8_length(text);
+  if (valid < text.size()) {
+    const auto line = std::count(text.begin(), text.begin() + std::ptrdiff_t(valid), '\n') + 1;
+    throw InputError(file, std::size_t(line), "", "is not UTF-8 text: save it in that encoding");
+  }
+  try {
+    Inspection inspection(file);
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    while (parser.HandleNextDocument(inspection)) {
+    }
+    if (!inspection.found_document()) throw InputError(file, "holds no YAML document");
+    return YAML::Load(text);
+  } catch (const YAML::Exception& failure) {
+    const bool tabs = text.find('\t') != std::string::npos;
+    throw InputError(file, line_of(failure.mark), "",
+                     "is not valid YAML: " + failure.msg +
+                         (tabs ? " (there are tabs: YAML is indented with spaces)" : ""));
+  }
+}
+
+}  // namespace
+
+YamlMap::YamlMap(const YAML::Node& node, const std::filesystem::path* file, std::string key)
+    : file_(file), prefix_(std::move(key)), line_(line_of(node.Mark())) {
+  std::set<std::string> seen;
+  for (const auto& pair : node) {
+    const std::size_t line = line_of(pair.first.Mark());
+    if (!pair.first.IsScalar()) throw error(line, "a key should be a word");
+    const std::string& name = pair.first.Scalar();
+    if (!seen.insert(name).second) throw error(line, "key " + in_quotes(name) + " stands twice");
+    entries_.push_back({name, line, pair.second});
+  }
+}
+
+std::optional<YamlValue> YamlMap::optional(const std::string& key) {
+  known_.push_back(key);
+  for (const Entry& entry : entries_) {
+    if (entry.key != key) continue;
+    // yaml-cpp takes the place of what comes next for the place of nothing.
+    const std::size_t line = entry.value.IsNull() ? entry.line : line_of(entry.value.Mark());
+    return YamlValue(entry.value, file_, prefix_.empty() ? key : prefix_ + "." + key, line);
+  }
+  return std::nullopt;
+}
+
+YamlValue YamlMap::required(const std::string& key) {
+  if (auto value = optional(key)) return *value;
+  std::string names;
+  for (const Entry& entry : entries_) names += (names.empty() ? "" : ", ") + entry.key;
+  throw error(line_, "key '" + key + "' is missing; there are: " + shortened(names, 150));
+}
+
+void YamlMap::finish() const {
+  for (const Entry& entry : entries_) {
+    if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
+    std::string names;
+    for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
+    throw error(entry.line,
+                "key " + in_quotes(entry.key) + " is unknown here; the keys are: " + names);
+  }
+}
+
+InputError YamlMap::error(std::size_t line, const std::string& problem) const {
+  return {*file_, line, prefix_, problem};
+}
+
+YamlMap read_yaml(const std::filesystem::path& file, const std::string& format) {
+  constexpr std::size_t max_bytes = 1 << 20;  // yaml-cpp needs 500 times as much memory
+  const YAML::Node node = parse(file, read_text_file(file, max_bytes));
+  const YamlValue document(node, &file, "", line_of(node.Mark()));
+  YamlMap map = document.map();
+  const auto found = map.optional("format");
+  if (!found) {
+    throw document.error("key 'format' is missing: the file should begin with 'format: " + format +
+                         "'");
+  }
+  if (found->text() != format) {
+    throw found->error("should be '" + format + "', not " + in_quotes(found->text()) +
+                       ": is it the right file?");
+  }
+  return map;
+}
+
+}  // namespace vlp

@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "input_error.h"
+
+namespace vlp {
+
+class YamlMap;
+
+/// One value of a YAML document that knows where it stands. Each reader throws InputError with
+/// file, line and key when the value is of another kind.
+class YamlValue {
+ public:
+  YamlValue(const YAML::Node& node, const std::filesystem::path* file, std::string key,
+            std::size_t line);
+
+  /// A finite number, in [min, max] when given; `unit` is for the message.
+  double number() const;
+  double number_within(double min, double max, std::string_view unit) const;
+  int integer_within(int min, int max) const;
+  bool boolean() const;
+  std::string text() const;
+  /// Exactly `count` numbers.
+  std::vector<double> numbers(std::size_t count) const;
+  std::vector<YamlValue> list() const;
+  YamlMap map() const;
+
+  InputError error(const std::string& problem) const;
+  /// A word that is not among those that are known.
+  InputError unknown(const std::string& known) const;
+
+ private:
+  YAML::Node node_;
+  const std::filesystem::path* file_;
+  std::string key_;
+  std::size_t line_;
+};
+
+/// A mapping: ask for every key that it may have, then call finish(). `file` outlives it.
+class YamlMap {
+ public:
+  YamlMap(const YAML::Node& node, const std::filesystem::path* file, std::string key);
+
+  YamlValue required(const std::string& key);
+  std::optional<YamlValue> optional(const std::string& key);
+  /// Throws InputError for the first key that nobody asked for.
+  void finish() const;
+
+ private:
+  InputError error(std::size_t line, const std::string& problem) const;
+
+  struct Entry {
+    std::string key;
+    std::size_t line;
+    YAML::Node value;
+  };
+  const std::filesystem::path* file_;
+  std::string prefix_;
+  std::size_t line_;
+  std::vector<Entry> entries_;
+  std::vector<std::string> known_;
+};
+
+/// A YAML file whose first key is `format: NAME/VERSION`. Throws InputError when it cannot be read
+/// or parsed, is longer than 1 MiB, is not UTF-8, holds aliases or a second document, is nested
+/// more than 20 levels deep, or is of another format.
+YamlMap read_yaml(const std::filesystem::path& file, const std::string& format);
+
+}  // namespace vlp

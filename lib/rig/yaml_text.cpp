@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/yaml_text.h"
+
+#include <bit>
+#include <charconv>
+#include <cstdint>
+
+namespace vlp {
+namespace {
+
+/// Length of the character that `text` begins with; 0 when it is not UTF-8.
+std::size_t character_length(std::string_view text) {
+  const auto first = static_cast<unsigned char>(text.front());
+  if (first < 0x80) return 1;
+  const auto length = static_cast<std::size_t>(std::countl_one(first));
+  if (length < 2 || length > 4 || length > text.size()) return 0;
+  std::uint32_t code = first & (0x7fU >> length);
+  for (std::size_t i = 1; i < length; ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if ((byte & 0xc0) != 0x80) return 0;
+    code = (code << 6) | (byte & 0x3fU);
+  }
+  constexpr std::uint32_t least[] = {0, 0, 0x80, 0x800, 0x10000};
+  const bool surrogate = code >= 0xd800 && code < 0xe000;
+  return code < least[length] || code > 0x10ffff || surrogate ? 0 : length;
+}
+
+}  // namespace
+
+std::string shortest(double value) {
+  char text[32];
+  std::string digits(text, std::to_chars(text, text + sizeof text, value).ptr);
+  const std::size_t exponent = digits.find('e');
+  if (exponent == std::string::npos || digits.find('.') != std::string::npos) return digits;
+  digits.insert(exponent, ".0");
+  const auto fixed = std::to_chars(text, text + digits.size(), value, std::chars_format::fixed);
+  return fixed.ec == std::errc() ? std::string(text, fixed.ptr) : digits;
+}
+
+std::string shortened(std::string_view text, std::size_t enough) {
+  if (text.size() <= enough) return std::string(text);
+  return std::string(text.substr(0, utf8_length(text.substr(0, enough)))) + "...";
+}
+
+std::string in_quotes(std::string_view text) { return "'" + shortened(text, 40) + "'"; }
+
+std::string shown(const YAML::Node& node) {
+  if (node.IsScalar()) return in_quotes(node.Scalar());
+  return node.IsMap() ? "a mapping" : node.IsSequence() ? "a list" : "nothing";
+}
+
+std::size_t line_of(const YAML::Mark& mark) {
+  return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;
+}
+
+std::size_t utf8_length(std::string_view text) {
+  std::size_t valid = 0;
+  while (valid < text.size()) {
+    const std::size_t length = character_length(text.substr(valid));
+    if (length == 0) break;
+    valid += length;
+  }
+  return valid;
+}
+
+}  // namespace vlp

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace vlp {
+
+/// The fewest digits that read back as the same double. With an exponent it has a point, too
+/// ("1.0e-07"): without one, YAML 1.1 readers such as PyYAML take it for text.
+std::string shortest(double value);
+
+/// Text for a message, its end left out when it is long.
+std::string shortened(std::string_view text, std::size_t enough);
+std::string in_quotes(std::string_view text);
+
+/// What stands in the file, for a message: 'text', a list, a mapping, nothing.
+std::string shown(const YAML::Node& node);
+
+/// Counted from 1; 0 when it is not known.
+std::size_t line_of(const YAML::Mark& mark);
+
+/// The length of the longest beginning of `text` that is UTF-8.
+std::size_t utf8_length(std::string_view text);
+
+}  // namespace vlp

@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/board.h"
+
+#include <gmock/gmock.h>
+
+#include "rig/samples.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+std::string refusal_with(const std::string& from, const std::string& to) {
+  const TemporaryFolder folder;
+  return refusal(read_board, folder.file("board.yaml", changed(kBoardYaml, from, to)));
+}
+
+TEST(Board, IsReadWithEveryKeyOfTheFormat) {
+  const TemporaryFolder folder;
+  expect_same(read_board(folder.file("board.yaml", kBoardYaml)), sample_board());
+}
+
+TEST(Board, IsWrittenByteForByteInTheFormat) {
+  const TemporaryFolder folder;
+  write_board(folder / "board.yaml", sample_board());
+  EXPECT_EQ(folder.content_of(folder / "board.yaml"), kBoardYaml);
+}
+
+TEST(Board, KeepsEachOfTheEightIdOrders) {
+  const std::pair<std::string, IdOrder> orders[] = {
+      {"row-major-from-bottom-left", {false, BoardCorner::bottom_left}},
+      {"row-major-from-bottom-right", {false, BoardCorner::bottom_right}},
+      {"row-major-from-top-left", {false, BoardCorner::top_left}},
+      {"row-major-from-top-right", {false, BoardCorner::top_right}},
+      {"column-major-from-bottom-left", {true, BoardCorner::bottom_left}},
+      {"column-major-from-bottom-right", {true, BoardCorner::bottom_right}},
+      {"column-major-from-top-left", {true, BoardCorner::top_left}},
+      {"column-major-from-top-right", {true, BoardCorner::top_right}}};
+  const TemporaryFolder folder;
+  for (const auto& [name, order] : orders) {
+    SCOPED_TRACE(name);
+    const std::string text = changed(kBoardYaml, "column-major-from-top-left", name);
+    Board board = sample_board();
+    board.id_order = order;
+    expect_same(read_board(folder.file("board.yaml", text)), board);
+    write_board(folder / "written.yaml", board);
+    EXPECT_EQ(folder.content_of(folder / "written.yaml"), text);
+  }
+}
+
+TEST(Board, KeepsTheOtherValueOfEachSwitch) {
+  Board board = sample_board();
+  board.border_bits = 1;
+  board.corner_squares = false;
+  board.first_id = 0;
+  board.family = "tagStandard41h12";
+  const TemporaryFolder folder;
+  write_board(folder / "board.yaml", board);
+  expect_same(read_board(folder / "board.yaml"), board);
+}
+
+TEST(Board, NamesLineAndKeyOfEachMissingKey) {
+  for (const std::string key : {"family", "cols", "rows", "tag_size_m", "tag_spacing",
+                                "border_bits", "corner_squares", "first_id", "id_order"}) {
+    const std::size_t begin = kBoardYaml.find("\n" + key + ":") + 1;
+    const std::string line = kBoardYaml.substr(begin, kBoardYaml.find('\n', begin) + 1 - begin);
+    EXPECT_THAT(refusal_with(line, ""),
+                HasSubstr("board.yaml:1: key '" + key + "' is missing; there are: format, "));
+  }
+}
+
+TEST(Board, NamesTheWordsThatAreKnown) {
+  EXPECT_EQ(refusal_with("tag36h11", "tag36h12"),
+            "board.yaml:2: family: 'tag36h12' is unknown; the families are: tag36h11, tag25h9, "
+            "tag16h5, tagCircle21h7, tagCircle49h12, tagCustom48h12, tagStandard41h12, "
+            "tagStandard52h13");
+  EXPECT_THAT(refusal_with("column-major-from-top-left", "column-major"),
+              HasSubstr("board.yaml:10: id_order: 'column-major' is unknown; the orders are: "
+                        "row-major-from-bottom-left, row-major-from-bottom-right, "));
+}
+
+TEST(Board, RefusesWhatNoBoardCanBe) {
+  EXPECT_EQ(refusal_with("cols: 8", "cols: 0"),
+            "board.yaml:3: cols: should be a whole number within 1 and 1000, not '0'");
+  EXPECT_EQ(refusal_with("rows: 5", "rows: 4.5"),
+            "board.yaml:4: rows: should be a whole number within 1 and 1000, not '4.5'");
+  EXPECT_EQ(refusal_with("0.016", "16"),
+            "board.yaml:5: tag_size_m: 16 m is not within 0.0001 and 2 m: is it in the right "
+            "unit?");
+  EXPECT_THAT(refusal_with("0.016", "16 mm"), HasSubstr("tag_size_m: should be a finite number"));
+  EXPECT_THAT(refusal_with("0.3", "30 %"), HasSubstr("board.yaml:6: tag_spacing: should be a"));
+  EXPECT_THAT(refusal_with("0.3", "0"), HasSubstr("board.yaml:6: tag_spacing: 0 (gap / tag) is"));
+  EXPECT_EQ(refusal_with("border_bits: 2", "border_bits: 3"),
+            "board.yaml:7: border_bits: should be a whole number within 1 and 2, not '3'");
+  EXPECT_EQ(refusal_with("squares: true", "squares: yes"),
+            "board.yaml:8: corner_squares: should be true or false, not 'yes'");
+  EXPECT_EQ(refusal_with("first_id: 1", "first_id: -1"),
+            "board.yaml:9: first_id: should be a whole number within 0 and 2147483647, not '-1'");
+}
+
+TEST(Board, RefusesAnEmptyValueInItsOwnLine) {
+  EXPECT_EQ(refusal_with("tag_size_m: 0.016", "tag_size_m:"),
+            "board.yaml:5: tag_size_m: should be a finite number, not nothing");
+  EXPECT_EQ(refusal_with("id_order: column-major-from-top-left", "id_order:"),
+            "board.yaml:10: id_order: should be text, not nothing");
+}
+
+}  // namespace
+}  // namespace vlp

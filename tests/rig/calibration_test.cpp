@@ -1,0 +1,142 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/calibration.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "rig/samples.h"
+
+namespace vlp {
+namespace {
+
+/// Writes, reads and writes again: the values and the bytes stay.
+void expect_kept(const Calibration& calibration) {
+  const TemporaryFolder folder;
+  write_calibration(folder / "first.yaml", calibration);
+  const Calibration found = read_calibration(folder / "first.yaml");
+  expect_same(found, calibration);
+  write_calibration(folder / "second.yaml", found);
+  EXPECT_EQ(folder.content_of(folder / "second.yaml"), folder.content_of(folder / "first.yaml"));
+}
+
+TEST(Calibration, IsReadWithEveryKeyOfTheFormat) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("calibration.yaml", kCalibrationYaml);
+  // It tells of no rotation centre in the history, which may be shorter than the file.
+  expect_same(read_calibration(file), sample_calibration());
+}
+
+TEST(Calibration, IsWrittenByteForByteInTheFormat) {
+  const TemporaryFolder folder;
+  write_calibration(folder / "calibration.yaml", sample_calibration());
+  EXPECT_EQ(folder.content_of(folder / "calibration.yaml"), kCalibrationYaml);
+}
+
+TEST(Calibration, MayHaveItsPartsInAnyOrder) {
+  const TemporaryFolder folder;
+  const std::size_t camera = kCalibrationYaml.find("camera:\n  id:");
+  const std::string reordered = "format: vlp-calibration/1\n" + kCalibrationYaml.substr(camera) +
+                                kCalibrationYaml.substr(26, camera - 26);
+  expect_same(read_calibration(folder.file("calibration.yaml", reordered)), sample_calibration());
+}
+
+TEST(Calibration, KeepsEachPartWithoutEachOptionalKey) {
+  const std::function<void(Calibration&)> removals[] = {
+      [](Calibration& c) { c.camera.pixel_pitch_m.reset(); },
+      [](Calibration& c) { c.camera.row_time_s.reset(); },
+      [](Calibration& c) { c.camera.readout.reset(); },
+      [](Calibration& c) { c.intrinsics_report->board_warp_m.reset(); },
+      [](Calibration& c) { c.intrinsics_report->uncertainty_px.reset(); },
+      [](Calibration& c) { c.rotation_center->covariance.reset(); },
+      [](Calibration& c) { c.intrinsics_report.reset(); },
+      [](Calibration& c) { c.rotation_center.reset(); },
+      [](Calibration& c) { c.history.clear(); },
+      [](Calibration& c) { c.dispersion.reset(); }};
+  Calibration with_less_and_less = sample_calibration();
+  for (const auto& remove : removals) {
+    Calibration calibration = sample_calibration();
+    calibration.history.pop_back();  // it tells of the dispersion
+    remove(calibration);
+    expect_kept(calibration);
+    remove(with_less_and_less);
+    expect_kept(with_less_and_less);
+  }
+}
+
+TEST(Calibration, KeepsEachWord) {
+  for (const RotationModel model : {RotationModel::shift, RotationModel::tilt}) {
+    for (const Readout readout : {Readout::rows, Readout::columns}) {
+      Calibration calibration = sample_calibration();
+      calibration.rotation_center->model = model;
+      calibration.camera.readout = readout;
+      expect_kept(calibration);
+    }
+  }
+}
+
+TEST(Calibration, KeepsEachLensModelWithItsParameters) {
+  for (const auto& [model, parameters] : {std::pair{LensModel::pinhole, 4},
+                                          {LensModel::stereographic, 4},
+                                          {LensModel::opencv4, 8},
+                                          {LensModel::opencv5, 9},
+                                          {LensModel::opencv8, 12},
+                                          {LensModel::opencv12, 16}}) {
+    Calibration calibration = bare_calibration();
+    calibration.camera.lens_model = model;
+    for (int i = 4; i < parameters; ++i) calibration.camera.intrinsics.push_back(i * -1e-3);
+    expect_kept(calibration);
+  }
+}
+
+TEST(Calibration, KeepsTextOfAnyKind) {
+  std::string all_ascii;
+  for (char c = 0; c >= 0 && c < 127; ++c) all_ascii += c;
+  for (const std::string& text :
+       {std::string("007"), std::string("true"), std::string("~"), std::string("null"),
+        std::string("1e3"), std::string(""), std::string(" two  spaces "),
+        std::string("'single' and \"double\" quotes"), std::string("a: b, [c] {d} # e"),
+        std::string("- \\ % @ ` & * ! | >"), std::string("first\nsecond\r\nthird\ttab"),
+        std::string("Grüße, 校准, \U0001F4A1, e\u0301, \u00a0, \u2028"), std::string("\x7f"),
+        all_ascii, std::string(3000, 'x')}) {
+    SCOPED_TRACE(text);
+    Calibration calibration = sample_calibration();
+    calibration.camera.id = text;
+    calibration.history[0] = {text, text, text, text, {{text, text}}};
+    expect_kept(calibration);
+  }
+}
+
+TEST(Calibration, KeepsRandomFiguresExactly) {
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> normal(0, 1000);
+  const auto figure = [&] { return normal(random) * std::exp(normal(random) / 100); };
+  for (int i = 0; i < 30; ++i) {
+    Calibration calibration = sample_calibration();
+    for (std::size_t k = 2; k < 8; ++k) calibration.camera.intrinsics[k] = figure();
+    calibration.intrinsics_report->rms_px = std::abs(figure());
+    calibration.intrinsics_report->board_warp_m = {figure(), figure()};
+    calibration.rotation_center->center_px = {figure(), figure()};
+    calibration.dispersion = {{figure(), figure()}, std::abs(figure()), {figure(), figure()}, 1};
+    expect_kept(calibration);
+  }
+}
+
+TEST(Calibration, KeepsAnyUnitVectorAndACovarianceOfFullCorrelation) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 30; ++i) {
+    Calibration calibration = sample_calibration();
+    Eigen::Vector3d up(normal(random), normal(random), std::abs(normal(random)));
+    calibration.rotation_center->zenith_in_camera = up.normalized();
+    const Eigen::Vector2d sd(normal(random), normal(random));
+    calibration.rotation_center->covariance = sd * sd.transpose();
+    expect_kept(calibration);
+  }
+}
+
+}  // namespace
+}  // namespace vlp

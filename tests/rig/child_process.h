@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <exception>
+#include <string>
+
+namespace vlp {
+
+/// Starts a child that does `action` and ends; returns its process id.
+template <typename Action>
+pid_t start_child(Action action) {
+  const pid_t child = ::fork();
+  if (child != 0) return child;
+  action();
+  ::_exit(0);
+}
+
+/// What `action` throws in a process of its own, for what changes the whole process: its user,
+/// its limits, its mounts. "" when it throws nothing.
+template <typename Action>
+std::string thrown_in_child(Action action) {
+  int channel[2];
+  if (::pipe(channel) != 0) return "no pipe";
+  const pid_t child = start_child([&] {
+    std::string message;
+    try {
+      action();
+    } catch (const std::exception& error) {
+      message = error.what();
+    }
+    if (::write(channel[1], message.data(), message.size()) < 0) ::_exit(1);
+  });
+  ::close(channel[1]);
+  std::string message;
+  char block[4096];
+  for (ssize_t size; (size = ::read(channel[0], block, sizeof block)) > 0;) {
+    message.append(block, static_cast<std::size_t>(size));
+  }
+  ::close(channel[0]);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return status == 0 ? message : "the child did not end well";
+}
+
+}  // namespace vlp

@@ -1,0 +1,113 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+
+#include "rig/samples.h"
+
+// Files that are made, or happen, to take a reader's memory, stack or time.
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kHead = "format: vlp-lamps/1\nlamps: ";
+constexpr std::size_t kMostBytes = 1 << 20;
+
+std::string refusal_of(const std::string& content) {
+  const TemporaryFolder folder;
+  return refusal(read_lamp_map, folder.file("lamps.yaml", content));
+}
+
+/// For a map whose lamps are `value`.
+std::string refusal_of_lamps(const std::string& value) { return refusal_of(kHead + value + "\n"); }
+
+std::string repeated(const std::string& text, std::size_t count) {
+  std::string all;
+  for (std::size_t i = 0; i < count; ++i) all += text;
+  return all;
+}
+
+TEST(HostileYaml, OfAHundredThousandLevelsIsRefused) {
+  constexpr std::size_t levels = 100000;
+  const std::string deep = ": is nested too deep: is it the right file?";
+  for (const std::string open : {"[", "{", "{a: ", "- ", "? ", "[{a: ", "[a, "}) {
+    SCOPED_TRACE(open);
+    const std::string nest = repeated(open, levels);
+    EXPECT_EQ(refusal_of_lamps("\n  " + nest), "lamps.yaml:3" + deep);
+    EXPECT_EQ(refusal_of(nest + "\n"), "lamps.yaml:1" + deep);
+  }
+  EXPECT_EQ(refusal_of_lamps(repeated("[", levels) + repeated("]", levels)), "lamps.yaml:2" + deep);
+  std::string indented = kHead + "\n";
+  for (std::size_t level = 1; level < 1000; ++level) indented += std::string(level, ' ') + "a:\n";
+  EXPECT_THAT(refusal_of(indented), HasSubstr(deep));
+}
+
+TEST(HostileYaml, OfABillionLaughsIsRefused) {
+  std::string bomb = "a0: &a0 [lol, lol, lol, lol, lol, lol, lol, lol, lol]\n";
+  for (int i = 1; i < 10; ++i) {
+    const std::string alias = "*a" + std::to_string(i - 1);
+    const std::string name = "a" + std::to_string(i);
+    bomb.append(name).append(": &").append(name).append(" [").append(alias);
+    bomb.append(repeated(", " + alias, 8)).append("]\n");
+  }
+  EXPECT_THAT(refusal_of("format: vlp-lamps/1\n" + bomb + "lamps: *a9\n"),
+              HasSubstr("lamps.yaml:3: an alias (*) is not read here"));
+}
+
+// Every key is right; it would take 400 GB.
+TEST(HostileYaml, OfAHistoryThatRepeatsItselfIsRefused) {
+  std::string text = changed(kCalibrationYaml, "history:\n  - part", "history:\n  - &a\n    part");
+  text = changed(text, "    inputs:\n",
+                 "    inputs:\n" + repeated("      - {file: a, sha256: b}\n", 15000));
+  text =
+      changed(text, "  - part: dispersion", repeated("  - *a\n", 60000) + "  - part: dispersion");
+  const TemporaryFolder folder;
+  EXPECT_THAT(refusal(read_calibration, folder.file("calibration.yaml", text)),
+              HasSubstr(": an alias (*) is not read here: write out what it stands for"));
+}
+
+TEST(HostileYaml, LongerThanAMebibyteIsRefused) {
+  std::string content = kLampsYaml + "#";
+  content += std::string(kMostBytes - content.size() - 1, 'x') + "\n";
+  ASSERT_EQ(content.size(), kMostBytes);
+  EXPECT_EQ(refusal_of(content), "");
+  const std::string refused = "lamps.yaml: is longer than 1 MiB: is it the right file?";
+  EXPECT_EQ(refusal_of(content + "\n"), refused);
+
+  const TemporaryFolder folder;
+  const auto file = folder.file("lamps.yaml", kLampsYaml);
+  std::filesystem::resize_file(file, 100'000'000);  // sparse
+  EXPECT_EQ(refusal(read_lamp_map, file), refused);
+}
+
+TEST(HostileYaml, IsRefusedBeforeAllOfItIsRead) {
+  EXPECT_EQ(refusal(read_lamp_map, "/dev/zero"),
+            "zero: is longer than 1 MiB: is it the right file?");
+}
+
+TEST(HostileYaml, OfManySmallPiecesIsRefusedForWhatItIs) {
+  for (const std::string piece : {"1,", "[],", "{},", "&a 1,", "a: 1,", "'',", "? ,"}) {
+    const std::string list = repeated(piece, 100'000 / piece.size()).append("]");
+    EXPECT_THAT(refusal_of_lamps("[" + list), testing::StartsWith("lamps.yaml:2: "));
+  }
+  for (const std::string line :
+       {"- a\n", "k: 1\n", "---\n", "#\n", "%A\n", "? \n", ": \n", "...\n"}) {
+    const std::string lines = repeated(line, 100'000 / line.size());
+    EXPECT_THAT(refusal_of_lamps("\n" + lines), testing::StartsWith("lamps.yaml:"));
+  }
+  EXPECT_THAT(refusal_of_lamps("'" + std::string(kMostBytes - 100, 'a') + "'"),
+              HasSubstr("lamps.yaml:2: lamps: should be a list, not 'aaaa"));
+}
+
+TEST(HostileYaml, IsNotAMapOfTenThousandLamps) {
+  std::string yaml = kHead + "\n";
+  for (int id = 0; id < 10000; ++id) {
+    yaml += "  - {id: " + std::to_string(id) + ", position_m: [" + std::to_string(id % 100) + ", " +
+            std::to_string(id / 100) + ", 2.1]}\n";
+  }
+  const TemporaryFolder folder;
+  EXPECT_EQ(read_lamp_map(folder.file("lamps.yaml", yaml)).lamps.size(), 10000U);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,127 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+
+#include "rig/samples.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+std::string refusal_of(const std::string& yaml) {
+  const TemporaryFolder folder;
+  return refusal(read_lamp_map, folder.file("lamps.yaml", yaml));
+}
+
+/// For a map of one lamp, in the third line.
+std::string refusal_of_lamp(const std::string& keys) {
+  return refusal_of("format: vlp-lamps/1\nlamps:\n  - {" + keys + "}\n");
+}
+
+TEST(LampMapRefusals, NameLineAndKeyOfAMissingKey) {
+  EXPECT_EQ(refusal_of_lamp("id: 1"),
+            "lamps.yaml:3: lamps[0]: key 'position_m' is missing; there are: id");
+  EXPECT_EQ(refusal_of_lamp("id: 1, position_mm: [0, 0, 2000]"),
+            "lamps.yaml:3: lamps[0]: key 'position_m' is missing; there are: id, position_mm");
+  EXPECT_EQ(refusal_of_lamp("position_m: [0, 0, 2]"),
+            "lamps.yaml:3: lamps[0]: key 'id' is missing; there are: position_m");
+  EXPECT_EQ(refusal_of("format: vlp-lamps/1\n"),
+            "lamps.yaml:1: key 'lamps' is missing; there are: format");
+  EXPECT_EQ(
+      refusal_of("lamps: []\n"),
+      "lamps.yaml:1: key 'format' is missing: the file should begin with 'format: vlp-lamps/1'");
+}
+
+TEST(LampMapRefusals, NameLineAndKeyOfAnUnknownKey) {
+  EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], position_mm: [0, 0, 2000]"),
+            "lamps.yaml:3: lamps[0]: key 'position_mm' is unknown here; the keys are: id, "
+            "position_m, diameter_m, frequency_hz, duty");
+  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nunits: mm\nlamps: []\n"),
+            "lamps.yaml:2: key 'units' is unknown here; the keys are: format, lamps");
+}
+
+TEST(LampMapRefusals, NameLineAndKeyOfAKeyThatStandsTwice) {
+  EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], id: 2"),
+            "lamps.yaml:3: lamps[0]: key 'id' stands twice");
+  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nlamps: []\nlamps: []\n"),
+            "lamps.yaml:3: key 'lamps' stands twice");
+}
+
+TEST(LampMapRefusals, NameTheLineOfAnIdThatStandsTwice) {
+  EXPECT_EQ(refusal_of(changed(kLampsYaml, "id: 7", "id: 1")),
+            "lamps.yaml:4: lamps[1]: id 1 stands twice");
+}
+
+TEST(LampMapRefusals, NameBothOfTwoLampsInOnePlace) {
+  EXPECT_EQ(refusal_of(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.1009]")),
+            "lamps.yaml:4: lamps[1]: lamp 7 is where lamp 1 is");
+  EXPECT_EQ(refusal_of(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.102]")), "");
+}
+
+TEST(LampMapRefusals, NameAnIdThatIsNoWholeNumber) {
+  for (const std::string id : {"-1", "1.5", "1.0", "2147483648", "one", "0x1", "[1]", "''", ""}) {
+    EXPECT_THAT(refusal_of_lamp("id: " + id + ", position_m: [0, 0, 2]"),
+                HasSubstr("lamps.yaml:3: lamps[0].id: should be a whole number within 0 and "
+                          "2147483647, not "));
+  }
+}
+
+TEST(LampMapRefusals, NameWhatIsNoFiniteNumber) {
+  for (const std::string number :
+       {"2.1 m", "2,1", ".nan", ".NaN", "nan", ".inf", "-.inf", "inf", "1e999", "0x10", "2.1.1",
+        "1_000", "+-2", "true", "''", "~", "two"}) {
+    EXPECT_THAT(refusal_of_lamp("id: 1, position_m: [0, 0, 2], diameter_m: '" + number + "'"),
+                HasSubstr("lamps.yaml:3: lamps[0].diameter_m: should be a finite number, not "));
+    if (number == "2,1") continue;  // two numbers here
+    EXPECT_THAT(refusal_of_lamp("id: 1, position_m: [0, 0, " + number + "]"),
+                HasSubstr("lamps.yaml:3: lamps[0].position_m[2]: should be a finite number, not "));
+  }
+}
+
+TEST(LampMapRefusals, ShowWhatStandsInPlaceOfANumber) {
+  const std::string place = "lamps.yaml:3: lamps[0].duty: should be a finite number, not ";
+  const std::string lamp = "id: 1, position_m: [0, 0, 2], duty: ";
+  EXPECT_EQ(refusal_of_lamp(lamp + "50 %"), place + "'50 %'");
+  EXPECT_EQ(refusal_of_lamp(lamp + "[0.5]"), place + "a list");
+  EXPECT_EQ(refusal_of_lamp(lamp + "{is: 0.5}"), place + "a mapping");
+  EXPECT_EQ(refusal_of_lamp(lamp), place + "nothing");
+}
+
+TEST(LampMapRefusals, NameAPositionThatIsNotThreeNumbers) {
+  const std::string place = "lamps.yaml:3: lamps[0].position_m: ";
+  EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 2]"), place + "should be 3 numbers, not 2");
+  EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2,1]"),
+            place + "should be 3 numbers, not 4");
+  EXPECT_EQ(refusal_of_lamp("id: 1, position_m: 2"), place + "should be a list, not '2'");
+  EXPECT_EQ(refusal_of_lamp("id: 1, position_m: {x: 0}"),
+            place + "should be a list, not a mapping");
+}
+
+TEST(LampMapRefusals, AskForTheUnitWhenAFigureCannotBeInIt) {
+  const std::string lamp = "id: 1, position_m: [0, 0, 2], ";
+  const std::string place = "lamps.yaml:3: lamps[0].";
+  EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [500, -300, 2100]"),
+            place + "position_m[2]: 2100 m is not within -200 and 200 m: is it in the right unit?");
+  EXPECT_EQ(refusal_of_lamp(lamp + "diameter_m: 180"),
+            place + "diameter_m: 180 m is not within 0.001 and 10 m: is it in the right unit?");
+  EXPECT_THAT(refusal_of_lamp(lamp + "diameter_m: 0"), HasSubstr(place + "diameter_m: 0 m is not"));
+  EXPECT_THAT(refusal_of_lamp(lamp + "frequency_hz: 2"), HasSubstr("frequency_hz: 2 Hz is not"));
+  EXPECT_THAT(refusal_of_lamp(lamp + "frequency_hz: -2000"), HasSubstr("-2000 Hz is not within"));
+  EXPECT_THAT(refusal_of_lamp(lamp + "frequency_hz: 2e6"), HasSubstr("2000000 Hz is not within"));
+  EXPECT_THAT(refusal_of_lamp(lamp + "duty: 50"), HasSubstr(place + "duty: 50 (a share of the"));
+  EXPECT_THAT(refusal_of_lamp(lamp + "duty: 0"), HasSubstr(place + "duty: 0 (a share of the"));
+}
+
+TEST(LampMapRefusals, NameAnotherShape) {
+  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nlamps: []\n"), "lamps.yaml:2: lamps: holds no lamp");
+  EXPECT_EQ(refusal_of("format: vlp-lamps/1\n\nlamps:\n\n# none\n"),
+            "lamps.yaml:3: lamps: should be a list, not nothing");
+  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nlamps:\n  id: 1\n"),
+            "lamps.yaml:3: lamps: should be a list, not a mapping");
+  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nlamps:\n  - 1\n"),
+            "lamps.yaml:3: lamps[0]: should be a mapping of keys to values, not '1'");
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/lamp_map.h"
+
+#include <gmock/gmock.h>
+
+#include <bit>
+#include <cmath>
+#include <random>
+
+#include "rig/samples.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(LampMap, IsReadWithEveryKeyOfTheFormat) {
+  const TemporaryFolder folder;
+  expect_same(read_lamp_map(folder.file("lamps.yaml", kLampsYaml)), sample_lamps());
+}
+
+TEST(LampMap, IsWrittenByteForByteInTheFormat) {
+  const TemporaryFolder folder;
+  write_lamp_map(folder / "lamps.yaml", sample_lamps());
+  EXPECT_EQ(folder.content_of(folder / "lamps.yaml"), kLampsYaml);
+}
+
+TEST(LampMap, KeepsEveryDoubleExactly) {
+  std::mt19937_64 random(1);
+  const auto any_finite = [&random] {
+    for (;;) {
+      const auto value = std::bit_cast<double>(random());
+      if (std::isfinite(value)) return value;
+    }
+  };
+  LampMap map;
+  for (int id = 0; id < 300; ++id) {
+    map.lamps.push_back({id, {any_finite(), any_finite(), 0.1 * id}, {}, {}, {}});
+  }
+  map.lamps[0].position_m.x() = 5e-324;  // the smallest
+  map.lamps[1].position_m.x() = std::numeric_limits<double>::max();
+  map.lamps[2].position_m.x() = 0.1;
+  const TemporaryFolder folder;
+  write_lamp_map(folder / "lamps.yaml", map);
+  expect_same(read_lamp_map(folder / "lamps.yaml"), map);
+}
+
+// Readers of YAML 1.1 take 1e-07 for text.
+TEST(LampMap, HasAPointInEveryNumberWithAnExponent) {
+  const TemporaryFolder folder;
+  write_lamp_map(folder / "lamps.yaml", {{{1, {1e-7, -2e300, 0}, {}, 1e5, {}}}});
+  EXPECT_THAT(folder.content_of(folder / "lamps.yaml"),
+              HasSubstr("{id: 1, position_m: [1.0e-07, -2.0e+300, 0], frequency_hz: 100000}"));
+}
+
+TEST(LampMap, MayBeWrittenInOtherWaysOfYaml) {
+  const TemporaryFolder folder;
+  const auto lamps = read_lamp_map(folder.file("lamps.yaml", R"(---
+# A comment.
+lamps:
+- id: +1  # a comment
+  position_m:
+  - 0.5
+  - -3.0e-1
+  - 2.10
+  "duty": 0.5
+  frequency_hz: 2000.0
+  diameter_m: .18
+- position_m: [-25e-2, 0, &height 2.1]
+  id: 7
+format: "vlp-lamps/1"
+...
+)"));
+  expect_same(lamps, sample_lamps());
+}
+
+}  // namespace
+}  // namespace vlp

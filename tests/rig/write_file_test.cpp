@@ -1,0 +1,141 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "rig/file.h"
+#include "rig/samples.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+
+std::string refusal_of(const fs::path& file) {
+  return refusal([](const fs::path& path) { write_file(path, "new\n"); }, file);
+}
+
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+TEST(WriteFile, PutsTheContentInPlaceOfTheOld) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("a.yaml", "old content that is longer\n");
+  write_file(file, "new\n");
+  EXPECT_EQ(folder.content_of(file), "new\n");
+  const std::string with_zeros("\0\xff\n", 3);
+  write_file(file, with_zeros);
+  EXPECT_EQ(folder.content_of(file), with_zeros);
+  write_file(file, "");
+  EXPECT_EQ(folder.content_of(file), "");
+  EXPECT_THAT(names_in(folder / ""), ElementsAre("a.yaml"));
+}
+
+TEST(WriteFile, MakesAFileThatOthersMayReadAsTheUserHasSetIt) {
+  const TemporaryFolder folder;
+  const mode_t before = ::umask(027);
+  write_file(folder / "a.yaml", "new\n");
+  ::umask(before);
+  EXPECT_EQ(fs::status(folder / "a.yaml").permissions(), fs::perms(0640));
+}
+
+TEST(WriteFile, TakesAPathFromTheCurrentFolder) {
+  const TemporaryFolder folder;
+  const fs::path before = fs::current_path();
+  fs::current_path(folder / "");
+  write_file("a.yaml", "new\n");
+  fs::current_path(before);
+  EXPECT_THAT(names_in(folder / ""), ElementsAre("a.yaml"));
+}
+
+TEST(WriteFile, TakesTheLongestName) {
+  const TemporaryFolder folder;
+  const std::string name(255, 'x');
+  write_file(folder / name, "new\n");
+  EXPECT_THAT(names_in(folder / ""), ElementsAre(name));
+}
+
+TEST(WriteFile, LeavesNothingWhereItCannotWrite) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("file", "old\n");
+  fs::create_directory(folder / "folder");
+  const std::string cannot = " cannot be written: ";
+  EXPECT_EQ(refusal_of(folder / "missing" / "a.yaml"),
+            "a.yaml:" + cannot + "No such file or directory");
+  EXPECT_EQ(refusal_of(folder / "folder"), "folder:" + cannot + "Is a directory");
+  EXPECT_EQ(refusal_of(file / "a.yaml"), "a.yaml:" + cannot + "Not a directory");
+  const std::string too_long(256, 'x');
+  EXPECT_EQ(refusal_of(folder / too_long), too_long + ":" + cannot + "File name too long");
+  EXPECT_NE(refusal_of(""), "");
+  EXPECT_THAT(names_in(folder / ""), ElementsAre("file", "folder"));
+  EXPECT_THAT(names_in(folder / "folder"), ElementsAre());
+  EXPECT_EQ(folder.content_of(file), "old\n");
+}
+
+TEST(WriteFile, FollowsSymbolicLinks) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "real");
+  const auto file = folder.file("real/a.yaml", "old\n");
+  fs::create_symlink("real/a.yaml", folder / "relative");
+  fs::create_symlink(file, folder / "absolute");
+  fs::create_symlink("relative", folder / "of_a_link");
+  fs::create_symlink("real", folder / "folder");
+  int number = 0;
+  for (const std::string name : {"relative", "absolute", "of_a_link", "folder/a.yaml"}) {
+    const std::string content = std::to_string(++number) + "\n";
+    write_file(folder / name, content);
+    EXPECT_EQ(folder.content_of(file), content) << name;
+  }
+  EXPECT_TRUE(fs::is_symlink(folder / "relative") && fs::is_symlink(folder / "absolute") &&
+              fs::is_symlink(folder / "of_a_link") && fs::is_symlink(folder / "folder"));
+  EXPECT_THAT(names_in(folder / "real"), ElementsAre("a.yaml"));
+}
+
+TEST(WriteFile, FollowsALinkToWhatIsNotThereYet) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "real");
+  fs::create_symlink("real/new.yaml", folder / "link");
+  write_file(folder / "link", "new\n");
+  EXPECT_TRUE(fs::is_symlink(folder / "link"));
+  EXPECT_EQ(folder.content_of(folder / "real/new.yaml"), "new\n");
+}
+
+TEST(WriteFile, RefusesALinkToItself) {
+  const TemporaryFolder folder;
+  fs::create_symlink("b", folder / "a");
+  fs::create_symlink("a", folder / "b");
+  EXPECT_EQ(refusal_of(folder / "a"), "a: is a link that leads to itself");
+  EXPECT_TRUE(fs::is_symlink(folder / "a") && fs::is_symlink(folder / "b"));
+}
+
+TEST(WriteFile, WritesToDevicesAsTheyAre) {
+  write_file("/dev/null", "new\n");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  EXPECT_EQ(refusal_of("/dev/full"), "full: cannot be written: No space left on device");
+  EXPECT_TRUE(fs::is_character_file("/dev/full"));
+}
+
+TEST(WriteFile, WritesToAPipeAsItIs) {
+  const TemporaryFolder folder;
+  const fs::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  write_file(pipe, "new\n");
+  char found[16];
+  const ssize_t size = ::read(reader, found, sizeof found);
+  ::close(reader);
+  EXPECT_EQ(std::string(found, static_cast<std::size_t>(std::max<ssize_t>(size, 0))), "new\n");
+  EXPECT_TRUE(fs::is_fifo(pipe));
+  EXPECT_THAT(names_in(folder / ""), ElementsAre("pipe"));
+}
+
+}  // namespace
+}  // namespace vlp

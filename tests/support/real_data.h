@@ -1,0 +1,16 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+namespace vlp {
+
+/// A folder of real captures; empty when it is not there.
+inline std::filesystem::path real_data(const char* folder) {
+  const std::filesystem::path all = VLP_REAL_DATA_DIR;
+  const bool there = !all.empty() && std::filesystem::is_directory(all / folder);
+  return there ? all / folder : std::filesystem::path();
+}
+
+}  // namespace vlp

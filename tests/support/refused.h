@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "rig/input_error.h"
+
+namespace vlp {
+
+/// The message with which `read` is refused; empty when it is not.
+template <typename Read>
+std::string refusal_of(const Read& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace vlp
