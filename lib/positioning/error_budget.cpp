@@ -1,0 +1,70 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/error_budget.h"
+
+#include <Eigen/Cholesky>
+
+#include "positioning/sighting.h"
+
+namespace vlp {
+namespace {
+
+using Matrix24 = Eigen::Matrix<double, 2, 4>;
+using Matrix42 = Eigen::Matrix<double, 4, 2>;
+using Matrix43 = Eigen::Matrix<double, 4, 3>;
+
+/// A lamp's part in the least-squares fix, in pixels.
+struct Row {
+  Eigen::Matrix2d d_pixel_d_z;
+  Matrix24 d_pixel_d_state;
+  Eigen::Vector2d z;
+};
+
+std::optional<Row> row_of(const Eigen::Vector3d& lamp_m, const Lens& lens,
+                          const LevelPose& camera) {
+  if (!(height_above(camera, lamp_m) > 0)) return std::nullopt;
+  const Prediction prediction = predict(camera, lamp_m);
+  const auto projection = lens.project_with_jacobians({prediction.z.x(), prediction.z.y(), 1});
+  if (!projection) return std::nullopt;
+  // On the plane z = 1, where the sightings are.
+  const Eigen::Matrix2d d_pixel_d_z = projection->d_pixel_d_point.leftCols<2>();
+  return Row{d_pixel_d_z, d_pixel_d_z * prediction.d_z_d_state, prediction.z};
+}
+
+/// A lamp's prediction moves with the lamp as it moves against the camera.
+Eigen::Matrix<double, 2, 3> d_pixel_d_lamp(const Row& row) {
+  return -row.d_pixel_d_state.leftCols<3>();
+}
+
+}  // namespace
+
+std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
+                                        const Pose& level, const ErrorSources& sources) {
+  if (lamps_m.size() < 2) return std::nullopt;
+  const LevelPose camera(level);
+  Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+  Matrix42 center_gradient = Matrix42::Zero(), tilt_gradient = Matrix42::Zero();
+  Eigen::Matrix4d lamp_map_gradient = Eigen::Matrix4d::Zero();
+  for (const Eigen::Vector3d& lamp_m : lamps_m) {
+    const auto row = row_of(lamp_m, lens, camera);
+    if (!row) return std::nullopt;
+    const Matrix42 transposed = row->d_pixel_d_state.transpose();
+    information += transposed * row->d_pixel_d_state;
+    center_gradient += transposed;
+    tilt_gradient += transposed * row->d_pixel_d_z * tilt_jacobian(row->z);
+    const Matrix43 lamp_gradient = transposed * d_pixel_d_lamp(*row);
+    lamp_map_gradient += lamp_gradient * lamp_gradient.transpose();
+  }
+  const Eigen::LLT<Eigen::Matrix4d> factor(information);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::Matrix4d inverse = factor.solve(Eigen::Matrix4d::Identity());
+  if (!inverse.allFinite()) return std::nullopt;
+  const Matrix42 by_center = sources.center_px * inverse * center_gradient;
+  const Matrix42 by_tilt = sources.tilt_rad * inverse * tilt_gradient;
+  return ErrorBudget{
+      sources.noise_px * sources.noise_px * inverse, by_center * by_center.transpose(),
+      by_tilt * by_tilt.transpose(),
+      sources.lamp_map_m * sources.lamp_map_m * inverse * lamp_map_gradient * inverse};
+}
+
+}  // namespace vlp

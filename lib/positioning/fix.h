@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+#include "camera_mount.h"
+
+namespace vlp {
+
+/// How a fix went. name_of() is what stands in fixes.csv.
+enum class FixStatus {
+  ok,
+  too_few_lamps,      // fewer than two lamps of the map
+  too_many_lamps,     // more than Positioner::max_lamps
+  duplicate_lamp,     // one id twice in a frame
+  not_finite,         // a pixel or a sensor reading is not, or a sigma is out of range
+  outside_lens,       // a pixel that no ray through the lens reaches
+  lamp_below_camera,  // a lamp would have to hang at or below the camera's height
+  degenerate,         // the lamps are seen too close together, or do not fit any pose
+  ambiguous,          // two lamps at different heights that two poses would explain
+  inconsistent,       // three lamps or more that contradict each other
+  mirrored_map        // they fit a mirror image of the map
+};
+
+/// The enumerator as a word, for example "too_few_lamps".
+std::string_view name_of(FixStatus status);
+
+/// What it means and what to do, for people.
+std::string_view explanation_of(FixStatus status);
+
+/// The answer to one frame. Everything below `status` holds only when that is `ok`.
+struct Fix {
+  FixStatus status = FixStatus::too_few_lamps;
+  /// Of the camera, or of the robot's centre when a CameraMount is given; the covariance of
+  /// (X, Y, Z, yaw) is that of the pixel noise (and of the inclination, when its noise is given).
+  PoseEstimate estimate;
+  /// Root of the mean squared distance between the lamps' pixels and where the fix sees them. Zero,
+  /// to rounding, with one or two lamps.
+  double residual_px = 0;
+  /// Lamps that the fix rests on.
+  int lamps = 0;
+  /// Lamps that were left out because the others contradict them, and the id of the first.
+  int rejected_lamps = 0;
+  int rejected_lamp_id = -1;
+  /// Detections whose id is not in the lamp map; they are left out. Holds whatever the status.
+  int unknown_lamps = 0;
+
+  bool ok() const { return status == FixStatus::ok; }
+};
+
+}  // namespace vlp

@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "../geometry/frames.h"
+#include "../rig/calibration.h"
+#include "../rig/lamp_map.h"
+#include "error_budget.h"
+
+namespace vlp {
+
+/// Places on the floor, row by row from (x_min, y_min), in metres of the world.
+struct FloorGrid {
+  double x_min_m;
+  double x_max_m;
+  double y_min_m;
+  double y_max_m;
+  double step_m;
+};
+
+/// The smallest grid around the lamps. Precondition: the map has lamps.
+FloorGrid floor_under(const LampMap& map, double step_m);
+
+/// What a camera at one place could reach.
+struct FloorLimit {
+  Pose camera;
+  /// Lamps that are seen whole.
+  int lamps;
+  /// Nothing where fewer than two lamps are seen.
+  std::optional<ErrorBudget> budget;
+};
+
+/// The lamps of the map that a level camera at `pose` sees whole: the centre, and the rim when the
+/// diameter is known, are in front of it and within the image.
+std::vector<Eigen::Vector3d> visible_lamps(const LampMap& map, const Camera& camera,
+                                           const Pose& pose);
+
+/// The error budget at every place of the grid, for a level camera at height `z_m` and one yaw.
+/// Throws std::invalid_argument when the grid has a step that is not positive, no extent or more
+/// than ten million places, or the intrinsics are not the lens model's.
+std::vector<FloorLimit> floor_limits(const LampMap& map, const Camera& camera,
+                                     const FloorGrid& grid, double z_m, double yaw_rad,
+                                     const ErrorSources& sources);
+
+}  // namespace vlp

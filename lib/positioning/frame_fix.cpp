@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/frame_fix.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+// The stated noise does not explain residuals beyond five of its standard deviations. A majority
+// of the lamps that it does explain, and a hundred times better, shows that the others are wrong;
+// a tilt or a map that is a little off for all lamps seldom looks so.
+constexpr double kTooNoisySigmas = 5;
+constexpr double kTooNoisy = kTooNoisySigmas * kTooNoisySigmas;
+constexpr double kClearGain = 100;
+
+/// Squared residuals over what the stated noise lets expect.
+double excess_of(const WeightedFix& fix, std::size_t lamps) {
+  return fix.chi_squared / static_cast<double>(2 * lamps - 4);
+}
+
+/// The largest standard deviation of a z.
+double noise_of(std::span<const Sighting> sightings) {
+  double noise = 0;
+  for (const Sighting& sighting : sightings) {
+    noise = std::max(noise,
+                     sighting.sigma_px / std::sqrt(std::abs(sighting.d_pixel_d_z.determinant())));
+  }
+  return noise;
+}
+
+/// As a camera under the mirrored map would see them.
+void mirror(SightedFrame& frame) {
+  for (Sighting& sighting : std::span(frame.sightings.data(), frame.size)) {
+    sighting.z.y() = -sighting.z.y();
+    sighting.d_pixel_d_z.col(1) = -sighting.d_pixel_d_z.col(1);
+  }
+}
+
+/// Leaves only those that agree.
+void keep(SightedFrame& frame, const Consensus& consensus) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    if (consensus.agreeing[i]) {
+      frame.sightings[kept] = frame.sightings[i];
+      frame.ids[kept] = frame.ids[i];
+      frame.nearest_m[kept++] = frame.nearest_m[i];
+    } else if (frame.rejected_lamps++ == 0) {
+      frame.rejected_lamp_id = frame.ids[i];
+    }
+  }
+  frame.size = kept;
+}
+
+/// How far in z a lamp may be from where the fix sees it. The spreads of the lamps in z and on the
+/// floor plan give the scale, since the fix may be wrong.
+double limit_of(const SightedFrame& frame, double max_residual_share) {
+  constexpr double share_of_the_way = 0.15;
+  const double n = static_cast<double>(frame.size);
+  const double spread = spread_of(frame.span());
+  Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
+  for (const Sighting& sighting : frame.span()) mean_m += sighting.lamp_m.head<2>() / n;
+  double sum = 0, nearest_m = frame.nearest_m[0];
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    sum += (frame.sightings[i].lamp_m.head<2>() - mean_m).squaredNorm();
+    nearest_m = std::min(nearest_m, frame.nearest_m[i]);
+  }
+  const double spread_m = std::sqrt(sum / n);
+  return std::min(max_residual_share * spread, share_of_the_way * nearest_m * spread / spread_m);
+}
+
+/// The fix under the mirror image of the map.
+ConsistentFix fix_mirrored(SightedFrame& frame, double limit) {
+  mirror(frame);
+  const ConsistentFix solution = fix_consistent(frame.span(), limit);
+  mirror(frame);
+  return solution;
+}
+
+/// The fix of the majority if the stated noise explains it and not that of all, else that of all.
+ConsistentFix fix_doubtful(SightedFrame& frame, const ConsistentFix& all,
+                           double max_residual_share) {
+  const double excess = excess_of(all.fix, frame.size);
+  const ConsistentFix mirrored = fix_mirrored(frame, limit_of(frame, max_residual_share));
+  if (mirrored.status == FixStatus::ok &&
+      kClearGain * excess_of(mirrored.fix, frame.size) < excess) {
+    return {FixStatus::mirrored_map, {}};
+  }
+  if (!frame.noise_is_stated || frame.size < 4) return all;
+  const auto majority = find_consensus(frame.span(), kTooNoisySigmas * noise_of(frame.span()));
+  if (!majority) return all;
+  SightedFrame agreeing = frame;
+  keep(agreeing, *majority);
+  const ConsistentFix solution =
+      fix_consistent(agreeing.span(), limit_of(agreeing, max_residual_share));
+  const double remaining = excess_of(solution.fix, agreeing.size);
+  const bool explains =
+      solution.status == FixStatus::ok && remaining < kTooNoisy && kClearGain * remaining < excess;
+  if (!explains) return all;
+  frame = agreeing;
+  return solution;
+}
+
+}  // namespace
+
+ConsistentFix fix_frame(SightedFrame& frame, double max_residual_share) {
+  const double limit = limit_of(frame, max_residual_share);
+  const ConsistentFix all = fix_consistent(frame.span(), limit);
+  if (frame.size < 3) return all;
+  if (all.status == FixStatus::ok) {
+    return excess_of(all.fix, frame.size) > kTooNoisy ? fix_doubtful(frame, all, max_residual_share)
+                                                      : all;
+  }
+  if (fix_mirrored(frame, limit).status == FixStatus::ok) return {FixStatus::mirrored_map, {}};
+  if (frame.size < 4) return all;
+  const auto majority = find_consensus(frame.span(), limit);
+  if (!majority) return all;
+  keep(frame, *majority);
+  return fix_consistent(frame.span(), limit_of(frame, max_residual_share));
+}
+
+}  // namespace vlp

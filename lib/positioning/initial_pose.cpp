@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/initial_pose.h"
+
+#include <algorithm>
+
+#include "positioning/coplanar_fix.h"
+#include "positioning/two_lamp_fix.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kSameHeight_m = 1e-6;
+
+bool at_one_height(std::span<const Sighting> sightings) {
+  return std::all_of(sightings.begin(), sightings.end(), [&](const Sighting& sighting) {
+    return std::abs(sighting.lamp_m.z() - sightings.front().lamp_m.z()) <= kSameHeight_m;
+  });
+}
+
+const Sighting& farthest_from(const Sighting& from, std::span<const Sighting> sightings) {
+  return *std::max_element(sightings.begin(), sightings.end(),
+                           [&](const Sighting& a, const Sighting& b) {
+                             return (a.z - from.z).squaredNorm() < (b.z - from.z).squaredNorm();
+                           });
+}
+
+/// Sum of the squared residuals in z; a lamp that is not above the pose counts as far off.
+double disagreement(const Pose& pose, std::span<const Sighting> sightings) {
+  const LevelPose camera(pose);
+  double sum = 0;
+  for (const Sighting& sighting : sightings) {
+    sum += height_above(camera, sighting.lamp_m) > 0
+               ? (sighting.z - predicted_z(camera, sighting.lamp_m)).squaredNorm()
+               : 1e6;
+  }
+  return sum;
+}
+
+}  // namespace
+
+InitialPose initial_pose(std::span<const Sighting> sightings) {
+  if (sightings.size() > 2 && at_one_height(sightings)) {
+    const auto pose = fix_coplanar_lamps(sightings);
+    if (!pose) return {FixStatus::degenerate, {}};
+    return {FixStatus::ok, *pose};
+  }
+  const Sighting& first = farthest_from(sightings.front(), sightings);
+  const TwoLampFix pair = fix_two_lamps(first, farthest_from(first, sightings));
+  if (pair.count == 0) {
+    return {pair.lamp_below_camera ? FixStatus::lamp_below_camera : FixStatus::degenerate, {}};
+  }
+  if (pair.count == 1) return {FixStatus::ok, pair.poses[0]};
+  if (sightings.size() == 2) return {FixStatus::ambiguous, {}};
+  const bool second =
+      disagreement(pair.poses[1], sightings) < disagreement(pair.poses[0], sightings);
+  return {FixStatus::ok, pair.poses[second ? 1 : 0]};
+}
+
+}  // namespace vlp

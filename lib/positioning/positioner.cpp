@@ -1,0 +1,181 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/positioner.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "positioning/one_lamp_fix.h"
+#include "positioning/sighting.h"
+
+namespace vlp {
+namespace {
+
+using Sightings = std::span<const Sighting>;
+
+void check_places(const std::vector<Lamp>& lamps) {
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    const std::string name = "lamp " + std::to_string(lamps[i].id);
+    if (!lamps[i].position_m.allFinite()) {
+      throw std::invalid_argument(name + " has a position that is not finite");
+    }
+    for (std::size_t k = 0; k < i; ++k) {
+      if (lamps[k].position_m == lamps[i].position_m) {
+        throw std::invalid_argument(name + " is where lamp " + std::to_string(lamps[k].id) + " is");
+      }
+    }
+  }
+}
+
+std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
+  if (lamps.empty()) throw std::invalid_argument("the lamp map is empty");
+  check_places(lamps);
+  std::sort(lamps.begin(), lamps.end(), [](const Lamp& a, const Lamp& b) { return a.id < b.id; });
+  for (std::size_t i = 1; i < lamps.size(); ++i) {
+    if (lamps[i].id == lamps[i - 1].id) {
+      throw std::invalid_argument("lamp " + std::to_string(lamps[i].id) + " stands twice");
+    }
+  }
+  return lamps;
+}
+
+bool finite(const Sensors& sensors) {
+  const auto& lean = sensors.inclination;
+  const auto& known = sensors.height_and_yaw;
+  return std::isfinite(sensors.inclination_sigma_rad) &&
+         (!lean || (std::isfinite(lean->roll_rad) && std::isfinite(lean->pitch_rad))) &&
+         (!known || (std::isfinite(known->z_m) && std::isfinite(known->yaw_rad)));
+}
+
+/// The mean of the lamps' places, so that a map in national coordinates loses no digits.
+Eigen::Vector3d center_of(const std::vector<Lamp>& lamps) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Lamp& lamp : lamps) sum += lamp.position_m - lamps.front().position_m;
+  return lamps.front().position_m + sum / static_cast<double>(lamps.size());
+}
+
+double distance_to_nearest(const std::vector<Lamp>& lamps, const Lamp& lamp) {
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const Lamp& other : lamps) {
+    if (other.id == lamp.id) continue;
+    nearest_m = std::min(nearest_m, (other.position_m - lamp.position_m).head<2>().norm());
+  }
+  return nearest_m;
+}
+
+Fix refused(FixStatus status, int unknown_lamps) {
+  Fix fix;
+  fix.status = status;
+  fix.unknown_lamps = unknown_lamps;
+  return fix;
+}
+
+}  // namespace
+
+Positioner::Positioner(const LampMap& map, const Calibration& calibration,
+                       const PositionerOptions& options)
+    : lamps_(sorted_by_id(map.lamps)),
+      lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
+      origin_m_(center_of(lamps_)),
+      base_from_camera_(level_from_camera(calibration, options.correction)),
+      mount_(options.mount),
+      max_residual_share_(options.max_residual_share),
+      unstated_sigma_px_(options.unstated_sigma_px) {
+  for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
+  for (const Lamp& lamp : lamps_) nearest_m_.push_back(distance_to_nearest(lamps_, lamp));
+  if (mount_ &&
+      !(mount_->position_in_robot_m.allFinite() && std::isfinite(mount_->yaw_in_robot_rad))) {
+    throw std::invalid_argument("the camera's place on the robot is not finite");
+  }
+  if (!(max_residual_share_ > 0)) throw std::invalid_argument("max_residual_share is not positive");
+  if (!(unstated_sigma_px_ >= kMinSigma_px && unstated_sigma_px_ <= kMaxSigma_px)) {
+    throw std::invalid_argument("unstated_sigma_px is not within 0.0001 and 1000");
+  }
+}
+
+FixStatus Positioner::sight(std::span<const Detection> detections,
+                            const Eigen::Matrix3d& level_from_base, SightedFrame& frame) const {
+  const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
+  for (const Detection& detection : detections) {
+    const auto lamp =
+        std::lower_bound(lamps_.begin(), lamps_.end(), detection.lamp,
+                         [](const Lamp& candidate, int id) { return candidate.id < id; });
+    if (lamp == lamps_.end() || lamp->id != detection.lamp) {
+      ++frame.unknown_lamps;
+      continue;
+    }
+    const auto ids_end = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
+    if (std::find(frame.ids.begin(), ids_end, lamp->id) != ids_end)
+      return FixStatus::duplicate_lamp;
+    if (frame.size == max_lamps) return FixStatus::too_many_lamps;
+    const double sigma_px = detection.sigma_px.value_or(unstated_sigma_px_);
+    const bool plausible = sigma_px >= kMinSigma_px && sigma_px <= kMaxSigma_px;
+    if (!detection.pixel.allFinite() || !plausible) return FixStatus::not_finite;
+    const auto ray = lens_.unproject(detection.pixel);
+    if (!ray) return FixStatus::outside_lens;
+    const Eigen::Vector3d direction = level_from_camera * ray->direction;
+    if (!(direction.z() > 0)) return FixStatus::lamp_below_camera;
+    const Eigen::Matrix<double, 3, 2> d_direction = level_from_camera * ray->d_direction_d_pixel;
+    const Eigen::Vector2d z = direction.head<2>() / direction.z();
+    const Eigen::Matrix2d d_z_d_pixel =
+        (d_direction.topRows<2>() - z * d_direction.row(2)) / direction.z();
+    frame.sightings[frame.size] = {lamp->position_m, z, lens_.focal_px().asDiagonal(), sigma_px};
+    if (detection.sigma_px) {
+      frame.sightings[frame.size].d_pixel_d_z = d_z_d_pixel.inverse();
+    } else {
+      frame.noise_is_stated = false;
+    }
+    frame.nearest_m[frame.size] = nearest_m_[static_cast<std::size_t>(lamp - lamps_.begin())];
+    frame.ids[frame.size++] = lamp->id;
+  }
+  return FixStatus::ok;
+}
+
+Fix Positioner::locate(std::span<const Detection> detections,
+                       const Sensors& sensors) const noexcept {
+  if (!finite(sensors)) return refused(FixStatus::not_finite, 0);
+  const Lean lean = sensors.inclination
+                        ? lean_of(*sensors.inclination, mount_ ? mount_->yaw_in_robot_rad : 0)
+                        : Lean();
+  SightedFrame frame;
+  const FixStatus seen = sight(detections, lean.level_from_base, frame);
+  if (seen != FixStatus::ok) return refused(seen, frame.unknown_lamps);
+
+  Fix fix;
+  const double sigma_rad = sensors.inclination_sigma_rad;
+  LeanEffect by_lean = LeanEffect::Zero();
+  if (frame.size > 1) {
+    const auto [status, solution] = fix_frame(frame, max_residual_share_);
+    if (status != FixStatus::ok) return refused(status, frame.unknown_lamps);
+    fix.estimate = {solution.pose, solution.covariance};
+    fix.residual_px = solution.residual_px;
+    if (sigma_rad > 0) by_lean = rotation_effect(frame.span(), solution) * lean.error_axes;
+  } else if (frame.size == 1 && sensors.height_and_yaw) {
+    const Sighting& sighting = frame.sightings.front();
+    const HeightAndYaw& known = *sensors.height_and_yaw;
+    const auto pose = fix_one_lamp(sighting, {known.z_m - origin_m_.z(), known.yaw_rad});
+    if (!pose) return refused(FixStatus::lamp_below_camera, frame.unknown_lamps);
+    fix.estimate = {*pose, one_lamp_covariance(sighting, *pose)};
+    by_lean = one_lamp_rotation_effect(sighting, *pose) * lean.error_axes;
+  } else {
+    return refused(FixStatus::too_few_lamps, frame.unknown_lamps);
+  }
+  fix.status = FixStatus::ok;
+  fix.lamps = static_cast<int>(frame.size);
+  fix.rejected_lamps = frame.rejected_lamps;
+  fix.rejected_lamp_id = frame.rejected_lamp_id;
+  fix.unknown_lamps = frame.unknown_lamps;
+  if (mount_) {
+    fix.estimate = robot_from_camera(fix.estimate, by_lean, sigma_rad, *mount_, lean);
+  } else if (sigma_rad > 0) {
+    fix.estimate.covariance += sigma_rad * sigma_rad * by_lean * by_lean.transpose();
+  }
+  fix.estimate.pose.position_m += origin_m_;
+  return fix;
+}
+
+}  // namespace vlp

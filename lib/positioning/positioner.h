@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "../camera/lens.h"
+#include "../rig/calibration.h"
+#include "../rig/detection.h"
+#include "../rig/lamp_map.h"
+#include "camera_mount.h"
+#include "correction.h"
+#include "fix.h"
+#include "frame_fix.h"
+#include "one_lamp_fix.h"
+
+namespace vlp {
+
+struct PositionerOptions {
+  Correction correction = Correction::all;
+  /// With it, fixes are of the robot's centre; without, of the camera.
+  std::optional<CameraMount> mount;
+  /// Lamps are inconsistent when one is farther from where the fix sees it than this share of
+  /// the spread (rms) of all lamps in the image (or too near to another lamp, see fix_frame).
+  /// Noise, lens and a tilt of 5 degrees that nothing corrects put it off by 0.05 or less.
+  double max_residual_share = 0.1;
+  /// For detections that do not state their sigma_px: the standard deviation per axis in the
+  /// undistorted image, f * (x/z, y/z) + c of the level camera. Stated noise is of the image as
+  /// taken, and weighs a lamp by how the lens squeezes the image there; where nothing is known
+  /// of it, lamps weigh alike in direction, as in the closed forms. Poses do not depend on this
+  /// figure; their covariance does, and whether lamps close together are `degenerate`.
+  double unstated_sigma_px = 1;
+};
+
+/// What the robot knows of a frame besides the image.
+struct Sensors {
+  /// From the inclination sensor (eq. 2), about the axes of the robot, or, without a mount, of the
+  /// camera (its calibrated tilt taken off); level without.
+  std::optional<Inclination> inclination;
+  /// Standard deviation of each of its angles; 0 leaves it out of the covariance.
+  double inclination_sigma_rad = 0;
+  /// Of the camera. Makes a fix of a single lamp; not used when two or more are seen.
+  std::optional<HeightAndYaw> height_and_yaw;
+};
+
+/// From identified lamps in an image to a position: the way from pixels to a fix, put together
+/// once from calibration and lamp map. Immutable: any number of threads may share it.
+class Positioner {
+ public:
+  static constexpr std::size_t max_lamps = kMaxSightings;
+
+  /// Throws std::invalid_argument when the map is empty, an id stands twice in it, two lamps are in
+  /// one place or a place is not finite (likewise that of the mount), when the intrinsics are not
+  /// the lens model's, or when `options` ask for a part that is not there or for a share or a sigma
+  /// out of range.
+  Positioner(const LampMap& map, const Calibration& calibration,
+             const PositionerOptions& options = {});
+
+  /// The fix of one frame. Neither allocates nor throws. One lamp: fix_one_lamp(); two: in closed
+  /// form; more: fix_weighted() from initial_pose(), without the lamps whose identity is wrong
+  /// (fix_frame).
+  Fix locate(std::span<const Detection> detections, const Sensors& sensors = {}) const noexcept;
+
+ private:
+  FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
+                  SightedFrame& frame) const;
+
+  std::vector<Lamp> lamps_;        // in the order of their ids, their places from origin_m_
+  std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
+  Lens lens_;
+  Eigen::Vector3d origin_m_;
+  Eigen::Matrix3d base_from_camera_;
+  std::optional<CameraMount> mount_;
+  double max_residual_share_;
+  double unstated_sigma_px_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/residual_noise.h"
+
+#include <cmath>
+
+namespace vlp {
+
+std::optional<double> residual_noise_px(std::span<const Fix> fixes) {
+  double sum_of_squares = 0, degrees_of_freedom = 0;
+  for (const Fix& fix : fixes) {
+    if (!fix.ok() || fix.lamps < 3) continue;
+    sum_of_squares += fix.lamps * fix.residual_px * fix.residual_px;
+    degrees_of_freedom += 2 * fix.lamps - 4;
+  }
+  if (!(sum_of_squares > 0)) return std::nullopt;
+  return std::sqrt(sum_of_squares / degrees_of_freedom);
+}
+
+}  // namespace vlp

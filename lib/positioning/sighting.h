@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "../geometry/frames.h"
+#include "../geometry/plane.h"
+#include "../geometry/types.h"
+
+/// The positioning equation (Chen and Guan, eq. 1, 3, 6, 7). A level camera at S = (X, Y, Zs)
+/// with yaw g sees a lamp at P = (p, Z) at the normalized point z = (x/z, y/z) of its level
+/// frame. With points of the floor plane as complex numbers, s = X + jY and H = Z - Zs:
+///   p = s + H e^{jg} z      so      z = e^{-jg} (p - s) / H.
+namespace vlp {
+
+/// A lamp of the map as the level camera sees it.
+struct Sighting {
+  /// P, in the world.
+  Eigen::Vector3d lamp_m;
+  /// z, measured.
+  Eigen::Vector2d z;
+  /// How the pixel moves with z: it turns residuals of z into pixels, which is where noise lives.
+  Matrix2 d_pixel_d_z;
+  /// Standard deviation of that pixel per axis.
+  double sigma_px;
+};
+
+/// A pose with e^{jg} in place of g, so that predictions need no trigonometry.
+struct LevelPose {
+  Eigen::Vector3d position_m;
+  Eigen::Vector2d heading;
+
+  LevelPose(const Eigen::Vector3d& position, const Eigen::Vector2d& unit_heading)
+      : position_m(position), heading(unit_heading) {}
+  explicit LevelPose(const Pose& pose)
+      : position_m(pose.position_m), heading(std::cos(pose.yaw_rad), std::sin(pose.yaw_rad)) {}
+  Pose pose() const { return {position_m, std::atan2(heading.y(), heading.x())}; }
+};
+
+/// z of a lamp from a pose, and its derivatives. Precondition: the lamp is above the camera.
+struct Prediction {
+  Eigen::Vector2d z;
+  /// By (X, Y, Zs, g).
+  Eigen::Matrix<double, 2, 4> d_z_d_state;
+};
+
+inline double height_above(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
+  return lamp_m.z() - camera.position_m.z();
+}
+
+inline Eigen::Vector2d predicted_z(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
+  const Eigen::Vector2d offset = (lamp_m - camera.position_m).head<2>();
+  return conj_times(camera.heading, offset) / height_above(camera, lamp_m);
+}
+
+inline Prediction predict(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
+  const double inverse_height = 1 / height_above(camera, lamp_m);
+  const double c = camera.heading.x() * inverse_height, s = camera.heading.y() * inverse_height;
+  const Eigen::Vector2d z = predicted_z(camera, lamp_m);
+  Prediction prediction{z, {}};
+  prediction.d_z_d_state << -c, -s, z.x() * inverse_height, z.y(),  //
+      s, -c, z.y() * inverse_height, -z.x();
+  return prediction;
+}
+
+/// Derivative of z by a small rotation of the level frame about its x and y axes.
+inline Eigen::Matrix2d tilt_jacobian(const Eigen::Vector2d& z) {
+  Eigen::Matrix2d jacobian;
+  jacobian << -z.x() * z.y(), 1 + z.x() * z.x(), -(1 + z.y() * z.y()), z.x() * z.y();
+  return jacobian;
+}
+
+}  // namespace vlp

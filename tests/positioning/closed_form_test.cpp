@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "geometry/angles.h"
+#include "positioning/coplanar_fix.h"
+#include "positioning/one_lamp_fix.h"
+#include "positioning/two_lamp_fix.h"
+#include "support/near.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+Sighting seen(const Eigen::Vector3d& lamp_m, const Pose& pose) {
+  return {lamp_m, predicted_z(LevelPose(pose), lamp_m), Matrix2::Identity() * 500, 1};
+}
+
+Pose random_pose(Random& random) {
+  return {{random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-0.5, 0.5)},
+          random.uniform(-3.1, 3.1)};
+}
+
+void expect_pose(const Pose& pose, const Pose& truth) {
+  EXPECT_THAT(pose.position_m, IsNear(truth.position_m, 1e-9));
+  EXPECT_NEAR(wrapped_rad(pose.yaw_rad - truth.yaw_rad), 0, 1e-9);
+}
+
+TEST(TwoLampFix, IsTheOnlyPoseAtEqualHeights) {
+  Random random(3);
+  for (int i = 0; i < 200; ++i) {
+    const Pose truth = random_pose(random);
+    const TwoLampFix fix = fix_two_lamps(seen({-1, 0.5, 2.5}, truth), seen({1, 0.2, 2.5}, truth));
+    ASSERT_EQ(fix.count, 1);
+    expect_pose(fix.poses[0], truth);
+  }
+}
+
+TEST(TwoLampFix, ListsTheTruthAtDifferentHeights) {
+  Random random(4);
+  int doubles = 0;
+  for (int i = 0; i < 500; ++i) {
+    const Pose truth = random_pose(random);
+    const Sighting a = seen({random.uniform(-1, 1), random.uniform(-1, 1), 2.0}, truth);
+    const Sighting b = seen({random.uniform(-1, 1), random.uniform(-1, 1), 2.6}, truth);
+    const TwoLampFix fix = fix_two_lamps(a, b);
+    ASSERT_GE(fix.count, 1);
+    const bool first = (fix.poses[0].position_m - truth.position_m).norm() < 1e-6;
+    if (fix.count == 2) ++doubles;
+    // Near a double root the solution is as sharp as the root of the rounding.
+    const Pose& nearest = fix.poses[first ? 0 : static_cast<std::size_t>(fix.count - 1)];
+    EXPECT_LT((nearest.position_m - truth.position_m).norm(), 1e-6);
+    for (int k = 0; k < fix.count; ++k) {
+      const LevelPose pose(fix.poses[static_cast<std::size_t>(k)]);
+      EXPECT_THAT(predicted_z(pose, a.lamp_m), IsNear(a.z, 1e-9));
+      EXPECT_THAT(predicted_z(pose, b.lamp_m), IsNear(b.z, 1e-9));
+    }
+  }
+  EXPECT_GT(doubles, 10) << "the ambiguous case was not met";
+}
+
+TEST(TwoLampFix, HasNoPoseForLampsSeenAsOne) {
+  const Pose pose{{0, 0, 0}, 0};
+  Sighting a = seen({0, 0, 2}, pose), b = seen({1, 0, 2}, pose);
+  b.z = a.z;
+  EXPECT_EQ(fix_two_lamps(a, b).count, 0);
+}
+
+TEST(TwoLampFix, SaysWhenALampWouldHangBelowTheCamera) {
+  // The only pose has the second lamp, 2 m below the first, at the camera's own height.
+  const Sighting a{{0, 0, 3}, {-1, 0}, Matrix2::Identity(), 1};
+  const Sighting b{{2, 0, 1}, {1, 0}, Matrix2::Identity(), 1};
+  const TwoLampFix fix = fix_two_lamps(a, b);
+  EXPECT_EQ(fix.count, 0);
+  EXPECT_TRUE(fix.lamp_below_camera);
+}
+
+TEST(CoplanarFix, IsExactForThreeLampsAndMore) {
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    const Pose truth = random_pose(random);
+    std::vector<Sighting> sightings;
+    for (int lamp = 0; lamp < 3 + i % 6; ++lamp) {
+      sightings.push_back(seen({random.uniform(-1, 1), random.uniform(-1, 1), 2.2}, truth));
+    }
+    const auto pose = fix_coplanar_lamps(sightings);
+    ASSERT_TRUE(pose);
+    expect_pose(*pose, truth);
+  }
+}
+
+TEST(OneLampFix, IsExactWhenHeightAndYawAreKnown) {
+  Random random(6);
+  for (int i = 0; i < 100; ++i) {
+    const Pose truth = random_pose(random);
+    const auto pose =
+        fix_one_lamp(seen({0.3, -0.4, 2}, truth), {truth.position_m.z(), truth.yaw_rad});
+    ASSERT_TRUE(pose);
+    expect_pose(*pose, truth);
+  }
+}
+
+TEST(OneLampFix, NeedsTheLampAboveTheCamera) {
+  const Sighting sighting = seen({0, 0, 2}, {{0, 0, 0}, 0});
+  EXPECT_FALSE(fix_one_lamp(sighting, {2, 0}));
+  EXPECT_FALSE(fix_one_lamp(sighting, {2.5, 0}));
+}
+
+}  // namespace
+}  // namespace vlp

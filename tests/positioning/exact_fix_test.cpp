@@ -1,0 +1,188 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Without noise a fix is the truth, computed forwards from world to pixel, to rounding.
+#include <gtest/gtest.h>
+
+#include "geometry/angles.h"
+#include "positioning/positioner.h"
+#include "support/near.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kExact_m = 1e-9;
+constexpr double kExact_rad = 1e-9;
+
+LampMap first_lamps(std::size_t count, bool equal_heights) {
+  LampMap map = synthetic_lamps();
+  map.lamps.resize(count);
+  constexpr double offsets_m[] = {0, 0.35, -0.2, 0.5, 0.1, -0.3, 0.25, 0.05};
+  for (std::size_t i = 0; i < count && !equal_heights; ++i) {
+    map.lamps[i].position_m.z() += offsets_m[i];
+  }
+  return map;
+}
+
+SyntheticRig rig_of(std::size_t lamps, bool equal_heights) {
+  return {first_lamps(lamps, equal_heights), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
+}
+
+void expect_exact(const SyntheticRig& rig, const Sensors& sensors = {}) {
+  const auto detections = seen_from(rig);
+  ASSERT_EQ(detections.size(), rig.map.lamps.size());
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections, sensors);
+  ASSERT_TRUE(fix.ok()) << name_of(fix.status);
+  EXPECT_EQ(fix.lamps, static_cast<int>(detections.size()));
+  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, kExact_m));
+  EXPECT_NEAR(wrapped_rad(fix.estimate.pose.yaw_rad - rig.camera.yaw_rad), 0, kExact_rad);
+  EXPECT_NEAR(fix.residual_px, 0, 1e-6);  // 1e-9 m at f / H = 325 px/m
+}
+
+using LampsAndHeights = std::tuple<std::size_t, bool>;
+class ExactFix : public testing::TestWithParam<LampsAndHeights> {
+ protected:
+  SyntheticRig rig = rig_of(std::get<0>(GetParam()), std::get<1>(GetParam()));
+  Random random{7};
+
+  Pose place() {
+    return {{random.uniform(-0.25, 0.25), random.uniform(-0.2, 0.2), random.uniform(-0.1, 0.3)},
+            random.uniform(-3.1, 3.1)};
+  }
+};
+
+TEST_P(ExactFix, AtEveryYaw) {
+  for (int yaw_deg = -180; yaw_deg <= 180; yaw_deg += 5) {
+    rig.camera = place();
+    rig.camera.yaw_rad = rad_from_deg(yaw_deg);
+    expect_exact(rig);
+  }
+}
+
+TEST_P(ExactFix, WithACalibratedTilt) {
+  for (int tilt_deg = 0; tilt_deg <= 10; tilt_deg += 2) {
+    rig.camera = place();
+    rig.calibration.rotation_center =
+        tilted_by(rig.calibration.camera, rad_from_deg(tilt_deg), random.uniform(-3.1, 3.1));
+    expect_exact(rig);
+  }
+}
+
+TEST_P(ExactFix, WithACalibratedShiftAndDispersion) {
+  rig.camera = place();
+  rig.calibration.rotation_center = {RotationModel::shift, {411, 290}, {0, 0, 1}, {}};
+  rig.calibration.dispersion = {{1.5, -2.5}, 0.01, {0, 0}, 40};
+  expect_exact(rig);
+}
+
+TEST_P(ExactFix, WithAnInclinationSensorOverACalibratedTilt) {
+  for (int i = 0; i < 20; ++i) {
+    rig.camera = place();
+    rig.calibration.rotation_center = tilted_by(rig.calibration.camera, rad_from_deg(2), i);
+    rig.inclination = {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1)};
+    expect_exact(rig, {rig.inclination, 0, {}});
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Lamps, ExactFix,
+                         testing::Combine(testing::Values(2, 3, 4, 8), testing::Bool()),
+                         [](const auto& instance) {
+                           return std::to_string(std::get<0>(instance.param)) +
+                                  (std::get<1>(instance.param) ? "AtOneHeight" : "AtManyHeights");
+                         });
+
+TEST(ExactFix, OfOneLampWithKnownHeightAndYaw) {
+  SyntheticRig rig = rig_of(1, true);
+  rig.camera = {{-0.3, 0.1, 0.2}, -2.5};
+  expect_exact(rig, {{}, 0, HeightAndYaw{0.2, -2.5}});
+}
+
+TEST(ExactFix, OfTheRobotsCentre) {
+  SyntheticRig rig = rig_of(4, true);
+  const Pose robot{{0.1, -0.2, 0.05}, 3.0};
+  const CameraMount mount{{0.12, -0.03, 0.2}, 0.4};
+  rig.camera = {robot.position_m + rotation_about_z(robot.yaw_rad) * mount.position_in_robot_m,
+                robot.yaw_rad + mount.yaw_in_robot_rad};
+  PositionerOptions options;
+  options.mount = mount;
+  const Fix fix = Positioner(rig.map, rig.calibration, options).locate(seen_from(rig));
+  ASSERT_TRUE(fix.ok());
+  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(robot.position_m, kExact_m));
+  EXPECT_NEAR(fix.estimate.pose.yaw_rad, robot.yaw_rad, kExact_rad);
+}
+
+TEST(ExactFix, OfALeaningRobotsCentre) {
+  SyntheticRig rig = rig_of(4, true);
+  const Eigen::Vector3d robot_m(0.1, -0.2, 0.05);
+  const CameraMount mount{{0.12, -0.03, 0.2}, 1.3};
+  const Inclination of_robot{0.08, -0.05};
+  const double robot_yaw_rad = 0.6;
+  rig.camera.yaw_rad = robot_yaw_rad + mount.yaw_in_robot_rad;
+  rig.camera.position_m = robot_m + rotation_about_z(robot_yaw_rad) *
+                                        level_from_inclination(of_robot) *
+                                        mount.position_in_robot_m;
+  // The camera leans about its own axes, which are turned against the robot's: the same rotation.
+  const Eigen::Matrix3d camera_from_robot = rotation_about_z(-mount.yaw_in_robot_rad);
+  const Eigen::Matrix3d lean =
+      camera_from_robot * level_from_inclination(of_robot) * camera_from_robot.transpose();
+  rig.inclination = {std::atan2(lean(2, 1), lean(2, 2)), -std::asin(lean(2, 0))};
+  const double yaw_of_lean_rad = std::atan2(lean(1, 0), lean(0, 0));
+  rig.camera.yaw_rad += yaw_of_lean_rad;  // Rz Ry Rx of the camera's axes
+  PositionerOptions options;
+  options.mount = mount;
+  const Fix fix =
+      Positioner(rig.map, rig.calibration, options).locate(seen_from(rig), {of_robot, 0, {}});
+  ASSERT_TRUE(fix.ok());
+  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(robot_m, kExact_m));
+  EXPECT_NEAR(fix.estimate.pose.yaw_rad, robot_yaw_rad, kExact_rad);
+}
+
+/// Two of them fit two poses; the third tells which.
+TEST(ExactFix, OfThreeLampsOfWhichTwoAreAmbiguous) {
+  Random random(4);
+  for (int i = 0; i < 200; ++i) {
+    SyntheticRig rig = rig_of(3, true);
+    rig.map = lamp_map_of({{1.0, 0, 1.6}, {1.2, 0.1, 2.4}, {1.1, 0.06, 1.9}});
+    rig.camera = {{random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(-0.3, 0.3)},
+                  random.uniform(-3, 3)};
+    const auto detections = seen_from(rig, 1e-3);
+    if (detections.size() < 3) continue;
+    const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
+    ASSERT_TRUE(fix.ok()) << name_of(fix.status);
+    EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 1e-6));
+  }
+}
+
+TEST(ExactFix, InNationalCoordinatesAndWithNoise) {
+  SyntheticRig rig = rig_of(5, false);
+  const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
+  for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
+  Random random(3);
+  for (int i = 0; i < 200; ++i) {
+    rig.camera = {origin_m + Eigen::Vector3d(0.1, -0.2, 0), random.uniform(-3, 3)};
+    const Positioner positioner(rig.map, rig.calibration);
+    const Fix exact = positioner.locate(seen_from(rig));
+    ASSERT_TRUE(exact.ok());
+    // The coordinates themselves are rounded to 1e-9 m.
+    EXPECT_THAT(exact.estimate.pose.position_m, IsNear(rig.camera.position_m, 1e-8));
+    EXPECT_TRUE(positioner.locate(with_noise(seen_from(rig, 0.5), random)).ok());
+  }
+}
+
+TEST(ExactFix, WithEveryLensModel) {
+  const std::vector<double> opencv12{520,  522,  403,  296,  -0.28, 0.09,  1e-4, -2e-4,
+                                     -.01, 0.02, 0.01, 1e-3, 1e-3,  -1e-3, 2e-3, 1e-3};
+  for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
+                                LensModel::opencv5, LensModel::opencv8, LensModel::opencv12}) {
+    SyntheticRig rig = rig_of(8, false);
+    Camera& camera = rig.calibration.camera;
+    camera.lens_model = model;
+    camera.intrinsics = opencv12;
+    camera.intrinsics.resize(parameter_count(model));
+    rig.camera = {{0.1, 0.1, 0}, 1};
+    expect_exact(rig);
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,91 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/floor_limits.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "support/near.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+Camera pinhole_camera() {
+  Camera camera;
+  camera.imager_px = {800, 600};
+  camera.lens_model = LensModel::pinhole;
+  camera.intrinsics = {500, 500, 399.5, 299.5};
+  return camera;
+}
+
+const ErrorSources kNoise{0.1, 0, 0, 0};
+
+TEST(VisibleLamps, EndAtTheImagesEdge) {
+  // At 1 m above the camera the image is 1.6 m wide: its edges are at +-0.8 m, -+0.6 m.
+  const LampMap map = lamp_map_of({{0.7999, 0, 1},
+                                   {0.8001, 0, 1},
+                                   {-0.7999, 0, 1},
+                                   {-0.8001, 0, 1},
+                                   {0, 0.5999, 1},
+                                   {0, 0.6001, 1},
+                                   {0, -0.5999, 1},
+                                   {0, -0.6001, 1},
+                                   {0, 0, -1}});
+  EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 4);
+}
+
+TEST(VisibleLamps, AreSeenWholeWhenTheirDiameterIsKnown) {
+  LampMap map = lamp_map_of({{0.75, 0, 1}, {0, 0, 1}});
+  EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 2);
+  map.lamps[0].diameter_m = map.lamps[1].diameter_m = 0.2;
+  const auto visible = visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0});
+  ASSERT_EQ(visible.size(), 1);
+  EXPECT_THAT(visible[0], IsNear(Eigen::Vector3d(0, 0, 1), 0));
+}
+
+TEST(VisibleLamps, TurnWithTheCamera) {
+  const LampMap map = lamp_map_of({{0.7, 0, 1}});
+  EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 1);
+  EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
+}
+
+TEST(FloorLimits, CoverTheGridRowByRow) {
+  const LampMap map = synthetic_lamps();
+  const auto limits = floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
+  ASSERT_EQ(limits.size(), 4 * 3);
+  EXPECT_THAT(limits[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
+  for (const FloorLimit& limit : limits) EXPECT_EQ(limit.budget.has_value(), limit.lamps >= 2);
+}
+
+TEST(FloorLimits, HaveNoBudgetWhereNoLampsAreSeen) {
+  const auto limits =
+      floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);
+  ASSERT_EQ(limits.size(), 1);
+  EXPECT_EQ(limits[0].lamps, 0);
+  EXPECT_FALSE(limits[0].budget);
+}
+
+TEST(FloorLimits, RefuseAGridThatIsNone) {
+  const auto on = [](const FloorGrid& grid) {
+    return floor_limits(synthetic_lamps(), pinhole_camera(), grid, 0, 0, kNoise);
+  };
+  EXPECT_THROW(on({0, 1, 0, 1, 0}), std::invalid_argument);
+  EXPECT_THROW(on({0, 1, 0, 1, -1}), std::invalid_argument);
+  EXPECT_THROW(on({1, 0, 0, 1, 0.1}), std::invalid_argument);
+  EXPECT_THROW(on({0, 1, 0, 1, 1e-9}), std::invalid_argument);
+  EXPECT_THROW(on({0, 1, 0, 1, 1e-4}), std::invalid_argument);
+  EXPECT_THROW(on({0, NAN, 0, 1, 0.1}), std::invalid_argument);
+}
+
+TEST(FloorUnder, IsTheLampsRectangle) {
+  const FloorGrid grid = floor_under(synthetic_lamps(), 0.05);
+  EXPECT_EQ(grid.x_min_m, -0.8);
+  EXPECT_EQ(grid.x_max_m, 0.8);
+  EXPECT_EQ(grid.y_min_m, -0.5);
+  EXPECT_EQ(grid.y_max_m, 0.5);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// A Positioner answers without allocating, without throwing, from any number of threads.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+#include <thread>
+
+#include "positioning/positioner.h"
+#include "support/synthetic_rig.h"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+// Every allocation of this program is counted. Inlined, GCC would take free() for a mismatch.
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
+  ++allocations;
+  const auto step = static_cast<std::size_t>(alignment);
+  if (void* memory = std::aligned_alloc(step, (size + step - 1) / step * step)) return memory;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept {
+  std::free(memory);
+}
+[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  std::free(memory);
+}
+
+namespace vlp {
+namespace {
+
+SyntheticRig tilted_rig() {
+  SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, 0, 0}, 2}, {}};
+  for (std::size_t i = 0; i < 4; ++i)
+    rig.map.lamps[i].position_m.z() += 0.1 * static_cast<double>(i);
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
+  return rig;
+}
+
+static_assert(noexcept(std::declval<const Positioner&>().locate({}, {})));
+
+TEST(Positioner, DoesNotAllocate) {
+  const SyntheticRig rig = tilted_rig();
+  PositionerOptions options;
+  options.mount = CameraMount{{0.1, 0.2, 0.3}, 0.4};
+  const Positioner positioner(rig.map, rig.calibration, options);
+  const auto good = seen_from(rig);
+  auto swapped = good, bad = good;
+  std::swap(swapped[0].lamp, swapped[6].lamp);
+  for (Detection& detection : bad) detection.lamp = 1 + detection.lamp % 8;
+  const Sensors sensors{Inclination{0.01, 0.02}, 0.001, HeightAndYaw{0, 0}};
+  for (const auto& detections : {good, swapped, bad, {}}) {
+    const long before = allocations;
+    for (std::size_t count = 0; count <= detections.size(); ++count) {
+      (void)positioner.locate({detections.data(), count}, sensors);
+    }
+    EXPECT_EQ(allocations, before);
+  }
+  const long before = allocations;
+  ::operator delete(::operator new(1));
+  EXPECT_EQ(allocations, before + 1) << "the counter does not count";
+}
+
+TEST(Positioner, AnswersManyThreadsAlike) {
+  const SyntheticRig rig = tilted_rig();
+  const Positioner positioner(rig.map, rig.calibration);
+  const auto detections = seen_from(rig);
+  const Fix expected = positioner.locate(detections);
+  ASSERT_TRUE(expected.ok());
+  std::atomic<int> different{0};
+  std::vector<std::thread> threads;
+  for (int thread = 0; thread < 8; ++thread) {
+    threads.emplace_back([&] {
+      for (int i = 0; i < 2000; ++i) {
+        const Fix fix = positioner.locate(detections);
+        if (fix.estimate.pose.position_m != expected.estimate.pose.position_m ||
+            fix.estimate.covariance != expected.estimate.covariance) {
+          ++different;
+        }
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(different, 0);
+}
+
+}  // namespace
+}  // namespace vlp

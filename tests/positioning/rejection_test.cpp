@@ -1,0 +1,216 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Wrong identities: left out where a majority outvotes them, refused where it cannot.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "positioning/floor_limits.h"
+#include "positioning/positioner.h"
+#include "support/near.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+class Rejection : public testing::Test {
+ protected:
+  SyntheticRig rig{
+      synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, -0.05, 0}, 0.4}, {}};
+  Random random{31};
+
+  std::vector<Detection> seen(std::size_t lamps) {
+    auto detections = with_noise(seen_from(rig, 0.2), random);
+    detections.resize(lamps);
+    return detections;
+  }
+  Fix locate(const std::vector<Detection>& detections) {
+    return Positioner(rig.map, rig.calibration).locate(detections);
+  }
+  void expect_truth(const Fix& fix) {
+    ASSERT_TRUE(fix.ok()) << name_of(fix.status);
+    EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 0.005));
+  }
+};
+
+TEST_F(Rejection, LeavesOutOneMisidentifiedLampOfFour) {
+  // The map has eight lamps; one of the four seen takes the identity of one that is not seen.
+  for (std::size_t wrong = 0; wrong < 4; ++wrong) {
+    for (int id = 5; id <= 8; ++id) {
+      auto detections = seen(4);
+      const int right_id = detections[wrong].lamp;
+      detections[wrong].lamp = id;
+      const Fix fix = locate(detections);
+      SCOPED_TRACE(testing::Message() << "lamp " << right_id << " taken for " << id);
+      expect_truth(fix);
+      EXPECT_EQ(fix.lamps, 3);
+      EXPECT_EQ(fix.rejected_lamps, 1);
+      EXPECT_EQ(fix.rejected_lamp_id, id);
+    }
+  }
+}
+
+TEST_F(Rejection, LeavesOutTwoSwappedLampsOfFiveAndMore) {
+  for (const std::size_t count : {5u, 6u, 8u}) {
+    for (std::size_t a = 0; a < count; ++a) {
+      for (std::size_t b = a + 1; b < count; ++b) {
+        auto detections = seen(count);
+        std::swap(detections[a].lamp, detections[b].lamp);
+        SCOPED_TRACE(testing::Message() << a << " and " << b << " of " << count);
+        const Fix fix = locate(detections);
+        expect_truth(fix);
+        EXPECT_EQ(fix.rejected_lamps, 2);
+      }
+    }
+  }
+}
+
+TEST_F(Rejection, WorksUnderLampsOfManyHeightsAndATilt) {
+  for (std::size_t i = 0; i < rig.map.lamps.size(); ++i) {
+    rig.map.lamps[i].position_m.z() += i % 2 ? 0.3 : -0.1;
+  }
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.04, 2);
+  for (std::size_t wrong = 0; wrong < 8; ++wrong) {
+    auto detections = seen(8);
+    detections[wrong].pixel += Eigen::Vector2d(120, -90);  // a reflection, say
+    const Fix fix = locate(detections);
+    SCOPED_TRACE(wrong);
+    expect_truth(fix);
+    EXPECT_EQ(fix.rejected_lamp_id, static_cast<int>(wrong) + 1);
+  }
+}
+
+TEST_F(Rejection, KeepsAllLampsUnderATiltThatNothingCorrects) {
+  const LampMap map = rig.map;
+  SyntheticRig tilted = rig;
+  tilted.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.09, 2);  // 5 degrees
+  const Fix fix = locate(seen_from(tilted));
+  ASSERT_TRUE(fix.ok());
+  EXPECT_EQ(fix.lamps, 8);
+  EXPECT_EQ(fix.rejected_lamps, 0);
+}
+
+/// A reflection near the lamp passes for it by its place, but not by the noise that is stated.
+TEST_F(Rejection, LeavesOutALampThatIsALittleOffWhereTheNoiseIsStated) {
+  for (const std::size_t count : {4u, 5u, 8u}) {
+    for (std::size_t wrong = 0; wrong < count; ++wrong) {
+      auto detections = seen(count);
+      detections[wrong].pixel += Eigen::Vector2d(13, -9);
+      SCOPED_TRACE(testing::Message() << wrong << " of " << count);
+      const Fix fix = locate(detections);
+      expect_truth(fix);
+      EXPECT_EQ(fix.rejected_lamps, 1);
+      EXPECT_EQ(fix.rejected_lamp_id, static_cast<int>(wrong) + 1);
+      for (Detection& detection : detections) detection.sigma_px.reset();
+      EXPECT_EQ(locate(detections).rejected_lamps, 0);
+    }
+  }
+}
+
+/// In a grid of lamps a wrong identity can hide in a scale and a turn.
+TEST_F(Rejection, NeverGivesAWrongFixInARegularGrid) {
+  std::vector<Eigen::Vector3d> positions_m;
+  for (int i = 0; i < 49; ++i)
+    positions_m.emplace_back(0.5 * (i % 7) - 1.5, 0.5 * (i / 7) - 1.5, 1.8);
+  rig.map = lamp_map_of(positions_m);
+  int fixes = 0;
+  for (int i = 0; i < 2000; ++i) {
+    rig.camera = {{random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), 0}, random.uniform(-3, 3)};
+    const auto visible = visible_lamps(rig.map, rig.calibration.camera, rig.camera);
+    auto detections = with_noise(seen_from(rig, 0.2), random);
+    std::erase_if(detections, [&](const Detection& detection) {
+      const auto& lamp = rig.map.lamps[static_cast<std::size_t>(detection.lamp) - 1];
+      return std::find(visible.begin(), visible.end(), lamp.position_m) == visible.end();
+    });
+    const std::size_t count = 4 + random.index(3);
+    while (detections.size() > count) {
+      detections.erase(detections.begin() + std::ptrdiff_t(random.index(detections.size())));
+    }
+    Detection& wrong = detections[random.index(count)];
+    const int right_id = wrong.lamp;
+    while (std::any_of(detections.begin(), detections.end(),
+                       [&](const Detection& detection) {
+                         return &detection != &wrong && detection.lamp == wrong.lamp;
+                       }) ||
+           wrong.lamp == right_id) {
+      wrong.lamp = 1 + static_cast<int>(random.index(49));
+    }
+    const Fix fix = locate(detections);
+    if (!fix.ok()) continue;
+    ++fixes;
+    EXPECT_LT((fix.estimate.pose.position_m - rig.camera.position_m).norm(), 0.02) << i;
+  }
+  EXPECT_GT(fixes, 1500);
+}
+
+/// Lamps close together and one far away: the far one, wrong, turns and scales the others a little.
+TEST_F(Rejection, OfAWrongLampFarFromACluster) {
+  rig.map = lamp_map_of({{0, 0, 2.5}, {0.1, 0, 2.5}, {0, 0.1, 2.5}, {1.5, 0, 2.5}, {0, 1.5, 2.5}});
+  rig.camera = {{0.3, 0.2, 0}, 0};
+  for (const bool stated : {true, false}) {
+    auto detections = seen(4);
+    detections[3].lamp = 5;
+    for (Detection& detection : detections) {
+      if (!stated) detection.sigma_px.reset();
+    }
+    const Fix fix = locate(detections);
+    EXPECT_TRUE(!fix.ok() || fix.rejected_lamp_id == 5) << fix.residual_px << " px";
+  }
+}
+
+TEST_F(Rejection, NamesAMirroredMapOfLampsNearlyInARow) {
+  for (const double width_m : {0.1, 0.15, 0.3}) {
+    rig.map = lamp_map_of({{0, 0, 2.5}, {0.6, width_m, 2.5}, {1.2, 0, 2.5}, {1.8, width_m, 2.5}});
+    rig.camera = {{0.9, 0, 0}, 0.4};
+    const auto detections = seen(4);
+    SyntheticRig drawn_from_below = rig;
+    for (Lamp& lamp : drawn_from_below.map.lamps) lamp.position_m.y() *= -1;
+    const Fix fix = Positioner(drawn_from_below.map, rig.calibration).locate(detections);
+    EXPECT_EQ(fix.status, FixStatus::mirrored_map) << width_m << name_of(fix.status);
+  }
+}
+
+TEST_F(Rejection, RefusesTwoHalvesThatContradict) {
+  auto detections = seen(6);
+  for (std::size_t i = 0; i < 3; ++i) detections[i].pixel += Eigen::Vector2d(60, 40);
+  EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
+}
+
+TEST_F(Rejection, RefusesThreeLampsThatContradict) {
+  auto detections = seen(3);
+  detections[1].lamp = 8;
+  EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
+}
+
+TEST_F(Rejection, RefusesAnotherRoomsMap) {
+  rig.map = lamp_map_of({{0.1, 0.2, 1.6},
+                         {-0.7, 0.4, 1.6},
+                         {0.5, -0.4, 1.6},
+                         {0.2, 0.3, 1.6},
+                         {-0.1, -0.4, 1.6},
+                         {0.8, 0.1, 1.6},
+                         {-0.6, -0.3, 1.6},
+                         {0.4, 0.4, 1.6}});
+  const auto detections = seen(8);
+  rig.map = synthetic_lamps();
+  EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
+}
+
+TEST_F(Rejection, NamesAMirroredMap) {
+  for (const bool equal_heights : {true, false}) {
+    rig.map = synthetic_lamps();
+    for (std::size_t i = 0; i < 8 && !equal_heights; ++i) {
+      rig.map.lamps[i].position_m.z() += i % 2 ? 0.3 : 0;
+    }
+    for (const std::size_t count : {3u, 4u, 8u}) {
+      const auto detections = seen(count);
+      SyntheticRig drawn_from_below = rig;
+      for (Lamp& lamp : drawn_from_below.map.lamps) lamp.position_m.x() *= -1;
+      const Fix fix = Positioner(drawn_from_below.map, rig.calibration).locate(detections);
+      EXPECT_EQ(fix.status, FixStatus::mirrored_map) << count << name_of(fix.status);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vlp

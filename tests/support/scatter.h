@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <vector>
+
+#include "geometry/angles.h"
+#include "positioning/camera_mount.h"
+
+namespace vlp {
+
+/// What many estimates of one pose with one covariance show, against that covariance.
+class Scatter {
+ public:
+  Scatter(const Pose& truth, const Eigen::Matrix4d& covariance)
+      : truth_(truth), covariance_(covariance), factor_(covariance) {}
+
+  void add(const Pose& pose) {
+    Eigen::Vector4d error;
+    error << pose.position_m - truth_.position_m, wrapped_rad(pose.yaw_rad - truth_.yaw_rad);
+    sum_ += error;
+    squares_ += error.cwiseAbs2();
+    // 95 % quantile of chi-square with four degrees of freedom.
+    beyond_95_ += error.dot(factor_.solve(error)) > 9.4877 ? 1 : 0;
+    ++count_;
+  }
+
+  /// Standard deviations found over those of the covariance, less one: X, Y, Z, yaw.
+  Eigen::Vector4d excess() const {
+    const Eigen::Vector4d variance = squares_ / count_ - mean().cwiseAbs2();
+    return (variance.array() / covariance_.diagonal().array()).sqrt() - 1;
+  }
+  /// Mean errors over the standard deviations of the mean.
+  Eigen::Vector4d bias() const {
+    return mean().array() / (covariance_.diagonal().array() / count_).sqrt();
+  }
+  /// Share of the errors outside the 95 % ellipsoid.
+  double share_beyond_95() const { return beyond_95_ / count_; }
+
+ private:
+  Eigen::Vector4d mean() const { return sum_ / count_; }
+
+  Pose truth_;
+  Eigen::Matrix4d covariance_;
+  Eigen::LDLT<Eigen::Matrix4d> factor_;
+  Eigen::Vector4d sum_ = Eigen::Vector4d::Zero(), squares_ = Eigen::Vector4d::Zero();
+  double beyond_95_ = 0, count_ = 0;
+};
+
+}  // namespace vlp

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "support/synthetic_rig.h"
+
+#include <Eigen/LU>
+
+namespace vlp {
+
+Camera synthetic_camera() {
+  Camera camera;
+  camera.id = "synthetic";
+  camera.imager_px = {800, 600};
+  camera.lens_model = LensModel::opencv8;
+  camera.intrinsics = {520, 522, 403, 296, -0.28, 0.09, 1e-4, -2e-4, -0.010, 0.020, 0.010, 0.001};
+  return camera;
+}
+
+LampMap lamp_map_of(const std::vector<Eigen::Vector3d>& positions_m) {
+  LampMap map;
+  for (const auto& position_m : positions_m) {
+    map.lamps.push_back({static_cast<int>(map.lamps.size()) + 1, position_m, {}, {}, {}});
+  }
+  return map;
+}
+
+LampMap synthetic_lamps() {
+  return lamp_map_of({{-0.8, -0.4, 1.6},
+                      {0.8, -0.4, 1.6},
+                      {0.8, 0.4, 1.6},
+                      {-0.8, 0.4, 1.6},
+                      {0.1, 0.5, 1.6},
+                      {-0.3, -0.5, 1.6},
+                      {0.5, 0.05, 1.6},
+                      {-0.4, 0.1, 1.6}});
+}
+
+RotationCenter tilted_by(const Camera& camera, double tilt_rad, double azimuth_rad) {
+  RotationCenter center;
+  center.model = RotationModel::tilt;
+  center.zenith_in_camera = {std::sin(tilt_rad) * std::cos(azimuth_rad),
+                             std::sin(tilt_rad) * std::sin(azimuth_rad), std::cos(tilt_rad)};
+  const Eigen::Vector2d focal_px(camera.intrinsics[0], camera.intrinsics[1]);
+  center.center_px =
+      Eigen::Vector2d(camera.intrinsics[2], camera.intrinsics[3]) +
+      focal_px.cwiseProduct(center.zenith_in_camera.head<2>() / center.zenith_in_camera.z());
+  return center;
+}
+
+std::vector<Detection> seen_from(const SyntheticRig& rig, double sigma_px) {
+  const Camera& camera = rig.calibration.camera;
+  const Lens lens(camera.lens_model, camera.intrinsics);
+  Eigen::Matrix3d level_from_camera = vlp::level_from_camera(rig.calibration, Correction::all);
+  if (rig.inclination) {
+    level_from_camera = level_from_inclination(*rig.inclination) * level_from_camera;
+  }
+  std::vector<Detection> detections;
+  for (const Lamp& lamp : rig.map.lamps) {
+    const Eigen::Vector3d x_in_camera =
+        level_from_camera.inverse() * level_from_world(rig.camera, lamp.position_m);
+    if (const auto pixel = lens.project(x_in_camera)) {
+      detections.push_back({lamp.id, *pixel, sigma_px});
+    }
+  }
+  return detections;
+}
+
+std::vector<Detection> with_noise(std::vector<Detection> detections, Random& random) {
+  for (Detection& detection : detections) {
+    detection.pixel.x() += *detection.sigma_px * random.normal();
+    detection.pixel.y() += *detection.sigma_px * random.normal();
+  }
+  return detections;
+}
+
+}  // namespace vlp
