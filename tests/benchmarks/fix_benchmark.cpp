@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// A fix from pixel positions, the lens included, beside OpenCV's undistortPoints and solvePnP on
+/// the same points in the same run.
+#include <benchmark/benchmark.h>
+
+#include <opencv2/calib3d.hpp>
+#include <stdexcept>
+
+#include "positioning/positioner.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+struct Scene {
+  SyntheticRig rig;
+  std::vector<Detection> detections;
+};
+
+Scene scene_of(std::size_t lamps) {
+  Scene scene{{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.2, -0.1, 0}, 0.7}, {}},
+              {}};
+  scene.rig.map.lamps.resize(lamps);
+  Random random(1);
+  scene.detections = with_noise(seen_from(scene.rig, 0.1), random);
+  return scene;
+}
+
+void fix(benchmark::State& state) {
+  const Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
+  const Positioner positioner(scene.rig.map, scene.rig.calibration);
+  if (!positioner.locate(scene.detections).ok()) throw std::logic_error("no fix");
+  for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(scene.detections));
+}
+BENCHMARK(fix)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
+
+/// solvePnP takes four points or more for its iterative method.
+void opencv_undistort_and_solve_pnp(benchmark::State& state) {
+  const Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
+  const auto& k = scene.rig.calibration.camera.intrinsics;
+  const cv::Matx33d camera(k[0], 0, k[2], 0, k[1], k[3], 0, 0, 1);
+  const std::vector<double> distortion(k.begin() + 4, k.end());
+  std::vector<cv::Point3d> lamps;
+  std::vector<cv::Point2d> pixels;
+  for (std::size_t i = 0; i < scene.detections.size(); ++i) {
+    const auto& p = scene.rig.map.lamps[i].position_m;
+    lamps.emplace_back(p.x(), p.y(), p.z());
+    pixels.emplace_back(scene.detections[i].pixel.x(), scene.detections[i].pixel.y());
+  }
+  cv::setNumThreads(1);
+  for (auto _ : state) {
+    std::vector<cv::Point2d> plane;
+    cv::Vec3d rotation, translation;
+    cv::undistortPoints(pixels, plane, camera, distortion);
+    cv::solvePnP(lamps, plane, cv::Matx33d::eye(), cv::noArray(), rotation, translation, false,
+                 cv::SOLVEPNP_ITERATIVE);
+    benchmark::DoNotOptimize(translation);
+  }
+}
+BENCHMARK(opencv_undistort_and_solve_pnp)->ArgName("lamps")->Arg(4)->Arg(8);
+
+}  // namespace
+}  // namespace vlp
