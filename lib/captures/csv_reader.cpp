@@ -1,0 +1,148 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/csv_reader.h"
+
+#include <csv.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "rig/file.h"
+
+namespace vlp {
+namespace {
+
+template <typename Number>
+std::optional<Number> parsed(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  Number value{};
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (failure != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+/// libcsv calls back for each field and each row; fed line by line, a row knows where it stands.
+struct CsvParsing {
+  CsvTable& table;
+  csv_parser parser{};
+  std::size_t line = 0;
+  std::size_t row_line = 0;  // where the row's first field ends
+  std::size_t row_fields = 0;
+  bool in_header = true;
+  std::optional<InputError> error;
+
+  explicit CsvParsing(CsvTable& into) : table(into) {
+    csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI);
+  }
+  ~CsvParsing() { csv_free(&parser); }
+  CsvParsing(const CsvParsing&) = delete;
+  CsvParsing& operator=(const CsvParsing&) = delete;
+
+  static void on_field(void* data, std::size_t size, void* self) {
+    static_cast<CsvParsing*>(self)->field({static_cast<const char*>(data), size});
+  }
+  static void on_row(int, void* self) { static_cast<CsvParsing*>(self)->row(); }
+
+  void field(std::string_view text) {
+    if (row_fields++ == 0) row_line = line;
+    if (in_header) {
+      table.header_.emplace_back(text);
+    } else {
+      table.fields_ += text;
+      table.ends_.push_back(table.fields_.size());
+    }
+  }
+
+  void row() {
+    if (!in_header) table.lines_.push_back(row_line);
+    if (row_fields != table.header_.size() && !error) {
+      error = InputError(table.file_, row_line, "",
+                         "has " + std::to_string(row_fields) + " fields, the header has " +
+                             std::to_string(table.header_.size()) + ": is the row cut short?");
+    }
+    row_fields = 0;
+    in_header = false;
+  }
+
+  void parse(std::string_view content) {
+    while (!content.empty() && !error) {
+      const std::string_view text = content.substr(0, content.find('\n') + 1);
+      content.remove_prefix(text.size());
+      ++line;
+      if (csv_parse(&parser, text.data(), text.size(), on_field, on_row, this) != text.size()) {
+        error = InputError(table.file_, line, "", "a quote stands where none may");
+      }
+    }
+    if (!error && csv_fini(&parser, on_field, on_row, this) != 0) {
+      error = InputError(table.file_, row_fields > 0 ? row_line : row_line + 1, "",
+                         "a quote opens that is never closed");
+    }
+    if (error) throw *error;
+  }
+};
+
+CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
+  constexpr std::size_t max_bytes = std::size_t{2} << 30;
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  const std::string content = read_text_file(file, max_bytes);
+  std::string_view text = content;
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  CsvParsing(*this).parse(text);
+  for (auto name = header_.begin(); name != header_.end(); ++name) {
+    if (std::find(header_.begin(), name, *name) != name) {
+      throw InputError(file_, 1, *name, "this column stands twice");
+    }
+  }
+}
+
+CsvTable::Column CsvTable::required(std::string_view name) const {
+  if (const auto column = optional(name)) return *column;
+  std::string names;
+  for (const std::string& have : header_) names += (names.empty() ? "" : ", ") + have;
+  throw InputError(file_, 1, std::string(name),
+                   "this column is missing; the columns are: " + names);
+}
+
+std::optional<CsvTable::Column> CsvTable::optional(std::string_view name) const {
+  const auto found = std::find(header_.begin(), header_.end(), name);
+  if (found == header_.end()) return std::nullopt;
+  return Column{static_cast<std::size_t>(found - header_.begin())};
+}
+
+std::string_view CsvTable::text(std::size_t row, Column column) const {
+  const std::size_t field = row * header_.size() + column.index;
+  const std::size_t begin = field == 0 ? 0 : ends_[field - 1];
+  return std::string_view(fields_).substr(begin, ends_[field] - begin);
+}
+
+double CsvTable::number(std::size_t row, Column column) const {
+  const auto value = parsed<double>(text(row, column));
+  if (!value || !std::isfinite(*value)) {
+    throw error(row, column,
+                "should be a finite number, not '" + std::string(text(row, column)) + "'");
+  }
+  return *value;
+}
+
+int CsvTable::integer(std::size_t row, Column column) const {
+  const auto value = parsed<int>(text(row, column));
+  if (!value) {
+    throw error(row, column,
+                "should be a whole number, not '" + std::string(text(row, column)) + "'");
+  }
+  return *value;
+}
+
+std::optional<double> CsvTable::optional_number(std::size_t row, Column column) const {
+  if (text(row, column).empty()) return std::nullopt;
+  return number(row, column);
+}
+
+InputError CsvTable::error(std::size_t row, Column column, const std::string& problem) const {
+  return {file_, lines_[row], header_[column.index], problem};
+}
+
+}  // namespace vlp

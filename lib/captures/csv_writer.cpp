@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/csv_writer.h"
+
+#include <csv.h>
+
+#include <array>
+#include <charconv>
+
+#include "rig/file.h"
+
+namespace vlp {
+namespace {
+
+std::string formatted(double value, std::chars_format format, int digits) {
+  std::array<char, 400> text;  // the longest double with a few digits after the point
+  const auto end = std::to_chars(text.begin(), text.end(), value, format, digits).ptr;
+  return {text.begin(), end};
+}
+
+std::string quoted(std::string_view field) {
+  std::string text(2 * field.size() + 2, '\0');
+  text.resize(csv_write(text.data(), text.size(), field.data(), field.size()));
+  return text;
+}
+
+}  // namespace
+
+void CsvWriter::row(std::initializer_list<std::string_view> fields) {
+  const char* separator = "";
+  for (const std::string_view field : fields) {
+    content_ += separator;
+    const bool plain = field.find_first_of(",\"\r\n") == std::string_view::npos &&
+                       !field.starts_with(' ') && !field.ends_with(' ');
+    content_ += plain ? std::string(field) : quoted(field);
+    separator = ",";
+  }
+  content_ += '\n';
+}
+
+void CsvWriter::save(const std::filesystem::path& file) const { write_file(file, content_); }
+
+std::string fixed(double value, int digits) {
+  return formatted(value, std::chars_format::fixed, digits);
+}
+
+std::string significant(double value, int digits) {
+  return formatted(value, std::chars_format::general, digits);
+}
+
+}  // namespace vlp

@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/detections_table.h"
+
+#include <unordered_map>
+
+#include "captures/csv_reader.h"
+#include "captures/csv_writer.h"
+
+namespace vlp {
+
+std::vector<Frame> read_detections(const std::filesystem::path& file) {
+  const CsvTable csv(file);
+  const auto image = csv.required("image"), lamp = csv.required("lamp");
+  const auto u_px = csv.required("u_px"), v_px = csv.required("v_px");
+  const auto sigma_px = csv.optional("sigma_px");
+  std::vector<Frame> frames;
+  std::unordered_map<std::string, std::size_t> frame_of_image;
+  for (std::size_t row = 0; row < csv.rows(); ++row) {
+    const std::string name(csv.text(row, image));
+    if (name.empty()) throw csv.error(row, image, "is empty");
+    const auto [entry, is_new] = frame_of_image.try_emplace(name, frames.size());
+    if (is_new) frames.push_back({name, {}});
+    auto& detections = frames[entry->second].detections;
+    Detection detection{csv.integer(row, lamp), {csv.number(row, u_px), csv.number(row, v_px)}, {}};
+    if (sigma_px) detection.sigma_px = csv.optional_number(row, *sigma_px);
+    const double sigma = detection.sigma_px.value_or(1);
+    if (sigma < kMinSigma_px || sigma > kMaxSigma_px) {
+      throw csv.error(row, *sigma_px, "should be within 0.0001 and 1000 px");
+    }
+    for (const Detection& other : detections) {
+      if (other.lamp == detection.lamp) {
+        throw csv.error(row, lamp,
+                        std::to_string(other.lamp) + " stands twice in image '" + name + "'");
+      }
+    }
+    detections.push_back(detection);
+  }
+  if (frames.empty()) throw InputError(file, "holds no detection");
+  return frames;
+}
+
+void write_detections(const std::filesystem::path& file, const std::vector<Frame>& frames) {
+  constexpr int digits = 4;        // a ten-thousandth of a pixel
+  constexpr int sigma_digits = 4;  // significant
+  CsvWriter csv({"image", "lamp", "u_px", "v_px", "sigma_px"});
+  for (const Frame& frame : frames) {
+    for (const Detection& detection : frame.detections) {
+      csv.row({frame.image, std::to_string(detection.lamp), fixed(detection.pixel.x(), digits),
+               fixed(detection.pixel.y(), digits),
+               detection.sigma_px ? significant(*detection.sigma_px, sigma_digits) : ""});
+    }
+  }
+  csv.save(file);
+}
+
+}  // namespace vlp

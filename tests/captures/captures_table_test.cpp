@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/captures_table.h"
+
+#include <gmock/gmock.h>
+
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(CapturesTable, ReadsAnyOfItsColumns) {
+  const TemporaryFolder folder;
+  const auto captures = read_captures(
+      folder.file("captures.csv",
+                  "image,z_m,roll_rad,yaw_rad,pitch_rad,time_s\na,0.1,0.01,3,0.02,5\nb,,,,,\n"));
+  ASSERT_EQ(captures.size(), 2);
+  const Capture& a = captures.at("a");
+  EXPECT_EQ(a.z_m, 0.1);
+  EXPECT_EQ(a.yaw_rad, 3);
+  EXPECT_EQ(a.time_s, 5);
+  EXPECT_FALSE(a.x_m);
+  ASSERT_TRUE(a.inclination);
+  EXPECT_EQ(a.inclination->roll_rad, 0.01);
+  EXPECT_EQ(a.inclination->pitch_rad, 0.02);
+  EXPECT_FALSE(captures.at("b").inclination);
+  EXPECT_FALSE(captures.at("b").z_m);
+}
+
+TEST(CapturesTable, RefusesWhatContradicts) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& content) {
+    return refusal_of([&] { read_captures(folder.file("c.csv", content)); });
+  };
+  EXPECT_THAT(refusal("z_m\n1\n"), HasSubstr("c.csv:1: image: this column is missing"));
+  EXPECT_THAT(refusal("image\na\na\n"), HasSubstr("c.csv:3: image: 'a' stands twice"));
+  EXPECT_THAT(refusal("image,roll_rad\na,0.1\n"), HasSubstr("without the other"));
+  EXPECT_THAT(refusal("image,z_m\na,high\n"), HasSubstr("c.csv:2: z_m: should be a finite number"));
+  EXPECT_THAT(refusal("image,z_m\n,1\n"), HasSubstr("c.csv:2: image: is empty"));
+}
+
+}  // namespace
+}  // namespace vlp

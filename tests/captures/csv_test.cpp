@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "captures/csv_reader.h"
+#include "captures/csv_writer.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+class Csv : public testing::Test {
+ protected:
+  TemporaryFolder folder;
+  CsvTable read(const std::string& content) { return CsvTable(folder.file("a.csv", content)); }
+  std::string refusal(const std::string& content) {
+    return refusal_of([&] { read(content); });
+  }
+};
+
+TEST_F(Csv, FindsColumnsByNameInAnyOrder) {
+  const CsvTable table = read("b,extra,a\n1,x,2\n3,,4\n");
+  ASSERT_EQ(table.rows(), 2);
+  EXPECT_EQ(table.number(0, table.required("a")), 2);
+  EXPECT_EQ(table.number(1, table.required("b")), 3);
+  EXPECT_EQ(table.text(1, table.required("extra")), "");
+  EXPECT_FALSE(table.optional("c"));
+}
+
+TEST_F(Csv, ReadsQuotesAsTheyAreMeant) {
+  const CsvTable table =
+      read("image,a\n\"one, two.png\",1\n\"say \"\"hi\"\"\",2\n\"two\nlines\",3\n\"\",4\n");
+  ASSERT_EQ(table.rows(), 4);
+  const auto image = table.required("image");
+  EXPECT_EQ(table.text(0, image), "one, two.png");
+  EXPECT_EQ(table.text(1, image), "say \"hi\"");
+  EXPECT_EQ(table.text(2, image), "two\nlines");
+  EXPECT_EQ(table.text(3, image), "");
+}
+
+TEST_F(Csv, ReadsCarriageReturnsAByteOrderMarkAndEmptyLines) {
+  const CsvTable table = read("\xEF\xBB\xBFimage,a\r\n\r\nx.png,1\r\ny.png,2\r\n\r\n");
+  ASSERT_EQ(table.rows(), 2);
+  EXPECT_EQ(table.text(1, table.required("image")), "y.png");
+  EXPECT_EQ(table.integer(1, table.required("a")), 2);
+}
+
+TEST_F(Csv, ReadsAHeaderWithoutRows) { EXPECT_EQ(read("a,b\n").rows(), 0); }
+
+TEST_F(Csv, NamesTheMissingColumn) {
+  const CsvTable table = read("image,lamp\nx,1\n");
+  EXPECT_THAT(refusal_of([&] { (void)table.required("u_px"); }),
+              HasSubstr("a.csv:1: u_px: this column is missing; the columns are: image, lamp"));
+}
+
+TEST_F(Csv, NamesTheLineOfARowCutShort) {
+  EXPECT_THAT(refusal("a,b,c\n1,2,3\n1,2\n"), HasSubstr("a.csv:3: has 2 fields, the header has 3"));
+  EXPECT_THAT(refusal("a,b,c\n1,2,3,4\n"), HasSubstr("a.csv:2: has 4 fields, the header has 3"));
+  EXPECT_THAT(refusal("a,b,c\n1,2,3"), HasSubstr("a.csv:2: the last line has no end"));
+}
+
+TEST_F(Csv, CountsLinesThroughQuotedLineEnds) {
+  EXPECT_THAT(refusal("a,b\n\"x\ny\",1\n\n\nz\n"), HasSubstr("a.csv:6: has 1 fields"));
+}
+
+TEST_F(Csv, RefusesWhatIsNoCsv) {
+  EXPECT_THAT(refusal("a,b\n1,\"2\n3,4\n"), HasSubstr("a.csv:2: a quote opens"));
+  EXPECT_THAT(refusal("a,b\n1,x\"y\"\n"), HasSubstr("a.csv:2: a quote stands where none may"));
+  EXPECT_THAT(refusal("a,a\n1,2\n"), HasSubstr("a.csv:1: a: this column stands twice"));
+  EXPECT_THAT(refusal(std::string("a,b\n1,\0\n", 8)), HasSubstr("a.csv:2: is not a text file"));
+  EXPECT_THAT(refusal(""), HasSubstr("a.csv: is empty"));
+}
+
+TEST_F(Csv, NamesLineAndColumnOfWhatIsNoNumber) {
+  for (const std::string bad : {"", "x", "1.5 m", "nan", "inf", "-inf", "1e999", "0x10", "1,5"}) {
+    const CsvTable table = read("image,u_px\nok,1\nbad,\"" + bad + "\"\n");
+    EXPECT_THAT(refusal_of([&] { (void)table.number(1, table.required("u_px")); }),
+                HasSubstr("a.csv:3: u_px: should be a finite number, not '" + bad + "'"));
+  }
+  const CsvTable table = read("lamp\n1.5\n");
+  EXPECT_THAT(refusal_of([&] { (void)table.integer(0, table.required("lamp")); }),
+              HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
+}
+
+TEST_F(Csv, WritesWhatItReads) {
+  const std::vector<std::string> fields{"plain", "a,b", "say \"hi\"", "two\nlines", " spaces ", ""};
+  CsvWriter writer({"one", "two"});
+  for (const std::string& field : fields) writer.row({field, "x"});
+  writer.save(folder / "b.csv");
+  const CsvTable table(folder / "b.csv");
+  ASSERT_EQ(table.rows(), fields.size());
+  for (std::size_t row = 0; row < fields.size(); ++row) {
+    EXPECT_EQ(table.text(row, table.required("one")), fields[row]);
+  }
+}
+
+TEST(CsvNumbers, HaveTheDigitsAskedFor) {
+  EXPECT_EQ(fixed(1.0 / 3, 4), "0.3333");
+  EXPECT_EQ(fixed(-2e-12, 9), "-0.000000000");
+  EXPECT_EQ(significant(1234.5678, 6), "1234.57");
+  EXPECT_EQ(significant(1.5e-7, 6), "1.5e-07");
+  EXPECT_GT(fixed(std::numeric_limits<double>::max(), 9).size(), 300);
+}
+
+}  // namespace
+}  // namespace vlp
