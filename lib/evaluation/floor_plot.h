@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// A figure over the floor, to be drawn as a coloured map with the lamps on it.
+struct FloorPlot {
+  struct Place {
+    Eigen::Vector2d xy_m;
+    /// Nothing where there is no figure: left blank.
+    std::optional<double> value;
+  };
+  std::string title;
+  /// Of the values, with their unit.
+  std::string label;
+  /// Distance between neighbouring places.
+  double step_m;
+  std::vector<Place> places;
+};
+
+/// Draws it, .png or .svg by the ending. Throws InputError, see draw().
+void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
+                     const LampMap& lamps);
+
+}  // namespace vlp
