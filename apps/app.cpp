@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "app.h"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <memory>
+
+namespace vlp {
+namespace {
+
+void log_to_stderr(const std::string& program, bool quiet, bool verbose) {
+  auto logger = std::make_shared<spdlog::logger>(
+      program, std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
+  logger->set_pattern("%n: %^%l%$: %v");
+  logger->set_level(quiet     ? spdlog::level::err
+                    : verbose ? spdlog::level::debug
+                              : spdlog::level::info);
+  spdlog::set_default_logger(logger);
+}
+
+CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
+  return CLI::Validator(
+      [name, accepts](const std::string& text) {
+        double value = 0;
+        const bool good =
+            CLI::detail::lexical_cast(text, value) && std::isfinite(value) && accepts(value);
+        return good ? std::string() : "'" + text + "' should be a " + name + " number";
+      },
+      "");
+}
+
+}  // namespace
+
+CLI::Validator finite() {
+  return number_check("finite", [](double) { return true; });
+}
+CLI::Validator finite_positive() {
+  return number_check("finite positive", [](double value) { return value > 0; });
+}
+CLI::Validator finite_not_negative() {
+  return number_check("finite and not negative", [](double value) { return value >= 0; });
+}
+
+void check_output(const std::string& output, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code missing;
+    if (std::filesystem::equivalent(output, input, missing)) {
+      throw std::invalid_argument(output + ": is an input, too, and would be overwritten");
+    }
+  }
+}
+
+int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run) {
+  bool quiet = false, verbose = false;
+  auto* quiet_flag = app.add_flag("-q,--quiet", quiet, "Only errors on stderr, nothing on stdout");
+  app.add_flag("-v,--verbose", verbose, "Details on stderr")->excludes(quiet_flag);
+  app.set_version_flag("--version", app.get_name() + " " + VLP_VERSION);
+  log_to_stderr(app.get_name(), false, false);
+  try {
+    app.parse(argc, argv);
+    log_to_stderr(app.get_name(), quiet, verbose);
+    if (quiet && std::freopen("/dev/null", "w", stdout) == nullptr) return kBadInput;
+    run();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+      throw std::runtime_error("stdout cannot be written");
+    }
+    return kDone;
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    spdlog::error("{}; see {} --help", error.what(), app.get_name());
+    return kBadInput;
+  } catch (const Undetermined& error) {
+    spdlog::error("{}", error.what());
+    return kUndetermined;
+  } catch (const std::exception& error) {  // vlp::InputError and std::invalid_argument among them
+    spdlog::error("{}", error.what());
+    return kBadInput;
+  }
+}
+
+}  // namespace vlp

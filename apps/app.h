@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace vlp {
+
+/// Exit codes of every program.
+enum ExitCode : int { kDone = 0, kGateNotMet = 1, kBadInput = 2, kUndetermined = 3 };
+
+/// The data cannot determine the answer; what() says what to add. Exit code 3.
+class Undetermined : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Checks for options: a number that is finite, and positive, or not negative.
+CLI::Validator finite();
+CLI::Validator finite_positive();
+CLI::Validator finite_not_negative();
+
+/// Throws std::invalid_argument when `output` is one of the files that are read.
+void check_output(const std::string& output, const std::vector<std::string>& inputs);
+
+/// The common shell of a program: adds --quiet, --verbose and --version to `app`, parses, and calls
+/// `run`. Messages go through spdlog to stderr. Bad usage and bad input end with one line and
+/// exit code 2, Undetermined with 3.
+int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run);
+
+}  // namespace vlp

@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The committed example: what its generator makes, and what vlp-locate makes of it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "captures/csv_reader.h"
+#include "support/program.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
+const std::string kLocate = "vlp-locate " + kExample + "detections.csv --lamps " + kExample +
+                            "lamps.yaml --calibration " + kExample + "calibration.yaml -o ";
+
+/// Horizontal errors of fixes.csv against truth.csv, in its order.
+std::vector<double> horizontal_errors_m(const std::filesystem::path& fixes_file) {
+  const CsvTable fixes(fixes_file), truth(kExample + "truth.csv");
+  EXPECT_EQ(fixes.rows(), truth.rows());
+  std::vector<double> errors_m;
+  for (std::size_t row = 0; row < truth.rows(); ++row) {
+    EXPECT_EQ(fixes.text(row, fixes.required("image")), truth.text(row, truth.required("image")));
+    EXPECT_EQ(fixes.text(row, fixes.required("status")), "ok");
+    errors_m.push_back(std::hypot(
+        fixes.number(row, fixes.required("x_m")) - truth.number(row, truth.required("x_m")),
+        fixes.number(row, fixes.required("y_m")) - truth.number(row, truth.required("y_m"))));
+  }
+  return errors_m;
+}
+
+double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+TEST(Example, IsWhatItsGeneratorMakes) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_program(VLP_MAKE_EXAMPLE " '" + (folder / "example").string() + "'").exit_code, 0);
+  for (const std::string name : {"lamps.yaml", "calibration.yaml", "detections.csv", "truth.csv"}) {
+    EXPECT_EQ(TemporaryFolder::content_of(folder / ("example/" + name)),
+              TemporaryFolder::content_of(kExample + name))
+        << name;
+  }
+}
+
+TEST(Example, IsLocatedWithinItsNoise) {
+  const TemporaryFolder folder;
+  const auto fixes = (folder / "fixes.csv").string();
+  const auto result = run_program(kLocate + fixes);
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const auto errors_m = horizontal_errors_m(fixes);
+  ASSERT_EQ(errors_m.size(), 36);
+  // 0.05 px at f / H = 325 px/m and five lamps: about 0.1 mm.
+  EXPECT_LT(mean(errors_m), 0.2e-3);
+  EXPECT_GT(mean(errors_m), 0.02e-3);
+}
+
+TEST(Example, IsFarOffWithoutTheTilt) {
+  const TemporaryFolder folder;
+  const auto fixes = (folder / "fixes.csv").string();
+  ASSERT_EQ(run_program(kLocate + fixes + " --correction none").exit_code, 0);
+  EXPECT_GT(mean(horizontal_errors_m(fixes)), 20e-3);  // 1.3 degrees at 1.3 to 1.6 m
+}
+
+TEST(Example, GivesTheSameBytesTwice) {
+  const TemporaryFolder folder;
+  const auto first = run_program(kLocate + (folder / "a.csv").string());
+  const auto second = run_program(kLocate + (folder / "b.csv").string());
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "a.csv"),
+            TemporaryFolder::content_of(folder / "b.csv"));
+  EXPECT_EQ(first.output, second.output);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,163 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-locate as its users call it.
+#include <gmock/gmock.h>
+
+#include "captures/csv_reader.h"
+#include "captures/detections_table.h"
+#include "support/program.h"
+#include "support/synthetic_rig.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+class Locate : public testing::Test {
+ protected:
+  TemporaryFolder folder;
+  SyntheticRig rig{
+      synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, -0.2, 0.05}, 0.5}, {}};
+
+  ProgramResult locate(const std::vector<Frame>& frames, const std::string& options = "") {
+    write_lamp_map(folder / "lamps.yaml", rig.map);
+    write_calibration(folder / "calibration.yaml", rig.calibration);
+    write_detections(folder / "detections.csv", frames);
+    const auto path = [&](const char* name) { return (folder / name).string() + " "; };
+    return run_program("vlp-locate " + path("detections.csv") + "--lamps " + path("lamps.yaml") +
+                       "--calibration " + path("calibration.yaml") + "-o " + path("fixes.csv") +
+                       options);
+  }
+  double figure(std::size_t row, const char* column) {
+    const CsvTable fixes(folder / "fixes.csv");
+    return fixes.number(row, fixes.required(column));
+  }
+  std::string word(std::size_t row, const char* column) {
+    const CsvTable fixes(folder / "fixes.csv");
+    return std::string(fixes.text(row, fixes.required(column)));
+  }
+  std::vector<Detection> seen(std::size_t lamps, std::optional<double> sigma_px = 0.1) {
+    auto detections = seen_from(rig);
+    detections.resize(lamps);
+    for (Detection& detection : detections) detection.sigma_px = sigma_px;
+    return detections;
+  }
+};
+
+TEST_F(Locate, GivesARowForEveryImage) {
+  auto swapped = seen(8);
+  std::swap(swapped[0].lamp, swapped[1].lamp);
+  auto unknown = seen(3);
+  unknown[0].lamp = 99;
+  const auto result =
+      locate({{"two", seen(2)}, {"one", seen(1)}, {"swapped", swapped}, {"99", unknown}});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_EQ(word(0, "status"), "ok");
+  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
+  EXPECT_NEAR(figure(0, "z_m"), 0.05, 1e-5);
+  EXPECT_EQ(word(1, "status"), "too_few_lamps");
+  EXPECT_EQ(word(1, "x_m"), "");
+  EXPECT_EQ(figure(2, "lamps"), 6);
+  EXPECT_EQ(figure(3, "lamps"), 2);
+  EXPECT_THAT(result.output, HasSubstr("fixes       3\n"));
+  EXPECT_THAT(result.output, HasSubstr("1 too_few_lamps"));
+  EXPECT_THAT(result.errors, HasSubstr("1 detections of lamps that are not in the map"));
+  EXPECT_THAT(result.errors, HasSubstr("2 detections that contradict the others"));
+}
+
+TEST_F(Locate, TakesTheNoiseFromTheColumnTheOptionOrTheResiduals) {
+  locate({{"a", seen(4, 0.1)}});
+  const double stated_m = figure(0, "sd_x_m");
+  locate({{"a", seen(4, 0.1)}}, "--sigma-px 0.3");
+  EXPECT_NEAR(figure(0, "sd_x_m"), 3 * stated_m, 1e-4 * stated_m);
+
+  Random random(5);
+  std::vector<Frame> frames;
+  for (int i = 0; i < 500; ++i) {
+    frames.push_back({std::to_string(i), with_noise(seen(4, 0.2), random)});
+    for (Detection& detection : frames.back().detections) detection.sigma_px.reset();
+  }
+  const auto result = locate(frames);
+  EXPECT_THAT(result.errors, HasSubstr("px taken from the residuals"));
+  double scatter = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    scatter += std::pow(figure(i, "x_m") - 0.1, 2) / static_cast<double>(frames.size());
+  }
+  EXPECT_NEAR(figure(0, "sd_x_m"), std::sqrt(scatter), 0.1 * std::sqrt(scatter));
+}
+
+TEST_F(Locate, LeavesSdEmptyWhenTheNoiseIsNotKnown) {
+  const auto result = locate({{"a", seen(2, std::nullopt)}});
+  ASSERT_EQ(result.exit_code, 0);
+  EXPECT_EQ(word(0, "sd_x_m"), "");
+  EXPECT_THAT(result.errors, HasSubstr("sd columns are empty"));
+}
+
+TEST_F(Locate, UsesTheInclinationSensor) {
+  rig.inclination = {0.05, -0.03};
+  const auto captures = folder.file("captures.csv", "image,roll_rad,pitch_rad\na,0.05,-0.03\n");
+  const auto seen_leaning = seen(4);
+  ASSERT_EQ(locate({{"a", seen_leaning}}, "--captures " + captures.string()).exit_code, 0);
+  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
+  const double sd_m = figure(0, "sd_x_m");
+  locate({{"a", seen_leaning}}, "--captures " + captures.string() + " --inclination-sigma-deg 0.1");
+  EXPECT_GT(figure(0, "sd_x_m"), 2 * sd_m);
+  locate({{"a", seen_leaning}});
+  EXPECT_GT(std::hypot(figure(0, "x_m") - 0.1, figure(0, "y_m") + 0.2), 0.02);
+}
+
+TEST_F(Locate, WarnsOfCapturesThatAreOfOtherImages) {
+  const auto captures = folder.file("captures.csv", "image,roll_rad,pitch_rad\nz.png,0,0\n");
+  const auto result = locate({{"a", seen(4)}}, "--captures " + captures.string());
+  EXPECT_THAT(result.errors, HasSubstr("1 of 1 images are not in captures.csv"));
+  EXPECT_EQ(locate({{"a", seen(4)}}, "--one-lamp").exit_code, 2) << "it needs captures.csv";
+}
+
+TEST_F(Locate, FixesOneLampWhenToldTo) {
+  const auto captures = folder.file("captures.csv", "image,z_m,yaw_rad\na,0.05,0.5\n");
+  EXPECT_EQ(locate({{"a", seen(1)}}, "--captures " + captures.string()).exit_code, 3);
+  const auto result = locate({{"a", seen(1)}}, "--one-lamp --captures " + captures.string());
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
+}
+
+TEST_F(Locate, GivesTheRobotsCentre) {
+  ASSERT_EQ(locate({{"a", seen(4)}}, "--camera-on-robot 0.3 0 0.2 90").exit_code, 0);
+  const double robot_yaw_rad = 0.5 - M_PI / 2;
+  EXPECT_NEAR(figure(0, "yaw_rad"), robot_yaw_rad, 1e-5);
+  EXPECT_NEAR(figure(0, "x_m"), 0.1 - 0.3 * std::cos(robot_yaw_rad), 1e-5);
+  EXPECT_NEAR(figure(0, "y_m"), -0.2 - 0.3 * std::sin(robot_yaw_rad), 1e-5);
+  EXPECT_NEAR(figure(0, "z_m"), 0.05 - 0.2, 1e-5);
+}
+
+TEST_F(Locate, AppliesTheCorrectionsAskedFor) {
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
+  const auto seen_tilted = seen(4);
+  locate({{"a", seen_tilted}});
+  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
+  locate({{"a", seen_tilted}}, "--correction rotation");
+  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
+  locate({{"a", seen_tilted}}, "--correction none");
+  EXPECT_GT(std::hypot(figure(0, "x_m") - 0.1, figure(0, "y_m") + 0.2), 0.02);
+  const auto result = locate({{"a", seen_tilted}}, "--correction dispersion");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("the calibration has no dispersion"));
+}
+
+TEST_F(Locate, EndsWithThreeWhenNothingCanBeFixed) {
+  const auto result = locate({{"a", seen(1)}});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.errors, HasSubstr("no frame has a fix; the first: fewer than two lamps"));
+  EXPECT_EQ(word(0, "status"), "too_few_lamps") << "the rows are written all the same";
+}
+
+TEST_F(Locate, IsQuietOrVerboseWhenAsked) {
+  EXPECT_EQ(locate({{"a", seen(4)}}, "--quiet").output, "");
+  auto wrong = seen(4);
+  wrong[0].lamp = 8;
+  EXPECT_THAT(locate({{"a", wrong}}, "--verbose").errors, HasSubstr("a: lamp 8 contradicts"));
+}
+
+}  // namespace
+}  // namespace vlp
