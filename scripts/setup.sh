@@ -1,0 +1,44 @@
+#!/bin/bash
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Installs the Debian packages that the toolbox is built and tested with. As root or through sudo;
+# again and again; silent when nothing is missing.
+set -euo pipefail
+
+packages=(
+  # compilers and tools
+  g++ cmake ninja-build ccache git pkg-config clang-format clang-tidy
+  # libraries
+  libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
+  gnuplot-nox fonts-dejavu-core
+  # tests and benchmarks
+  libgtest-dev libgmock-dev libbenchmark-dev libmrcal-dev libopencv-dev
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  state=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
+  [ "$state" = installed ] || missing+=("$package")
+done
+[ ${#missing[@]} -gt 0 ] || exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "setup.sh: these packages are missing; install them as root: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo env DEBIAN_FRONTEND=noninteractive)
+fi
+echo "setup.sh: installing ${missing[*]}"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+export DEBIAN_FRONTEND=noninteractive
+if ! { "${as_root[@]}" apt-get update &&
+       "${as_root[@]}" apt-get install --yes --no-install-recommends "${missing[@]}"; } >"$log" 2>&1
+then
+  tail -n 20 "$log" >&2
+  echo "setup.sh: the packages could not be installed; see above" >&2
+  exit 1
+fi

@@ -1,0 +1,12 @@
+#!/bin/bash
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Sets up, builds and runs every test. In CI (the variable CI is set) warnings are errors.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+scripts/setup.sh
+cmake --preset release -DVLP_TOOLBOX=ON -DBUILD_TESTING=ON -DVLP_WARNINGS_AS_ERRORS="${CI:+ON}"
+cmake --build --preset release
+ctest --preset release --parallel "$(nproc)"
