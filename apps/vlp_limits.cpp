@@ -24,8 +24,9 @@ struct Options {
 
 void write_map(const std::string& file, const std::vector<FloorLimit>& limits) {
   constexpr int digits = 6;
-  CsvWriter csv({"x_m", "y_m", "z_m", "yaw_rad", "lamps", "sd_x_m", "sd_y_m", "sd_z_m",
-                 "sd_yaw_rad", "noise_m", "center_m", "tilt_m", "lamp_map_m", "horizontal_m"});
+  CsvWriter csv(
+      file, {"x_m", "y_m", "z_m", "yaw_rad", "lamps", "sd_x_m", "sd_y_m", "sd_z_m", "sd_yaw_rad",
+             "noise_m", "center_m", "tilt_m", "lamp_map_m", "horizontal_m"});
   for (const FloorLimit& limit : limits) {
     const auto& [position_m, yaw_rad] = limit.camera;
     const auto at = [](double value) { return significant(value, digits); };
@@ -44,7 +45,7 @@ void write_map(const std::string& file, const std::vector<FloorLimit>& limits) {
              horizontal(budget.noise), horizontal(budget.center), horizontal(budget.tilt),
              horizontal(budget.lamp_map), horizontal(budget.total())});
   }
-  csv.save(file);
+  csv.save();
 }
 
 void draw_map(const Options& options, const std::vector<FloorLimit>& limits, const LampMap& lamps) {

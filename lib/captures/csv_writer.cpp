@@ -7,8 +7,6 @@
 #include <array>
 #include <charconv>
 
-#include "rig/file.h"
-
 namespace vlp {
 namespace {
 
@@ -29,16 +27,24 @@ std::string quoted(std::string_view field) {
 void CsvWriter::row(std::initializer_list<std::string_view> fields) {
   const char* separator = "";
   for (const std::string_view field : fields) {
-    content_ += separator;
+    waiting_ += separator;
     const bool plain = field.find_first_of(",\"\r\n") == std::string_view::npos &&
                        !field.starts_with(' ') && !field.ends_with(' ');
-    content_ += plain ? std::string(field) : quoted(field);
+    waiting_ += plain ? std::string(field) : quoted(field);
     separator = ",";
   }
-  content_ += '\n';
+  waiting_ += '\n';
+  constexpr std::size_t enough = 1 << 16;
+  if (waiting_.size() < enough) return;
+  file_.write(waiting_);
+  waiting_.clear();
 }
 
-void CsvWriter::save(const std::filesystem::path& file) const { write_file(file, content_); }
+void CsvWriter::save() {
+  file_.write(waiting_);
+  waiting_.clear();
+  file_.save();
+}
 
 std::string fixed(double value, int digits) {
   return formatted(value, std::chars_format::fixed, digits);

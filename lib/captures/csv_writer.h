@@ -7,21 +7,26 @@
 #include <string>
 #include <string_view>
 
+#include "rig/file.h"
+
 namespace vlp {
 
-/// A CSV file in the making: rows go in, save() writes the file whole or not at all. Fields are
-/// quoted where they must be.
+/// A CSV file in the making: rows go in and, a few at a time, on to the disk; with save() the file
+/// is there, whole. Fields are quoted where they must be. Each throws InputError when the file
+/// cannot be written.
 class CsvWriter {
  public:
-  explicit CsvWriter(std::initializer_list<std::string_view> header) { row(header); }
+  CsvWriter(const std::filesystem::path& file, std::initializer_list<std::string_view> header)
+      : file_(file) {
+    row(header);
+  }
 
   void row(std::initializer_list<std::string_view> fields);
-
-  /// Throws InputError when the file cannot be written.
-  void save(const std::filesystem::path& file) const;
+  void save();
 
  private:
-  std::string content_;
+  WholeFile file_;
+  std::string waiting_;
 };
 
 /// A number with so many digits after the point.

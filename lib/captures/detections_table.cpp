@@ -43,7 +43,7 @@ std::vector<Frame> read_detections(const std::filesystem::path& file) {
 void write_detections(const std::filesystem::path& file, const std::vector<Frame>& frames) {
   constexpr int digits = 4;        // a ten-thousandth of a pixel
   constexpr int sigma_digits = 4;  // significant
-  CsvWriter csv({"image", "lamp", "u_px", "v_px", "sigma_px"});
+  CsvWriter csv(file, {"image", "lamp", "u_px", "v_px", "sigma_px"});
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
       csv.row({frame.image, std::to_string(detection.lamp), fixed(detection.pixel.x(), digits),
@@ -51,7 +51,7 @@ void write_detections(const std::filesystem::path& file, const std::vector<Frame
                detection.sigma_px ? significant(*detection.sigma_px, sigma_digits) : ""});
     }
   }
-  csv.save(file);
+  csv.save();
 }
 
 }  // namespace vlp

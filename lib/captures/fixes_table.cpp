@@ -9,8 +9,8 @@ namespace vlp {
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows) {
   constexpr int digits = 9;     // nanometres
   constexpr int sd_digits = 6;  // significant
-  CsvWriter csv({"image", "status", "x_m", "y_m", "z_m", "yaw_rad", "sd_x_m", "sd_y_m", "sd_z_m",
-                 "sd_yaw_rad", "lamps", "residual_px"});
+  CsvWriter csv(file, {"image", "status", "x_m", "y_m", "z_m", "yaw_rad", "sd_x_m", "sd_y_m",
+                       "sd_z_m", "sd_yaw_rad", "lamps", "residual_px"});
   for (const FixRow& row : rows) {
     const std::string lamps = std::to_string(row.lamps);
     if (!row.fix) {
@@ -26,7 +26,7 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
              fixed(pose.yaw_rad, digits), sd_field(0), sd_field(1), sd_field(2), sd_field(3), lamps,
              significant(residual_px, sd_digits)});
   }
-  csv.save(file);
+  csv.save();
 }
 
 }  // namespace vlp

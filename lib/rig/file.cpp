@@ -21,33 +21,6 @@ namespace fs = std::filesystem;
   throw InputError(wanted, std::string("cannot be written: ") + std::strerror(errno));
 }
 
-/// A file open for writing that closes itself.
-class OutputFile {
- public:
-  OutputFile(int descriptor, const fs::path& wanted) : wanted_(wanted), descriptor_(descriptor) {
-    if (descriptor < 0) fail(wanted);
-  }
-  ~OutputFile() { ::close(descriptor_); }
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
-
-  void write(std::string_view content) {
-    while (!content.empty()) {
-      const ssize_t written = ::write(descriptor_, content.data(), content.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) fail(wanted_);
-      content.remove_prefix(static_cast<std::size_t>(written));
-    }
-  }
-  void sync() {
-    if (::fsync(descriptor_) != 0) fail(wanted_);
-  }
-
- private:
-  const fs::path& wanted_;
-  int descriptor_;
-};
-
 /// Where a symbolic link leads, though nothing may be there yet.
 fs::path without_links(fs::path path) {
   std::error_code error;
@@ -119,23 +92,45 @@ std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
   return content;
 }
 
-void write_file(const fs::path& path, std::string_view content) {
+WholeFile::WholeFile(const fs::path& path) : path_(path) {
   if (is_special(path)) {
-    OutputFile(::open(path.c_str(), O_WRONLY | O_CLOEXEC), path).write(content);
-    return;
+    descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+  } else {
+    target_ = without_links(path);
+    descriptor_ = create_beside(target_, temporary_);
   }
-  const fs::path target = without_links(path);
-  fs::path temporary;
-  OutputFile file(create_beside(target, temporary), path);
-  try {
-    file.write(content);
-    file.sync();
-    if (::rename(temporary.c_str(), target.c_str()) != 0) fail(path);
-  } catch (...) {
-    ::unlink(temporary.c_str());
-    throw;
+  if (descriptor_ < 0) {
+    temporary_.clear();
+    fail(path_);
   }
-  sync_folder(target.has_parent_path() ? target.parent_path() : ".");
+}
+
+void WholeFile::write(std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(descriptor_, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail(path_);
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void WholeFile::save() {
+  if (temporary_.empty()) return;
+  if (::fsync(descriptor_) != 0) fail(path_);
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(path_);
+  temporary_.clear();
+  sync_folder(target_.has_parent_path() ? target_.parent_path() : ".");
+}
+
+WholeFile::~WholeFile() {
+  ::close(descriptor_);
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void write_file(const fs::path& path, std::string_view content) {
+  WholeFile file(path);
+  file.write(content);
+  file.save();
 }
 
 }  // namespace vlp

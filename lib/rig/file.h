@@ -14,10 +14,28 @@ namespace vlp {
 /// no end: that is how a file cut short looks.
 std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes);
 
-/// Replaces `path` by `content` as a whole: a temporary file beside it, fsync, rename. Whatever
-/// interrupts it, `path` holds the old content or the new. A symbolic link is followed; a pipe
-/// or device is written to as it is. Throws InputError when it cannot be written. Killed, it may
-/// leave its temporary file, ".NAME.tmp-PID-N", which nothing reads.
+/// A file in the making that appears as a whole or not at all: a temporary file beside it, fsync,
+/// rename. Whatever interrupts it, `path` holds the old content or the new. A symbolic link is
+/// followed; a pipe or device is written to as it is. Killed, it may leave its temporary file,
+/// ".NAME.tmp-PID-N", which nothing reads.
+class WholeFile {
+ public:
+  /// Each throws InputError when the file cannot be written.
+  explicit WholeFile(const std::filesystem::path& path);
+  void write(std::string_view content);
+  void save();
+
+  /// Without save() nothing has happened to `path`.
+  ~WholeFile();
+  WholeFile(const WholeFile&) = delete;
+  WholeFile& operator=(const WholeFile&) = delete;
+
+ private:
+  std::filesystem::path path_, target_, temporary_;
+  int descriptor_ = -1;
+};
+
+/// Replaces `path` by `content` as a whole (WholeFile). Throws InputError.
 void write_file(const std::filesystem::path& path, std::string_view content);
 
 }  // namespace vlp

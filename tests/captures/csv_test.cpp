@@ -89,9 +89,9 @@ TEST_F(Csv, NamesLineAndColumnOfWhatIsNoNumber) {
 
 TEST_F(Csv, WritesWhatItReads) {
   const std::vector<std::string> fields{"plain", "a,b", "say \"hi\"", "two\nlines", " spaces ", ""};
-  CsvWriter writer({"one", "two"});
+  CsvWriter writer(folder / "b.csv", {"one", "two"});
   for (const std::string& field : fields) writer.row({field, "x"});
-  writer.save(folder / "b.csv");
+  writer.save();
   const CsvTable table(folder / "b.csv");
   ASSERT_EQ(table.rows(), fields.size());
   for (std::size_t row = 0; row < fields.size(); ++row) {

@@ -34,8 +34,9 @@ void make_example(const std::filesystem::path& folder) {
   rig.calibration.rotation_center =
       tilted_by(rig.calibration.camera, rad_from_deg(1.3), rad_from_deg(40));
   Random random(1);
+  std::filesystem::create_directories(folder);
   std::vector<Frame> frames;
-  CsvWriter truth({"image", "x_m", "y_m", "z_m", "yaw_rad"});
+  CsvWriter truth(folder / "truth.csv", {"image", "x_m", "y_m", "z_m", "yaw_rad"});
   for (int i = 0; i < 36; ++i) {
     rig.camera = {{-0.35 + 0.14 * (i % 6), -0.35 + 0.14 * (i / 6), 0.1 * (i % 4)},
                   wrapped_rad(rad_from_deg(100 * i))};
@@ -52,11 +53,10 @@ void make_example(const std::filesystem::path& folder) {
     truth.row({image.data(), fixed(p.x(), 6), fixed(p.y(), 6), fixed(p.z(), 6),
                fixed(rig.camera.yaw_rad, 9)});
   }
-  std::filesystem::create_directories(folder);
   write_lamp_map(folder / "lamps.yaml", rig.map);
   write_calibration(folder / "calibration.yaml", rig.calibration);
   write_detections(folder / "detections.csv", frames);
-  truth.save(folder / "truth.csv");
+  truth.save();
 }
 
 }  // namespace
