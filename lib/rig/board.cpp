@@ -4,10 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "rig/file.h"
-#include "rig/yaml_reader.h"
+#include "rig/yaml_parts.h"
 #include "rig/yaml_writer.h"
 
 namespace vlp {
@@ -47,19 +46,24 @@ std::string read_family(const YamlValue& value) {
 
 }  // namespace
 
-Board read_board(const std::filesystem::path& file) {
-  constexpr int most_tags = 1000;
-  YamlMap document = read_yaml(file, kFormat);
+Board read_board(YamlMap& map) {
+  constexpr int most_tags = 1000, largest_id = 1'000'000;  // families have fewer
   Board board;
-  board.family = read_family(document.required("family"));
-  board.cols = document.required("cols").integer_within(1, most_tags);
-  board.rows = document.required("rows").integer_within(1, most_tags);
-  board.tag_size_m = document.required("tag_size_m").number_within(1e-4, 2, "m");
-  board.tag_spacing = document.required("tag_spacing").number_within(0.01, 10, "(gap / tag)");
-  board.border_bits = document.required("border_bits").integer_within(1, 2);
-  board.corner_squares = document.required("corner_squares").boolean();
-  board.first_id = document.required("first_id").integer_within(0, std::numeric_limits<int>::max());
-  board.id_order = read_id_order(document.required("id_order"));
+  board.family = read_family(map.required("family"));
+  board.cols = map.required("cols").integer_within(1, most_tags);
+  board.rows = map.required("rows").integer_within(1, most_tags);
+  board.tag_size_m = map.required("tag_size_m").number_within(1e-4, 2, "m");
+  board.tag_spacing = map.required("tag_spacing").number_within(0.01, 10, "(gap / tag)");
+  board.border_bits = map.required("border_bits").integer_within(1, 2);
+  board.corner_squares = map.required("corner_squares").boolean();
+  board.first_id = map.required("first_id").integer_within(0, largest_id);
+  board.id_order = read_id_order(map.required("id_order"));
+  return board;
+}
+
+Board read_board(const std::filesystem::path& file) {
+  YamlMap document = read_yaml(file, kFormat);
+  Board board = read_board(document);
   document.finish();
   return board;
 }

@@ -5,52 +5,13 @@
 #include <cmath>
 #include <limits>
 
-#include "rig/yaml_reader.h"
+#include "rig/yaml_parts.h"
 
 namespace vlp {
 namespace {
 
 constexpr int kLarge = std::numeric_limits<int>::max();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-LensModel read_lens_model(const YamlValue& value) {
-  if (const auto model = lens_model_from_name(value.text())) return *model;
-  throw value.unknown("the models are: " + lens_model_names());
-}
-
-Readout read_readout(const YamlValue& value) {
-  if (value.text() == "rows") return Readout::rows;
-  if (value.text() == "columns") return Readout::columns;
-  throw value.unknown("the read-out is along rows or columns");
-}
-
-std::vector<double> read_intrinsics(const YamlValue& value, LensModel model) {
-  std::vector<double> intrinsics = value.numbers(parameter_count(model));
-  if (intrinsics[0] <= 0 || intrinsics[1] <= 0) {
-    throw value.error("the focal lengths, the first two, should be positive");
-  }
-  return intrinsics;
-}
-
-Camera read_camera(YamlMap map) {
-  Camera camera;
-  camera.id = map.required("id").text();
-  const YamlValue imager_px = map.required("imager_px");
-  const auto imager = imager_px.list();
-  if (imager.size() != 2) throw imager_px.error("should be [width, height]");
-  camera.imager_px = {imager[0].integer_within(1, 1 << 20), imager[1].integer_within(1, 1 << 20)};
-  camera.lens_model = read_lens_model(map.required("lens_model"));
-  camera.intrinsics = read_intrinsics(map.required("intrinsics"), camera.lens_model);
-  if (const auto value = map.optional("pixel_pitch_m")) {
-    camera.pixel_pitch_m = value->number_within(1e-7, 1e-4, "m");
-  }
-  if (const auto value = map.optional("row_time_s")) {
-    camera.row_time_s = value->number_within(1e-8, 1e-3, "s");
-  }
-  if (const auto value = map.optional("readout")) camera.readout = read_readout(*value);
-  map.finish();
-  return camera;
-}
 
 IntrinsicsReport read_intrinsics_report(YamlMap map) {
   IntrinsicsReport report;
@@ -140,7 +101,9 @@ Calibration read_calibration(const std::filesystem::path& file) {
   const auto dispersion = document.optional("dispersion");
   const auto history = document.optional("history");
   document.finish();
-  calibration.camera = read_camera(camera.map());
+  YamlMap camera_map = camera.map();
+  calibration.camera = read_camera(camera_map);
+  camera_map.finish();
   if (report) calibration.intrinsics_report = read_intrinsics_report(report->map());
   if (rotation_center) calibration.rotation_center = read_rotation_center(rotation_center->map());
   if (dispersion) calibration.dispersion = read_dispersion(dispersion->map());

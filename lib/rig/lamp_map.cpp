@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "rig/file.h"
-#include "rig/yaml_reader.h"
+#include "rig/yaml_parts.h"
 #include "rig/yaml_writer.h"
 
 namespace vlp {
@@ -21,7 +21,9 @@ std::optional<double> optional_within(YamlMap& map, const std::string& key, doub
   return value ? std::optional(value->number_within(min, max, unit)) : std::nullopt;
 }
 
-Lamp read_lamp(YamlMap map) {
+}  // namespace
+
+Lamp read_lamp(YamlMap& map) {
   Lamp lamp;
   lamp.id = map.required("id").integer_within(0, std::numeric_limits<int>::max());
   const auto position = map.required("position_m");
@@ -30,11 +32,10 @@ Lamp read_lamp(YamlMap map) {
   lamp.diameter_m = optional_within(map, "diameter_m", 1e-3, 10, "m");
   lamp.frequency_hz = optional_within(map, "frequency_hz", 50, 1e6, "Hz");
   lamp.duty = optional_within(map, "duty", 0.01, 0.99, "(a share of the period)");
-  map.finish();
   return lamp;
 }
 
-void check_against(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item) {
+void check_lamp(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item) {
   for (const Lamp& other : earlier) {
     if (other.id == lamp.id) {
       throw item.error("id " + std::to_string(lamp.id) + " stands twice");
@@ -46,16 +47,16 @@ void check_against(const std::vector<Lamp>& earlier, const Lamp& lamp, const Yam
   }
 }
 
-}  // namespace
-
 LampMap read_lamp_map(const std::filesystem::path& file) {
   YamlMap document = read_yaml(file, kFormat);
   const YamlValue list = document.required("lamps");
   document.finish();
   LampMap map;
   for (const YamlValue& item : list.list()) {
-    const Lamp lamp = read_lamp(item.map());
-    check_against(map.lamps, lamp, item);
+    YamlMap keys = item.map();
+    const Lamp lamp = read_lamp(keys);
+    keys.finish();
+    check_lamp(map.lamps, lamp, item);
     map.lamps.push_back(lamp);
   }
   if (map.lamps.empty()) throw list.error("holds no lamp");

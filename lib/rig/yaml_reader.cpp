@@ -94,7 +94,7 @@ YamlMap::YamlMap(const YAML::Node& node, const std::filesystem::path* file, std:
 }
 
 std::optional<YamlValue> YamlMap::optional(const std::string& key) {
-  known_.push_back(key);
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
   for (const Entry& entry : entries_) {
     if (entry.key != key) continue;
     // yaml-cpp takes the place of what comes next for the place of nothing.
@@ -120,6 +120,8 @@ void YamlMap::finish() const {
                 "key " + in_quotes(entry.key) + " is unknown here; the keys are: " + names);
   }
 }
+
+InputError YamlMap::error(const std::string& problem) const { return error(line_, problem); }
 
 InputError YamlMap::error(std::size_t line, const std::string& problem) const {
   return {*file_, line, prefix_, problem};

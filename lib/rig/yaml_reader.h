@@ -56,6 +56,9 @@ class YamlMap {
   /// Throws InputError for the first key that nobody asked for.
   void finish() const;
 
+  /// About the mapping as a whole.
+  InputError error(const std::string& problem) const;
+
  private:
   InputError error(std::size_t line, const std::string& problem) const;
 

@@ -96,7 +96,7 @@ TEST(Board, RefusesWhatNoBoardCanBe) {
   EXPECT_EQ(refusal_with("squares: true", "squares: yes"),
             "board.yaml:8: corner_squares: should be true or false, not 'yes'");
   EXPECT_EQ(refusal_with("first_id: 1", "first_id: -1"),
-            "board.yaml:9: first_id: should be a whole number within 0 and 2147483647, not '-1'");
+            "board.yaml:9: first_id: should be a whole number within 0 and 1000000, not '-1'");
 }
 
 TEST(Board, RefusesAnEmptyValueInItsOwnLine) {

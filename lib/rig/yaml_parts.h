@@ -1,0 +1,22 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "board.h"
+#include "calibration.h"
+#include "lamp_map.h"
+#include "yaml_reader.h"
+
+namespace vlp {
+
+/// The parts that more than one kind of document holds. Each asks `map` for the keys that are the
+/// fields of what it returns and leaves finish() to the caller, who may have keys of its own.
+/// Throws InputError.
+Lamp read_lamp(YamlMap& map);
+Board read_board(YamlMap& map);
+Camera read_camera(YamlMap& map);
+
+/// Refuses a lamp that has the id or the place of an earlier one.
+void check_lamp(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item);
+
+}  // namespace vlp

@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/board_layout.h"
+
+#include <gtest/gtest.h>
+
+namespace vlp {
+namespace {
+
+Board board_with(const IdOrder& order) {
+  return {"tag36h11", 3, 2, 0.02, 0.5, 1, false, 10, order};
+}
+
+/// Ids row by row from the top left.
+std::vector<int> ids_of(const IdOrder& order) {
+  std::vector<int> ids;
+  for (const BoardTag& tag : board_layout(board_with(order))) ids.push_back(tag.id);
+  return ids;
+}
+
+TEST(BoardLayout, CountsIdsInTheirOrder) {
+  using enum BoardCorner;
+  EXPECT_EQ(ids_of({false, top_left}), (std::vector{10, 11, 12, 13, 14, 15}));
+  EXPECT_EQ(ids_of({false, top_right}), (std::vector{12, 11, 10, 15, 14, 13}));
+  EXPECT_EQ(ids_of({false, bottom_left}), (std::vector{13, 14, 15, 10, 11, 12}));
+  EXPECT_EQ(ids_of({false, bottom_right}), (std::vector{15, 14, 13, 12, 11, 10}));
+  EXPECT_EQ(ids_of({true, top_left}), (std::vector{10, 12, 14, 11, 13, 15}));
+  EXPECT_EQ(ids_of({true, top_right}), (std::vector{14, 12, 10, 15, 13, 11}));
+  EXPECT_EQ(ids_of({true, bottom_left}), (std::vector{11, 13, 15, 10, 12, 14}));
+  EXPECT_EQ(ids_of({true, bottom_right}), (std::vector{15, 13, 11, 14, 12, 10}));
+}
+
+TEST(BoardLayout, PutsCornersOneTagAndOneGapApart) {
+  const Board board = board_with({false, BoardCorner::top_left});
+  EXPECT_DOUBLE_EQ(tag_pitch_m(board), 0.03);
+  EXPECT_TRUE(tag_field_m(board).isApprox(Eigen::Vector2d(0.08, 0.05)));
+  const BoardTag last = board_layout(board).back();
+  const auto [bottom_left, bottom_right, top_right, top_left] = last.corners_m;
+  EXPECT_TRUE(bottom_left.isApprox(Eigen::Vector2d(0.06, 0.05)));
+  EXPECT_TRUE(bottom_right.isApprox(Eigen::Vector2d(0.08, 0.05)));
+  EXPECT_TRUE(top_right.isApprox(Eigen::Vector2d(0.08, 0.03)));
+  EXPECT_TRUE(top_left.isApprox(Eigen::Vector2d(0.06, 0.03)));
+}
+
+}  // namespace
+}  // namespace vlp
