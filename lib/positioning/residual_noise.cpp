@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "positioning/residual_noise.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "rig/detection.h"
 
 namespace vlp {
 
@@ -13,8 +16,8 @@ std::optional<double> residual_noise_px(std::span<const Fix> fixes) {
     sum_of_squares += fix.lamps * fix.residual_px * fix.residual_px;
     degrees_of_freedom += 2 * fix.lamps - 4;
   }
-  if (!(sum_of_squares > 0)) return std::nullopt;
-  return std::sqrt(sum_of_squares / degrees_of_freedom);
+  if (degrees_of_freedom == 0) return std::nullopt;
+  return std::clamp(std::sqrt(sum_of_squares / degrees_of_freedom), kMinSigma_px, kMaxSigma_px);
 }
 
 }  // namespace vlp
