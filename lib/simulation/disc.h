@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "simulation/coverage.h"
+
+namespace vlp {
+
+/// A disc around the origin with the radiance 1 - (1 - edge_share) (r / radius)^2.
+class Disc {
+ public:
+  Disc(double radius_m, double edge_share) : radius_m_(radius_m), fall_(1 - edge_share) {}
+
+  Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+    return plane_hit(origin, direction) / radius_m_;
+  }
+
+  /// The integral over the part of the triangle (0, p, q) in the disc, in units of the radius
+  /// (add_shape needs no others). A triangle inside: the area (p x q) / 2, and of r^2
+  /// (p x q) (p p + p q + q q) / 12. A sector of angle a: a / 2 and a / 4.
+  double edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+
+ private:
+  double triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+
+  double radius_m_, fall_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/exposure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace vlp {
+namespace {
+
+/// A Poisson number. Small means by adding up probabilities until they pass a random one; from 16
+/// on by the quantile of a normal number with its correction for the skew (Cornish and Fisher,
+/// 1938), rounded; the correction and the rounding add 1/18 + 1/12 to the variance, which is taken
+/// off before. Mean and variance are right, the distribution nearly so.
+float poisson(float mean, cv::RNG& random) {
+  constexpr float small = 16;
+  if (mean <= 0) return 0;
+  if (mean < small) {
+    const double limit = random.uniform(0.0, 1.0);
+    double probability = std::exp(-double(mean)), sum = probability;
+    int count = 0;
+    for (; limit > sum && count < 200; sum += probability) probability *= double(mean) / ++count;
+    return static_cast<float>(count);
+  }
+  constexpr double added = 1.0 / 18 + 1.0 / 12;
+  const double z = random.gaussian(1);
+  return static_cast<float>(
+      std::max(0.0, std::round(mean + std::sqrt(mean - added) * z + (z * z - 1) / 6)));
+}
+
+void add_bloom(const Bloom& bloom, float full_well_e, cv::Mat1f& electrons) {
+  cv::Mat1f excess(electrons - full_well_e);
+  excess = cv::max(excess, 0);
+  if (cv::countNonZero(excess) == 0) return;
+  cv::GaussianBlur(excess, excess, {}, bloom.sigma_px, bloom.sigma_px, cv::BORDER_CONSTANT);
+  electrons += bloom.share * excess;
+}
+
+}  // namespace
+
+cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed) {
+  cv::RNG random(seed);
+  cv::Mat1f electrons = mean_electrons.clone();
+  if (sensor.shot_noise) {
+    for (float& value : electrons) value = poisson(value, random);
+  }
+  const auto full_well = static_cast<float>(sensor.full_well_e);
+  if (sensor.bloom) add_bloom(*sensor.bloom, full_well, electrons);
+  const auto read_noise = sensor.read_noise_e;
+  for (float& value : electrons) {
+    value = std::min(value, full_well);
+    if (read_noise > 0) value += static_cast<float>(random.gaussian(read_noise));
+  }
+  cv::Mat image;
+  electrons.convertTo(image, sensor.bits == 8 ? CV_8U : CV_16U, sensor.gain_dn_per_e,
+                      sensor.black_level_dn);
+  return image;
+}
+
+}  // namespace vlp

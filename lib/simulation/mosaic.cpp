@@ -1,0 +1,113 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/mosaic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace vlp {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Ascending, with those that are the same but for rounding once.
+std::vector<double> distinct(std::vector<double> lines) {
+  constexpr double same_m = 1e-9;
+  std::sort(lines.begin(), lines.end());
+  const auto same = [](double a, double b) { return b - a < same_m; };
+  lines.erase(std::unique(lines.begin(), lines.end(), same), lines.end());
+  return lines;
+}
+
+/// How many lines are at or below a coordinate: 0 before the first.
+int cell_of(const std::vector<double>& lines, double at) {
+  return static_cast<int>(std::upper_bound(lines.begin(), lines.end(), at) - lines.begin());
+}
+
+/// The line that is closest.
+int line_at(const std::vector<double>& lines, double at) {
+  const auto closer = [&](double a, double b) { return std::abs(a - at) < std::abs(b - at); };
+  return static_cast<int>(std::min_element(lines.begin(), lines.end(), closer) - lines.begin());
+}
+
+/// A walk over the lines of one axis: the cell, and the share of the way where it ends.
+struct Walk {
+  Walk(const std::vector<double>& all, double from, double way)
+      : lines(all), start(from), length(way), cell(cell_of(all, from)) {
+    if (way < 0 && cell > 0 && all[std::size_t(cell) - 1] == from) --cell;  // it leaves downwards
+  }
+  double end() const {
+    const int line = length > 0 ? cell : cell - 1;
+    if (length == 0 || line < 0 || line >= static_cast<int>(lines.size())) return kInfinity;
+    return (lines[static_cast<std::size_t>(line)] - start) / length;
+  }
+  void step() { cell += length > 0 ? 1 : -1; }
+
+  const std::vector<double>& lines;
+  double start, length;
+  int cell;
+};
+
+}  // namespace
+
+Mosaic::Mosaic(const std::vector<Rectangle>& rectangles) {
+  for (const Rectangle& each : rectangles) {
+    x_m_.insert(x_m_.end(), {each.left_m, each.right_m});
+    y_m_.insert(y_m_.end(), {each.top_m, each.bottom_m});
+  }
+  x_m_ = distinct(std::move(x_m_));
+  y_m_ = distinct(std::move(y_m_));
+  stride_ = x_m_.size() + 1;
+  values_.assign(stride_ * (y_m_.size() + 1), 0);
+  for (const Rectangle& rectangle : rectangles) fill(rectangle);
+  sum_up();
+}
+
+void Mosaic::fill(const Rectangle& rectangle) {
+  const int top = line_at(y_m_, rectangle.top_m), bottom = line_at(y_m_, rectangle.bottom_m);
+  const int left = line_at(x_m_, rectangle.left_m), right = line_at(x_m_, rectangle.right_m);
+  for (int row = top + 1; row <= bottom; ++row) {
+    for (int column = left + 1; column <= right; ++column) {
+      values_[index(column, row)] = rectangle.value;
+    }
+  }
+}
+
+void Mosaic::sum_up() {
+  sums_.assign(values_.size(), 0);
+  for (std::size_t i = 0; i < values_.size(); ++i) {
+    const std::size_t column = i % stride_;
+    if (column < 2) continue;
+    sums_[i] = sums_[i - 1] + values_[i - 1] * (x_m_[column - 1] - x_m_[column - 2]);
+  }
+}
+
+/// The integral of the pattern along a row up to x in a column.
+double Mosaic::value_sum(int column, int row, double x) const {
+  if (column == 0) return 0;
+  const std::size_t i = index(column, row);
+  return sums_[i] + values_[i] * (x - x_m_[static_cast<std::size_t>(column) - 1]);
+}
+
+double Mosaic::edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+  const Eigen::Vector2d way = q - p;
+  if (!way.allFinite()) return std::numeric_limits<double>::quiet_NaN();
+  Walk x(x_m_, p.x(), way.x()), y(y_m_, p.y(), way.y());
+  double sum = 0, done = 0;
+  while (done < 1) {
+    const double x_end = x.end(), y_end = y.end();
+    const double next = std::min({x_end, y_end, 1.0});
+    const double middle = p.x() + way.x() * (done + next) / 2;
+    sum += value_sum(x.cell, y.cell, middle) * (next - done);
+    if (x_end <= y_end) {
+      x.step();
+    } else {
+      y.step();
+    }
+    done = next;
+  }
+  return sum * way.y();
+}
+
+}  // namespace vlp

@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "simulation/coverage.h"
+
+namespace vlp {
+
+struct Rectangle {
+  double left_m, top_m, right_m, bottom_m;
+  double value;
+};
+
+/// A flat pattern of rectangles, zero around them.
+class Mosaic {
+ public:
+  /// Later rectangles lie on earlier ones. Edges closer than 1 nm are one.
+  explicit Mosaic(const std::vector<Rectangle>& rectangles);
+
+  Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+    return plane_hit(origin, direction);
+  }
+
+  /// The integral along the edge of G dy, with G the integral of the pattern from the far left to
+  /// x.
+  double edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+
+ private:
+  void fill(const Rectangle& rectangle);
+  void sum_up();
+  std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row) * stride_ + static_cast<std::size_t>(column);
+  }
+  double value_sum(int column, int row, double x) const;
+
+  std::vector<double> x_m_, y_m_;
+  /// Row by row; each row begins with the nothing on its left and ends with that on its right.
+  std::vector<double> values_, sums_;
+  std::size_t stride_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/pixel_window.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "geometry/angles.h"
+
+namespace vlp {
+
+PixelWindow whole_window(const PixelRays& rays) {
+  const int margin = rays.margin_px();
+  return {-margin, rays.lines() + margin, -margin, rays.places() + margin};
+}
+
+PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const CarrierMotion& motion,
+                      const Shutter& shutter, const PixelRays& rays) {
+  const double begin_s = shutter.begin_s(-rays.margin_px());
+  const double end_s = shutter.end_s(rays.lines() + rays.margin_px());
+  // Between two samples an arc of 450 px bulges by less than 0.1 px.
+  const double step_rad = rad_from_deg(2);
+  const int samples =
+      4 + static_cast<int>(std::abs(motion.turn_rate_rad_per_s) * (end_s - begin_s) / step_rad);
+  constexpr double far = 1e6;
+  Eigen::Array2d least = Eigen::Array2d::Constant(far), most = -least;
+  for (int i = 0; i <= samples; ++i) {
+    const double time_s = begin_s + (end_s - begin_s) * i / samples;
+    const Eigen::Isometry3d camera_from_world = motion.world_from_camera(time_s).inverse();
+    for (const Eigen::Vector3d& point_m : outline_m) {
+      const auto pixel = rays.lens().project(camera_from_world * point_m);
+      if (!pixel) return whole_window(rays);
+      const Eigen::Array2d at = rays.line_and_place(*pixel).array().max(-far).min(far);
+      least = least.min(at);
+      most = most.max(at);
+    }
+  }
+  constexpr int between_points_px = 2;  // the outline may bulge there
+  const int spare = rays.margin_px() + between_points_px;
+  const PixelWindow all = whole_window(rays);
+  return {std::max(all.line_begin, int(std::floor(least[0])) - spare),
+          std::min(all.line_end, int(std::ceil(most[0])) + spare + 1),
+          std::max(all.place_begin, int(std::floor(least[1])) - spare),
+          std::min(all.place_end, int(std::ceil(most[1])) + spare + 1)};
+}
+
+std::vector<Eigen::Vector3d> outline_of(const Glow& glow) {
+  constexpr int count = 48;
+  std::vector<Eigen::Vector3d> points_m;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2 * std::numbers::pi * i / count;
+    points_m.push_back(glow.position_m +
+                       glow.diameter_m / 2 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
+  }
+  return points_m;
+}
+
+std::vector<Eigen::Vector3d> outline_of(const Panel& panel) {
+  constexpr int per_edge = 24;
+  std::vector<Eigen::Vector3d> points_m;
+  for (int i = 0; i <= per_edge; ++i) {
+    const double share = double(i) / per_edge;
+    const Eigen::Vector3d along_a = panel.corner_m + share * panel.edge_a_m;
+    const Eigen::Vector3d along_b = panel.corner_m + share * panel.edge_b_m;
+    points_m.insert(points_m.end(),
+                    {along_a, along_a + panel.edge_b_m, along_b, along_b + panel.edge_a_m});
+  }
+  return points_m;
+}
+
+}  // namespace vlp

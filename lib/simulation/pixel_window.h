@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "simulation/pixel_rays.h"
+#include "simulation/shot.h"
+#include "simulation/shutter.h"
+
+namespace vlp {
+
+/// Lines and places from begin to before end; they may lie in the margin.
+struct PixelWindow {
+  int line_begin, line_end, place_begin, place_end;
+
+  bool empty() const { return line_begin >= line_end || place_begin >= place_end; }
+  cv::Mat1f image(float value) const {
+    return cv::Mat1f(line_end - line_begin, place_end - place_begin, value);
+  }
+  /// The window's part of an image with margin (PixelRays::image).
+  cv::Mat1f of(const cv::Mat1f& image, int margin_px) const {
+    return image(cv::Rect(place_begin + margin_px, line_begin + margin_px, place_end - place_begin,
+                          line_end - line_begin));
+  }
+};
+
+/// The image and its margin.
+PixelWindow whole_window(const PixelRays& rays);
+
+/// Where something with that outline (points in world, close together) is seen during that part of
+/// the exposure while the camera moves, blur included. The whole where the lens does not describe
+/// all of the outline.
+PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const CarrierMotion& motion,
+                      const Shutter& shutter, const PixelRays& rays);
+
+/// Points around the rim of a glow, or along the edges of a panel.
+std::vector<Eigen::Vector3d> outline_of(const Glow& glow);
+std::vector<Eigen::Vector3d> outline_of(const Panel& panel);
+
+}  // namespace vlp

@@ -1,0 +1,131 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "geometry/frames.h"
+#include "rig/board.h"
+#include "rig/calibration.h"
+#include "rig/lamp_map.h"
+#include "simulation/capture_set.h"
+
+namespace vlp {
+
+/// Radiances, named ..._e_per_s, are the electrons per second that a source frees in a pixel on the
+/// optical axis that it fills.
+
+/// A horizontal disc of light. Its radiance at the distance r of its centre is
+///   radiance (1 - (1 - edge_share) (2 r / diameter)^2).
+struct Glow {
+  Eigen::Vector3d position_m;
+  double diameter_m;
+  double radiance_e_per_s;
+  double edge_share;
+};
+
+/// A lamp of the lamp map: a glow that a square wave switches.
+struct SceneLamp {
+  int id;
+  Glow glow;
+  double frequency_hz;
+  double duty;
+  /// In periods, at time 0: lit while frac(frequency t + phase) < duty. Without it the lamp runs
+  /// free: its phase is another one in each capture.
+  std::optional<double> phase;
+  /// What lamps.yaml says of its place, minus where it is.
+  Eigen::Vector3d map_error_m;
+};
+
+/// The light of a lamp thrown back by a shiny floor onto the ceiling: fades towards its rim and
+/// flickers with its lamp.
+struct Reflection {
+  Glow glow;
+  std::size_t lamp;  // in Scene::lamps
+};
+
+/// A rectangle in the world: a corner and, at right angles, its two edges from there.
+struct Panel {
+  Eigen::Vector3d corner_m;
+  Eigen::Vector3d edge_a_m, edge_b_m;
+  double radiance_e_per_s;
+};
+
+/// What is in view besides the lamps.
+struct Clutter {
+  std::vector<Glow> steady_lamps;
+  std::vector<Panel> windows;
+  std::vector<Reflection> reflections;
+  /// Hide what is behind them.
+  std::vector<Panel> occluders;
+};
+
+struct Optics {
+  /// Sigma of the Gaussian point spread.
+  double blur_px;
+  /// A ray at the angle a from the optical axis arrives weakened by cos(a)^power; 4 is natural.
+  double vignetting_power;
+};
+
+/// Charge above the full well: `share` of it goes to the pixels around, as a Gaussian.
+struct Bloom {
+  double share;
+  double sigma_px;
+};
+
+/// From electrons to grey levels:
+///   level = round(black_level + gain (min(Poisson(mean) + bloom, full well) + Normal(read noise)))
+struct Sensor {
+  int bits;  // 8 or 16
+  double gain_dn_per_e;
+  double black_level_dn;
+  double full_well_e;
+  double read_noise_e;
+  bool shot_noise;
+  std::optional<Bloom> bloom;
+};
+
+/// How the camera sits on what carries it and turns about a vertical axis. It leans by a tilt that
+/// adds no yaw (level_from_zenith): in the camera, up is (sin t cos a, sin t sin a, cos t), with
+/// the tilt t and its azimuth a from the image's x to its y.
+struct Mount {
+  Eigen::Matrix3d level_from_camera;
+  /// From the axis to the camera, in the level frame.
+  Eigen::Vector2d lever_arm_m;
+};
+
+struct SceneBoard {
+  Board print;
+  double margin_m;
+  /// Deflection into the paper at the middle, along x and along y (mrcal's calobject_warp):
+  /// z = warp_x (1 - a^2) + warp_y (1 - b^2), with a and b from -1 to 1 over the tags.
+  Eigen::Vector2d warp_m;
+  double white_e_per_s, black_e_per_s, surround_e_per_s;
+};
+
+struct Scene {
+  std::uint64_t seed;
+  /// Row time and read-out are given.
+  Camera camera;
+  Optics optics;
+  Sensor sensor;
+  Mount mount;
+  /// Radiance of the ceiling.
+  double ambient_e_per_s;
+  std::vector<SceneLamp> lamps;
+  Clutter clutter;
+  std::optional<SceneBoard> board;
+  std::vector<CaptureSet> sets;
+};
+
+/// Reads `vlp-scene/1`; datasets/README.md lists the keys, the scenes there explain them. Angles
+/// are in degrees there. Throws InputError, with line and key: unknown or missing keys, figures
+/// that cannot be, a lamp that is not above the camera, a spot outside the room.
+Scene read_scene(const std::filesystem::path& file);
+
+}  // namespace vlp

@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rig/yaml_reader.h"
+#include "simulation/scene.h"
+
+/// The parts of a scene file. Each throws InputError.
+namespace vlp {
+
+struct Room {
+  Eigen::Vector3d min_m, max_m;
+};
+
+/// Of one folder.
+inline constexpr int kMostCaptures = 1'000'000;
+
+Eigen::Vector3d read_point(const YamlValue& value);
+double read_radiance(YamlMap& map, const std::string& key);
+/// Refuses more than kMostCaptures; `where` has error().
+template <typename Place>
+void check_count(double captures, const Place& where) {
+  if (captures <= kMostCaptures) return;
+  throw where.error("makes more than " + std::to_string(kMostCaptures) + " captures");
+}
+
+/// Lights are checked against the room.
+std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room);
+Clutter read_clutter(YamlMap map, const std::vector<SceneLamp>& lamps, const Room& room);
+/// A glow's keys but edge_share.
+Glow read_glow(YamlMap& map, const Room& room);
+double read_edge_share(YamlMap& map);
+SceneBoard read_scene_board(YamlMap map);
+/// Where the axis stands at each capture: spots, a grid or a drive, all in the room.
+void read_places(YamlMap& map, const Scene& scene, const Room& room, LampCaptures& captures);
+/// Heights are checked against the lamps, too.
+CaptureSet read_capture_set(YamlMap map, const Scene& scene, const Room& room);
+
+}  // namespace vlp

@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/shot.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <random>
+
+#include "camera/lens.h"
+#include "rig/board_layout.h"
+
+namespace vlp {
+namespace {
+
+cv::RNG random_of(std::uint64_t seed, const std::string& folder, std::size_t index) {
+  std::vector<std::uint32_t> words{std::uint32_t(seed), std::uint32_t(seed >> 32),
+                                   std::uint32_t(index), std::uint32_t(index >> 32)};
+  words.insert(words.end(), folder.begin(), folder.end());
+  std::seed_seq sequence(words.begin(), words.end());
+  std::array<std::uint32_t, 2> state{};
+  sequence.generate(state.begin(), state.end());
+  return cv::RNG(state[0] | std::uint64_t(state[1]) << 32);
+}
+
+std::uint64_t next_seed(cv::RNG& random) {
+  const std::uint64_t high = random.next();
+  return high << 32 | random.next();
+}
+
+std::string image_name(std::size_t index, std::size_t count) {
+  const std::string number = std::to_string(index);
+  const std::size_t digits = std::max<std::size_t>(4, std::to_string(count - 1).size());
+  return std::string(digits - number.size(), '0') + number + ".png";
+}
+
+Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
+  return Eigen::AngleAxisd(angle_rad, axis.normalized()).toRotationMatrix();
+}
+
+/// Which of a set's heights, spots and yaws a capture has, and how long its pass lasts already.
+struct Step {
+  std::size_t height, spot, yaw;
+  double driven_s;
+};
+
+Step step_of(const LampCaptures& captures, std::size_t index) {
+  const std::size_t spots = captures.spots_m.size(), yaws = captures.yaws_rad.size();
+  const auto repeat = static_cast<std::size_t>(captures.repeat);
+  if (captures.drive) {
+    const std::size_t turned = index / spots / repeat;
+    return {turned / yaws, index % spots, turned % yaws,
+            static_cast<double>(index % spots) * captures.interval_s};
+  }
+  const std::size_t turned = index / repeat;
+  return {turned / yaws / spots, turned / yaws % spots, turned % yaws, 0};
+}
+
+}  // namespace
+
+Pose CarrierMotion::pose(double time_s) const {
+  const double yaw = yaw_rad + turn_rate_rad_per_s * time_s;
+  Pose pose{axis_m, yaw};
+  pose.position_m.head<2>() +=
+      velocity_m_per_s * time_s + Eigen::Rotation2Dd(yaw) * mount.lever_arm_m;
+  return pose;
+}
+
+Eigen::Isometry3d CarrierMotion::world_from_camera(double time_s) const {
+  const Pose level = pose(time_s);
+  Eigen::Isometry3d world_from_camera;
+  world_from_camera.linear() = rotation_about_z(level.yaw_rad) * mount.level_from_camera;
+  world_from_camera.translation() = level.position_m;
+  return world_from_camera;
+}
+
+Eigen::Isometry3d BoardShot::camera_from_board(double time_s) const {
+  return Eigen::Translation3d(velocity_in_camera_m_per_s * time_s) * camera_from_board_at_0;
+}
+
+std::size_t shots_in(const CaptureSet& set) {
+  if (set.board) return static_cast<std::size_t>(set.board->count);
+  const LampCaptures& lamps = *set.lamps;
+  return lamps.heights_m.size() * lamps.spots_m.size() * lamps.yaws_rad.size() *
+         static_cast<std::size_t>(lamps.repeat);
+}
+
+LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
+  const LampCaptures& captures = *set.lamps;
+  cv::RNG random = random_of(scene.seed, set.folder, index);
+  const Step step = step_of(captures, index);
+  const double jitter_rad = captures.yaw_jitter_rad * random.uniform(-1.0, 1.0);
+
+  LampShot shot;
+  shot.image = image_name(index, shots_in(set));
+  shot.time_s = static_cast<double>(index) * captures.interval_s;
+  shot.exposure_s = set.exposure_s;
+  shot.motion.axis_m << captures.spots_m[step.spot], captures.heights_m[step.height];
+  shot.motion.velocity_m_per_s.setZero();
+  if (const auto& drive = captures.drive) {
+    shot.motion.velocity_m_per_s =
+        (drive->to_m - drive->from_m).normalized() * drive->speed_m_per_s;
+  }
+  shot.motion.turn_rate_rad_per_s = captures.turn_rate_rad_per_s;
+  shot.motion.yaw_rad =
+      captures.yaws_rad[step.yaw] + jitter_rad + captures.turn_rate_rad_per_s * step.driven_s;
+  shot.motion.mount = scene.mount;
+  for (const SceneLamp& lamp : scene.lamps) {
+    const double free_phase = random.uniform(0.0, 1.0);
+    const double periods = lamp.phase ? *lamp.phase + lamp.frequency_hz * shot.time_s : free_phase;
+    shot.waves.push_back({lamp.frequency_hz, lamp.duty, periods - std::floor(periods)});
+  }
+  shot.noise_seed = next_seed(random);
+  return shot;
+}
+
+BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
+  const BoardViews& views = *set.board;
+  const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
+  cv::RNG random = random_of(scene.seed, set.folder, index);
+  const auto share = [&] { return random.uniform(-1.0, 1.0); };
+
+  // The board's middle, and the board facing the camera; then turned in place. Towards the middle
+  // of the image from where the lens has no ray.
+  const Eigen::Vector2d half((scene.camera.imager_px[0] - 1) / 2.0,
+                             (scene.camera.imager_px[1] - 1) / 2.0);
+  Eigen::Vector2d off{share(), share()};
+  off = views.spread * off.cwiseProduct(half);
+  auto ray = lens.unproject(half + off);
+  for (int halving = 0; !ray && halving < 20; ++halving) ray = lens.unproject(half + (off /= 2));
+  const Eigen::Vector3d sight =
+      ray ? ray->direction.normalized() : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+  const double distance_m = random.uniform(views.distance_m.first, views.distance_m.second);
+  const double azimuth = std::numbers::pi * share(), tilt = views.tilt_rad * std::abs(share());
+  const double roll = views.roll_rad * share();
+  const Eigen::Matrix3d facing =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), sight).toRotationMatrix();
+  const Eigen::Vector3d tilt_axis(std::cos(azimuth), std::sin(azimuth), 0);
+
+  BoardShot shot;
+  shot.image = image_name(index, shots_in(set));
+  shot.exposure_s = set.exposure_s;
+  shot.camera_from_board_at_0.linear() =
+      facing * rotation(tilt, tilt_axis) * rotation(roll, Eigen::Vector3d::UnitZ());
+  Eigen::Vector3d middle_m(0, 0, 0);
+  middle_m.head<2>() = tag_field_m(scene.board->print) / 2;
+  shot.camera_from_board_at_0.translation() =
+      distance_m * sight - shot.camera_from_board_at_0.linear() * middle_m;
+  shot.velocity_in_camera_m_per_s = views.velocity_m_per_s;
+  shot.noise_seed = next_seed(random);
+  return shot;
+}
+
+}  // namespace vlp

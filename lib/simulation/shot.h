@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "simulation/modulation.h"
+#include "simulation/scene.h"
+
+namespace vlp {
+
+/// The camera on its carrier while it takes a picture. Times count from the middle of the exposure
+/// of the image's middle row (or column), which is when the capture is said to be taken.
+struct CarrierMotion {
+  /// The vertical axis at time 0, at the height of the camera.
+  Eigen::Vector3d axis_m;
+  Eigen::Vector2d velocity_m_per_s;
+  double yaw_rad;
+  double turn_rate_rad_per_s;
+  Mount mount;
+
+  bool at_rest() const { return velocity_m_per_s.isZero(0) && turn_rate_rad_per_s == 0; }
+  Pose pose(double time_s) const;
+  Eigen::Isometry3d world_from_camera(double time_s) const;
+};
+
+/// A capture of the lamps, with everything that chance decides.
+struct LampShot {
+  std::string image;
+  double time_s;
+  double exposure_s;
+  CarrierMotion motion;
+  /// Of each lamp of the scene; time 0 is time_s.
+  std::vector<SquareWave> waves;
+  std::uint64_t noise_seed;
+};
+
+/// A capture of the board.
+struct BoardShot {
+  std::string image;
+  double exposure_s;
+  Eigen::Isometry3d camera_from_board_at_0;
+  Eigen::Vector3d velocity_in_camera_m_per_s;
+  std::uint64_t noise_seed;
+
+  Eigen::Isometry3d camera_from_board(double time_s) const;
+};
+
+/// How many captures a set has.
+std::size_t shots_in(const CaptureSet& set);
+
+/// The capture of that index; it depends on the scene's seed, the set's folder and the index alone.
+LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
+BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
+
+}  // namespace vlp

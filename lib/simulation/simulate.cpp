@@ -1,0 +1,151 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/simulate.h"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <thread>
+
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "simulation/exposure.h"
+#include "simulation/frame_renderer.h"
+#include "simulation/truth.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<CaptureSet> wanted_sets(const Scene& scene, const std::vector<std::string>& folders) {
+  if (folders.empty()) return scene.sets;
+  std::vector<CaptureSet> sets;
+  for (const std::string& folder : folders) {
+    const auto same = [&](const CaptureSet& each) { return each.folder == folder; };
+    const auto set = std::find_if(scene.sets.begin(), scene.sets.end(), same);
+    if (set == scene.sets.end()) {
+      throw std::invalid_argument("the scene has no captures called '" + folder + "'");
+    }
+    if (std::none_of(sets.begin(), sets.end(), same)) sets.push_back(*set);
+  }
+  return sets;
+}
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw InputError(folder, "cannot be made: " + error.message());
+}
+
+/// Claims a folder for a scene, or finds that it is.
+void claim(const fs::path& output, const std::string& origin) {
+  const fs::path mark = output / "scene.yaml";
+  if (fs::exists(mark)) {
+    constexpr std::size_t most_bytes = 2 << 20;
+    if (read_text_file(mark, most_bytes) == origin) return;
+    throw InputError(output,
+                     "holds captures of another scene, seed or version: choose another folder or "
+                     "remove it");
+  }
+  make_folder(output);
+  // A run that was killed here may have left its unfinished scene.yaml.
+  const auto foreign = [](const fs::directory_entry& entry) {
+    return !entry.path().filename().string().starts_with(".scene.yaml.tmp-");
+  };
+  if (std::any_of(fs::directory_iterator(output), fs::directory_iterator(), foreign)) {
+    throw InputError(output,
+                     "is not empty and holds no captures of this scene: choose another folder");
+  }
+  write_file(mark, origin);
+}
+
+void write_common_files(const Scene& scene, const fs::path& output) {
+  if (!scene.lamps.empty()) {
+    write_lamp_map(output / "lamps.yaml", lamp_map_of(scene, true));
+    write_lamp_map(output / "true_lamps.yaml", lamp_map_of(scene, false));
+  }
+  if (scene.board) write_board(output / "board.yaml", scene.board->print);
+  write_calibration(output / "true_calibration.yaml", true_calibration(scene));
+}
+
+void write_image(const fs::path& file, const cv::Mat& lines, Readout readout) {
+  const cv::Mat image = readout == Readout::rows ? lines : cv::Mat(lines.t());
+  std::vector<unsigned char> bytes;
+  cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+/// Renders a capture unless it is there.
+bool render(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
+            std::size_t index, const fs::path& folder) {
+  const auto write = [&](const std::string& image, const auto& electrons, std::uint64_t seed) {
+    if (fs::exists(folder / image)) return false;
+    write_image(folder / image, expose(scene.sensor, electrons(), seed), renderer.rays().readout());
+    return true;
+  };
+  if (set.board) {
+    const BoardShot shot = board_shot(scene, set, index);
+    return write(
+        shot.image, [&] { return renderer.board_electrons(shot); }, shot.noise_seed);
+  }
+  const LampShot shot = lamp_shot(scene, set, index);
+  return write(
+      shot.image, [&] { return renderer.lamp_electrons(shot); }, shot.noise_seed);
+}
+
+/// Calls task(0) to task(count - 1), each once, on so many threads. The first exception ends it.
+void in_parallel(std::size_t count, int threads, const std::function<void(std::size_t)>& task) {
+  std::atomic<std::size_t> next = 0;
+  std::mutex failing;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    try {
+      for (std::size_t i = next++; i < count; i = next++) task(i);
+    } catch (...) {
+      next = count;
+      const std::lock_guard lock(failing);
+      if (!failure) failure = std::current_exception();
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (std::size_t i = 1; i < std::min<std::size_t>(std::size_t(threads), count); ++i)
+      workers.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace
+
+SimulationSummary simulate(const Scene& scene, const fs::path& output,
+                           const SimulationOptions& options, const SimulationProgress& progress) {
+  const std::vector<CaptureSet> sets = wanted_sets(scene, options.folders);
+  const FrameRenderer renderer(scene);
+  claim(output, options.origin);
+  write_common_files(scene, output);
+
+  std::size_t total = 0;
+  for (const CaptureSet& set : sets) total += shots_in(set);
+  SimulationSummary summary;
+  std::mutex counting;
+  for (const CaptureSet& set : sets) {
+    const fs::path folder = output / set.folder;
+    make_folder(folder);
+    write_truth(scene, renderer, set, folder);
+    in_parallel(shots_in(set), options.threads, [&](std::size_t index) {
+      const bool rendered = render(scene, renderer, set, index, folder);
+      const std::lock_guard lock(counting);
+      ++(rendered ? summary.rendered : summary.found);
+      progress(summary, total);
+    });
+  }
+  return summary;
+}
+
+}  // namespace vlp

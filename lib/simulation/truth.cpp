@@ -1,0 +1,135 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/truth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "rig/board_layout.h"
+#include "simulation/board_print.h"
+
+namespace vlp {
+namespace {
+
+struct Seen {
+  Eigen::Vector2d pixel;
+  double time_s;
+};
+
+/// Where a moving point is seen, and when: at the time at which its line is exposed. Nothing when
+/// the lens does not describe it, or when it moves along with the lines, so fast that there is no
+/// such time. `camera_from_target` is a function of the time.
+template <typename Motion>
+std::optional<Seen> seen(const FrameRenderer& renderer, const Shutter& shutter,
+                         const Motion& camera_from_target, const Eigen::Vector3d& point_m) {
+  constexpr double exact_px = 1e-7;
+  std::optional<Eigen::Vector2d> before;
+  double time_s = 0;
+  // Each round leaves (lines that it moves in a line's time) of the error.
+  for (int round = 0; round < 200; ++round) {
+    const auto pixel = renderer.rays().lens().project(camera_from_target(time_s) * point_m);
+    if (!pixel) return std::nullopt;
+    if (before && (*pixel - *before).norm() < exact_px) return Seen{*pixel, time_s};
+    before = pixel;
+    time_s = shutter.center_s(renderer.rays().line_and_place(*pixel)[0]);
+  }
+  return std::nullopt;
+}
+
+bool in_image(const Camera& camera, const Eigen::Vector2d& pixel) {
+  return pixel.minCoeff() >= -0.5 && pixel.x() < camera.imager_px[0] - 0.5 &&
+         pixel.y() < camera.imager_px[1] - 0.5;
+}
+
+bool hidden_by(const Panel& panel, const Eigen::Vector3d& eye_m, const Eigen::Vector3d& point_m) {
+  const Eigen::Vector3d normal = panel.edge_a_m.cross(panel.edge_b_m);
+  const Eigen::Vector3d way = point_m - eye_m;
+  const double share = normal.dot(panel.corner_m - eye_m) / normal.dot(way);
+  if (!(share > 0 && share < 1)) return false;
+  const Eigen::Vector3d on_panel = eye_m + share * way - panel.corner_m;
+  const double a = on_panel.dot(panel.edge_a_m) / panel.edge_a_m.squaredNorm();
+  const double b = on_panel.dot(panel.edge_b_m) / panel.edge_b_m.squaredNorm();
+  return a >= 0 && a <= 1 && b >= 0 && b <= 1;
+}
+
+template <typename Motion>
+double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Shutter& shutter,
+                     const Motion& camera_from_world, const Glow& glow) {
+  constexpr int points = 200;
+  constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
+  int visible = 0;
+  for (int i = 0; i < points; ++i) {
+    const double radius_m = glow.diameter_m / 2 * std::sqrt((i + 0.5) / points);
+    const double angle = golden_angle * i;
+    const Eigen::Vector3d point_m =
+        glow.position_m + radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+    const auto at = seen(renderer, shutter, camera_from_world, point_m);
+    if (!at || !in_image(scene.camera, at->pixel)) continue;
+    const Eigen::Vector3d eye_m = camera_from_world(at->time_s).inverse().translation();
+    const auto& occluders = scene.clutter.occluders;
+    visible += std::none_of(occluders.begin(), occluders.end(), [&](const Panel& occluder) {
+      return hidden_by(occluder, eye_m, point_m);
+    });
+  }
+  return double(visible) / points;
+}
+
+}  // namespace
+
+std::vector<TrueLamp> true_lamps(const Scene& scene, const FrameRenderer& renderer,
+                                 const LampShot& shot) {
+  const auto camera_from_world = [&](double time_s) {
+    return shot.motion.world_from_camera(time_s).inverse();
+  };
+  std::vector<TrueLamp> lamps;
+  for (const SceneLamp& lamp : scene.lamps) {
+    const Shutter shutter = renderer.shutter(shot.exposure_s);
+    const auto center = seen(renderer, shutter, camera_from_world, lamp.glow.position_m);
+    const double in_view = share_in_view(scene, renderer, shutter, camera_from_world, lamp.glow);
+    if (center && in_view > 0) lamps.push_back({lamp.id, center->pixel, in_view});
+  }
+  return lamps;
+}
+
+std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& renderer,
+                                     const BoardShot& shot) {
+  const BoardBend bend(*scene.board);
+  const auto camera_from_board = [&](double time_s) { return shot.camera_from_board(time_s); };
+  std::vector<TrueCorner> corners;
+  for (const BoardTag& tag : board_layout(scene.board->print)) {
+    for (int corner = 0; corner < 4; ++corner) {
+      const Eigen::Vector2d& at_m = tag.corners_m[static_cast<std::size_t>(corner)];
+      const Eigen::Vector3d point_m(at_m.x(), at_m.y(), bend.depth(at_m).depth_m);
+      const auto at = seen(renderer, renderer.shutter(shot.exposure_s), camera_from_board, point_m);
+      if (at && in_image(scene.camera, at->pixel)) corners.push_back({tag.id, corner, at->pixel});
+    }
+  }
+  return corners;
+}
+
+Calibration true_calibration(const Scene& scene) {
+  const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
+  RotationCenter center;
+  center.model = RotationModel::tilt;
+  center.zenith_in_camera = scene.mount.level_from_camera.row(2);
+  center.center_px =
+      lens.focal_px().cwiseProduct(center.zenith_in_camera.hnormalized()) + lens.center_px();
+  Calibration calibration;
+  calibration.camera = scene.camera;
+  calibration.rotation_center = center;
+  return calibration;
+}
+
+LampMap lamp_map_of(const Scene& scene, bool surveyed) {
+  LampMap map;
+  for (const SceneLamp& lamp : scene.lamps) {
+    Eigen::Vector3d position_m = lamp.glow.position_m;
+    if (surveyed) position_m += lamp.map_error_m;
+    map.lamps.push_back({lamp.id, position_m, lamp.glow.diameter_m, lamp.frequency_hz, lamp.duty});
+  }
+  return map;
+}
+
+}  // namespace vlp

@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "rig/calibration.h"
+#include "simulation/frame_renderer.h"
+#include "simulation/shot.h"
+
+namespace vlp {
+
+/// A lamp as a capture shows it.
+struct TrueLamp {
+  int id;
+  /// Where the centre of the disc is seen, each line of the image at its own time.
+  Eigen::Vector2d pixel;
+  /// The share of the disc that is in the image and not hidden, of 200 points spread over it.
+  double in_view;
+};
+
+/// The lamps that are at least partly in view and whose centre the lens describes, though it may
+/// lie outside the image.
+std::vector<TrueLamp> true_lamps(const Scene& scene, const FrameRenderer& renderer,
+                                 const LampShot& shot);
+
+/// A corner of a tag's black border as a capture shows it; see BoardTag for the order.
+struct TrueCorner {
+  int tag, corner;
+  Eigen::Vector2d pixel;
+};
+
+/// The corners in the image.
+std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& renderer,
+                                     const BoardShot& shot);
+
+/// The scene's camera, with its tilt as the rotation centre.
+Calibration true_calibration(const Scene& scene);
+
+/// The lamps as the lamp map has them, or (`surveyed` false) as they are.
+LampMap lamp_map_of(const Scene& scene, bool surveyed);
+
+/// Writes into `folder`: of lamps truth.csv, true_detections.csv (with the share in view) and
+/// captures.csv; of boards true_boards.csv (camera_from_board as a place in metres and a rotation
+/// vector in radians) and true_corners.csv. Throws InputError.
+void write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
+                 const std::filesystem::path& folder);
+
+}  // namespace vlp

@@ -1,0 +1,153 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Where corners of boards are rendered: measured along the edges, against mrcal's projection.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <map>
+
+#include "geometry/angles.h"
+#include "rig/board_layout.h"
+#include "simulation/plain_scene.h"
+#include "simulation/truth.h"
+#include "support/mrcal_oracle.h"
+
+namespace vlp {
+namespace {
+
+/// A nearly straight edge near a corner: one coordinate as a square polynomial of the other.
+struct EdgeCurve {
+  Eigen::Vector3d coefficients;
+  double origin;
+
+  double at(double position) const {
+    const double d = position - origin;
+    return coefficients.dot(Eigen::Vector3d(1, d, d * d));
+  }
+};
+
+/// Of the black border's edge from `corner` to `next`, which runs more along x than along y. In
+/// each column the white pixels between two rows are counted, which is exact for a straight edge.
+/// `image` is 0 where black and 1 where white.
+EdgeCurve edge_of(const cv::Mat1d& image, const Eigen::Vector2d& corner,
+                  const Eigen::Vector2d& next) {
+  constexpr int reach_px = 2, skipped_px = 2;  // the black border is 3.5 px wide or more
+  const Eigen::Vector2d way = next - corner;
+  std::vector<Eigen::Vector2d> points;
+  const int first = int(std::ceil(std::min(corner.x(), next.x()))) + skipped_px;
+  const int last = int(std::floor(std::max(corner.x(), next.x()))) - skipped_px;
+  for (int column = first; column <= last; ++column) {
+    const int row = int(std::lround(corner.y() + way.y() * (column - corner.x()) / way.x()));
+    double white = 0;
+    for (int y = row - reach_px; y <= row + reach_px; ++y) white += image(y, column);
+    const bool white_above = image(row - reach_px, column) > image(row + reach_px, column);
+    const double edge = white_above ? row - reach_px - 0.5 + white : row + reach_px + 0.5 - white;
+    points.emplace_back(column, edge);
+  }
+  Eigen::MatrixX3d terms(points.size(), 3);
+  Eigen::VectorXd values(points.size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const Eigen::Vector2d& point = points[std::size_t(i)];
+    const double d = point.x() - corner.x();
+    terms.row(i) << 1, d, d * d;
+    values[i] = point.y();
+  }
+  return {terms.colPivHouseholderQr().solve(values), corner.x()};
+}
+
+/// Where the two edges of a corner meet; `a` is its neighbour along x, `b` along y.
+Eigen::Vector2d measured_corner(const cv::Mat1d& image, const cv::Mat1d& transposed,
+                                const Eigen::Vector2d& corner, const Eigen::Vector2d& a,
+                                const Eigen::Vector2d& b) {
+  const EdgeCurve along_x = edge_of(image, corner, a);
+  const EdgeCurve along_y = edge_of(transposed, corner.reverse(), b.reverse());
+  Eigen::Vector2d meeting = corner;
+  for (int i = 0; i < 20; ++i) {
+    meeting.y() = along_x.at(meeting.x());
+    meeting.x() = along_y.at(meeting.y());
+  }
+  return meeting;
+}
+
+struct View {
+  Camera camera;
+  Eigen::Vector2d warp_m;
+  bool kalibr_border;
+  const char* name;
+
+  friend void PrintTo(const View& view, std::ostream* out) { *out << view.name; }
+};
+
+class BoardCorners : public testing::TestWithParam<View> {
+ protected:
+  BoardCorners() {
+    scene_.camera = GetParam().camera;
+    scene_.board = plain_board();
+    scene_.board->warp_m = GetParam().warp_m;
+    if (GetParam().kalibr_border) scene_.board->print.border_bits = 2;
+  }
+  Scene scene_ = plain_scene();
+  // Turned so little that the tags' edges keep their directions.
+  CaptureSet views_ = board_views(6, 0.17, rad_from_deg(18), rad_from_deg(12), 0.4);
+};
+
+TEST_P(BoardCorners, AreRenderedWhereTheyProject) {
+  const FrameRenderer renderer(scene_);
+  double worst_px = 0, squares = 0;
+  int corners = 0;
+  for (std::size_t index = 0; index < 6; ++index) {
+    const BoardShot shot = board_shot(scene_, views_, index);
+    const cv::Mat1d image(renderer.board_electrons(shot) / 1e3);
+    const cv::Mat1d transposed(image.t());
+    std::map<int, std::map<int, Eigen::Vector2d>> tags;
+    for (const auto& [tag, corner, pixel] : true_corners(scene_, renderer, shot)) {
+      constexpr double edge_px = 8;
+      if (pixel.minCoeff() > edge_px && pixel.x() < 799 - edge_px && pixel.y() < 599 - edge_px) {
+        tags[tag][corner] = pixel;
+      }
+    }
+    for (const auto& [tag, at] : tags) {
+      if (at.size() < 4) continue;
+      for (int corner = 0; corner < 4; ++corner) {
+        // Bottom left, bottom right, top right, top left: neighbours along x are 0 1 and 2 3.
+        const Eigen::Vector2d found =
+            measured_corner(image, transposed, at.at(corner), at.at(corner ^ 1), at.at(3 - corner));
+        const double error_px = (found - at.at(corner)).norm();
+        worst_px = std::max(worst_px, error_px);
+        squares += error_px * error_px;
+        ++corners;
+      }
+    }
+  }
+  EXPECT_GT(corners, 200);
+  EXPECT_LT(worst_px, 0.01);
+  EXPECT_LT(std::sqrt(squares / corners), 0.003);
+}
+
+TEST_P(BoardCorners, ProjectAsMrcalSays) {
+  const FrameRenderer renderer(scene_);
+  const MrcalOracle mrcal(std::string(name_of(scene_.camera.lens_model)), scene_.camera.intrinsics);
+  const BoardShot shot = board_shot(scene_, views_, 1);
+  const auto layout = board_layout(scene_.board->print);
+  const Eigen::Vector2d field_m = tag_field_m(scene_.board->print);
+  for (const auto& [tag, corner, pixel] : true_corners(scene_, renderer, shot)) {
+    const Eigen::Vector2d at_m = layout.at(std::size_t(tag)).corners_m.at(std::size_t(corner));
+    const Eigen::Vector2d share = 2 * at_m.cwiseQuotient(field_m) - Eigen::Vector2d(1, 1);
+    const double depth_m = scene_.board->warp_m.dot(
+        Eigen::Vector2d(1 - share.x() * share.x(), 1 - share.y() * share.y()));
+    const Eigen::Vector3d point =
+        shot.camera_from_board(0) * Eigen::Vector3d(at_m.x(), at_m.y(), depth_m);
+    EXPECT_LT((mrcal.project(std::vector{point})[0] - pixel).norm(), 1e-6);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Views, BoardCorners,
+    testing::Values(View{paper_rig_camera(), {0, 0}, false, "Flat"},
+                    View{paper_rig_camera(), {0.002, -0.001}, false, "Bent"},
+                    View{wide_camera(), {0.001, 0.001}, true, "WideAndBorderOfTwoBits"},
+                    View{stereographic_camera(), {0, 0}, false, "Stereographic"}),
+    [](const auto& instance) { return std::string(instance.param.name); });
+
+}  // namespace
+}  // namespace vlp

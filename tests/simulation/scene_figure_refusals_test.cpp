@@ -1,0 +1,153 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Scenes of the right shape with figures that cannot be.
+#include <gmock/gmock.h>
+
+#include "simulation/scene_sample.h"
+
+namespace vlp {
+namespace {
+
+std::string refusal_with(const std::string& from, const std::string& to) {
+  return scene_refusal(scene_with(from, to));
+}
+
+TEST(SceneFigures, AskForTheUnitOfARadiance) {
+  const std::string range =
+      " electrons per second is not within 0 and 1.0e+12 electrons per second: is it in the right "
+      "unit?";
+  EXPECT_EQ(refusal_with("ambient_e_per_s: 1.0e+6", "ambient_e_per_s: -1"),
+            "scene.yaml:8: ambient_e_per_s: -1" + range);
+  EXPECT_EQ(refusal_with("radiance_e_per_s: 2.0e+8", "radiance_e_per_s: -5"),
+            "scene.yaml:10: lamps[0].radiance_e_per_s: -5" + range);
+  EXPECT_EQ(refusal_with("radiance_e_per_s: 3.0e+8", "radiance_e_per_s: 2.5e+13"),
+            "scene.yaml:11: lamps[1].radiance_e_per_s: 2.5e+13" + range);
+  EXPECT_EQ(refusal_with("radiance_e_per_s: 1.5e+8", "radiance_e_per_s: -2"),
+            "scene.yaml:13: clutter.steady_lamps[0].radiance_e_per_s: -2" + range);
+  EXPECT_EQ(refusal_with("radiance_e_per_s: 8.0e+7", "radiance_e_per_s: -2"),
+            "scene.yaml:14: clutter.windows[0].radiance_e_per_s: -2" + range);
+  EXPECT_EQ(refusal_with("radiance_e_per_s: 1.2e+7", "radiance_e_per_s: -2"),
+            "scene.yaml:15: clutter.reflections[0].radiance_e_per_s: -2" + range);
+  EXPECT_EQ(refusal_with("radiance_e_per_s: 2.0e+6", "radiance_e_per_s: -2"),
+            "scene.yaml:16: clutter.occluders[0].radiance_e_per_s: -2" + range);
+  EXPECT_EQ(refusal_with("black_e_per_s: 1.5e+5", "black_e_per_s: -2"),
+            "scene.yaml:22: board.black_e_per_s: -2" + range);
+}
+
+TEST(SceneFigures, OfTheSensorAreChecked) {
+  EXPECT_EQ(refusal_with("bits: 8", "bits: 12"), "scene.yaml:6: sensor.bits: should be 8 or 16");
+  EXPECT_EQ(refusal_with("bits: 8", "bits: 32"),
+            "scene.yaml:6: sensor.bits: should be a whole number within 8 and 16, not '32'");
+  EXPECT_EQ(refusal_with("gain_dn_per_e: 0.02", "gain_dn_per_e: 0"),
+            "scene.yaml:6: sensor.gain_dn_per_e: 0 DN per electron is not within 1.0e-06 and 10000 "
+            "DN per electron: is it in the right unit?");
+  EXPECT_EQ(refusal_with("black_level_dn: 2", "black_level_dn: 256"),
+            "scene.yaml:6: sensor.black_level_dn: 256 DN is not within 0 and 255 DN: is it in the "
+            "right unit?");
+  EXPECT_EQ(scene_refusal(scene_with("bits: 8, gain_dn_per_e: 0.02, black_level_dn: 2",
+                                     "bits: 16, gain_dn_per_e: 0.02, black_level_dn: 256")),
+            "");
+  EXPECT_EQ(refusal_with("full_well_e: 13000", "full_well_e: 0"),
+            "scene.yaml:6: sensor.full_well_e: 0 electrons is not within 1 and 1.0e+09 electrons: "
+            "is it in the right unit?");
+  EXPECT_EQ(refusal_with("share: 0.3", "share: 30"),
+            "scene.yaml:6: sensor.bloom.share: 30 (of the charge) is not within 0 and 1 (of the "
+            "charge): is it in the right unit?");
+}
+
+TEST(SceneFigures, OfTheMountAndTheLensAreChecked) {
+  EXPECT_EQ(refusal_with("tilt_deg: 2,", "tilt_deg: 100,"),
+            "scene.yaml:7: mount.tilt_deg: 100 degrees is not within 0 and 45 degrees: is it in "
+            "the right unit?");
+  EXPECT_EQ(refusal_with("[0.03, -0.04]", "[30, -40]"),
+            "scene.yaml:7: mount.lever_arm_m[0]: 30 m is not within -5 and 5 m: is it in the right "
+            "unit?");
+  EXPECT_EQ(refusal_with("[100, 101,", "[0, 101,"),
+            "scene.yaml:4: camera.intrinsics: the focal lengths, the first two, should be "
+            "positive");
+}
+
+TEST(SceneFigures, OfAnImagerThatIsTooLargeAreRefused) {
+  EXPECT_EQ(refusal_with("imager_px: [160, 120]", "imager_px: [20000, 20000]"),
+            "scene.yaml:4: camera.imager_px: has more than 64 million pixels");
+}
+
+TEST(SceneFigures, OfLightsKeepThemInTheRoomAndAboveTheCamera) {
+  EXPECT_EQ(refusal_with("[-0.6, -0.3, 1.6]", "[-0.6, -0.3, 16]"),
+            "scene.yaml:10: lamps[0].position_m: is outside the room");
+  EXPECT_EQ(refusal_with("position_m: [0.3, 0, 1.6]", "position_m: [3, 0, 1.6]"),
+            "scene.yaml:13: clutter.steady_lamps[0].position_m: is outside the room");
+  EXPECT_EQ(refusal_with("position_m: [0.2, 0.1, 1.6]", "position_m: [0.2, 1, 1.6]"),
+            "scene.yaml:15: clutter.reflections[0].position_m: is outside the room");
+  const auto low = [](const std::string& from, const std::string& to) {
+    std::string yaml = scene_with(from, to);
+    const auto begin = yaml.find("  occluders:");
+    yaml.erase(begin, yaml.find('\n', begin) + 1 - begin);
+    return scene_refusal(yaml);
+  };
+  EXPECT_EQ(low("position_m: [0.3, 0, 1.6]", "position_m: [0.3, 0, 0.1]"),
+            "scene.yaml:24: captures[0].heights_m[1]: a steady lamp is not above the camera");
+  EXPECT_EQ(low("position_m: [0.2, 0.1, 1.6]", "position_m: [0.2, 0.1, 0.1]"),
+            "scene.yaml:24: captures[0].heights_m[1]: a reflection is not above the camera");
+}
+
+TEST(SceneFigures, OfTheLampsAreChecked) {
+  EXPECT_EQ(refusal_with("id: 5,", "id: 1,"), "scene.yaml:11: lamps[1]: id 1 stands twice");
+  EXPECT_EQ(refusal_with("[0.6, 0.2, 1.5]", "[-0.6, -0.3, 1.6]"),
+            "scene.yaml:11: lamps[1]: lamp 5 is where lamp 1 is");
+  EXPECT_EQ(refusal_with("phase: 0.25", "phase: 90"),
+            "scene.yaml:11: lamps[1].phase: 90 (of a period) is not within 0 and 1 (of a period): "
+            "is it in the right unit?");
+  EXPECT_EQ(refusal_with("[0.001, 0.002, 0.003]", "[0.001, 0.002]"),
+            "scene.yaml:11: lamps[1].map_error_m: should be 3 numbers, not 2");
+}
+
+TEST(SceneFigures, OfAWindowOrOccluderMakeARectangle) {
+  const std::string problem = "should be at right angles to each other and not of length zero";
+  EXPECT_EQ(refusal_with("[0, 0.3, 0]", "[0.01, 0.3, 0]"),
+            "scene.yaml:14: clutter.windows[0].edges_m: " + problem);
+  EXPECT_EQ(refusal_with("[0, 0.3, 0]", "[0, 0, 0]"),
+            "scene.yaml:14: clutter.windows[0].edges_m: " + problem);
+  EXPECT_EQ(refusal_with("[-0.2, 0.2, 0]", "[0.2, 0.2, 0]"),
+            "scene.yaml:16: clutter.occluders[0].edges_m: " + problem);
+  EXPECT_EQ(refusal_with("[[0.1, 0.1, 0], [-0.2, 0.2, 0]]", "[[0.1, 0.1, 0]]"),
+            "scene.yaml:16: clutter.occluders[0].edges_m: should be two vectors, from the corner "
+            "along each edge");
+}
+
+TEST(SceneFigures, OfAnOccluderKeepItBelowEveryLight) {
+  const std::string problem =
+      "scene.yaml:16: clutter.occluders[0]: is not below every lamp, steady lamp, window and "
+      "reflection";
+  EXPECT_EQ(refusal_with("[-0.7, -0.2, 1.4]", "[-0.7, -0.2, 1.49]"), "");
+  EXPECT_EQ(refusal_with("[-0.7, -0.2, 1.4]", "[-0.7, -0.2, 1.51]"), problem) << "lamp 5";
+  EXPECT_EQ(refusal_with("[[0.1, 0.1, 0], [-0.2, 0.2, 0]]", "[[0.1, 0.1, 0], [0, 0, 0.2]]"),
+            problem);
+  EXPECT_EQ(refusal_with("[0.3, 0, 1.6]", "[0.3, 0, 1.3]"), problem) << "the steady lamp";
+  EXPECT_EQ(refusal_with("[0.2, 0.1, 1.6]", "[0.2, 0.1, 1.3]"), problem) << "the reflection";
+  EXPECT_EQ(refusal_with("[0, 0.3, 0]", "[0, 0, -0.3]"), problem) << "the window";
+}
+
+TEST(SceneFigures, OfAReflectionNameALampThatIsThere) {
+  EXPECT_EQ(refusal_with("of_lamp: 5", "of_lamp: 2"),
+            "scene.yaml:15: clutter.reflections[0].of_lamp: there is no lamp 2");
+  EXPECT_EQ(refusal_with("of_lamp: 5", "of_lamp: -5"),
+            "scene.yaml:15: clutter.reflections[0].of_lamp: should be a whole number within 0 and "
+            "2147483647, not '-5'");
+}
+
+TEST(SceneFigures, OfSteadyLampsAndBoardsAreChecked) {
+  EXPECT_EQ(refusal_with("diameter_m: 0.12", "diameter_m: 120"),
+            "scene.yaml:13: clutter.steady_lamps[0].diameter_m: 120 m is not within 0.001 and 10 "
+            "m: is it in the right unit?");
+  EXPECT_EQ(refusal_with("edge_share: 0.7", "edge_share: -0.7"),
+            "scene.yaml:13: clutter.steady_lamps[0].edge_share: -0.7 (of the radiance at the "
+            "centre) is not within 0 and 2 (of the radiance at the centre): is it in the right "
+            "unit?");
+  EXPECT_EQ(refusal_with("[0.0003, -0.0002]", "[0.3, -0.2]"),
+            "scene.yaml:20: board.warp_m[0]: 0.3 m is not within -0.006 and 0.006 m: is it in the "
+            "right unit?");
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+
+#include <numbers>
+
+#include "geometry/angles.h"
+#include "simulation/scene_sample.h"
+#include "simulation/shot.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector2d, Eigen::Vector3d;
+using testing::DoubleNear;
+using testing::ElementsAre;
+using testing::Pointwise;
+
+constexpr double kRounding = 1e-12;
+
+TEST(Scene, HasTheCameraAndItsSensor) {
+  const Scene scene = scene_of(kSceneYaml);
+  EXPECT_EQ(scene.seed, 7U);
+  EXPECT_EQ(scene.camera.id, "small");
+  EXPECT_EQ(scene.camera.imager_px[1], 120);
+  EXPECT_EQ(scene.camera.lens_model, LensModel::pinhole);
+  EXPECT_EQ(scene.camera.intrinsics, (std::vector<double>{100, 101, 80, 60}));
+  EXPECT_EQ(scene.camera.row_time_s, 3e-5);
+  EXPECT_EQ(scene.camera.readout, Readout::columns);
+  EXPECT_EQ(scene.optics.blur_px, 0.7);
+  EXPECT_EQ(scene.optics.vignetting_power, 4);
+  EXPECT_EQ(scene.sensor.bits, 8);
+  EXPECT_EQ(scene.sensor.gain_dn_per_e, 0.02);
+  EXPECT_EQ(scene.sensor.black_level_dn, 2);
+  EXPECT_EQ(scene.sensor.full_well_e, 13000);
+  EXPECT_EQ(scene.sensor.read_noise_e, 8);
+  EXPECT_TRUE(scene.sensor.shot_noise);
+  EXPECT_EQ(scene.sensor.bloom->share, 0.3);
+  EXPECT_EQ(scene.sensor.bloom->sigma_px, 2.5);
+}
+
+TEST(Scene, HasAMountInRadians) {
+  const Mount mount = scene_of(kSceneYaml).mount;
+  EXPECT_THAT(mount.level_from_camera,
+              IsNear(level_from_zenith({0, std::tan(rad_from_deg(2)), 1}), kRounding));
+  EXPECT_EQ(mount.lever_arm_m, Vector2d(0.03, -0.04));
+}
+
+TEST(Scene, HasTheLampsInTheirOrder) {
+  const Scene scene = scene_of(kSceneYaml);
+  ASSERT_EQ(scene.lamps.size(), 2U);
+  EXPECT_EQ(scene.ambient_e_per_s, 1e6);
+  EXPECT_EQ(scene.lamps[0].id, 1);
+  EXPECT_FALSE(scene.lamps[0].phase);
+  EXPECT_EQ(scene.lamps[0].map_error_m, Vector3d::Zero());
+  const SceneLamp& lamp = scene.lamps[1];
+  EXPECT_EQ(lamp.id, 5);
+  EXPECT_EQ(lamp.glow.position_m, Vector3d(0.6, 0.2, 1.5));
+  EXPECT_EQ(lamp.glow.diameter_m, 0.1);
+  EXPECT_EQ(lamp.glow.radiance_e_per_s, 3e8);
+  EXPECT_EQ(lamp.glow.edge_share, 0.9);
+  EXPECT_EQ(lamp.frequency_hz, 2500);
+  EXPECT_EQ(lamp.duty, 0.5);
+  EXPECT_EQ(lamp.phase, 0.25);
+  EXPECT_EQ(lamp.map_error_m, Vector3d(0.001, 0.002, 0.003));
+}
+
+TEST(Scene, HasTheClutterAndTheBoard) {
+  const Scene scene = scene_of(kSceneYaml);
+  const Clutter& clutter = scene.clutter;
+  EXPECT_EQ(clutter.steady_lamps.at(0).edge_share, 0.7);
+  EXPECT_EQ(clutter.windows.at(0).edge_b_m, Vector3d(0, 0.3, 0));
+  EXPECT_EQ(clutter.windows.at(0).radiance_e_per_s, 8e7);
+  EXPECT_EQ(clutter.reflections.at(0).lamp, 1U) << "the index of lamp 5";
+  EXPECT_EQ(clutter.reflections.at(0).glow.edge_share, 0) << "it fades towards its rim";
+  EXPECT_EQ(clutter.occluders.at(0).corner_m, Vector3d(-0.7, -0.2, 1.4));
+  EXPECT_EQ(scene.board->print.first_id, 9);
+  EXPECT_EQ(scene.board->margin_m, 0.02);
+  EXPECT_EQ(scene.board->warp_m, Vector2d(0.0003, -0.0002));
+  EXPECT_EQ(scene.board->white_e_per_s, 2.4e6);
+  EXPECT_EQ(scene.board->black_e_per_s, 1.5e5);
+  EXPECT_EQ(scene.board->surround_e_per_s, 6e5);
+}
+
+TEST(Scene, HasTheSpotsInTheOrderOfTheFile) {
+  const CaptureSet set = scene_of(kSceneYaml).sets.at(0);
+  EXPECT_EQ(set.folder, "spots");
+  EXPECT_EQ(set.exposure_s, 5e-5);
+  EXPECT_FALSE(set.board);
+  EXPECT_THAT(set.lamps->spots_m, ElementsAre(Vector2d(0.1, -0.05), Vector2d(-0.2, 0.3)));
+  EXPECT_THAT(set.lamps->heights_m, ElementsAre(0, 0.2));
+  EXPECT_THAT(set.lamps->yaws_rad,
+              Pointwise(DoubleNear(kRounding), {std::numbers::pi / 9, -std::numbers::pi / 2}));
+  EXPECT_EQ(set.lamps->repeat, 3);
+  EXPECT_EQ(set.lamps->interval_s, 0.5);
+  EXPECT_EQ(set.lamps->turn_rate_rad_per_s, 0);
+  EXPECT_TRUE(set.lamps->known);
+  EXPECT_EQ(shots_in(set), 2U * 2 * 2 * 3);
+}
+
+TEST(Scene, GoesThroughAGridRowByRowFromItsFirstCorner) {
+  const LampCaptures captures = *scene_of(kSceneYaml).sets.at(1).lamps;
+  const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
+                                       {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};
+  ASSERT_EQ(captures.spots_m.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_THAT(captures.spots_m[i], IsNear(expected[i], kRounding)) << i;
+  }
+  const double quarter_rad = std::numbers::pi / 2;
+  EXPECT_THAT(captures.yaws_rad, Pointwise(DoubleNear(kRounding),
+                                           {0.0, quarter_rad, 2 * quarter_rad, 3 * quarter_rad}));
+  EXPECT_NEAR(captures.yaw_jitter_rad, rad_from_deg(9), kRounding);
+  EXPECT_NEAR(captures.turn_rate_rad_per_s, quarter_rad, kRounding);
+  EXPECT_EQ(captures.repeat, 1);
+  EXPECT_FALSE(captures.known);
+}
+
+TEST(Scene, HasThePlacesAlongALineUpToItsEnd) {
+  const LampCaptures captures = *scene_of(kSceneYaml).sets.at(2).lamps;
+  EXPECT_EQ(captures.drive->speed_m_per_s, 0.5);
+  // 0.894 m in steps of 0.125 m.
+  ASSERT_EQ(captures.spots_m.size(), 8U);
+  const Vector2d step_m = Vector2d(0.8, 0.4).normalized() * 0.125;
+  for (int i = 0; i < 8; ++i) {
+    EXPECT_THAT(captures.spots_m[std::size_t(i)],
+                IsNear(Vector2d(-0.3, 0) + i * step_m, kRounding));
+  }
+  const std::string whole_steps = scene_with("to_m: [0.5, 0.4]", "to_m: [0.7, 0]");
+  EXPECT_THAT(scene_of(whole_steps).sets.at(2).lamps->spots_m.back(),
+              IsNear(Vector2d(0.7, 0), kRounding));
+}
+
+TEST(Scene, HasViewsOfTheBoard) {
+  const CaptureSet set = scene_of(kSceneYaml).sets.at(3);
+  EXPECT_FALSE(set.lamps);
+  EXPECT_EQ(shots_in(set), 5U);
+  EXPECT_EQ(set.board->distance_m, std::pair(0.2, 0.4));
+  EXPECT_NEAR(set.board->tilt_rad, std::numbers::pi / 4, kRounding);
+  EXPECT_NEAR(set.board->roll_rad, std::numbers::pi, kRounding);
+  EXPECT_EQ(set.board->spread, 0.75);
+  EXPECT_EQ(set.board->velocity_m_per_s, Vector3d(0.1, 0, 0.2));
+}
+
+TEST(ScenesOfTheDatasets, AreReadAndHaveASample) {
+  for (const std::string name : {"paper-rig", "paper-rig-faulty", "wide", "clutter"}) {
+    SCOPED_TRACE(name);
+    const Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
+    EXPECT_EQ(scene.camera.id, name);
+    EXPECT_GE(scene.lamps.size(), 6U);
+    EXPECT_EQ(scene.sets.at(0).folder, "sample");
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "simulation/disc.h"
+#include "simulation/mosaic.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+/// The integral over a triangle, by its edges.
+template <typename Shape>
+double integral_over(const Shape& shape, const std::array<Eigen::Vector2d, 3>& triangle) {
+  double sum = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    sum += shape.edge_integral(triangle[i], triangle[(i + 1) % 3]);
+  }
+  return sum;
+}
+
+/// The same from many points of the triangle.
+template <typename Value>
+double sampled_integral(const Value& value, const std::array<Eigen::Vector2d, 3>& triangle) {
+  constexpr int side = 1500;
+  double sum = 0;
+  for (int i = 0; i < side; ++i) {
+    for (int j = 0; j < side; ++j) {
+      double a = (i + 0.5) / side, b = (j + 0.5) / side;
+      if (a + b > 1) a = 1 - a, b = 1 - b;
+      sum += value(Eigen::Vector2d(triangle[0] + a * (triangle[1] - triangle[0]) +
+                                   b * (triangle[2] - triangle[0])));
+    }
+  }
+  const double area = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]) / 2;
+  return area * sum / (side * side);
+}
+
+std::array<Eigen::Vector2d, 3> random_triangle(Random& random, double reach) {
+  std::array<Eigen::Vector2d, 3> triangle;
+  for (auto& corner : triangle) {
+    corner = {random.uniform(-reach, reach), random.uniform(-reach, reach)};
+  }
+  return triangle;
+}
+
+TEST(Disc, IntegratesToItsWholeOverAnythingThatHoldsIt) {
+  const std::array<Eigen::Vector2d, 3> triangle{{{-5, -4}, {7, -3}, {0, 9}}};
+  EXPECT_NEAR(integral_over(Disc(1, 1), triangle), std::numbers::pi, 1e-12);
+  // 1 - fall r^2 over the unit disc: pi (1 - fall / 2)
+  EXPECT_NEAR(integral_over(Disc(1, 0.4), triangle), std::numbers::pi * 0.7, 1e-12);
+}
+
+TEST(Disc, IntegratesOverAnyTriangle) {
+  Random random(1);
+  const double edge_share = 0.3;
+  const Disc disc(1, edge_share);
+  for (int i = 0; i < 20; ++i) {
+    const auto triangle = random_triangle(random, 1.5);
+    const double expected = sampled_integral(
+        [&](const Eigen::Vector2d& at) {
+          const double r2 = at.squaredNorm();
+          return r2 < 1 ? 1 - (1 - edge_share) * r2 : 0;
+        },
+        triangle);
+    EXPECT_NEAR(integral_over(disc, triangle), expected, 1e-3);
+  }
+}
+
+TEST(Disc, IsNothingElsewhere) {
+  EXPECT_NEAR(integral_over(Disc(1, 1), {{{2, 0}, {3, 0}, {2, 50}}}), 0, 1e-14);
+}
+
+TEST(Mosaic, IntegratesOverAnyTriangle) {
+  const Mosaic mosaic({{-1, -0.8, -0.4, 0, 7},  // covered by the next
+                       {-1, -0.8, -0.4, 0, 2},
+                       {-0.4, 0, 0.9, 0.7, -1},
+                       {0.1, -0.8, 0.9, 0, 0.5}});
+  const auto value = [](const Eigen::Vector2d& at) {
+    if (at.x() < -1 || at.x() > 0.9 || at.y() < -0.8 || at.y() > 0.7) return 0.0;
+    if (at.y() < 0) return at.x() < -0.4 ? 2 : at.x() < 0.1 ? 0 : 0.5;
+    return at.x() < -0.4 ? 0.0 : -1.0;
+  };
+  Random random(2);
+  for (int i = 0; i < 20; ++i) {
+    const auto triangle = random_triangle(random, 1.3);
+    EXPECT_NEAR(integral_over(mosaic, triangle), sampled_integral(value, triangle), 3e-3);
+  }
+}
+
+TEST(Mosaic, IntegratesExactlyAlongItsLines) {
+  const Mosaic square({{0, 0, 2, 3, 0.5}});
+  EXPECT_DOUBLE_EQ(integral_over(square, {{{0, 0}, {2, 0}, {2, 3}}}), 1.5);
+  EXPECT_DOUBLE_EQ(integral_over(square, {{{2, 3}, {0, 3}, {0, 0}}}), 1.5);
+  EXPECT_DOUBLE_EQ(integral_over(square, {{{-9, -9}, {20, -9}, {-9, 20}}}), 3);
+}
+
+}  // namespace
+}  // namespace vlp

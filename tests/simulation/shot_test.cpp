@@ -1,0 +1,132 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Captures as a scene plans them.
+#include "simulation/shot.h"
+
+#include <gmock/gmock.h>
+
+#include <set>
+
+#include "geometry/angles.h"
+#include "rig/board_layout.h"
+#include "simulation/plain_scene.h"
+
+namespace vlp {
+namespace {
+
+CaptureSet turning() {
+  LampCaptures captures{{0, 0.3}, {{0.1, 0.2}, {0.3, 0.4}}, {}, {0, 2, 4}, 0.2, 0, 2, 0.5, false};
+  return {"turning", 5e-5, captures, {}};
+}
+
+TEST(LampShots, GoThroughRepeatsThenYawsThenSpotsThenHeights) {
+  const Scene scene = plain_scene();
+  const CaptureSet set = turning();
+  ASSERT_EQ(shots_in(set), 2 * 2 * 3 * 2);
+  const auto axis = [&](std::size_t index) { return lamp_shot(scene, set, index).motion.axis_m; };
+  const auto yaw = [&](std::size_t index) { return lamp_shot(scene, set, index).motion.yaw_rad; };
+  EXPECT_EQ(axis(0), Eigen::Vector3d(0.1, 0.2, 0));
+  EXPECT_EQ(axis(5), Eigen::Vector3d(0.1, 0.2, 0));
+  EXPECT_EQ(axis(6), Eigen::Vector3d(0.3, 0.4, 0));
+  EXPECT_EQ(axis(23), Eigen::Vector3d(0.3, 0.4, 0.3));
+  EXPECT_NEAR(yaw(0), 0, 0.2);
+  EXPECT_NEAR(yaw(1), 0, 0.2);
+  EXPECT_NEAR(yaw(2), 2, 0.2);
+  EXPECT_NE(yaw(0), yaw(1));
+  EXPECT_EQ(lamp_shot(scene, set, 7).time_s, 3.5);
+  EXPECT_EQ(lamp_shot(scene, set, 7).image, "0007.png");
+}
+
+TEST(LampShots, DependOnSeedFolderAndIndexAlone) {
+  Scene scene = plain_scene();
+  CaptureSet set = turning();
+  std::set<double> yaws{lamp_shot(scene, set, 3).motion.yaw_rad};
+  EXPECT_TRUE(yaws.contains(lamp_shot(scene, set, 3).motion.yaw_rad));
+  yaws.insert(lamp_shot(scene, set, 9).motion.yaw_rad);
+  set.folder = "other";
+  yaws.insert(lamp_shot(scene, set, 3).motion.yaw_rad);
+  scene.seed = 2;
+  yaws.insert(lamp_shot(scene, set, 3).motion.yaw_rad);
+  EXPECT_EQ(yaws.size(), 4);
+}
+
+TEST(LampShots, KeepThePhaseOfALampThatHasOneAndLetOthersRun) {
+  Scene scene = plain_scene();
+  scene.lamps[0].frequency_hz = 1000.5;
+  scene.lamps[0].phase = 0.25;
+  const CaptureSet set = turning();
+  EXPECT_NEAR(lamp_shot(scene, set, 1).waves[0].phase, 0.5, 1e-9);  // 500.25 + 0.25 periods on
+  scene.lamps[0].phase.reset();
+  std::set<double> phases;
+  for (std::size_t i = 0; i < 24; ++i) phases.insert(lamp_shot(scene, set, i).waves[0].phase);
+  EXPECT_EQ(phases.size(), 24);
+  EXPECT_LT(*phases.begin(), 0.3);
+  EXPECT_GT(*phases.rbegin(), 0.7);
+}
+
+TEST(LampShots, MoveAlongALineAtItsSpeed) {
+  const Scene scene = plain_scene();
+  CaptureSet set = turning();
+  set.lamps->drive = Drive{{0, 0}, {0.3, 0.4}, 0.1};
+  const Pose before = lamp_shot(scene, set, 0).motion.pose(-1);
+  const Pose after = lamp_shot(scene, set, 0).motion.pose(1);
+  EXPECT_TRUE((after.position_m - before.position_m).isApprox(Eigen::Vector3d(0.12, 0.16, 0)));
+}
+
+TEST(LampShots, OfADriveAreWhereTheCaptureBeforeGoes) {
+  const Scene scene = plain_scene();
+  const Drive drive{{0, 0}, {0.3, 0.4}, 0.1};
+  LampCaptures captures{{0, 0.3}, {}, drive, {0, 2}, 0, 0.4, 2, 0.5, false};
+  for (int i = 0; i <= 10; ++i) captures.spots_m.emplace_back(0.03 * i, 0.04 * i);
+  const CaptureSet set{"drive", 5e-5, captures, {}};
+  ASSERT_EQ(shots_in(set), 88);
+  for (std::size_t i = 0; i + 1 < 88; ++i) {
+    if (i % 11 == 10) continue;  // the next pass begins
+    const LampShot before = lamp_shot(scene, set, i), after = lamp_shot(scene, set, i + 1);
+    const Pose expected = before.motion.pose(after.time_s - before.time_s);
+    EXPECT_TRUE(after.motion.pose(0).position_m.isApprox(expected.position_m, 1e-12));
+    EXPECT_NEAR(after.motion.yaw_rad, expected.yaw_rad, 1e-12);
+  }
+  EXPECT_EQ(lamp_shot(scene, set, 11).motion.axis_m, Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(lamp_shot(scene, set, 22).motion.yaw_rad, 2);
+  EXPECT_EQ(lamp_shot(scene, set, 44).motion.axis_m, Eigen::Vector3d(0, 0, 0.3));
+}
+
+TEST(CarrierMotion, TurnsTheCameraAboutTheAxis) {
+  const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
+  const CarrierMotion motion{{1, 2, 0.5}, {0, 0}, 0, rad_from_deg(90), mount};
+  EXPECT_TRUE(motion.pose(0).position_m.isApprox(Eigen::Vector3d(1.1, 2, 0.5)));
+  EXPECT_TRUE(motion.pose(1).position_m.isApprox(Eigen::Vector3d(1, 2.1, 0.5)));
+  EXPECT_NEAR(motion.pose(1).yaw_rad, rad_from_deg(90), 1e-15);
+}
+
+TEST(BoardShots, StayWithinTheLimitsOfTheirViews) {
+  Scene scene = plain_scene();
+  scene.board = plain_board();
+  CaptureSet set = board_views(300, 0, rad_from_deg(40), rad_from_deg(30), 0.5);
+  set.board->distance_m = {0.2, 0.5};
+  const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
+  double farthest_m = 0, most_tilt = 0, most_off = 0;
+  for (std::size_t i = 0; i < 300; ++i) {
+    const Eigen::Isometry3d camera_from_board = board_shot(scene, set, i).camera_from_board(0);
+    EXPECT_NEAR(camera_from_board.linear().determinant(), 1, 1e-12);
+    Eigen::Vector3d middle_m(0, 0, 0);
+    middle_m.head<2>() = tag_field_m(scene.board->print) / 2;
+    const Eigen::Vector3d middle = camera_from_board * middle_m;
+    const double tilt =
+        std::acos(std::min(1.0, middle.normalized().dot(camera_from_board.linear().col(2))));
+    EXPECT_GE(middle.norm(), 0.2);
+    EXPECT_LE(middle.norm(), 0.5);
+    EXPECT_LE(tilt, rad_from_deg(40) + 1e-6);
+    farthest_m = std::max(farthest_m, middle.norm());
+    most_tilt = std::max(most_tilt, tilt);
+    const Eigen::Vector2d pixel = lens.project(middle).value();
+    most_off = std::max({most_off, std::abs(pixel.x() / 400 - 1), std::abs(pixel.y() / 300 - 1)});
+  }
+  EXPECT_GT(farthest_m, 0.49);
+  EXPECT_GT(most_tilt, rad_from_deg(39));
+  EXPECT_NEAR(most_off, 0.5, 0.01);
+}
+
+}  // namespace
+}  // namespace vlp

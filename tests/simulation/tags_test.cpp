@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Rendered boards as libapriltag reads them.
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+#include <apriltag/tagStandard41h12.h>
+#include <gmock/gmock.h>
+
+#include <map>
+
+#include "geometry/angles.h"
+#include "simulation/exposure.h"
+#include "simulation/plain_scene.h"
+#include "simulation/tag_pattern.h"
+#include "simulation/truth.h"
+
+namespace vlp {
+namespace {
+
+using Corners = std::map<std::pair<int, int>, Eigen::Vector2d>;
+
+/// Tag and corner in libapriltag's order, with the centre of the top left pixel at (0, 0).
+Corners detected(cv::Mat image, apriltag_family_t* family) {
+  apriltag_detector_t* detector = apriltag_detector_create();
+  detector->quad_decimate = 1;
+  apriltag_detector_add_family(detector, family);
+  image_u8_t view{image.cols, image.rows, int(image.step), image.data};
+  zarray_t* detections = apriltag_detector_detect(detector, &view);
+  Corners corners;
+  for (int i = 0; i < zarray_size(detections); ++i) {
+    apriltag_detection_t* tag = nullptr;
+    zarray_get(detections, i, &tag);
+    for (int corner = 0; corner < 4; ++corner) {
+      corners[{tag->id, corner}] = {tag->p[corner][0] - 0.5, tag->p[corner][1] - 0.5};
+    }
+  }
+  apriltag_detections_destroy(detections);
+  apriltag_detector_destroy(detector);
+  return corners;
+}
+
+void expect_all_read(const Scene& scene, apriltag_family_t* family) {
+  const FrameRenderer renderer(scene);
+  const CaptureSet views = board_views(4, 0.28, rad_from_deg(35), rad_from_deg(180), 0);
+  for (std::size_t index = 0; index < 4; ++index) {
+    const BoardShot shot = board_shot(scene, views, index);
+    const Corners found = detected(expose(scene.sensor, renderer.board_electrons(shot), 1), family);
+    const auto truth = true_corners(scene, renderer, shot);
+    EXPECT_EQ(found.size(), truth.size());
+    for (const auto& [tag, corner, pixel] : truth) {
+      const auto at = found.find({tag, corner});
+      ASSERT_NE(at, found.end()) << tag;
+      EXPECT_LT((at->second - pixel).norm(), 0.5) << tag << ' ' << corner;
+    }
+  }
+}
+
+class Tags : public testing::Test {
+ protected:
+  Tags() {
+    scene_.board = plain_board();
+    scene_.sensor = {8, 0.2, 5, 60000, 0, false, {}};
+    scene_.optics.blur_px = 0.5;
+  }
+  Scene scene_ = plain_scene();
+};
+
+TEST_F(Tags, OfPlainBoardsAreReadWhereTheyAre) {
+  scene_.board->print.id_order = {true, BoardCorner::bottom_right};
+  apriltag_family_t* family = tag36h11_create();
+  expect_all_read(scene_, family);
+  tag36h11_destroy(family);
+}
+
+TEST_F(Tags, WithBitsOutsideTheirBorderAreReadWhereTheyAre) {
+  scene_.board->print.family = "tagStandard41h12";
+  scene_.board->print.first_id = 100;
+  apriltag_family_t* family = tagStandard41h12_create();
+  expect_all_read(scene_, family);
+  tagStandard41h12_destroy(family);
+}
+
+TEST(TagPattern, HasASecondBlackRingWhenTheBorderHasTwoBits) {
+  const TagPattern plain = tag_pattern("tag36h11", 17, 1), wide = tag_pattern("tag36h11", 17, 2);
+  ASSERT_EQ(plain.width(), 8);
+  ASSERT_EQ(wide.width(), 10);
+  for (int row = 0; row < 10; ++row) {
+    for (int column = 0; column < 10; ++column) {
+      const bool ring = row == 0 || column == 0 || row == 9 || column == 9;
+      const bool white = !ring && plain.white[std::size_t((row - 1) * 8 + column - 1)];
+      EXPECT_EQ(wide.white[std::size_t(row * 10 + column)], white) << row << ' ' << column;
+    }
+  }
+}
+
+TEST(TagPattern, IsRefusedWhenTheFamilyDoesNotHaveIt) {
+  EXPECT_THROW(tag_pattern("tag36h11", 587, 1), std::invalid_argument);
+  EXPECT_NO_THROW(tag_pattern("tag36h11", 586, 1));
+  EXPECT_THROW(tag_pattern("tag36h11", -1, 1), std::invalid_argument);
+  EXPECT_THROW(tag_pattern("tagStandard41h12", 0, 2), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vlp
