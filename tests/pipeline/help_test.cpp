@@ -45,7 +45,8 @@ TEST_P(Help, NamesTheVersion) {
   EXPECT_THAT(result.output, HasSubstr(std::string(GetParam()) + " 0."));
 }
 
-INSTANTIATE_TEST_SUITE_P(Programs, Help, testing::Values("vlp-limits", "vlp-locate"),
+INSTANTIATE_TEST_SUITE_P(Programs, Help,
+                         testing::Values("vlp-limits", "vlp-locate", "vlp-simulate"),
                          [](const auto& instance) {
                            return std::string(instance.param).substr(4);
                          });

@@ -1,0 +1,84 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-simulate: renders the captures of a scene, with their truth.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <opencv2/core/utility.hpp>
+#include <optional>
+#include <regex>
+#include <thread>
+
+#include "app.h"
+#include "progress.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "simulation/simulate.h"
+
+namespace vlp {
+namespace {
+
+struct Options {
+  std::string scene, output;
+  std::vector<std::string> folders;
+  std::optional<int> seed;
+  int threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+};
+
+/// The scene file as it goes into the output: with the seed that is used, and what rendered it.
+std::string origin_of(const Options& options, std::uint64_t seed) {
+  constexpr std::size_t most_bytes = 1 << 20;
+  std::string text = read_text_file(options.scene, most_bytes);
+  constexpr std::string_view mark = "# vlp-simulate ";
+  if (text.starts_with(mark)) text.erase(0, text.find('\n') + 1);
+  if (options.seed) {
+    const std::regex seed_line("(^|\n)seed:[^\n]*");
+    if (!std::regex_search(text, seed_line)) {
+      throw InputError(options.scene, "--seed needs the scene's seed on a line of its own");
+    }
+    text = std::regex_replace(text, seed_line, fmt::format("$1seed: {}", seed),
+                              std::regex_constants::format_first_only);
+  }
+  return std::string(mark) + VLP_VERSION + '\n' + text;
+}
+
+void run(const Options& options) {
+  check_output((std::filesystem::path(options.output) / "scene.yaml").string(), {options.scene});
+  Scene scene = read_scene(options.scene);
+  if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
+  cv::setNumThreads(1);  // the captures themselves go in parallel
+  Progress progress("captures");
+  const SimulationSummary summary = simulate(
+      scene, options.output, {options.folders, options.threads, origin_of(options, scene.seed)},
+      [&](const SimulationSummary& so_far, std::size_t total) {
+        progress.update(so_far.rendered + so_far.found, total, so_far.found);
+      });
+  fmt::print("rendered {} captures, {} were there; in {}\n", summary.rendered, summary.found,
+             options.output);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Renders what a rolling-shutter camera sees of modulated lamps and of calibration boards, "
+      "with\n"
+      "the truth beside the images. An interrupted run goes on where it stopped.\n\n"
+      "Example, from the project's folder:\n"
+      "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only sample -o paper-rig\n",
+      "vlp-simulate");
+  vlp::Options options;
+  app.add_option("scene", options.scene, "Scene file, .yaml")->required();
+  app.add_option("-o,--output", options.output, "Folder for the captures")->required();
+  app.add_option("--only", options.folders,
+                 "Render this folder of the scene alone; several with commas between")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  app.add_option("--seed", options.seed, "Another seed than the scene's")
+      ->check(CLI::Range(0, std::numeric_limits<int>::max()));
+  app.add_option("--threads", options.threads, "Captures at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
+  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+}

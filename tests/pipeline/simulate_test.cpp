@@ -1,0 +1,130 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-simulate as its users call it.
+#include <set>
+
+#include "captures/csv_reader.h"
+#include "small_simulation.h"
+
+namespace vlp {
+namespace {
+
+using testing::UnorderedElementsAre;
+
+using Simulate = SmallSimulation;
+
+TEST_F(Simulate, WritesTheCapturesWithTheirTruth) {
+  const auto result = simulate();
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_EQ(result.output, "rendered 24 captures, 0 were there; in " + output.string() + "\n");
+  const Files files = files_below(output);
+  EXPECT_EQ(images_of(files).size(), 24U);
+  std::set<std::string> others;
+  for (const auto& [name, content] : files) {
+    if (!name.ends_with(".png")) others.insert(name);
+  }
+  EXPECT_THAT(others,
+              UnorderedElementsAre("scene.yaml", "lamps.yaml", "true_lamps.yaml", "board.yaml",
+                                   "true_calibration.yaml", "lamps/captures.csv", "lamps/truth.csv",
+                                   "lamps/true_detections.csv", "boards/true_boards.csv",
+                                   "boards/true_corners.csv"));
+  EXPECT_NE(files.at("lamps.yaml"), files.at("true_lamps.yaml")) << "lamp 1 is off in the map";
+}
+
+TEST_F(Simulate, GivesTheSameBytesHoweverManyThreads) {
+  const Files expected = undisturbed("--threads 1");
+  EXPECT_EQ(std::set<std::string>({expected.at("lamps/0000.png"), expected.at("lamps/0001.png"),
+                                   expected.at("lamps/0002.png"), expected.at("lamps/0003.png")})
+                .size(),
+            4U);
+  for (const std::string threads : {"1", "2", "5"}) {
+    std::filesystem::remove_all(output);
+    ASSERT_EQ(simulate("--threads " + threads).exit_code, 0);
+    EXPECT_TRUE(files_below(output) == expected) << threads;
+  }
+}
+
+TEST_F(Simulate, GivesOtherImagesOfTheSameRigWithAnotherSeed) {
+  const Files first = undisturbed();
+  EXPECT_TRUE(undisturbed("--seed 1") == first) << "the scene's own";
+  const Files other = undisturbed("--seed 2");
+  for (const std::string& image : images_of(first)) EXPECT_NE(first.at(image), other.at(image));
+  for (const std::string name :
+       {"lamps.yaml", "true_lamps.yaml", "board.yaml", "true_calibration.yaml"}) {
+    EXPECT_EQ(first.at(name), other.at(name)) << name;
+  }
+  EXPECT_NE(first.at("boards/true_boards.csv"), other.at("boards/true_boards.csv"));
+}
+
+TEST_F(Simulate, RendersAFolderAloneAsItDoesWithTheOthers) {
+  const Files all = undisturbed();
+  const auto result = simulate("--only boards");
+  EXPECT_EQ(result.output, "rendered 8 captures, 0 were there; in " + output.string() + "\n");
+  const Files boards = files_below(output);
+  EXPECT_EQ(images_of(boards).size(), 8U);
+  for (const auto& [name, content] : boards) EXPECT_TRUE(all.at(name) == content) << name;
+  EXPECT_EQ(simulate("--only lamps,boards").output,
+            "rendered 16 captures, 8 were there; in " + output.string() + "\n");
+  EXPECT_TRUE(files_below(output) == all);
+}
+
+TEST_F(Simulate, IsRepeatedFromTheSceneThatItLeaves) {
+  ASSERT_EQ(simulate("--seed 5").exit_code, 0);
+  const auto first = files_below(output);
+  EXPECT_EQ(first.at("scene.yaml").substr(0, 15), "# vlp-simulate ");
+  const auto again = run_program("vlp-simulate " + (output / "scene.yaml").string() + " -o " +
+                                 (folder / "again").string());
+  EXPECT_EQ(again.exit_code, 0) << again.errors;
+  EXPECT_EQ(files_below(folder / "again"), first);
+}
+
+TEST_F(Simulate, SaysNothingWhenQuiet) {
+  const auto result = simulate("--quiet");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.output, "");
+  EXPECT_EQ(result.errors, "");
+  EXPECT_EQ(images_of(files_below(output)).size(), 24U);
+}
+
+/// The largest differences of the fixes that vlp-locate makes of the true detections.
+struct Differences {
+  std::size_t fixes = 0;
+  double position_m = 0, yaw_rad = 0;
+};
+
+Differences located_against_truth(const std::filesystem::path& output) {
+  const std::string path = output.string();
+  const auto result = run_program("vlp-locate -q " + path + "/lamps/true_detections.csv --lamps " +
+                                  path + "/true_lamps.yaml --calibration " + path +
+                                  "/true_calibration.yaml -o " + path + "/fixes.csv");
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  const CsvTable fixes(output / "fixes.csv"), truth(output / "lamps/truth.csv");
+  EXPECT_EQ(fixes.rows(), truth.rows());
+  Differences differences;
+  for (std::size_t row = 0; row < fixes.rows() && row < truth.rows(); ++row) {
+    EXPECT_EQ(fixes.text(row, fixes.required("image")), truth.text(row, truth.required("image")));
+    if (fixes.text(row, fixes.required("status")) != "ok") continue;
+    ++differences.fixes;
+    const auto difference = [&](const char* column) {
+      return fixes.number(row, fixes.required(column)) - truth.number(row, truth.required(column));
+    };
+    for (const char* axis : {"x_m", "y_m", "z_m"}) {
+      differences.position_m = std::max(differences.position_m, std::abs(difference(axis)));
+    }
+    const double turn_rad = std::remainder(difference("yaw_rad"), 2 * M_PI);
+    differences.yaw_rad = std::max(differences.yaw_rad, std::abs(turn_rad));
+  }
+  return differences;
+}
+
+// Pixels are written to 1e-6 px, which are 2e-8 m here.
+TEST_F(Simulate, HasATruthThatLocateFinds) {
+  ASSERT_EQ(simulate("--only lamps").exit_code, 0);
+  const Differences differences = located_against_truth(output);
+  EXPECT_EQ(differences.fixes, 16U);
+  EXPECT_LT(differences.position_m, 1e-7);
+  EXPECT_LT(differences.yaw_rad, 1e-7);
+}
+
+}  // namespace
+}  // namespace vlp
