@@ -1,0 +1,14 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace vlp {
+
+/// Calls task(0) to task(count - 1), each once, on so many threads, the calling one among them. The
+/// first exception ends it and is thrown here.
+void in_parallel(std::size_t count, int threads, const std::function<void(std::size_t)>& task);
+
+}  // namespace vlp
