@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-simulate: renders the captures of a scene, with their truth.
 #include <fmt/core.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -48,12 +49,16 @@ void run(const Options& options) {
   Scene scene = read_scene(options.scene);
   if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
   cv::setNumThreads(1);  // the captures themselves go in parallel
-  Progress progress("captures");
-  const SimulationSummary summary = simulate(
-      scene, options.output, {options.folders, options.threads, origin_of(options, scene.seed)},
-      [&](const SimulationSummary& so_far, std::size_t total) {
-        progress.update(so_far.rendered + so_far.found, total, so_far.found);
-      });
+  SimulationSummary summary;
+  {
+    Progress progress("captures");
+    summary = simulate(scene, options.output,
+                       {options.folders, options.threads, origin_of(options, scene.seed)},
+                       [&](const SimulationSummary& so_far, std::size_t total) {
+                         progress.update(so_far.rendered + so_far.found, total, so_far.found);
+                       });
+  }
+  for (const std::string& doubt : summary.doubts) spdlog::warn("{}", doubt);
   fmt::print("rendered {} captures, {} were there; in {}\n", summary.rendered, summary.found,
              options.output);
 }
@@ -67,15 +72,16 @@ int main(int argc, char** argv) {
       "with\n"
       "the truth beside the images. An interrupted run goes on where it stopped.\n\n"
       "Example, from the project's folder:\n"
-      "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only sample -o paper-rig\n",
+      "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only sample -o out/paper-rig\n",
       "vlp-simulate");
   vlp::Options options;
   app.add_option("scene", options.scene, "Scene file, .yaml")->required();
   app.add_option("-o,--output", options.output, "Folder for the captures")->required();
   app.add_option("--only", options.folders,
-                 "Render this folder of the scene alone; several with commas between")
+                 "Render these folders of the scene alone (commas between, no spaces)")
       ->delimiter(',')
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->option_text("FOLDER[,FOLDER...]");
   app.add_option("--seed", options.seed, "Another seed than the scene's")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   app.add_option("--threads", options.threads, "Captures at a time (default: one a core)")

@@ -3,16 +3,14 @@
 #include "simulation/simulate.h"
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
-#include <functional>
 #include <mutex>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
-#include <thread>
 
+#include "captures/in_parallel.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "simulation/doubts.h"
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
 #include "simulation/truth.h"
@@ -29,7 +27,13 @@ std::vector<CaptureSet> wanted_sets(const Scene& scene, const std::vector<std::s
     const auto same = [&](const CaptureSet& each) { return each.folder == folder; };
     const auto set = std::find_if(scene.sets.begin(), scene.sets.end(), same);
     if (set == scene.sets.end()) {
-      throw std::invalid_argument("the scene has no captures called '" + folder + "'");
+      std::string problem = "the scene has no captures called '";
+      problem += folder + "'; it has";
+      for (const CaptureSet& each : scene.sets) {
+        problem += ' ';
+        problem += each.folder;
+      }
+      throw std::invalid_argument(problem);
     }
     if (std::none_of(sets.begin(), sets.end(), same)) sets.push_back(*set);
   }
@@ -98,29 +102,6 @@ bool render(const Scene& scene, const FrameRenderer& renderer, const CaptureSet&
       shot.image, [&] { return renderer.lamp_electrons(shot); }, shot.noise_seed);
 }
 
-/// Calls task(0) to task(count - 1), each once, on so many threads. The first exception ends it.
-void in_parallel(std::size_t count, int threads, const std::function<void(std::size_t)>& task) {
-  std::atomic<std::size_t> next = 0;
-  std::mutex failing;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    try {
-      for (std::size_t i = next++; i < count; i = next++) task(i);
-    } catch (...) {
-      next = count;
-      const std::lock_guard lock(failing);
-      if (!failure) failure = std::current_exception();
-    }
-  };
-  {
-    std::vector<std::jthread> workers;
-    for (std::size_t i = 1; i < std::min<std::size_t>(std::size_t(threads), count); ++i)
-      workers.emplace_back(work);
-    work();
-  }
-  if (failure) std::rethrow_exception(failure);
-}
-
 }  // namespace
 
 SimulationSummary simulate(const Scene& scene, const fs::path& output,
@@ -137,7 +118,12 @@ SimulationSummary simulate(const Scene& scene, const fs::path& output,
   for (const CaptureSet& set : sets) {
     const fs::path folder = output / set.folder;
     make_folder(folder);
-    write_truth(scene, renderer, set, folder);
+    const auto doubts = doubts_about(scene, set);
+    summary.doubts.insert(summary.doubts.end(), doubts.begin(), doubts.end());
+    if (const std::size_t empty = write_truth(scene, renderer, set, folder); empty > 0) {
+      summary.doubts.push_back(set.folder + ": nothing is in view in " + std::to_string(empty) +
+                               " of " + std::to_string(shots_in(set)) + " captures");
+    }
     in_parallel(shots_in(set), options.threads, [&](std::size_t index) {
       const bool rendered = render(scene, renderer, set, index, folder);
       const std::lock_guard lock(counting);

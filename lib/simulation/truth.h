@@ -43,8 +43,9 @@ LampMap lamp_map_of(const Scene& scene, bool surveyed);
 
 /// Writes into `folder`: of lamps truth.csv, true_detections.csv (with the share in view) and
 /// captures.csv; of boards true_boards.csv (camera_from_board as a place in metres and a rotation
-/// vector in radians) and true_corners.csv. Throws InputError.
-void write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
-                 const std::filesystem::path& folder);
+/// vector in radians) and true_corners.csv. Returns how many captures show no lamp, or no corner.
+/// Throws InputError.
+std::size_t write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
+                        const std::filesystem::path& folder);
 
 }  // namespace vlp

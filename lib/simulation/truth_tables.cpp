@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include "captures/csv_writer.h"
+#include "geometry/angles.h"
 #include "simulation/truth.h"
 
 namespace vlp {
@@ -10,8 +11,8 @@ std::string length(double value_m) { return fixed(value_m, 9); }
 std::string angle(double value_rad) { return fixed(value_rad, 10); }
 std::string pixel(double value_px) { return fixed(value_px, 6); }
 
-void write_lamp_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
-                      const std::filesystem::path& folder) {
+std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
+                             const CaptureSet& set, const std::filesystem::path& folder) {
   CsvWriter truth(folder / "truth.csv", {"image", "x_m", "y_m", "z_m", "yaw_rad"});
   CsvWriter detections(folder / "true_detections.csv",
                        {"image", "lamp", "u_px", "v_px", "in_view"});
@@ -20,18 +21,21 @@ void write_lamp_truth(const Scene& scene, const FrameRenderer& renderer, const C
       folder / "captures.csv",
       known ? std::initializer_list<std::string_view>{"image", "time_s", "x_m", "y_m", "z_m"}
             : std::initializer_list<std::string_view>{"image", "time_s"});
+  std::size_t empty = 0;
   for (std::size_t i = 0; i < shots_in(set); ++i) {
     const LampShot shot = lamp_shot(scene, set, i);
     const auto& [position_m, yaw_rad] = shot.motion.pose(0);
     const std::string x = length(position_m.x()), y = length(position_m.y());
     const std::string z = length(position_m.z()), time = fixed(shot.time_s, 9);
-    truth.row({shot.image, x, y, z, angle(yaw_rad)});
+    truth.row({shot.image, x, y, z, angle(wrapped_rad(yaw_rad))});
     if (known) {
       captures.row({shot.image, time, x, y, z});
     } else {
       captures.row({shot.image, time});
     }
-    for (const auto& [id, at_px, in_view] : true_lamps(scene, renderer, shot)) {
+    const auto lamps = true_lamps(scene, renderer, shot);
+    empty += lamps.empty();
+    for (const auto& [id, at_px, in_view] : lamps) {
       detections.row({shot.image, std::to_string(id), pixel(at_px.x()), pixel(at_px.y()),
                       significant(in_view, 3)});
     }
@@ -39,13 +43,15 @@ void write_lamp_truth(const Scene& scene, const FrameRenderer& renderer, const C
   truth.save();
   detections.save();
   captures.save();
+  return empty;
 }
 
-void write_board_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
-                       const std::filesystem::path& folder) {
+std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
+                              const CaptureSet& set, const std::filesystem::path& folder) {
   CsvWriter boards(folder / "true_boards.csv",
                    {"image", "x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"});
   CsvWriter corners(folder / "true_corners.csv", {"image", "tag", "corner", "u_px", "v_px"});
+  std::size_t empty = 0;
   for (std::size_t i = 0; i < shots_in(set); ++i) {
     const BoardShot shot = board_shot(scene, set, i);
     const Eigen::Isometry3d camera_from_board = shot.camera_from_board(0);
@@ -54,24 +60,26 @@ void write_board_truth(const Scene& scene, const FrameRenderer& renderer, const 
     const Eigen::Vector3d turn_rad = turn.angle() * turn.axis();
     boards.row({shot.image, length(place_m.x()), length(place_m.y()), length(place_m.z()),
                 angle(turn_rad.x()), angle(turn_rad.y()), angle(turn_rad.z())});
-    for (const auto& [tag, corner, at_px] : true_corners(scene, renderer, shot)) {
+    const auto seen = true_corners(scene, renderer, shot);
+    empty += seen.empty();
+    for (const auto& [tag, corner, at_px] : seen) {
       corners.row({shot.image, std::to_string(tag), std::to_string(corner), pixel(at_px.x()),
                    pixel(at_px.y())});
     }
   }
   boards.save();
   corners.save();
+  return empty;
 }
 
 }  // namespace
 
-void write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
-                 const std::filesystem::path& folder) {
+std::size_t write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
+                        const std::filesystem::path& folder) {
   if (set.board) {
-    write_board_truth(scene, renderer, set, folder);
-  } else {
-    write_lamp_truth(scene, renderer, set, folder);
+    return write_board_truth(scene, renderer, set, folder);
   }
+  return write_lamp_truth(scene, renderer, set, folder);
 }
 
 }  // namespace vlp

@@ -9,6 +9,9 @@
 namespace vlp {
 namespace {
 
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
 using testing::UnorderedElementsAre;
 
 using Simulate = SmallSimulation;
@@ -76,6 +79,30 @@ TEST_F(Simulate, IsRepeatedFromTheSceneThatItLeaves) {
                                  (folder / "again").string());
   EXPECT_EQ(again.exit_code, 0) << again.errors;
   EXPECT_EQ(files_below(folder / "again"), first);
+}
+
+TEST_F(Simulate, WarnsOfCapturesThatAreOfNoUse) {
+  const auto warnings_with = [&](const std::string& from, const std::string& to) {
+    change_scene(from, to);
+    const auto result = simulate("");
+    EXPECT_EQ(result.exit_code, 0);
+    std::filesystem::remove_all(output);
+    change_scene(to, from);
+    return result.errors;
+  };
+  EXPECT_EQ(warnings_with("seed: 1", "seed: 2"), "");
+  EXPECT_THAT(warnings_with("bits: 8", "bits: 16"),
+              AllOf(HasSubstr("lamps: the brightest lamp is only 200 of 65535 grey levels above"),
+                    HasSubstr("boards: the board's white is only 180 of 65535 grey levels")));
+  EXPECT_THAT(warnings_with("gain_dn_per_e: 0.02", "gain_dn_per_e: 5.0"),
+              HasSubstr("lamps: the ceiling is at 252 of 255 grey levels"));
+  EXPECT_THAT(warnings_with("exposure_s: 5.0e-5", "exposure_s: 5.0e-4"),
+              AllOf(HasSubstr("lamp 2 has no clear stripes: the exposure is longer than its"),
+                    Not(HasSubstr("lamp 1 has"))));
+  EXPECT_THAT(warnings_with("row_time_s: 3.0e-5", "row_time_s: 1.0e-4"),
+              HasSubstr("lamp 4 has stripes of less than 2.2 lines"));
+  EXPECT_THAT(warnings_with("distance_m: [0.2, 0.3]", "distance_m: [0.002, 0.003]"),
+              HasSubstr("boards: nothing is in view in "));
 }
 
 TEST_F(Simulate, SaysNothingWhenQuiet) {
