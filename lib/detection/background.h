@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace vlp {
+
+/// The dark of an image of lamps, from a sample of its pixels.
+struct Background {
+  /// Median, and the noise around it (a robust standard deviation), in grey levels.
+  double level;
+  double noise;
+  /// Pixels above are lit: level + 6 noise, and at least 2.5 grey levels more.
+  double threshold;
+};
+
+/// `image` has one channel of 8 or 16 bits and is not empty.
+Background background_of(const cv::Mat& image);
+
+}  // namespace vlp

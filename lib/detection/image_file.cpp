@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/image_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <opencv2/imgcodecs.hpp>
+
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_image(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}) {
+    if (extension == known) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) throw InputError(folder, "is not a folder of images");
+  std::vector<fs::path> images;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code no_file;  // a folder, a pipe, a link that leads nowhere
+    if (entry->is_regular_file(no_file) && is_image(entry->path())) images.push_back(entry->path());
+  }
+  if (error) throw InputError(folder, "cannot be read: " + error.message());
+  if (images.empty()) {
+    throw InputError(folder, "holds no image (.png, .jpg, .bmp, .tif or .pgm)");
+  }
+  std::sort(images.begin(), images.end());
+  return images;
+}
+
+cv::Mat read_image(const fs::path& file) {
+  cv::Mat image;
+  try {
+    image = cv::imread(file.string(),
+                       cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception& failure) {
+    throw InputError(file, "cannot be read as an image: " + failure.err);
+  }
+  if (image.empty()) throw InputError(file, "cannot be read as an image");
+  if (image.depth() != CV_8U && image.depth() != CV_16U) {
+    throw InputError(file, "has neither 8 nor 16 bits");
+  }
+  return image;
+}
+
+}  // namespace vlp
