@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <map>
 #include <optional>
 
@@ -13,6 +14,7 @@
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "captures/fixes_table.h"
+#include "detect_folder.h"
 #include "evaluation/fix_summary.h"
 #include "geometry/angles.h"
 #include "positioning/positioner.h"
@@ -140,20 +142,33 @@ void report_noise(const std::vector<Frame>& frames, const std::vector<Fix>& fixe
   }
 }
 
+/// A lamp that the image's edge cuts may have its centre a little outside.
 void report_image(const std::vector<Frame>& frames, const Camera& camera) {
+  const Eigen::Array2d size(camera.imager_px[0], camera.imager_px[1]);
   std::size_t outside = 0;
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
-      const Eigen::Vector2d& pixel = detection.pixel;
-      const bool inside = pixel.minCoeff() >= -0.5 && pixel.x() <= camera.imager_px[0] - 0.5 &&
-                          pixel.y() <= camera.imager_px[1] - 0.5;
-      outside += inside ? 0 : 1;
+      const Eigen::Array2d pixel = detection.pixel.array();
+      const bool near = (pixel >= -0.1 * size).all() && (pixel <= 1.1 * size).all();
+      outside += near ? 0 : 1;
     }
   }
   if (outside > 0) {
-    spdlog::warn("{} detections outside the camera's {} x {} px: is the calibration this camera's?",
-                 outside, camera.imager_px[0], camera.imager_px[1]);
+    spdlog::warn(
+        "{} detections far outside the camera's {} x {} px: is the calibration this camera's?",
+        outside, camera.imager_px[0], camera.imager_px[1]);
   }
+}
+
+/// From detections.csv, or from the images themselves.
+std::vector<Frame> frames_of(const Options& options, const LampMap& lamps,
+                             const Calibration& calibration) {
+  if (!std::filesystem::is_directory(options.detections)) {
+    return read_detections(options.detections);
+  }
+  return detect_folder(options.detections, lamps, options.lamps, calibration, options.calibration,
+                       options.output, all_cores())
+      .frames;
 }
 
 void run(const Options& options) {
@@ -163,7 +178,7 @@ void run(const Options& options) {
   const Calibration calibration = read_calibration(options.calibration);
   const CapturesTable captures =
       options.captures.empty() ? CapturesTable{} : read_captures(options.captures);
-  std::vector<Frame> frames = read_detections(options.detections);
+  std::vector<Frame> frames = frames_of(options, lamps, calibration);
   if (options.sigma_px) set_sigma(frames, *options.sigma_px);
   PositionerOptions how;
   how.correction = kCorrections.at(options.correction);
@@ -207,7 +222,9 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Positions from the lamps seen in images: fixes.csv from detections.csv.\n\n"
+      "Positions from the lamps seen in images: fixes.csv from detections.csv, or from a folder "
+      "of\n"
+      "images.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-locate datasets/example/detections.csv --lamps datasets/example/lamps.yaml "
       "\\\n"
@@ -215,7 +232,7 @@ int main(int argc, char** argv) {
       "vlp-locate");
   vlp::Options options;
   app.add_option("detections", options.detections,
-                 "detections.csv: image, lamp, u_px, v_px [, sigma_px]")
+                 "detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images")
       ->required();
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
   app.add_option("--calibration", options.calibration, "Calibration of the camera")->required();

@@ -47,7 +47,7 @@ struct Light {
 struct DetectorCamera {
   Readout readout;
   std::optional<double> row_time_s;
-  /// Without it outlines are ellipses in the image.
+  /// Without it circles are fitted in the image itself.
   std::optional<Lens> lens;
   /// level_from_camera, for discs that a tilted camera sees.
   Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();

@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-detect: where the lamps are in images, and which they are.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <string>
+
+#include "app.h"
+#include "detect_folder.h"
+
+namespace vlp {
+namespace {
+
+struct Options {
+  std::string folder, lamps, calibration, output;
+  int threads = all_cores();
+};
+
+void run(const Options& options) {
+  check_output(options.output, {options.lamps, options.calibration});
+  const CaptureDetections found = detect_folder(
+      options.folder, read_lamp_map(options.lamps), options.lamps,
+      read_calibration(options.calibration), options.calibration, options.output, options.threads);
+  write_detections(options.output, found.frames);
+  const auto empty = std::count_if(found.frames.begin(), found.frames.end(),
+                                   [](const Frame& frame) { return frame.detections.empty(); });
+  const auto [identified, cut, unknown, steady] = found.lights;
+  fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images, found.refused.size(),
+             empty);
+  fmt::print("lamps       {}\n", identified);
+  fmt::print("left out    {} cut by the image's edge, {} unknown, {} steady\n", cut, unknown,
+             steady);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Finds the lamps in images of a rolling-shutter camera and tells them apart by their\n"
+      "stripes. Only lamps wholly in the image and identified beyond doubt are written.\n\n"
+      "Example, from the project's folder:\n"
+      "  build/bin/vlp-detect datasets/paper-rig/rendered/sample \\\n"
+      "    --lamps datasets/paper-rig/rendered/lamps.yaml \\\n"
+      "    --calibration datasets/paper-rig/rendered/true_calibration.yaml -o detections.csv\n",
+      "vlp-detect");
+  vlp::Options options;
+  app.add_option("images", options.folder, "Folder of images: PNG, JPEG, BMP, TIFF or PGM")
+      ->required();
+  app.add_option("--lamps", options.lamps, "Lamp map with frequencies, lamps.yaml")->required();
+  app.add_option("--calibration", options.calibration,
+                 "Calibration: the camera with its row time, and its tilt when known")
+      ->required();
+  app.add_option("-o,--output", options.output, "Where to write detections.csv")->required();
+  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
+  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+}

@@ -1,0 +1,153 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-detect end to end.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "captures/csv_reader.h"
+#include "support/program.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
+
+class Detect : public testing::Test {
+ protected:
+  ProgramResult detect(const std::string& images, const std::string& options = "") const {
+    return run_program("vlp-detect '" + images + "' --lamps " + kRig +
+                       "/lamps.yaml --calibration " + kRig + "/true_calibration.yaml -o " +
+                       (folder / "found.csv").string() + " " + options);
+  }
+  /// A folder with the captures of the sample.
+  fs::path images() const {
+    fs::copy(kRig + "/sample", folder / "images");
+    return folder / "images";
+  }
+  const TemporaryFolder folder;
+};
+
+TEST_F(Detect, FindsWhatLocateTurnsIntoTheTruePlace) {
+  ASSERT_EQ(detect(kRig + "/sample").exit_code, 0);
+  const auto located = run_program("vlp-locate -q " + (folder / "found.csv").string() +
+                                   " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
+                                   "/true_calibration.yaml -o " + (folder / "fixes.csv").string());
+  ASSERT_EQ(located.exit_code, 0) << located.errors;
+  const CsvTable fixes(folder / "fixes.csv"), truth(kRig + "/sample/truth.csv");
+  ASSERT_EQ(fixes.rows(), 2);
+  for (std::size_t row = 0; row < 2; ++row) {
+    EXPECT_EQ(fixes.text(row, fixes.required("image")), truth.text(row, truth.required("image")));
+    for (const char* axis : {"x_m", "y_m", "z_m"}) {
+      EXPECT_NEAR(fixes.number(row, fixes.required(axis)), truth.number(row, truth.required(axis)),
+                  1e-4);
+    }
+  }
+}
+
+TEST_F(Detect, IsPartOfLocateOnAFolderOfImages) {
+  ASSERT_EQ(detect(kRig + "/sample").exit_code, 0);
+  const std::string rig = " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
+                          "/true_calibration.yaml -o " + (folder / "fixes").string();
+  const auto from_table =
+      run_program("vlp-locate " + (folder / "found.csv").string() + rig + "1.csv");
+  const auto from_images = run_program("vlp-locate " + kRig + "/sample" + rig + "2.csv");
+  ASSERT_EQ(from_images.exit_code, 0) << from_images.errors;
+  EXPECT_EQ(from_images.output, from_table.output);
+  // An image without a lamp has a row that says so.
+  const fs::path images = this->images();
+  fs::copy(kRig + "/sample-boards/0000.png", images / "0002.png");
+  ASSERT_EQ(run_program("vlp-locate " + images.string() + rig + "3.csv").exit_code, 0);
+  const CsvTable fixes(folder / "fixes3.csv");
+  ASSERT_EQ(fixes.rows(), 3);
+  EXPECT_NE(fixes.text(2, fixes.required("status")), "ok");
+}
+
+TEST_F(Detect, GivesTheSameBytesWhateverTheThreads) {
+  ASSERT_EQ(detect(kRig + "/sample", "--threads 1").exit_code, 0);
+  const std::string one = TemporaryFolder::content_of(folder / "found.csv");
+  ASSERT_EQ(detect(kRig + "/sample", "--threads 4").exit_code, 0);
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "found.csv"), one);
+}
+
+TEST_F(Detect, SkipsAndCountsImagesThatItCannotUse) {
+  const fs::path images = this->images();
+  const std::string whole = TemporaryFolder::content_of(images / "0000.png");
+  folder.file("images/empty.png", "");
+  folder.file("images/text.png", "no image\n");
+  folder.file("images/half.PNG", whole.substr(0, 300));
+  fs::copy(VLP_SOURCE_DIR "/datasets/example/limits.png", images / "another.png");
+  const auto result = detect(images.string());
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.output, HasSubstr("images      6\n  skipped   4\n"));
+  EXPECT_THAT(result.errors, HasSubstr("empty.png: cannot be read as an image; skipped"));
+  EXPECT_THAT(result.errors, HasSubstr("text.png: cannot be read as an image; skipped"));
+  EXPECT_THAT(result.errors, HasSubstr("the calibration's camera has 800 x 600 px; skipped"));
+  EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
+}
+
+TEST_F(Detect, EndsWithOneLineWhereThereIsNothingToDetect) {
+  const auto refused = [&](const std::string& images, int exit_code, const std::string& message) {
+    const auto result = detect(images);
+    EXPECT_EQ(result.exit_code, exit_code);
+    EXPECT_THAT(result.errors, HasSubstr(message));
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1);
+    EXPECT_FALSE(fs::exists(folder / "found.csv"));
+  };
+  refused((folder / "none").string(), 2, "none: is not a folder of images");
+  fs::create_directory(folder / "bare");
+  refused((folder / "bare").string(), 2, "bare: holds no image");
+  refused(kRig + "/sample-boards", 3, "no lamp was identified wholly in view in 1 images");
+}
+
+TEST_F(Detect, PassesOverWhatOnlyHasTheNameOfAnImage) {
+  const fs::path images = this->images();
+  fs::create_symlink(images / "loop.png", images / "loop.png");
+  fs::create_directory(images / "folder.png");
+  ASSERT_EQ(run_program("mkfifo '" + (images / "pipe.png").string() + "'").exit_code, 0);
+  const auto result = detect(images.string());
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("images      2\n"));
+}
+
+TEST_F(Detect, KeepsItsImages) {
+  const fs::path images = this->images();
+  const auto result = run_program("vlp-detect " + images.string() + " --lamps " + kRig +
+                                  "/lamps.yaml --calibration " + kRig +
+                                  "/true_calibration.yaml -o " + (images / "0001.png").string());
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("0001.png: is an input, too"));
+}
+
+TEST_F(Detect, SaysWhenNoImageCanBeUsed) {
+  fs::create_directory(folder / "bad");
+  folder.file("bad/one.png", "no image\n");
+  const auto result = detect((folder / "bad").string());
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("bad: none of its 1 images can be used"));
+}
+
+TEST_F(Detect, AsksForTheRowTimeAndForFrequencies) {
+  std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+  calibration.erase(calibration.find("  row_time_s"), 21);
+  const auto without_row_time = run_program(
+      "vlp-detect " + kRig + "/sample --lamps " + kRig + "/lamps.yaml --calibration " +
+      folder.file("camera.yaml", calibration).string() + " -o " + (folder / "found.csv").string());
+  EXPECT_EQ(without_row_time.exit_code, 2);
+  EXPECT_THAT(without_row_time.errors, HasSubstr("camera.yaml: camera.row_time_s is missing"));
+  const fs::path lamps = folder.file(
+      "lamps.yaml", "format: vlp-lamps/1\nlamps:\n  - {id: 1, position_m: [0, 0, 2]}\n");
+  const auto without_frequency =
+      run_program("vlp-detect " + kRig + "/sample --lamps " + lamps.string() + " --calibration " +
+                  kRig + "/true_calibration.yaml -o " + (folder / "found.csv").string());
+  EXPECT_EQ(without_frequency.exit_code, 2);
+  EXPECT_THAT(without_frequency.errors, HasSubstr("lamps.yaml: no lamp has a frequency_hz"));
+}
+
+}  // namespace
+}  // namespace vlp
