@@ -29,7 +29,7 @@ std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
       second = std::min(second, off);
     }
   }
-  // A lamp's own frequency may be off by this much more than another's.
+  // Lamps drift: a lamp has to be nearer than any other by this much.
   constexpr double drift = 0.015;
   if (id && second < std::max(2 * best, best + drift)) return std::nullopt;
   return id;
@@ -55,14 +55,13 @@ void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) co
     if (soft || light.roundness < least_roundness) light.lamp.reset();
   }
   // Of two lights with one identity the one with the surer centre has it.
-  const auto surer = [](const Light& a, const Light& b) { return a.sigma_px < b.sigma_px; };
   for (const Lamp& lamp : lamps_.lamps) {
     std::vector<Light*> claims;
     for (Light& light : lights) {
       if (light.lamp == lamp.id) claims.push_back(&light);
     }
     const auto best = std::min_element(claims.begin(), claims.end(),
-                                       [&](auto* a, auto* b) { return surer(*a, *b); });
+                                       [](auto* a, auto* b) { return a->sigma_px < b->sigma_px; });
     for (Light* claim : claims) {
       if (claim != *best) claim->lamp.reset();
     }

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/stripes.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
