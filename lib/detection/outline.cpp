@@ -5,32 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <optional>
+
+#include "detection/profile.h"
 
 namespace vlp {
 namespace {
-
-/// A row seen from outside a light towards its inside.
-template <typename Level>
-struct Profile {
-  const Level* row;
-  int columns, edge, direction;
-
-  bool has(int i) const {
-    const int column = edge + direction * i;
-    return column >= 0 && column < columns;
-  }
-  double operator()(int i) const { return row[edge + direction * i]; }
-
-  /// Where the profile first rises through a level, from `begin` on.
-  std::optional<double> crossing(double level, int begin, int end) const {
-    for (int i = begin; i < end && has(i) && has(i + 1); ++i) {
-      const double below = (*this)(i), above = (*this)(i + 1);
-      if (below < level && above >= level) return i + (level - below) / (above - below);
-    }
-    return std::nullopt;
-  }
-};
 
 template <typename Level>
 void add_edge(const Profile<Level>& profile, int width, int row, double dark,

@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/robust_circle.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "detection/m_estimate.h"
 
 namespace vlp {
 namespace {
@@ -62,55 +65,20 @@ std::optional<RobustCircle> fit_robust_circle(std::span<const Eigen::Vector2d> p
   if (points.size() < kLeast) return std::nullopt;
   const auto begin = best_supported(points, tolerance);
   if (!begin) return std::nullopt;
-  RobustCircle fit{*begin, {}, std::vector<bool>(points.size()), 0, 0};
-  std::vector<double> sizes;
+  RobustCircle fit{*begin, {}, {}, 0, 0};
   for (int round = 0; round < 5; ++round) {
-    // The scale is the median distance of those that may belong to the circle at all.
-    sizes.clear();
-    for (const Eigen::Vector2d& point : points) {
-      const double size = std::abs(distance(fit.circle, point));
-      if (size < 4 * tolerance) sizes.push_back(size);
-    }
-    if (sizes.size() < kLeast) return std::nullopt;
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    constexpr double sigma_from_median = 1.4826, tukey = 4.685;
-    const double cut =
-        std::min(4 * tolerance, tukey * std::max(sigma_from_median * *middle, tolerance / 10));
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    double sum = 0, squares = 0, all = 0, psi_squares = 0, slopes = 0;
-    fit.count = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
+    auto better = m_estimate_step<3>(weights, tolerance, [&](std::size_t i) {
       const Eigen::Vector2d away = points[i] - fit.circle.center;
-      const double norm = away.norm(), error = norm - fit.circle.radius;
-      const double share = error / cut;
-      fit.inliers[i] = std::abs(share) < 1 && norm > 0;
-      if (!fit.inliers[i]) continue;
-      const double inside = 1 - share * share;
-      const double weight = weights[i] * inside * inside;
-      all += weights[i];
-      psi_squares += weights[i] * std::pow(inside * inside * error, 2);
-      slopes += weights[i] * inside * (1 - 5 * share * share);
-      squares += error * error;
-      const Eigen::Vector3d slope(-away.x() / norm, -away.y() / norm, -1);
-      normal += weight * slope * slope.transpose();
-      gradient += weight * error * slope;
-      sum += weight;
-      ++fit.count;
-    }
-    if (fit.count < kLeast || !(slopes > 0)) return std::nullopt;
-    const Eigen::LDLT<Eigen::Matrix3d> solver(normal);
-    if (!(solver.vectorD().minCoeff() > 1e-12 * sum)) return std::nullopt;
-    const Eigen::Vector3d step = solver.solve(gradient);
-    fit.circle.center -= step.head<2>();
-    fit.circle.radius -= step[2];
-    fit.rms = std::sqrt(squares / fit.count);
-    // Of an M-estimate: the mean of psi^2 over the squared mean of its slope (Huber 1981).
-    const double variance = psi_squares * all / (slopes * slopes) * fit.count / (fit.count - 3);
-    const Eigen::Matrix3d covariance =
-        solver.solve(Eigen::Matrix3d::Identity()) * (variance * sum / fit.count);
-    fit.center_covariance = covariance.topLeftCorner<2, 2>();
+      const double norm = std::max(away.norm(), std::numeric_limits<double>::min());
+      return CurveDistance<3>{norm - fit.circle.radius, {-away.x() / norm, -away.y() / norm, -1}};
+    });
+    if (!better) return std::nullopt;
+    fit.circle.center -= better->step.head<2>();
+    fit.circle.radius -= better->step[2];
+    fit.center_covariance = better->covariance.topLeftCorner<2, 2>();
+    fit.inliers = std::move(better->inliers);
+    fit.count = better->count;
+    fit.rms = better->rms;
   }
   if (!(fit.circle.radius > 0) || !fit.circle.center.allFinite()) return std::nullopt;
   return fit;

@@ -1,0 +1,91 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace vlp {
+
+/// The signed distance of a point from a curve, and its slope with the curve's N parameters.
+template <int N>
+struct CurveDistance {
+  double error;
+  Eigen::Matrix<double, N, 1> slope;
+};
+
+/// A step of Gauss-Newton on Tukey's biweight of the distances (Huber 1981).
+template <int N>
+struct MEstimateStep {
+  /// To be taken off the parameters.
+  Eigen::Matrix<double, N, 1> step;
+  /// Of the parameters, from the scatter of the points that belong to the curve.
+  Eigen::Matrix<double, N, N> covariance;
+  /// Which points belong to it, and how many.
+  std::vector<bool> inliers;
+  int count;
+  /// Root of the mean squared distance of those.
+  double rms;
+};
+
+/// `distance(i)` is that of point i, weights.size() points in all. The scale is the median distance
+/// of those closer than four tolerances, and a tenth of the tolerance at the least. Nothing when
+/// N + 2 points do not remain, or do not determine the curve.
+template <int N, typename Distance>
+std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights, double tolerance,
+                                                const Distance& distance) {
+  constexpr int least = N + 2;
+  std::vector<CurveDistance<N>> distances;
+  std::vector<double> sizes;
+  distances.reserve(weights.size());
+  sizes.reserve(weights.size());
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    distances.push_back(distance(i));
+    const double size = std::abs(distances[i].error);
+    if (size < 4 * tolerance) sizes.push_back(size);
+  }
+  if (sizes.size() < least) return std::nullopt;
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  constexpr double sigma_from_median = 1.4826, tukey = 4.685;
+  const double cut =
+      std::min(4 * tolerance, tukey * std::max(sigma_from_median * *middle, tolerance / 10));
+
+  MEstimateStep<N> result{{}, {}, std::vector<bool>(weights.size()), 0, 0};
+  Eigen::Matrix<double, N, N> normal = Eigen::Matrix<double, N, N>::Zero();
+  Eigen::Matrix<double, N, 1> gradient = Eigen::Matrix<double, N, 1>::Zero();
+  double sum = 0, squares = 0, all = 0, psi_squares = 0, slopes = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const auto& [error, slope] = distances[i];
+    const double share = error / cut;
+    result.inliers[i] = std::abs(share) < 1;
+    if (!result.inliers[i]) continue;
+    const double inside = 1 - share * share;
+    const double weight = weights[i] * inside * inside;
+    all += weights[i];
+    psi_squares += weights[i] * std::pow(inside * inside * error, 2);
+    slopes += weights[i] * inside * (1 - 5 * share * share);
+    squares += error * error;
+    normal += weight * slope * slope.transpose();
+    gradient += weight * error * slope;
+    sum += weight;
+    ++result.count;
+  }
+  if (result.count < least || !(slopes > 0)) return std::nullopt;
+  const Eigen::LDLT<Eigen::Matrix<double, N, N>> solver(normal);
+  if (!(solver.vectorD().minCoeff() > 1e-12 * solver.vectorD().maxCoeff())) return std::nullopt;
+  result.step = solver.solve(gradient);
+  result.rms = std::sqrt(squares / result.count);
+  // Of an M-estimate: the mean of psi^2 over the squared mean of its slope.
+  const double variance = psi_squares * all / (slopes * slopes) * result.count / (result.count - N);
+  result.covariance =
+      solver.solve(Eigen::Matrix<double, N, N>::Identity()) * (variance * sum / result.count);
+  return result;
+}
+
+}  // namespace vlp

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+namespace vlp {
+
+/// A row seen from outside a light towards its inside: pixel i is `edge + direction * i`.
+template <typename Level>
+struct Profile {
+  const Level* row;
+  int columns, edge, direction;
+
+  bool has(int i) const {
+    const int column = edge + direction * i;
+    return column >= 0 && column < columns;
+  }
+  double operator()(int i) const { return row[edge + direction * i]; }
+
+  /// Where the profile first rises through a level, from `begin` on.
+  std::optional<double> crossing(double level, int begin, int end) const {
+    for (int i = begin; i < end && has(i) && has(i + 1); ++i) {
+      const double below = (*this)(i), above = (*this)(i + 1);
+      if (below < level && above >= level) return i + (level - below) / (above - below);
+    }
+    return std::nullopt;
+  }
+};
+
+}  // namespace vlp
