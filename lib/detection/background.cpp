@@ -39,10 +39,28 @@ Background background(const cv::Mat& image) {
   for (auto below = sample.begin(); below != middle; ++below) {
     squares += (median - *below) * (median - *below);
   }
-  const double noise = std::max(
-      0.3, std::sqrt(squares / double(std::max<std::ptrdiff_t>(1, middle - sample.begin()))));
-  constexpr double clear = 6, least = 2.5;
-  return {median, noise, median + std::max(clear * noise, least)};
+  double noise = std::sqrt(squares / double(std::max<std::ptrdiff_t>(1, middle - sample.begin())));
+  if (median == 0) {
+    // Noise below is clipped: one pixel of ten is brighter than 1.28 standard deviations.
+    const auto tenth = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() * 9 / 10);
+    std::nth_element(sample.begin(), tenth, sample.end());
+    noise = std::max(noise, *tenth / 1.2816);
+  }
+  // Grey levels are coarse: of those around, the mean and the scatter say more.
+  constexpr double around = 3, least_noise = 0.3;
+  double count = 0, sum = 0, sum_of_squares = 0;
+  for (const Level value : sample) {
+    const double off = value - median;
+    if (std::abs(off) > around * noise) continue;
+    ++count;
+    sum += off;
+    sum_of_squares += off * off;
+  }
+  const double level = median + sum / count;
+  if (median > 0) noise = std::sqrt(sum_of_squares / count - std::pow(sum / count, 2));
+  noise = std::max(noise, least_noise);
+  constexpr double clear = 4.5, least = 1.6;
+  return {level, noise, level + std::max(clear * noise, least)};
 }
 
 }  // namespace

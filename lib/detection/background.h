@@ -8,10 +8,10 @@ namespace vlp {
 
 /// The dark of an image of lamps, from a sample of its pixels.
 struct Background {
-  /// Median, and the noise around it (a robust standard deviation), in grey levels.
+  /// Mean of the pixels around the median, and their standard deviation, in grey levels.
   double level;
   double noise;
-  /// Pixels above are lit: level + 6 noise, and at least 2.5 grey levels more.
+  /// Pixels above are lit: level + 4.5 noise, and at least 1.6 grey levels more.
   double threshold;
 };
 

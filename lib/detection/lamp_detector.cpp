@@ -8,6 +8,7 @@
 
 #include "detection/background.h"
 #include "detection/glow.h"
+#include "detection/lines.h"
 #include "detection/runs.h"
 #include "geometry/frames.h"
 
@@ -53,15 +54,29 @@ LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera)
       shape_(camera),
       most_dark_rows_(most_dark_rows_of(lamps, camera.row_time_s)) {}
 
-LightPart LampDetector::part_of(const cv::Mat& lines, const Blob& blob,
-                                const Background& background) const {
+std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& blob,
+                                              const Background& background) const {
   constexpr double least_roundness = 0.5;
-  auto outline = outline_of(lines, blob, background);
-  auto light = shape_.light_of(outline, background);
-  if (!light || light->roundness < least_roundness) {
-    if (auto glow = glow_of(lines, blob, background, shape_)) light = std::move(glow);
+  constexpr std::size_t most_lights = 4;
+  const cv::Rect box = box_of(blob);
+  std::vector<LightPart> parts;
+  auto rest = outline_of(lines, blob, background);
+  while (parts.size() < most_lights) {
+    auto light = shape_.light_of(rest, background);
+    if (!light && !parts.empty()) break;
+    auto outline = std::move(rest);
+    rest = light ? shape_.outside(*light, outline) : std::vector<EdgePoint>();
+    parts.push_back({std::move(light), std::move(outline), box});
+    if (rest.empty()) break;
   }
-  return {std::move(light), std::move(outline), box_of(blob)};
+  for (LightPart& part : parts) {
+    if (part.light) part.light->outside = double(rest.size()) / double(part.light->outline.size());
+  }
+  const std::optional<Light>& first = parts.front().light;
+  if (!first || first->roundness < least_roundness) {
+    if (auto glow = glow_of(lines, blob, background, shape_)) return {{std::move(glow), {}, box}};
+  }
+  return parts;
 }
 
 void LampDetector::measure(const cv::Mat& lines, const Background& background, Light& light) const {
@@ -76,6 +91,7 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
   auto better = shape_.light_of(refined(lines, light.outline, low, high, background), background);
   if (better && 2 * better->outline.size() > light.outline.size()) {
     better->roundness = light.roundness;
+    better->outside = light.outside;
     light = std::move(*better);
   }
   light.stripes = stripes_of(
@@ -83,12 +99,14 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
 }
 
 std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
-  const cv::Mat lines = camera_.readout == Readout::rows ? image : cv::Mat(image.t());
-  const Background background = background_of(lines);
+  const Background background = background_of(image);
+  const cv::Mat lines = lines_of(image, camera_.readout, background.threshold);
   const auto blobs = group_runs(find_runs(lines, background.threshold), most_dark_rows_);
   std::vector<LightPart> parts;
   parts.reserve(blobs.size());
-  for (const Blob& blob : blobs) parts.push_back(part_of(lines, blob, background));
+  for (const Blob& blob : blobs) {
+    for (LightPart& part : parts_of(lines, blob, background)) parts.push_back(std::move(part));
+  }
   std::vector<Light> lights = joined(std::move(parts), shape_, background);
   for (Light& light : lights) measure(lines, background, light);
   std::sort(lights.begin(), lights.end(), [](const Light& a, const Light& b) {

@@ -33,8 +33,10 @@ class LampDetector {
   std::vector<Light> detect(const cv::Mat& image) const;
 
  private:
-  /// What may be a light: the shape of a blob by its edge, or by its glow when it has none.
-  LightPart part_of(const cv::Mat& lines, const Blob& blob, const Background& background) const;
+  /// What may be lights: a blob by its edge, several when it is of several lights that touch, or by
+  /// its glow when it has no edge.
+  std::vector<LightPart> parts_of(const cv::Mat& lines, const Blob& blob,
+                                  const Background& background) const;
   /// The outline once more, exactly, and the stripes.
   void measure(const cv::Mat& lines, const Background& background, Light& light) const;
   void identify(std::vector<Light>& lights, const cv::Size& size) const;

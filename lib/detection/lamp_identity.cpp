@@ -16,6 +16,7 @@ std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
   const bool sure = stripes.clarity > clear && stripes.periods > many;
   const double most_off = sure ? 0.06 : 0.025;
   if (!camera_.row_time_s || !(stripes.period_lines > 0)) return std::nullopt;
+  if (!stripes.regular && stripes.clarity <= clear) return std::nullopt;
   const double frequency_hz = 1 / (stripes.period_lines * *camera_.row_time_s);
   double best = most_off, second = std::numeric_limits<double>::infinity();
   std::optional<int> id;
@@ -37,7 +38,7 @@ std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
 
 void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) const {
   constexpr double least_contrast = 0.2, least_clarity = 0.5, least_periods = 1.3;
-  constexpr double much_softer = 5, least_roundness = 0.45;
+  constexpr double much_softer = 5, least_roundness = 0.45, most_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity();
   for (Light& light : lights) {
     const Stripes& stripes = light.stripes;
@@ -52,7 +53,8 @@ void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) co
     // A lamp's reflection flickers like the lamp. Where most of the edge is not the lamp's, a
     // circle through the rest is not to be trusted.
     const bool soft = light.rise_px > much_softer * sharpest_px;
-    if (soft || light.roundness < least_roundness) light.lamp.reset();
+    const bool strays = light.outside > most_outside;
+    if (soft || strays || light.roundness < least_roundness) light.lamp.reset();
   }
   // Of two lights with one identity the one with the surer centre has it.
   for (const Lamp& lamp : lamps_.lamps) {
@@ -68,8 +70,8 @@ void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) co
   }
   for (Light& light : lights) {
     if (!light.lamp) continue;
-    const bool inside = light.low.minCoeff() > 0 && light.high.x() < size.width - 1 &&
-                        light.high.y() < size.height - 1;
+    const bool inside = light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
+                        light.high.y() < size.height - 0.5;
     light.kind = inside ? LightKind::lamp : LightKind::cut;
   }
 }

@@ -37,6 +37,9 @@ struct Light {
   double rise_px;
   /// The share of the blob's edge that lies on the circle.
   double roundness;
+  /// Points of the blob's edge that lie outside this and its other lights, over those on the
+  /// circle.
+  double outside;
   /// As (column, row) of the lines that the shutter reads: (v, u) for a read-out along columns.
   std::vector<EdgePoint> outline;
 };

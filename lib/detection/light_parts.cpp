@@ -18,6 +18,20 @@ bool near(const cv::Rect& a, const cv::Rect& b) {
 
 bool glows(const LightPart& part) { return part.light && part.light->glows; }
 
+std::size_t points_of(const LightPart& part) { return part.light ? part.light->outline.size() : 0; }
+
+/// Whether that light is of both parts: two lamps side by side have more of their points on a
+/// circle each than on one together. `points` are there in all.
+bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std::size_t points) {
+  constexpr double least_share = 0.6, least_gain = 1.25, least_of_both = 0.8, most_hidden = 1.5;
+  const cv::Rect box = a.box | b.box;
+  if (2 * whole.radius_px > most_hidden * std::max(box.width, box.height)) return false;
+  const auto on_circle = double(whole.outline.size());
+  const auto of_a = double(points_of(a)), of_b = double(points_of(b));
+  return on_circle >= least_share * double(points) && on_circle >= least_of_both * (of_a + of_b) &&
+         on_circle >= least_gain * std::max(of_a, of_b);
+}
+
 /// No two lights overlap: the one with more of an outline stands, the other is a piece of it.
 std::vector<Light> without_pieces(std::vector<Light> found) {
   std::stable_sort(found.begin(), found.end(), [](const Light& a, const Light& b) {
@@ -37,7 +51,6 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
 
 std::vector<Light> joined(std::vector<LightPart> parts, const LightShape& shape,
                           const Background& background) {
-  constexpr double round_share = 0.8;  // of the points on the circle
   for (std::size_t i = 0; i < parts.size(); ++i) {
     for (std::size_t j = i + 1; j < parts.size(); ++j) {
       if (glows(parts[i]) || glows(parts[j]) || !near(parts[i].box, parts[j].box)) continue;
@@ -45,7 +58,7 @@ std::vector<Light> joined(std::vector<LightPart> parts, const LightShape& shape,
       both.insert(both.end(), parts[j].outline.begin(), parts[j].outline.end());
       both = outermost(std::move(both));
       auto whole = shape.light_of(both, background);
-      if (!whole || double(whole->outline.size()) < round_share * double(both.size())) continue;
+      if (!whole || !is_of_both(*whole, parts[i], parts[j], both.size())) continue;
       parts[i] = {std::move(whole), std::move(both), parts[i].box | parts[j].box};
       parts.erase(parts.begin() + std::ptrdiff_t(j));
       j = i;  // the whole may have more parts

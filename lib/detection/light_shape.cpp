@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "detection/robust_circle.h"
@@ -32,6 +33,24 @@ double median_rise_px(const std::vector<EdgePoint>& outline) {
   rises.reserve(outline.size());
   for (const EdgePoint& edge : outline) rises.push_back(edge.rise_px);
   return median(std::move(rises));
+}
+
+/// The points of the circle, but those next to a point that is not: where the edge of what hides a
+/// part of the light meets the outline, both are blurred.
+std::vector<EdgePoint> on_circle(const std::vector<EdgePoint>& outline,
+                                 const std::vector<bool>& inliers) {
+  constexpr double reach_px = 4;
+  std::vector<EdgePoint> all, clear;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    if (!inliers[i]) continue;
+    bool near = false;
+    for (std::size_t j = 0; j < outline.size() && !near; ++j) {
+      near = !inliers[j] && (outline[j].pixel - outline[i].pixel).norm() < reach_px;
+    }
+    all.push_back(outline[i]);
+    if (!near) clear.push_back(outline[i]);
+  }
+  return 2 * clear.size() < all.size() ? all : clear;
 }
 
 /// A circle is an ellipse, too.
@@ -108,12 +127,25 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   const double sigma_px = std::sqrt(fit->center_covariance.trace() / 2) / per_px;
   if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
   light.sigma_px = std::max(kMinSigma_px, sigma_px);
-  for (std::size_t i = 0; i < outline.size(); ++i) {
-    if (fit->inliers[i]) light.outline.push_back(outline[i]);
-  }
-  light.roundness = double(light.outline.size()) / double(outline.size());
+  light.roundness = double(fit->count) / double(outline.size());
+  light.outline = on_circle(outline, fit->inliers);
   light.rise_px = median_rise_px(light.outline);
   return light;
+}
+
+std::vector<EdgePoint> LightShape::outside(const Light& light,
+                                           const std::vector<EdgePoint>& outline) const {
+  // Of the ellipse in its box, although the light may be one that lies aslant in it.
+  constexpr double clear = 1.1, clear_px = 1.5;
+  const Eigen::Vector2d center = (light.low + light.high) / 2;
+  const Eigen::Vector2d half =
+      clear * (light.high - light.low) / 2 + Eigen::Vector2d(clear_px, clear_px);
+  std::vector<EdgePoint> result;
+  std::copy_if(outline.begin(), outline.end(), std::back_inserter(result),
+               [&](const EdgePoint& edge) {
+                 return (turned(edge.pixel) - center).cwiseQuotient(half).norm() > 1;
+               });
+  return result;
 }
 
 }  // namespace vlp

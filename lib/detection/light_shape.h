@@ -35,6 +35,9 @@ class LightShape {
   /// when it is not round, or its centre is not known to a pixel or so.
   std::optional<Light> light_of(std::vector<EdgePoint> outline, const Background& background) const;
 
+  /// The points that lie outside a light.
+  std::vector<EdgePoint> outside(const Light& light, const std::vector<EdgePoint>& outline) const;
+
   /// (column, row) of the lines that the shutter reads from (u, v) of the image, and back.
   Eigen::Vector2d turned(const Eigen::Vector2d& at) const;
 

@@ -9,10 +9,29 @@
 namespace vlp {
 namespace {
 
+/// The level of a line between two columns: of five parts the second brightest, because something
+/// may hide some, and a speck may brighten one.
+template <typename Level>
+double level_of(const Level* pixels, int begin, int end) {
+  constexpr int parts = 5;
+  double most = 0, second = 0;
+  for (int part = 0; part < parts; ++part) {
+    const int from = begin + (end - begin) * part / parts;
+    const int to = begin + (end - begin) * (part + 1) / parts;
+    if (from == to) continue;
+    double sum = 0;
+    for (int column = from; column < to; ++column) sum += pixels[column];
+    const double mean = sum / (to - from);
+    second = std::max(second, std::min(most, mean));
+    most = std::max(most, mean);
+  }
+  return second > 0 ? second : most;
+}
+
 template <typename Level>
 std::vector<double> signal_of(const cv::Mat& image, const Eigen::Vector2d& low,
                               const Eigen::Vector2d& high, double dark) {
-  constexpr double used_height = 0.9, used_width = 0.6, most_width_px = 24;
+  constexpr double used_height = 0.9, used_width = 0.8;
   const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
   const int first = std::max(0, static_cast<int>(std::ceil(center.y() - used_height * half.y())));
   const int last =
@@ -20,15 +39,11 @@ std::vector<double> signal_of(const cv::Mat& image, const Eigen::Vector2d& low,
   std::vector<double> signal;
   for (int row = first; row <= last; ++row) {
     const double off = (row - center.y()) / half.y();
-    const double chord = half.x() * std::sqrt(std::max(0.0, 1 - off * off));
-    const double used = std::min(used_width * chord, most_width_px / 2);
+    const double used = used_width * half.x() * std::sqrt(std::max(0.0, 1 - off * off));
     const int begin = std::max(0, static_cast<int>(std::lround(center.x() - used)));
     const int end = std::min(image.cols, static_cast<int>(std::lround(center.x() + used)) + 1);
     if (begin >= end) continue;
-    const auto* pixels = image.ptr<Level>(row);
-    double sum = 0;
-    for (int column = begin; column < end; ++column) sum += pixels[column];
-    signal.push_back(sum / (end - begin) - dark);
+    signal.push_back(level_of(image.ptr<Level>(row), begin, end) - dark);
   }
   return signal;
 }

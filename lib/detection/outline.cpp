@@ -59,7 +59,7 @@ template <typename Level>
 std::vector<EdgePoint> refine(const cv::Mat& image, const std::vector<EdgePoint>& points,
                               const Eigen::Vector2d& low, const Eigen::Vector2d& high,
                               double dark) {
-  constexpr double flattest = 0.35, depth_px = 3;
+  constexpr double flattest = 0.35, depth_px = 3, most_bent = 0.35;
   constexpr int before = 8, samples = 8;
   const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
   std::vector<EdgePoint> result;
@@ -88,7 +88,9 @@ std::vector<EdgePoint> refine(const cv::Mat& image, const std::vector<EdgePoint>
     }
     constexpr double square = samples * (samples * samples - 1) / 12.0;
     const double back = first + (samples - 1) / 2.0 - before;
-    const double level = sum / samples - moment / square * back - dark;
+    const double inner = sum / samples - dark, level = inner - moment / square * back;
+    // What hides the light further in bends the line too much.
+    if (std::abs(level - inner) > most_bent * inner) continue;
     const auto at = profile.crossing(dark + level / 2, 0, first);
     if (level <= 0 || !at) continue;
     EdgePoint better = point;

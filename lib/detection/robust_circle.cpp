@@ -30,11 +30,12 @@ double distance(const Circle& circle, const Eigen::Vector2d& point) {
   return (point - circle.center).norm() - circle.radius;
 }
 
-/// The circle through three of the points that has most points close to it.
+/// The circle through three of the points that has most points close to it, and few outside:
+/// inside may be the edge of what hides a part of a light, outside is no light.
 std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, double tolerance) {
   constexpr int triples = 40;
   std::optional<Circle> best;
-  int most = kLeast - 1;
+  double most = kLeast - 1;
   const std::size_t n = points.size();
   Eigen::Vector2d low = points[0], high = points[0];
   for (const Eigen::Vector2d& point : points)
@@ -49,11 +50,14 @@ std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, do
     const std::size_t a = next(), b = next(), c = next();
     const auto circle = through(points[a], points[b], points[c]);
     if (!circle || circle->radius > largest) continue;
-    int count = 0;
+    int close = 0, outside = 0;
     for (const Eigen::Vector2d& point : points) {
-      count += std::abs(distance(*circle, point)) < tolerance;
+      const double off = distance(*circle, point);
+      close += std::abs(off) < tolerance;
+      outside += off > 3 * tolerance;
     }
-    if (count > most) most = count, best = circle;
+    const double score = close - outside / 2.0;
+    if (score > most) most = score, best = circle;
   }
   return best;
 }
@@ -79,6 +83,7 @@ std::optional<RobustCircle> fit_robust_circle(std::span<const Eigen::Vector2d> p
     fit.inliers = std::move(better->inliers);
     fit.count = better->count;
     fit.rms = better->rms;
+    if (better->step.norm() < 1e-3 * tolerance) break;
   }
   if (!(fit.circle.radius > 0) || !fit.circle.center.allFinite()) return std::nullopt;
   return fit;

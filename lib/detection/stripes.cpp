@@ -119,7 +119,9 @@ Stripes stripes_of(const std::vector<double>& signal) {
   const double before = at(best - step), after = at(best + step);
   const double bend = before - 2 * stripes.clarity + after;
   if (bend < 0) best += std::clamp((before - after) / bend / 2, -1.0, 1.0) * step;
-  stripes.period_lines = period_of(signal, (low + high) / 2, 1 / best).value_or(1 / best);
+  const auto in_time = period_of(signal, (low + high) / 2, 1 / best);
+  stripes.regular = in_time.has_value();
+  stripes.period_lines = in_time.value_or(1 / best);
   stripes.periods = n / stripes.period_lines;
   // Over whole periods alone.
   const double used = std::max(1.0, std::floor(stripes.periods)) * stripes.period_lines;

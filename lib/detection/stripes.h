@@ -8,8 +8,8 @@
 
 namespace vlp {
 
-/// How bright each line of a light is, from its first line on: the mean over the middle of the
-/// line, above the dark. The light is an ellipse in the box from `low` to `high` (column, row).
+/// How bright each line of a light is, from its first line on, above the dark, where nothing hides
+/// the line. The light is an ellipse in the box from `low` to `high` (column, row).
 std::vector<double> line_signal(const cv::Mat& image, const Eigen::Vector2d& low,
                                 const Eigen::Vector2d& high, double dark);
 
@@ -23,6 +23,8 @@ struct Stripes {
   double clarity;
   /// How many periods the signal shows.
   double periods;
+  /// Whether all stripes begin and end in time with the period.
+  bool regular;
 };
 
 /// The period is that of the sine with a constant that fits best (least squares, Lomb 1976),

@@ -57,23 +57,31 @@ bool hidden_by(const Panel& panel, const Eigen::Vector3d& eye_m, const Eigen::Ve
 template <typename Motion>
 double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Shutter& shutter,
                      const Motion& camera_from_world, const Glow& glow) {
-  constexpr int points = 200;
-  constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
-  int visible = 0;
-  for (int i = 0; i < points; ++i) {
-    const double radius_m = glow.diameter_m / 2 * std::sqrt((i + 0.5) / points);
-    const double angle = golden_angle * i;
+  const auto visible = [&](double radius_m, double angle) {
     const Eigen::Vector3d point_m =
         glow.position_m + radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
     const auto at = seen(renderer, shutter, camera_from_world, point_m);
-    if (!at || !in_image(scene.camera, at->pixel)) continue;
+    if (!at || !in_image(scene.camera, at->pixel)) return false;
     const Eigen::Vector3d eye_m = camera_from_world(at->time_s).inverse().translation();
     const auto& occluders = scene.clutter.occluders;
-    visible += std::none_of(occluders.begin(), occluders.end(), [&](const Panel& occluder) {
-      return hidden_by(occluder, eye_m, point_m);
-    });
+    return std::none_of(occluders.begin(), occluders.end(),
+                        [&](const Panel& occluder) { return hidden_by(occluder, eye_m, point_m); });
+  };
+  constexpr int points = 200, rim_points = 120;
+  constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
+  int count = 0;
+  for (int i = 0; i < points; ++i) {
+    const double radius_m = glow.diameter_m / 2 * std::sqrt((i + 0.5) / points);
+    count += visible(radius_m, golden_angle * i);
   }
-  return double(visible) / points;
+  if (count < points) return double(count) / points;
+  // Wholly in view is said only of a lamp whose rim is.
+  for (int i = 0; i < rim_points; ++i) {
+    if (!visible(glow.diameter_m / 2, 2 * std::numbers::pi / rim_points * i)) {
+      return (points - 0.5) / points;
+    }
+  }
+  return 1;
 }
 
 }  // namespace

@@ -28,14 +28,14 @@ void expect_dark(const cv::Mat& image, double level, double noise) {
   const Background background = background_of(image);
   EXPECT_NEAR(background.level, level, 0.15 * noise + 0.5);
   EXPECT_NEAR(background.noise, noise, 0.1 * noise);
-  EXPECT_DOUBLE_EQ(background.threshold, background.level + 6 * background.noise);
+  EXPECT_DOUBLE_EQ(background.threshold, background.level + 4.5 * background.noise);
 }
 
 void expect_flat(const cv::Mat& image, double level) {
   const Background background = background_of(image);
   EXPECT_EQ(background.level, level);
   EXPECT_LT(background.noise, 0.5);
-  EXPECT_EQ(background.threshold, level + 2.5);
+  EXPECT_EQ(background.threshold, level + 1.6);
 }
 
 TEST(Background, IsTheLevelAndNoiseOfFlatImagesOf8Bits) {
@@ -59,10 +59,10 @@ TEST(Background, IsNotMovedByLightsOnATwentiethOfThePixels) {
   expect_dark(noisy<std::uint16_t>({800, 600}, 900, 80, 20, 65535), 900, 80);
 }
 
-TEST(Background, LeavesFlatImagesBelowItsThreshold) {
+TEST(Background, LeavesAllButAFewPixelsOfFlatImagesBelowItsThreshold) {
   for (const double noise : {0.5, 2.0, 8.0}) {
     const cv::Mat image = noisy<std::uint8_t>({800, 600}, 60, noise, 0, 0);
-    EXPECT_EQ(cv::countNonZero(image > background_of(image).threshold), 0) << noise;
+    EXPECT_LT(cv::countNonZero(image > background_of(image).threshold), 20) << noise;
   }
 }
 
@@ -93,7 +93,7 @@ TEST(Background, MeetsEveryKindOfColumn) {
     for (int darker = 0; darker < 4; ++darker) {
       cv::Mat image(size, CV_8U, cv::Scalar(30));
       for (int column = darker; column < size.width; column += 4) image.col(column) = 20;
-      EXPECT_EQ(background_of(image).level, 30) << size << ", " << darker;
+      EXPECT_NEAR(background_of(image).level, 27.5, 0.1) << size << ", " << darker;
     }
   }
 }
