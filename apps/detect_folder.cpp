@@ -39,9 +39,9 @@ CaptureDetections detect_folder(const std::string& folder, const LampMap& lamps,
   CaptureDetections found;
   {
     Progress progress("images");
-    found =
-        detect_captures(LampDetector(lamps, camera), images, calibration.camera.imager_px, threads,
-                        [&](std::size_t done) { progress.update(done, images.size()); });
+    found = detect_captures(LampDetector(lamps, camera), images, calibration.camera.imager_px,
+                            DetectRun{threads},
+                            [&](std::size_t done) { progress.update(done, images.size()); });
   }
   for (const std::string& refused : found.refused) spdlog::warn("{}; skipped", refused);
   if (found.frames.empty()) {

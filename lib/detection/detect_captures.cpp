@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "captures/in_parallel.h"
+#include "detection/annotate.h"
 #include "detection/image_file.h"
 #include "rig/input_error.h"
 
@@ -21,28 +22,24 @@ struct Outcome {
   std::optional<std::string> refused;
 };
 
-Outcome outcome_of(const LampDetector& detector, const std::filesystem::path& file,
-                   const std::array<int, 2>& imager_px) {
-  const cv::Mat image = read_image(file);
+cv::Mat image_of_size(const std::filesystem::path& file, const std::array<int, 2>& imager_px) {
+  cv::Mat image = read_image(file);
   if (image.cols != imager_px[0] || image.rows != imager_px[1]) {
     throw InputError(file, "is " + std::to_string(image.cols) + " x " + std::to_string(image.rows) +
                                ", the calibration's camera has " + std::to_string(imager_px[0]) +
                                " x " + std::to_string(imager_px[1]) + " px");
   }
-  Outcome outcome;
-  for (const Light& light : detector.detect(image)) {
-    ++outcome.lights[static_cast<std::size_t>(light.kind)];
-    if (light.kind != LightKind::lamp) continue;
-    outcome.lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
-  }
-  return outcome;
+  return image;
 }
 
 /// One bad image does not end a run, whatever is bad about it.
-Outcome outcome_or_refusal(const LampDetector& detector, const std::filesystem::path& file,
-                           const std::array<int, 2>& imager_px) {
+Outcome outcome_of(const LampDetector& detector, const std::filesystem::path& file,
+                   const std::array<int, 2>& imager_px, const DetectRun& run) {
+  cv::Mat image;
+  std::vector<Light> lights;
   try {
-    return outcome_of(detector, file, imager_px);
+    image = image_of_size(file, imager_px);
+    lights = detector.detect(image);
   } catch (const InputError& error) {
     return {{}, {}, error.what()};
   } catch (const std::exception& error) {
@@ -50,19 +47,29 @@ Outcome outcome_or_refusal(const LampDetector& detector, const std::filesystem::
     std::replace(reason.begin(), reason.end(), '\n', ' ');
     return {{}, {}, reason};
   }
+  if (run.annotate) {
+    write_annotated(*run.annotate, file, annotated(image, lights, detector.readout()));
+  }
+  Outcome outcome;
+  for (const Light& light : lights) {
+    ++outcome.lights[static_cast<std::size_t>(light.kind)];
+    if (light.kind != LightKind::lamp) continue;
+    outcome.lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
+  }
+  return outcome;
 }
 
 }  // namespace
 
 CaptureDetections detect_captures(const LampDetector& detector,
                                   const std::vector<std::filesystem::path>& images,
-                                  const std::array<int, 2>& imager_px, int threads,
+                                  const std::array<int, 2>& imager_px, const DetectRun& run,
                                   const std::function<void(std::size_t done)>& progress) {
   std::vector<Outcome> outcomes(images.size());
   std::mutex counting;
   std::size_t done = 0;
-  in_parallel(images.size(), threads, [&](std::size_t i) {
-    outcomes[i] = outcome_or_refusal(detector, images[i], imager_px);
+  in_parallel(images.size(), run.threads, [&](std::size_t i) {
+    outcomes[i] = outcome_of(detector, images[i], imager_px, run);
     const std::lock_guard lock(counting);
     progress(++done);
   });

@@ -32,6 +32,8 @@ class LampDetector {
   /// The lights of an image, from the top. It has one channel of 8 or 16 bits and is not empty.
   std::vector<Light> detect(const cv::Mat& image) const;
 
+  Readout readout() const { return camera_.readout; }
+
  private:
   /// What may be lights: a blob by its edge, several when it is of several lights that touch, or by
   /// its glow when it has no edge.

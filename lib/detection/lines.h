@@ -10,7 +10,8 @@ namespace vlp {
 
 /// The image with the lines that the shutter reads as its rows. Read along columns, it is turned
 /// over its diagonal around all that is brighter than `threshold`; the rest, in which nothing is to
-/// be seen, is left black, because turning all of a large image takes longer than finding its lamps.
+/// be seen, is left black, because turning all of a large image takes longer than finding its
+/// lamps.
 cv::Mat lines_of(const cv::Mat& image, Readout readout, double threshold);
 
 }  // namespace vlp
