@@ -131,7 +131,7 @@ std::vector<EdgePoint> outline_at(const cv::Mat& image, const Blob& blob,
 std::optional<Light> glow_of(const cv::Mat& image, const Blob& blob, const Background& background,
                              const LightShape& shape) {
   constexpr std::array shares = {0.1, 0.15, 0.2};
-  constexpr double softest_edge = 0.05;  // of the radius
+  constexpr double softest_edge = 0.15;  // of the radius
   std::vector<Light> glows;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const double share : shares) {

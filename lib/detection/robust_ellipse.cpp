@@ -35,8 +35,8 @@ struct Conic {
 
 std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d> points,
                                                 std::span<const double> weights, double tolerance) {
-  constexpr double most_oval = 1.0 / 15, most_axis_ratio = 3;
-  constexpr int rounds = 8;
+  constexpr double most_oval = 1.0 / 8, most_axis_ratio = 3;
+  constexpr int rounds = 10;
   if (points.empty()) return std::nullopt;
   Eigen::Vector2d low = points[0], high = points[0];
   for (const Eigen::Vector2d& point : points) {
@@ -52,7 +52,7 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
   RobustEllipse fit{};
   for (int round = 0; round < rounds; ++round) {
     // The tolerance narrows as the ellipse gets better.
-    const double narrowed = std::max(tolerance, oval * std::pow(0.5, round));
+    const double narrowed = std::max(tolerance, oval * std::pow(0.6, round));
     auto better = m_estimate_step<5>(weights, narrowed / unit, [&](std::size_t i) {
       return ellipse.distance((points[i] - circle->circle.center) / unit);
     });

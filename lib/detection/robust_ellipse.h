@@ -23,7 +23,7 @@ struct RobustEllipse {
 };
 
 /// The ellipse close to a circle that most of the points support: the circle of fit_robust_circle()
-/// with a tolerance of a fifteenth of its size, then Gauss-Newton with Tukey's biweight on the
+/// with a tolerance of an eighth of its size, then Gauss-Newton with Tukey's biweight on the
 /// distance q from the ellipse (x - c)^T M (x - c) = 1 (to first order, Sampson 1982):
 /// q = (s - 1) s / |M (x - c)|, s^2 = (x - c)^T M (x - c).
 /// `tolerance` is how far a point of the ellipse may lie off it at the least, in the unit of the
