@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "detection/background.h"
 #include "detection/robust_circle.h"
@@ -64,9 +65,11 @@ DetectorCamera detector_camera(const Calibration& calibration) {
   return result;
 }
 
-LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera)
+LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera,
+                           std::optional<LampClassifier> classifier)
     : lamps_(lamps),
       camera_(camera),
+      classifier_(std::move(classifier)),
       most_dark_rows_(most_dark_rows_of(lamps, camera.row_time_s)) {}
 
 std::optional<Eigen::Vector2d> LampDetector::plane_of(const Eigen::Vector2d& pixel) const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "camera/lens.h"
+#include "detection/lamp_classifier.h"
 #include "detection/outline.h"
 #include "detection/stripes.h"
 #include "rig/calibration.h"
@@ -43,7 +44,11 @@ struct Light {
   std::vector<EdgePoint> outline;
 };
 
-/// What a detector knows of the camera. The row time is needed for identities.
+/// Whether the image's edge cuts no part of the light.
+bool wholly_in_view(const Light& light, const cv::Size& size);
+
+/// What a detector knows of the camera. The row time is needed for identities, unless there is a
+/// classifier.
 struct DetectorCamera {
   Readout readout;
   std::optional<double> row_time_s;
@@ -63,10 +68,11 @@ DetectorCamera detector_camera(const Calibration& calibration);
 /// lens into the level plane; a circle is fitted there robustly, and its centre is projected back,
 /// because the centre of an outline in the image is not the image of the centre (theory, "Lamp
 /// centroid"). Identity: a lamp of frequency f has stripes of 1 / (f row_time) lines (Chen and
-/// Guan, section 2.1).
+/// Guan, section 2.1), or what a trained classifier says.
 class LampDetector {
  public:
-  LampDetector(const LampMap& lamps, const DetectorCamera& camera);
+  LampDetector(const LampMap& lamps, const DetectorCamera& camera,
+               std::optional<LampClassifier> classifier = {});
 
   /// The lights of an image, from the top. It has one channel of 8 or 16 bits and is not empty.
   std::vector<Light> detect(const cv::Mat& image) const;
@@ -96,6 +102,7 @@ class LampDetector {
 
   LampMap lamps_;
   DetectorCamera camera_;
+  std::optional<LampClassifier> classifier_;
   int most_dark_rows_;
 };
 

@@ -8,6 +8,9 @@
 
 namespace vlp {
 
+/// The share of a disc's height whose lines are used: those at the rim are short and dim.
+inline constexpr double kUsedHeight = 0.9;
+
 /// How bright each line of a light is, from its first line on: the mean over the middle of the
 /// line, above the dark. The light is an ellipse in the box from `low` to `high` (column, row).
 std::vector<double> line_signal(const cv::Mat& image, const Eigen::Vector2d& low,
@@ -23,11 +26,21 @@ struct Stripes {
   double clarity;
   /// How many periods the signal shows.
   double periods;
+  /// How many stripes begin or end, half of it, over the lines: once a stripe passes the middle
+  /// between dark and bright upwards, and once downwards.
+  double count_per_line;
+  /// Share of the disc's area that lies on lines brighter than that middle.
+  double lit_area;
 };
 
+/// Whether the stripes are clear and many enough for what is measured to be trusted: clarity above
+/// 0.7 and 2.5 periods. Of a lamp that something hides in part they are not.
+bool trustworthy(const Stripes& stripes);
+
 /// The period is that of the sine with a constant that fits best (least squares, Lomb 1976),
-/// between 2.2 lines and the length of the signal. Without 8 lines or more contrast and clarity are
-/// 0.
+/// between 2.2 lines and the length of the signal. The signal is that of line_signal(): of a disc,
+/// from `kUsedHeight` of its radius above the middle to as much below. Without 8 lines or more
+/// contrast and clarity are 0.
 Stripes stripes_of(const std::vector<double>& signal);
 
 }  // namespace vlp
