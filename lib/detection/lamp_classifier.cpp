@@ -37,8 +37,8 @@ void fit(std::span<const LabelledLight> lights, const std::vector<bool>& used,
          LampClassifier& classifier) {
   std::map<int, LampClassifier::Class> lamps;
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    auto& lamp =
-        lamps.try_emplace(lights[i].lamp, lights[i].lamp, 0, LampFeatures::Zero()).first->second;
+    const LampClassifier::Class none{lights[i].lamp, 0, LampFeatures::Zero()};
+    auto& lamp = lamps.try_emplace(lights[i].lamp, none).first->second;
     if (!used[i]) continue;
     ++lamp.examples;
     lamp.center += standardized(classifier, features_of(lights[i].stripes));

@@ -51,6 +51,7 @@ std::vector<PeriodGroup> period_groups(std::span<const MeasuredPeriod> lights) {
     (light.lamp ? labelled[*light.lamp] : others).push_back(std::log(light.period_lines));
   }
   std::vector<PeriodGroup> groups;
+  groups.reserve(labelled.size());
   for (const auto& [lamp, log_periods] : labelled) groups.push_back(group_of(log_periods, lamp));
   std::sort(others.begin(), others.end());
   const std::size_t all = others.size();
