@@ -86,10 +86,11 @@ LampClassifier trained(std::span<const LabelledLight> lights) {
 }
 
 std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stripes) {
-  constexpr double least_probability = 0.99, farthest = 36, farthest_unclear = 9;
+  constexpr double least_probability = 0.99, farthest = 6, farthest_unclear = 3;
   const LampFeatures z = standardized(classifier, features_of(stripes));
   const Eigen::LLT<Eigen::Matrix4d> factor(classifier.covariance);
-  double nearest = trustworthy(stripes) ? farthest : farthest_unclear;
+  double nearest =
+      std::pow(trustworthy(stripes) ? farthest : farthest_unclear * clearness(stripes), 2);
   const LampClassifier::Class* lamp = nullptr;
   std::vector<double> distances;
   distances.reserve(classifier.lamps.size());

@@ -55,7 +55,8 @@ LampClassifier trained(std::span<const LabelledLight> lights);
 
 /// The lamp with these stripes; nothing when another may be it (probability below 99 %), or when
 /// they are like no lamp's: (z - c_k)^T C^-1 (z - c_k) above 36, a share of 3e-7 of normal
-/// lights, and above 9 where the stripes are not trustworthy(). The stripes have a period.
+/// lights, and above (3 clearness())^2 where the stripes are not trustworthy(). The stripes have a
+/// period.
 std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stripes);
 
 /// Two lamps, and how far apart they are: root of (c_j - c_k)^T C^-1 (c_j - c_k).

@@ -13,6 +13,8 @@
 namespace vlp {
 namespace {
 
+constexpr double kClear = 0.7;
+
 /// The share of the variance that a sine of that frequency (per line) and a constant explain.
 double explained(const std::vector<double>& signal, double mean, double variance,
                  double frequency) {
@@ -105,8 +107,13 @@ double lit_area(const std::vector<double>& signal, double middle) {
 }  // namespace
 
 bool trustworthy(const Stripes& stripes) {
-  constexpr double clear = 0.7, many = 2.5;
-  return stripes.clarity > clear && stripes.periods > many;
+  constexpr double many = 2.5;
+  return stripes.clarity > kClear && stripes.periods > many;
+}
+
+double clearness(const Stripes& stripes) {
+  constexpr double none = 0.45;
+  return std::clamp((stripes.clarity - none) / (kClear - none), 0.0, 1.0);
 }
 
 Stripes stripes_of(const std::vector<double>& signal) {

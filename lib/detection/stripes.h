@@ -37,6 +37,11 @@ struct Stripes {
 /// 0.7 and 2.5 periods. Of a lamp that something hides in part they are not.
 bool trustworthy(const Stripes& stripes);
 
+/// From 0 at a clarity of 0.45 to 1 at 0.7 and above: how near to a lamp's stripes that are not
+/// trustworthy() have to be, as a share of what is allowed at the most. By chance some hidden lamp
+/// is like another.
+double clearness(const Stripes& stripes);
+
 /// The period is that of the sine with a constant that fits best (least squares, Lomb 1976),
 /// between 2.2 lines and the length of the signal. The signal is that of line_signal(): of a disc,
 /// from `kUsedHeight` of its radius above the middle to as much below. Without 8 lines or more

@@ -46,6 +46,17 @@ TEST(LampRule, AsksMoreOfStripesThatAreFewOrUnclear) {
   EXPECT_EQ(identified(lamps, few), 1);
 }
 
+TEST(LampRule, AsksTheMoreTheLessClearStripesAre) {
+  const std::vector<Lamp> lamps{lamp(1, 2000)};
+  Stripes unclear = stripes(2020);
+  unclear.clarity = 0.65;
+  EXPECT_EQ(identified(lamps, unclear), 1);
+  unclear.clarity = 0.5;
+  EXPECT_EQ(identified(lamps, unclear), std::nullopt);
+  unclear.period_lines = stripes(2004).period_lines;
+  EXPECT_EQ(identified(lamps, unclear), 1);
+}
+
 TEST(LampRule, TellsLampsOfOneFrequencyApartByTheirDuties) {
   const std::vector<Lamp> lamps{lamp(1, 2000, 0.3), lamp(2, 2010, 0.7)};
   EXPECT_EQ(identified(lamps, stripes(2005, 0.33)), 1);
