@@ -6,55 +6,135 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/core/utility.hpp>
 #include <thread>
+#include <utility>
 
 #include "app.h"
 #include "detection/image_file.h"
 #include "progress.h"
+#include "readout_option.h"
 #include "rig/input_error.h"
+#include "warn_of_lamps.h"
 
 namespace vlp {
+namespace {
 
-int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
+bool has(const LampMap& lamps, int id) {
+  return std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
+                     [&](const Lamp& lamp) { return lamp.id == id; });
+}
 
-CaptureDetections detect_folder(const std::string& folder, const LampMap& lamps,
-                                const std::string& lamps_file, const Calibration& calibration,
-                                const std::string& calibration_file, const std::string& output,
-                                int threads) {
+void check_frequencies(const DetectOptions& options, const LampMap& lamps,
+                       const DetectorCamera& camera) {
   const bool frequencies =
       std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
                   [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); });
   if (!frequencies) {
-    throw InputError(lamps_file, "no lamp has a frequency_hz: none could be told from another");
+    throw InputError(options.lamps, "no lamp has a frequency_hz: none could be told from another");
   }
-  const DetectorCamera camera = detector_camera(calibration);
   if (!camera.row_time_s) {
-    throw InputError(calibration_file,
+    throw InputError(options.calibration,
                      "camera.row_time_s is missing: without it no stripe tells its lamp");
   }
-  const auto images = images_in(folder);
-  for (const auto& image : images) check_output(output, {image.string()});
-  cv::setNumThreads(1);  // the images themselves go in parallel
-  CaptureDetections found;
-  {
-    Progress progress("images");
-    found = detect_captures(LampDetector(lamps, camera), images, calibration.camera.imager_px,
-                            DetectRun{threads},
-                            [&](std::size_t done) { progress.update(done, images.size()); });
+}
+
+LampClassifier classifier_for(const DetectOptions& options, const LampMap& lamps,
+                              const DetectorCamera& camera) {
+  LampClassifier classifier = read_lamp_classifier(options.classifier);
+  for (const auto& lamp : classifier.lamps) {
+    if (has(lamps, lamp.lamp)) continue;
+    throw InputError(options.classifier,
+                     fmt::format("lamp {} is not in {}", lamp.lamp, options.lamps));
   }
-  for (const std::string& refused : found.refused) spdlog::warn("{}; skipped", refused);
+  for (const Lamp& lamp : lamps.lamps) {
+    const bool known = std::any_of(classifier.lamps.begin(), classifier.lamps.end(),
+                                   [&](const auto& other) { return other.lamp == lamp.id; });
+    if (!known) spdlog::warn("lamp {} is unknown to {}", lamp.id, options.classifier);
+  }
+  constexpr double same = 0.005;
+  if (classifier.row_time_s && camera.row_time_s &&
+      std::abs(*classifier.row_time_s / *camera.row_time_s - 1) > same) {
+    throw InputError(
+        options.classifier,
+        fmt::format("row_time_s is {:.4g}, that of {} is {:.4g}: train it for this camera",
+                    *classifier.row_time_s, options.calibration, *camera.row_time_s));
+  }
+  return classifier;
+}
+
+/// Made when it is not there.
+std::filesystem::path picture_folder(const DetectOptions& options) {
+  std::error_code error;
+  std::filesystem::create_directories(options.annotate, error);
+  if (error) throw InputError(options.annotate, "cannot be made: " + error.message());
+  if (std::filesystem::equivalent(options.annotate, options.folder, error)) {
+    throw InputError(options.annotate, "holds the images: the pictures go into another folder");
+  }
+  return options.annotate;
+}
+
+void check_found(const CaptureDetections& found, const std::string& folder) {
   if (found.frames.empty()) {
     throw InputError(folder, fmt::format("none of its {} images can be used", found.images));
   }
   const auto [identified, cut, unknown, steady] = found.lights;
-  if (identified == 0) {
-    throw Undetermined(fmt::format(
-        "no lamp was identified wholly in view in {} images ({} skipped; {} lamps are cut by the "
-        "image's edge, {} lights flicker unlike any lamp of the map, {} are steady): are lamp map "
-        "and row time right, and is the exposure short?",
-        found.images, found.refused.size(), cut, unknown, steady));
+  if (identified > 0) return;
+  throw Undetermined(fmt::format(
+      "no lamp was identified wholly in view in {} images ({} skipped; {} lamps are cut by the "
+      "image's edge, {} lights flicker unlike any lamp of the map, {} are steady): are lamp map "
+      "and row time right, and is the exposure short?",
+      found.images, found.refused.size(), cut, unknown, steady));
+}
+
+}  // namespace
+
+int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
+
+void add_detect_options(CLI::App& app, DetectOptions& options) {
+  app.add_option("--classifier", options.classifier,
+                 "Lamp classifier by vlp-train, instead of the map's frequencies");
+  app.add_option("--annotate", options.annotate,
+                 "Folder for pictures of the lights found, with outlines, centres and lamps");
+  add_readout_option(app, options.readout);
+  app.add_option("--exposure-s", options.exposure_s,
+                 "Exposure of the images, for the check of the lamp map (default: short)")
+      ->check(finite_positive());
+}
+
+CaptureDetections detect_folder(const DetectOptions& options, const LampMap& lamps,
+                                const std::optional<Calibration>& calibration) {
+  DetectorCamera camera = calibration ? detector_camera(*calibration)
+                                      : DetectorCamera{Readout::rows, options.row_time_s, {}};
+  std::optional<LampClassifier> classifier;
+  if (options.classifier.empty()) {
+    check_frequencies(options, lamps, camera);
+  } else {
+    classifier = classifier_for(options, lamps, camera);
   }
+  const auto images = images_in(options.folder);
+  for (const auto& image : images) check_output(options.output, {image.string()});
+  cv::setNumThreads(1);  // the images themselves go in parallel
+  DetectRun run{options.threads};
+  std::optional<Readout> calibrated;
+  if (calibration) {
+    run.imager_px = calibration->camera.imager_px;
+    calibrated = calibration->camera.readout;
+  }
+  camera.readout = readout_for(options.readout, calibrated, images);
+  if (!classifier && calibration) {
+    warn_of_lamps(lamps, camera, calibration->camera, options.exposure_s);
+  }
+  if (!options.annotate.empty()) run.annotate = picture_folder(options);
+  CaptureDetections found;
+  {
+    Progress progress("images");
+    found = detect_captures(LampDetector(lamps, camera, std::move(classifier)), images, run,
+                            [&](std::size_t done) { progress.update(done, images.size()); });
+  }
+  for (const std::string& refused : found.refused) spdlog::warn("{}; skipped", refused);
+  check_found(found, options.folder);
   return found;
 }
 

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "detection/detect_captures.h"
@@ -10,15 +12,31 @@
 
 namespace vlp {
 
-/// The lamps in a folder of images, on all cores, with progress and a warning for each image that
-/// is skipped. The names of the files are for messages; `output` must not be one of the images.
-/// Throws InputError: no row time, no frequency, no image; Undetermined when no lamp is identified.
-CaptureDetections detect_folder(const std::string& folder, const LampMap& lamps,
-                                const std::string& lamps_file, const Calibration& calibration,
-                                const std::string& calibration_file, const std::string& output,
-                                int threads);
-
 /// How many threads there are when nobody says so.
 int all_cores();
+
+/// How to find the lamps in a folder of images. Names of files are for messages, too.
+struct DetectOptions {
+  std::string folder, lamps, calibration, output;
+  /// Empty: lamps are told apart by the map's frequencies.
+  std::string classifier;
+  /// Where pictures of what was found go; empty: none are made.
+  std::string annotate;
+  std::optional<Readout> readout;
+  /// Of a camera without a calibration.
+  std::optional<double> row_time_s;
+  std::optional<double> exposure_s;
+  int threads = all_cores();
+};
+
+/// Adds --classifier, --annotate, --readout and --exposure-s.
+void add_detect_options(CLI::App& app, DetectOptions& options);
+
+/// The lamps in a folder of images, on all cores, with progress and a warning for each image that
+/// is skipped, for each two lamps of the map that are too much alike; `output` must not be one of
+/// the images. Throws InputError: no row time, no frequency, no image, a classifier of other lamps
+/// or of another row time; Undetermined when no lamp is identified.
+CaptureDetections detect_folder(const DetectOptions& options, const LampMap& lamps,
+                                const std::optional<Calibration>& calibration);
 
 }  // namespace vlp

@@ -4,7 +4,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <string>
+#include <optional>
+#include <stdexcept>
 
 #include "app.h"
 #include "detect_folder.h"
@@ -12,16 +13,15 @@
 namespace vlp {
 namespace {
 
-struct Options {
-  std::string folder, lamps, calibration, output;
-  int threads = all_cores();
-};
-
-void run(const Options& options) {
-  check_output(options.output, {options.lamps, options.calibration});
-  const CaptureDetections found = detect_folder(
-      options.folder, read_lamp_map(options.lamps), options.lamps,
-      read_calibration(options.calibration), options.calibration, options.output, options.threads);
+void run(const DetectOptions& options) {
+  check_output(options.output, {options.lamps, options.calibration, options.classifier});
+  std::optional<Calibration> calibration;
+  if (!options.calibration.empty()) {
+    calibration = read_calibration(options.calibration);
+  } else if (!options.row_time_s && options.classifier.empty()) {
+    throw std::invalid_argument("--calibration, --row-time-s or --classifier has to tell lamps");
+  }
+  const CaptureDetections found = detect_folder(options, read_lamp_map(options.lamps), calibration);
   write_detections(options.output, found.frames);
   const auto empty = std::count_if(found.frames.begin(), found.frames.end(),
                                    [](const Frame& frame) { return frame.detections.empty(); });
@@ -45,14 +45,20 @@ int main(int argc, char** argv) {
       "    --lamps datasets/paper-rig/rendered/lamps.yaml \\\n"
       "    --calibration datasets/paper-rig/rendered/true_calibration.yaml -o detections.csv\n",
       "vlp-detect");
-  vlp::Options options;
+  vlp::DetectOptions options;
   app.add_option("images", options.folder, "Folder of images: PNG, JPEG, BMP, TIFF or PGM")
       ->required();
-  app.add_option("--lamps", options.lamps, "Lamp map with frequencies, lamps.yaml")->required();
-  app.add_option("--calibration", options.calibration,
-                 "Calibration: the camera with its row time, and its tilt when known")
+  app.add_option("--lamps", options.lamps,
+                 "Lamp map, lamps.yaml, with frequencies unless there is a classifier")
       ->required();
+  app.add_option("--calibration", options.calibration,
+                 "Calibration: the camera with its row time, and its tilt when known; without it "
+                 "centres are those of ellipses in the image");
+  app.add_option("--row-time-s", options.row_time_s, "Row time of a camera without a calibration")
+      ->check(vlp::finite_positive())
+      ->excludes("--calibration");
   app.add_option("-o,--output", options.output, "Where to write detections.csv")->required();
+  vlp::add_detect_options(app, options);
   app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });

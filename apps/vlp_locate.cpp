@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <stdexcept>
 
 #include "app.h"
 #include "captures/captures_table.h"
@@ -29,7 +30,8 @@ const std::map<std::string, Correction> kCorrections{{"none", Correction::none},
                                                      {"all", Correction::all}};
 
 struct Options {
-  std::string detections, lamps, calibration, captures, output;
+  DetectOptions detect;
+  std::string captures;
   std::string correction = "all";
   std::optional<double> sigma_px;
   std::optional<double> inclination_sigma_deg;
@@ -163,19 +165,22 @@ void report_image(const std::vector<Frame>& frames, const Camera& camera) {
 /// From detections.csv, or from the images themselves.
 std::vector<Frame> frames_of(const Options& options, const LampMap& lamps,
                              const Calibration& calibration) {
-  if (!std::filesystem::is_directory(options.detections)) {
-    return read_detections(options.detections);
+  if (std::filesystem::is_directory(options.detect.folder)) {
+    return detect_folder(options.detect, lamps, calibration).frames;
   }
-  return detect_folder(options.detections, lamps, options.lamps, calibration, options.calibration,
-                       options.output, all_cores())
-      .frames;
+  if (!options.detect.classifier.empty()) {
+    throw std::invalid_argument("--classifier: " + options.detect.folder +
+                                " is no folder of images");
+  }
+  return read_detections(options.detect.folder);
 }
 
 void run(const Options& options) {
-  check_output(options.output,
-               {options.detections, options.lamps, options.calibration, options.captures});
-  const LampMap lamps = read_lamp_map(options.lamps);
-  const Calibration calibration = read_calibration(options.calibration);
+  check_output(options.detect.output,
+               {options.detect.folder, options.detect.lamps, options.detect.calibration,
+                options.detect.classifier, options.captures});
+  const LampMap lamps = read_lamp_map(options.detect.lamps);
+  const Calibration calibration = read_calibration(options.detect.calibration);
   const CapturesTable captures =
       options.captures.empty() ? CapturesTable{} : read_captures(options.captures);
   std::vector<Frame> frames = frames_of(options, lamps, calibration);
@@ -205,7 +210,7 @@ void run(const Options& options) {
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     rows.push_back(row_of(frames[i], fixes[i], noise_known));
   }
-  write_fixes(options.output, rows);
+  write_fixes(options.detect.output, rows);
   report_image(frames, calibration.camera);
   report_captures(frames, captures);
   report_lamps(frames, fixes);
@@ -231,12 +236,14 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml -o fixes.csv\n",
       "vlp-locate");
   vlp::Options options;
-  app.add_option("detections", options.detections,
+  app.add_option("detections", options.detect.folder,
                  "detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images")
       ->required();
-  app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
-  app.add_option("--calibration", options.calibration, "Calibration of the camera")->required();
-  app.add_option("-o,--output", options.output, "Where to write fixes.csv")->required();
+  app.add_option("--lamps", options.detect.lamps, "Lamp map, lamps.yaml")->required();
+  app.add_option("--calibration", options.detect.calibration, "Calibration of the camera")
+      ->required();
+  app.add_option("-o,--output", options.detect.output, "Where to write fixes.csv")->required();
+  vlp::add_detect_options(app, options.detect);
   app.add_option("--correction", options.correction,
                  "Parts of the calibration to apply (default: all that it has)")
       ->check(CLI::IsMember({"none", "rotation", "dispersion", "all"}))

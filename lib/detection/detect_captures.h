@@ -28,17 +28,18 @@ struct CaptureDetections {
 struct DetectRun {
   /// Images at a time.
   int threads;
+  /// What the images have to have.
+  std::optional<std::array<int, 2>> imager_px = std::nullopt;
   /// A folder that is there, for pictures of what was found in each image, see annotated().
   std::optional<std::filesystem::path> annotate = std::nullopt;
 };
 
-/// Detects in each image. An image that cannot be read, or that has another size than `imager_px`,
-/// is refused and does not end it; a picture that cannot be written does (InputError). The result
-/// does not depend on the threads. `progress` gets the images done so far; its calls do not
-/// overlap.
+/// Detects in each image. An image that cannot be used is refused and does not end it; a picture
+/// that cannot be written does (InputError). The result does not depend on the threads. `progress`
+/// gets the images done so far; its calls do not overlap.
 CaptureDetections detect_captures(const LampDetector& detector,
                                   const std::vector<std::filesystem::path>& images,
-                                  const std::array<int, 2>& imager_px, const DetectRun& run,
+                                  const DetectRun& run,
                                   const std::function<void(std::size_t done)>& progress);
 
 }  // namespace vlp

@@ -48,10 +48,12 @@ DetectorCamera detector_camera(const Calibration& calibration) {
   return result;
 }
 
-LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera)
+LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera,
+                           std::optional<LampClassifier> classifier)
     : lamps_(lamps),
       camera_(camera),
       shape_(camera),
+      classifier_(std::move(classifier)),
       most_dark_rows_(most_dark_rows_of(lamps, camera.row_time_s)) {}
 
 std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& blob,

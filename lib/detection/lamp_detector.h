@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "detection/lamp_classifier.h"
 #include "detection/light.h"
 #include "detection/light_parts.h"
 #include "detection/light_shape.h"
@@ -14,6 +15,9 @@
 #include "rig/lamp_map.h"
 
 namespace vlp {
+
+/// Whether the image's edge cuts no part of the light.
+bool wholly_in_view(const Light& light, const cv::Size& size);
 
 /// Of a calibration; rows are taken for the read-out when it is not stated.
 DetectorCamera detector_camera(const Calibration& calibration);
@@ -24,10 +28,12 @@ DetectorCamera detector_camera(const Calibration& calibration);
 /// Centre: from the outline of the lit lines, never from brightness, see LightShape. A lamp that
 /// has no edge because it glows is outlined where it passes a tenth of its brightest level; how
 /// round its glow is limits its centre then, and sigma_px may be too small. Identity: a lamp of
-/// frequency f has stripes of 1 / (f row_time) lines (Chen and Guan, section 2.1).
+/// frequency f has stripes of 1 / (f row_time) lines (Chen and Guan, section 2.1), or what a
+/// trained classifier says.
 class LampDetector {
  public:
-  LampDetector(const LampMap& lamps, const DetectorCamera& camera);
+  LampDetector(const LampMap& lamps, const DetectorCamera& camera,
+               std::optional<LampClassifier> classifier = {});
 
   /// The lights of an image, from the top. It has one channel of 8 or 16 bits and is not empty.
   std::vector<Light> detect(const cv::Mat& image) const;
@@ -48,6 +54,7 @@ class LampDetector {
   LampMap lamps_;
   DetectorCamera camera_;
   LightShape shape_;
+  std::optional<LampClassifier> classifier_;
   int most_dark_rows_;
 };
 

@@ -1,39 +1,23 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <vector>
 
 #include "detection/lamp_detector.h"
+#include "detection/lamp_rule.h"
 
 namespace vlp {
 
+bool wholly_in_view(const Light& light, const cv::Size& size) {
+  return light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
+         light.high.y() < size.height - 0.5;
+}
+
 std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
-  // Lamps keep their frequency to a few per cent. Few stripes, and unclear ones, where something
-  // hides a part, have to fit better.
-  constexpr double clear = 0.7, many = 2.5;
-  const bool sure = stripes.clarity > clear && stripes.periods > many;
-  const double most_off = sure ? 0.06 : 0.025;
-  if (!camera_.row_time_s || !(stripes.period_lines > 0)) return std::nullopt;
-  if (!stripes.regular && stripes.clarity <= clear) return std::nullopt;
-  const double frequency_hz = 1 / (stripes.period_lines * *camera_.row_time_s);
-  double best = most_off, second = std::numeric_limits<double>::infinity();
-  std::optional<int> id;
-  for (const Lamp& lamp : lamps_.lamps) {
-    if (!lamp.frequency_hz) continue;
-    const double off = std::abs(std::log(frequency_hz / *lamp.frequency_hz));
-    if (off < best) {
-      second = best < most_off ? best : second;
-      best = off, id = lamp.id;
-    } else {
-      second = std::min(second, off);
-    }
-  }
-  // Lamps drift: a lamp has to be nearer than any other by this much.
-  constexpr double drift = 0.015;
-  if (id && second < std::max(2 * best, best + drift)) return std::nullopt;
-  return id;
+  if (classifier_) return vlp::lamp_of(*classifier_, stripes);
+  if (!camera_.row_time_s) return std::nullopt;
+  return lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
 }
 
 void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) const {
@@ -70,9 +54,7 @@ void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) co
   }
   for (Light& light : lights) {
     if (!light.lamp) continue;
-    const bool inside = light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
-                        light.high.y() < size.height - 0.5;
-    light.kind = inside ? LightKind::lamp : LightKind::cut;
+    light.kind = wholly_in_view(light, size) ? LightKind::lamp : LightKind::cut;
   }
 }
 

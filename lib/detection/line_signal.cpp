@@ -31,11 +31,11 @@ double level_of(const Level* pixels, int begin, int end) {
 template <typename Level>
 std::vector<double> signal_of(const cv::Mat& image, const Eigen::Vector2d& low,
                               const Eigen::Vector2d& high, double dark) {
-  constexpr double used_height = 0.9, used_width = 0.8;
+  constexpr double used_width = 0.8;
   const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
-  const int first = std::max(0, static_cast<int>(std::ceil(center.y() - used_height * half.y())));
+  const int first = std::max(0, static_cast<int>(std::ceil(center.y() - kUsedHeight * half.y())));
   const int last =
-      std::min(image.rows - 1, static_cast<int>(std::floor(center.y() + used_height * half.y())));
+      std::min(image.rows - 1, static_cast<int>(std::floor(center.y() + kUsedHeight * half.y())));
   std::vector<double> signal;
   for (int row = first; row <= last; ++row) {
     const double off = (row - center.y()) / half.y();

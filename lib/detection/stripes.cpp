@@ -13,6 +13,8 @@
 namespace vlp {
 namespace {
 
+constexpr double kClear = 0.7;
+
 /// The share of the variance that a sine of that frequency (per line) and a constant explain.
 double explained(const std::vector<double>& signal, double mean, double variance,
                  double frequency) {
@@ -89,7 +91,27 @@ std::optional<double> period_of(const std::vector<double>& signal, double middle
   return period;
 }
 
+/// Share of the disc's area on lines brighter than `middle`: of chords, in the middle of the disc.
+double lit_area(const std::vector<double>& signal, double middle) {
+  const auto n = static_cast<double>(signal.size());
+  double lit = 0, all = 0;
+  for (std::size_t i = 0; i < signal.size(); ++i) {
+    const double off = kUsedHeight * (2 * (double(i) + 0.5) / n - 1);
+    const double chord = std::sqrt(1 - off * off);
+    all += chord;
+    if (signal[i] > middle) lit += chord;
+  }
+  return lit / all;
+}
+
 }  // namespace
+
+bool trustworthy(const Stripes& stripes) {
+  constexpr double many = 2.5;
+  return stripes.clarity > kClear && stripes.periods > many;
+}
+
+bool readable(const Stripes& stripes) { return stripes.regular || stripes.clarity > kClear; }
 
 Stripes stripes_of(const std::vector<double>& signal) {
   constexpr std::size_t least_lines = 8;
@@ -119,7 +141,8 @@ Stripes stripes_of(const std::vector<double>& signal) {
   const double before = at(best - step), after = at(best + step);
   const double bend = before - 2 * stripes.clarity + after;
   if (bend < 0) best += std::clamp((before - after) / bend / 2, -1.0, 1.0) * step;
-  const auto in_time = period_of(signal, (low + high) / 2, 1 / best);
+  const double middle = (low + high) / 2;
+  const auto in_time = period_of(signal, middle, 1 / best);
   stripes.regular = in_time.has_value();
   stripes.period_lines = in_time.value_or(1 / best);
   stripes.periods = n / stripes.period_lines;
@@ -130,6 +153,10 @@ Stripes stripes_of(const std::vector<double>& signal) {
     lit += std::clamp(used - double(i), 0.0, 1.0) * signal[i];
   }
   stripes.duty = std::clamp((lit / std::min(used, n) - low) / (high - low), 0.0, 1.0);
+  const std::size_t edges =
+      passages(signal, middle, true).size() + passages(signal, middle, false).size();
+  stripes.count_per_line = static_cast<double>(edges) / (2 * n);
+  stripes.lit_area = lit_area(signal, middle);
   return stripes;
 }
 

@@ -8,6 +8,9 @@
 
 namespace vlp {
 
+/// The share of a disc's height whose lines are used: those at the rim are short and dim.
+inline constexpr double kUsedHeight = 0.9;
+
 /// How bright each line of a light is, from its first line on, above the dark, where nothing hides
 /// the line. The light is an ellipse in the box from `low` to `high` (column, row).
 std::vector<double> line_signal(const cv::Mat& image, const Eigen::Vector2d& low,
@@ -25,11 +28,25 @@ struct Stripes {
   double periods;
   /// Whether all stripes begin and end in time with the period.
   bool regular;
+  /// How many stripes begin or end, half of it, over the lines: once a stripe passes the middle
+  /// between dark and bright upwards, and once downwards.
+  double count_per_line;
+  /// Share of the disc's area that lies on lines brighter than that middle.
+  double lit_area;
 };
 
+/// Whether the stripes are clear and many enough for what is measured to be trusted: clarity above
+/// 0.7 and 2.5 periods. Of a lamp that something hides in part they are not.
+bool trustworthy(const Stripes& stripes);
+
+/// Whether the period means anything: the stripes are regular, or clearer than that. Something that
+/// hides a part of a lamp makes stripes of its own, and by chance like another lamp's.
+bool readable(const Stripes& stripes);
+
 /// The period is that of the sine with a constant that fits best (least squares, Lomb 1976),
-/// between 2.2 lines and the length of the signal. Without 8 lines or more contrast and clarity are
-/// 0.
+/// between 2.2 lines and the length of the signal. The signal is that of line_signal(): of a disc,
+/// from `kUsedHeight` of its radius above the middle to as much below. Without 8 lines or more
+/// contrast and clarity are 0.
 Stripes stripes_of(const std::vector<double>& signal);
 
 }  // namespace vlp

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "detection/lamp_detector.h"
+
+namespace vlp {
+
+/// An image and its lights.
+struct ImageLights {
+  std::filesystem::path file;
+  cv::Mat image;
+  cv::Size size;
+  std::vector<Light> lights;
+  /// Why the image could not be used, in one line; empty when it could.
+  std::string refused;
+};
+
+/// One bad image does not end a run, whatever is bad about it: it cannot be read, or has another
+/// size than `imager_px`.
+ImageLights detect_image(const LampDetector& detector, const std::filesystem::path& file,
+                         const std::optional<std::array<int, 2>>& imager_px = std::nullopt);
+
+}  // namespace vlp

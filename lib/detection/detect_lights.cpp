@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/detect_lights.h"
+
+#include <mutex>
+
+#include "captures/in_parallel.h"
+
+namespace vlp {
+std::vector<ImageLights> detect_lights(const LampDetector& detector,
+                                       std::span<const std::filesystem::path> images, int threads,
+                                       const std::function<void(std::size_t done)>& progress) {
+  std::vector<ImageLights> found(images.size());
+  std::mutex counting;
+  std::size_t done = 0;
+  in_parallel(images.size(), threads, [&](std::size_t i) {
+    found[i] = detect_image(detector, images[i]);
+    found[i].image.release();
+    for (Light& light : found[i].lights) light.outline = {};
+    const std::lock_guard lock(counting);
+    progress(++done);
+  });
+  return found;
+}
+
+}  // namespace vlp

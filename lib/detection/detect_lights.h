@@ -1,0 +1,22 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "detection/detect_image.h"
+
+namespace vlp {
+
+/// The lights of each image, in their order, so many at a time, without pixels and outlines. An
+/// image that cannot be used does not end it. `progress` gets the images done so far; its calls do
+/// not overlap.
+std::vector<ImageLights> detect_lights(const LampDetector& detector,
+                                       std::span<const std::filesystem::path> images, int threads,
+                                       const std::function<void(std::size_t done)>& progress);
+
+}  // namespace vlp

@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "rig/calibration.h"
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// What decides how well a stripe period can be measured.
+struct StripeConditions {
+  double row_time_s;
+  /// Of the lens, in pixels along the direction in which the lines follow one another.
+  double focal_px;
+  /// Of the image plane of the camera above the world's origin.
+  double camera_height_m;
+  /// When it is not known, it is taken to be short: the worst case for a period.
+  std::optional<double> exposure_s;
+};
+
+/// Lines of the image on the lamp, of which kUsedHeight are used: diameter focal / height above the
+/// camera. Nothing without a diameter, or when the lamp is not above the camera.
+std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions);
+
+/// Periods on a lamp below which there is none to measure.
+inline constexpr double kLeastPeriods = 1.3;
+
+/// Relative standard deviation of the period that stripes_of() measures on so many lines. A period
+/// comes from the least-squares line through the numbered begins and through the numbered ends of
+/// stripes, M = lines / period of each:
+///
+///     sd(period) / period = (e / period) sqrt(6 / (M (M^2 - 1))).
+///
+/// e is how well one begin or end is placed. In sharp stripes it lies anywhere between two lines,
+/// e = 1 / sqrt(12); an exposure of x lines makes a ramp of it, on which noise of 2 % of a line's
+/// brightness counts:
+///
+///     e^2 = max(0, 1 - x / 1.2)^2 / 12 + (0.02 x)^2,
+///
+/// which bounds what is measured on square waves (where whole numbers of lines make a period, it is
+/// better). Infinity below kLeastPeriods.
+double period_sd(double period_lines, double lines, double exposure_lines);
+
+/// Two lamps that cannot be told apart with certainty.
+struct LampsAlike {
+  int first, second;
+  /// Their frequencies' ratio less one, and the one that would be enough.
+  double gap, needed;
+};
+
+/// Pairs of lamps that lamp_by_frequency() may call unknown: frequencies nearer than kLampDrift
+/// plus four standard deviations of a period (95 % of lights are told apart), and duties that are
+/// not known or nearer than twice kDutyMargin. Lamps without a frequency are left out; without a
+/// diameter only the drift counts.
+std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions& conditions);
+
+/// A lamp that shows too few stripes to be identified from there, or whose stripes an
+/// exposure of about a whole period wipes out.
+struct LampUnreadable {
+  int lamp;
+  /// Periods on the lamp.
+  double periods;
+  /// |sinc(frequency exposure)|, what is left of the stripes (theory, "Identity").
+  double contrast;
+};
+
+/// Lamps with less than kLeastPeriods or a contrast below 0.2.
+std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
+                                             const StripeConditions& conditions);
+
+}  // namespace vlp

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "support/random.h"
+
+namespace vlp {
+
+/// The signal of `lines` lines on a lamp of that period (lines) and duty, exposed for so many
+/// lines, with noise of the stripes' height times `noise`.
+inline std::vector<double> noisy_square_wave(int lines, double period, double duty,
+                                             double exposure_lines, double noise, Random& random) {
+  const auto lit_until = [&](double time) {
+    const double whole = std::floor(time / period);
+    return whole * duty * period + std::min(time - whole * period, duty * period);
+  };
+  const double phase = random.uniform(0, period);
+  std::vector<double> signal;
+  for (int line = 0; line < lines; ++line) {
+    const double begin = line + phase;
+    const double share = (lit_until(begin + exposure_lines) - lit_until(begin)) / exposure_lines;
+    signal.push_back(200 * (share + noise * random.normal()));
+  }
+  return signal;
+}
+
+}  // namespace vlp

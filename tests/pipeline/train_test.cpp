@@ -1,0 +1,219 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-train end to end, and what the other programs do with its results.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "captures/csv_reader.h"
+#include "rig/calibration.h"
+#include "support/program.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
+const std::string kLamps = " --lamps " + kRig + "/lamps.yaml";
+const std::string kCalibration = " --calibration " + kRig + "/true_calibration.yaml";
+
+class Train : public testing::Test {
+ protected:
+  /// Three places, turning, of the paper's rig; about 0.3 s.
+  std::string captures(const std::string& name = "rotation") {
+    const auto result =
+        run_program("vlp-simulate " VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml -q --only " +
+                    name + " -o " + (folder / "set").string());
+    EXPECT_EQ(result.exit_code, 0) << result.errors;
+    return (folder / "set" / name).string();
+  }
+  ProgramResult train(const std::string& options) const {
+    return run_program("vlp-train " + options + " -o " + output.string());
+  }
+  fs::path without(const std::string& line) const {
+    std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+    const auto begin = calibration.find(line);
+    calibration.erase(begin, calibration.find('\n', begin) + 1 - begin);
+    return folder.file("without.yaml", calibration);
+  }
+  const TemporaryFolder folder;
+  const fs::path output = folder / "trained.yaml";
+};
+
+TEST_F(Train, MakesAClassifierThatDetectAndLocateUse) {
+  const auto trained = train(captures() + kLamps + kCalibration);
+  ASSERT_EQ(trained.exit_code, 0) << trained.errors;
+  EXPECT_THAT(trained.output, HasSubstr("right       100.00 %\n  wrong     0\n  unknown   0\n"));
+  // On captures that it has not seen, without the map's frequencies and the row time.
+  std::string map = TemporaryFolder::content_of(kRig + "/lamps.yaml");
+  for (auto at = map.find(", frequency_hz"); at != std::string::npos;
+       at = map.find(", frequency_hz")) {
+    map.erase(at, map.find(", duty", at) - at);
+  }
+  const std::string rest = " --lamps " + folder.file("lamps.yaml", map).string() +
+                           " --calibration " + without("  row_time_s").string();
+  const auto detected = run_program("vlp-detect " + kRig + "/sample" + rest + " --classifier " +
+                                    output.string() + " -o " + (folder / "found.csv").string());
+  ASSERT_EQ(detected.exit_code, 0) << detected.errors;
+  const CsvTable found(folder / "found.csv"), truth(kRig + "/sample/true_detections.csv");
+  ASSERT_EQ(found.rows(), 12);
+  for (std::size_t row = 0; row < found.rows(); ++row) {
+    const auto matches = [&](std::size_t other) {
+      return found.text(row, found.required("image")) ==
+                 truth.text(other, truth.required("image")) &&
+             found.integer(row, found.required("lamp")) ==
+                 truth.integer(other, truth.required("lamp")) &&
+             std::abs(found.number(row, found.required("u_px")) -
+                      truth.number(other, truth.required("u_px"))) < 0.5;
+    };
+    int matching = 0;
+    for (std::size_t other = 0; other < truth.rows(); ++other) matching += matches(other);
+    EXPECT_EQ(matching, 1) << row;
+  }
+  const auto located = run_program("vlp-locate " + kRig + "/sample" + rest + " --classifier " +
+                                   output.string() + " -o " + (folder / "fixes.csv").string());
+  EXPECT_EQ(located.exit_code, 0) << located.errors;
+  EXPECT_THAT(located.output, HasSubstr("fixes       2\n"));
+}
+
+TEST_F(Train, GivesTheSameBytesWhateverTheThreads) {
+  const std::string options = captures() + kLamps + kCalibration;
+  ASSERT_EQ(train(options + " --threads 1").exit_code, 0);
+  const std::string one = TemporaryFolder::content_of(output);
+  ASSERT_EQ(train(options + " --threads 4").exit_code, 0);
+  EXPECT_EQ(TemporaryFolder::content_of(output), one);
+}
+
+TEST_F(Train, NamesLampsWithTooFewLights) {
+  const auto result = train(kRig + "/sample" + kLamps);
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.errors, HasSubstr("too few labelled lights of lamps 1 (has 2), 2 (has 2)"));
+  EXPECT_THAT(result.errors, HasSubstr("6 or more of each"));
+  EXPECT_FALSE(fs::exists(output));
+}
+
+TEST_F(Train, AsksForLabels) {
+  fs::create_directory(folder / "bare");
+  fs::copy(kRig + "/sample/0000.png", folder / "bare/0000.png");
+  const auto result = train((folder / "bare").string() + kLamps);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors,
+              HasSubstr("bare: has no detections.csv that says which lamp is where"));
+  folder.file("bare/mine.csv", "image,lamp,u_px,v_px\n0000.png,77,174.7,302.1\n");
+  const auto unknown = train((folder / "bare").string() + kLamps + " --labels mine.csv");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.errors, HasSubstr("the labels name lamp 77, which is not in the lamp map"));
+  EXPECT_EQ(run_program("vlp-train " + kRig + "/sample" + kLamps).exit_code, 2) << "no output";
+}
+
+TEST_F(Train, FindsTheRowTimeAndTheReadOut) {
+  // Nothing but the images is there.
+  fs::create_directory(folder / "images");
+  for (const auto& entry : fs::directory_iterator(captures())) {
+    if (entry.path().extension() == ".png") fs::copy(entry.path(), folder / "images");
+  }
+  const auto bare = run_program("vlp-train --row-time " + (folder / "images").string() + kLamps);
+  ASSERT_EQ(bare.exit_code, 0) << bare.errors;
+  EXPECT_THAT(bare.output, HasSubstr("read-out    along rows"));
+  std::string calibration = TemporaryFolder::content_of(without("  row_time_s"));
+  calibration.erase(calibration.find("  readout"), 16);
+  const auto result = train("--row-time " + (folder / "images").string() + kLamps +
+                            " --calibration " + folder.file("bare.yaml", calibration).string());
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const Calibration found = read_calibration(output);
+  const Calibration truth = read_calibration(kRig + "/true_calibration.yaml");
+  EXPECT_NEAR(found.camera.row_time_s.value() / *truth.camera.row_time_s, 1, 0.001);
+  EXPECT_EQ(found.camera.readout, Readout::rows);
+  EXPECT_EQ(found.camera.intrinsics, truth.camera.intrinsics);
+  EXPECT_EQ(found.rotation_center.value().center_px, truth.rotation_center->center_px);
+  ASSERT_FALSE(found.history.empty());
+  EXPECT_EQ(found.history.back().program, "vlp-train");
+}
+
+TEST_F(Train, DoesNotGuessTheRowTime) {
+  std::string map = "format: vlp-lamps/1\nlamps:\n";
+  for (int id = 1; id <= 9; ++id) {
+    map += "  - {id: " + std::to_string(id) + ", position_m: [" + std::to_string(id) +
+           ", 0, 2], frequency_hz: " + std::to_string(1000 * std::pow(1.244, id)) + "}\n";
+  }
+  const auto result = train("--row-time " + kRig + "/sample" + kCalibration + " --lamps " +
+                            folder.file("even.yaml", map).string());
+  EXPECT_EQ(result.exit_code, 3) << result.output;
+  EXPECT_THAT(result.errors, HasSubstr("fit a row time of"));
+  EXPECT_FALSE(fs::exists(output));
+  const auto labelled = run_program("vlp-train --row-time " + kRig + "/sample" + kLamps +
+                                    " --labels true_detections.csv");
+  EXPECT_EQ(labelled.exit_code, 0) << labelled.errors;
+  const auto nowhere = train("--row-time " + kRig + "/sample" + kLamps);
+  EXPECT_EQ(nowhere.exit_code, 2);
+  EXPECT_THAT(nowhere.errors, HasSubstr("needs --calibration"));
+}
+
+TEST_F(Train, FindsAReadOutAlongColumnsForDetect) {
+  const std::string wide = VLP_SOURCE_DIR "/datasets/wide/rendered";
+  std::string calibration = TemporaryFolder::content_of(wide + "/true_calibration.yaml");
+  calibration.erase(calibration.find("  readout: columns\n"), 19);
+  const std::string command = "vlp-detect " + wide + "/sample --lamps " + wide + "/lamps.yaml -o " +
+                              (folder / "found.csv").string() + " --calibration " +
+                              folder.file("c.yaml", calibration).string();
+  const auto found = run_program(command);
+  ASSERT_EQ(found.exit_code, 0) << found.errors;
+  EXPECT_THAT(found.errors, HasSubstr("the images show stripes along columns"));
+  const auto lamps = CsvTable(folder / "found.csv").rows();
+  EXPECT_GE(lamps, 6);
+  ASSERT_EQ(run_program(command + " --readout columns").exit_code, 0);
+  EXPECT_EQ(CsvTable(folder / "found.csv").rows(), lamps);
+  EXPECT_EQ(run_program(command + " --readout rows").exit_code, 3);
+  EXPECT_EQ(run_program(command + " --readout diagonal").exit_code, 2);
+}
+
+TEST_F(Train, ItsClassifierHasToFitLampsAndCamera) {
+  ASSERT_EQ(train(captures() + kLamps + kCalibration).exit_code, 0);
+  const auto refusal = [&](const std::string& lamps, const std::string& calibration) {
+    const auto result =
+        run_program("vlp-detect " + kRig + "/sample" + lamps + calibration + " --classifier " +
+                    output.string() + " -o " + (folder / "found.csv").string());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_FALSE(fs::exists(folder / "found.csv"));
+    return result.errors;
+  };
+  EXPECT_THAT(
+      refusal(" --lamps " VLP_SOURCE_DIR "/datasets/wide/rendered/lamps.yaml", kCalibration),
+      HasSubstr("trained.yaml: lamp 1 is not in"));
+  std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+  calibration.replace(calibration.find("0.00003"), 7, "0.00004");
+  EXPECT_THAT(refusal(kLamps, " --calibration " + folder.file("other.yaml", calibration).string()),
+              HasSubstr("trained.yaml: row_time_s is 3e-05"));
+  EXPECT_THAT(refusal(kLamps + " --classifier none.yaml", kCalibration), HasSubstr("--classifier"));
+  const auto table =
+      run_program("vlp-locate " + kRig + "/sample/true_detections.csv" + kLamps + kCalibration +
+                  " --classifier " + output.string() + " -o " + (folder / "fixes.csv").string());
+  EXPECT_EQ(table.exit_code, 2);
+  EXPECT_THAT(table.errors, HasSubstr("is no folder of images"));
+}
+
+TEST_F(Train, IsNotNeededToWarnOfLampsThatAreAlike) {
+  std::string map = TemporaryFolder::content_of(kRig + "/lamps.yaml");
+  map.replace(map.find("2000"), 4, "1620");
+  const std::string command = "vlp-detect " + kRig + "/sample" + kCalibration + " --lamps " +
+                              folder.file("alike.yaml", map).string() + " -o " +
+                              (folder / "found.csv").string();
+  const auto result = run_program(command);
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.errors, HasSubstr("lamps 1 and 2 may be left unknown, seen from z = 0"));
+  EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
+  const auto smeared = run_program(command + " --exposure-s 2e-4");
+  EXPECT_THAT(smeared.errors, HasSubstr("lamp 6 has"));
+  EXPECT_THAT(smeared.errors, HasSubstr("expose shorter"));
+  EXPECT_THAT(run_program("vlp-detect " + kRig + "/sample" + kCalibration + kLamps + " -o " +
+                          (folder / "found.csv").string())
+                  .errors,
+              "");
+}
+
+}  // namespace
+}  // namespace vlp
