@@ -12,7 +12,7 @@ double clear_stripes(const cv::Mat& image, Readout readout) {
   double sum = 0;
   for (const Light& light : detector.detect(image)) {
     if (light.kind == LightKind::steady) continue;
-    sum += light.stripes.clarity * light.roundness;
+    sum += light.stripes.clarity * light.stripes.contrast * light.roundness;
   }
   return sum;
 }

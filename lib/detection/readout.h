@@ -14,7 +14,7 @@ namespace vlp {
 /// What images say of the read-out.
 struct ReadoutEvidence {
   /// Striped lights seen with a read-out along rows, and along columns, each counted by how clear
-  /// its stripes are, from 0 to 1.
+  /// and full its stripes and how round it is, from 0 to 1.
   double rows = 0, columns = 0;
 
   /// The one with more, three times as much as the other and of two lights or more at least, in

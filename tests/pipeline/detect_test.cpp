@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "captures/csv_reader.h"
 #include "support/program.h"
@@ -47,6 +49,41 @@ TEST_F(Detect, FindsWhatLocateTurnsIntoTheTruePlace) {
       EXPECT_NEAR(fixes.number(row, fixes.required(axis)), truth.number(row, truth.required(axis)),
                   1e-4);
     }
+  }
+}
+
+TEST_F(Detect, DrawsWhatItFinds) {
+  const fs::path pictures = folder / "new" / "pictures";
+  ASSERT_EQ(detect(kRig + "/sample", "--annotate " + pictures.string()).exit_code, 0);
+  for (const char* name : {"0000.png", "0001.png"}) {
+    const cv::Mat picture = cv::imread((pictures / name).string(), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(picture.type(), CV_8UC3);
+    ASSERT_EQ(picture.size(), cv::Size(800, 600));
+    cv::Mat gray, drawn;
+    cv::extractChannel(picture, gray, 0);
+    cv::extractChannel(picture, drawn, 1);
+    EXPECT_GT(cv::countNonZero(gray != drawn), 500) << "green outlines, crosses and numbers";
+  }
+  const auto refused = detect(kRig + "/sample", "--annotate " + kRig + "/sample");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.errors, HasSubstr("holds the images"));
+}
+
+TEST_F(Detect, NeedsOnlyTheRowTimeOfACamera) {
+  const std::string call = "vlp-detect '" + kRig + "/sample' --lamps " + kRig + "/lamps.yaml -o " +
+                           (folder / "found.csv").string();
+  const auto refused = run_program(call);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.errors, HasSubstr("--row-time-s"));
+  ASSERT_EQ(run_program(call + " --row-time-s 3e-5").exit_code, 0);
+  const CsvTable without(folder / "found.csv");
+  ASSERT_EQ(detect(kRig + "/sample").exit_code, 0);
+  const CsvTable with(folder / "found.csv");
+  ASSERT_EQ(without.rows(), with.rows());
+  for (std::size_t row = 0; row < with.rows(); ++row) {
+    // The lens moves the middle of an outline by as much.
+    EXPECT_NEAR(without.number(row, without.required("u_px")),
+                with.number(row, with.required("u_px")), 1);
   }
 }
 
