@@ -1,0 +1,143 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// How far from the truth methods put the centres of lamps, in a folder of rendered captures:
+///   center_methods FOLDER
+/// with true_detections.csv in it and lamps.yaml and true_calibration.yaml beside it. Lamps are
+/// those wholly in view that our detector finds with and without the lens.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+
+#include "captures/csv_reader.h"
+#include "detection/background.h"
+#include "detection/image_file.h"
+#include "detection/lamp_detector.h"
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector2d;
+
+struct Errors {
+  const char* method;
+  double squares = 0, worst_px = 0;
+  int lamps = 0;
+
+  void add(const Vector2d& error_px) {
+    squares += error_px.squaredNorm();
+    worst_px = std::max(worst_px, error_px.norm());
+    ++lamps;
+  }
+};
+
+/// Of the pixels above the background's threshold.
+struct LitPixels {
+  Vector2d box_center, centroid;
+};
+
+template <typename Level>
+LitPixels lit_pixels_of(const cv::Mat& image, const Background& background, const cv::Rect& box) {
+  Vector2d low(box.br().x, box.br().y), high(box.x, box.y), moment(0, 0);
+  double sum = 0;
+  for (int row = box.y; row < box.br().y; ++row) {
+    for (int column = box.x; column < box.br().x; ++column) {
+      const double level = image.at<Level>(row, column);
+      if (level <= background.threshold) continue;
+      const Vector2d pixel(column, row);
+      low = low.cwiseMin(pixel);
+      high = high.cwiseMax(pixel);
+      moment += (level - background.level) * pixel;
+      sum += level - background.level;
+    }
+  }
+  return {(low + high) / 2, moment / sum};
+}
+
+LitPixels lit_pixels_of(const cv::Mat& image, const Light& light) {
+  constexpr int around_px = 4;
+  const cv::Point low(int(std::floor(light.low.x())) - around_px,
+                      int(std::floor(light.low.y())) - around_px);
+  const cv::Point high(int(std::ceil(light.high.x())) + around_px + 1,
+                       int(std::ceil(light.high.y())) + around_px + 1);
+  const cv::Rect box = cv::Rect(low, high) & cv::Rect({0, 0}, image.size());
+  const Background background = background_of(image);
+  return image.depth() == CV_8U ? lit_pixels_of<std::uint8_t>(image, background, box)
+                                : lit_pixels_of<std::uint16_t>(image, background, box);
+}
+
+std::map<int, Light> lamps_in(const LampDetector& detector, const cv::Mat& image) {
+  std::map<int, Light> lamps;
+  for (Light& light : detector.detect(image)) {
+    if (light.kind == LightKind::lamp) lamps[*light.lamp] = std::move(light);
+  }
+  return lamps;
+}
+
+/// Of lamps wholly in view, by image.
+std::map<std::string, std::map<int, Vector2d>> truth_in(const std::filesystem::path& folder) {
+  const CsvTable table(folder / "true_detections.csv");
+  const auto image = table.required("image"), lamp = table.required("lamp");
+  const auto u = table.required("u_px"), v = table.required("v_px");
+  const auto in_view = table.required("in_view");
+  std::map<std::string, std::map<int, Vector2d>> truth;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (table.number(row, in_view) < 1) continue;
+    truth[std::string(table.text(row, image))][table.integer(row, lamp)] = {table.number(row, u),
+                                                                            table.number(row, v)};
+  }
+  return truth;
+}
+
+void run(const std::filesystem::path& folder) {
+  const std::filesystem::path beside = folder / "..";
+  const LampMap map = read_lamp_map(beside / "lamps.yaml");
+  DetectorCamera camera = detector_camera(read_calibration(beside / "true_calibration.yaml"));
+  const LampDetector with_lens(map, camera);
+  camera.lens.reset();
+  const LampDetector without_lens(map, camera);
+
+  std::array<Errors, 4> methods = {
+      Errors{"bounding box of the lit pixels"}, Errors{"centroid of the brightness"},
+      Errors{"our ellipse, without lens"}, Errors{"our circle, through the lens"}};
+  int missed_with = 0, missed_without = 0;
+  for (const auto& [name, truth] : truth_in(folder)) {
+    const cv::Mat image = read_image(folder / name);
+    const auto lamps = lamps_in(with_lens, image), ellipses = lamps_in(without_lens, image);
+    for (const auto& [id, pixel] : truth) {
+      missed_with += !lamps.contains(id);
+      missed_without += !ellipses.contains(id);
+      if (!lamps.contains(id) || !ellipses.contains(id)) continue;
+      const LitPixels lit = lit_pixels_of(image, lamps.at(id));
+      methods[0].add(lit.box_center - pixel);
+      methods[1].add(lit.centroid - pixel);
+      methods[2].add(ellipses.at(id).pixel - pixel);
+      methods[3].add(lamps.at(id).pixel - pixel);
+    }
+  }
+  fmt::print("{:32}{:>7}{:>10}{:>10}\n", "method", "lamps", "rms px", "worst px");
+  for (const auto& [method, squares, worst_px, lamps] : methods) {
+    fmt::print("{:32}{:7}{:10.3f}{:10.3f}\n", method, lamps, std::sqrt(squares / lamps), worst_px);
+  }
+  fmt::print("wholly in view, but not found with the lens {}, without {}\n", missed_with,
+             missed_without);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    fmt::print(stderr, "center_methods FOLDER\n");
+    return 2;
+  }
+  try {
+    vlp::run(argv[1]);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "center_methods: {}\n", error.what());
+    return 2;
+  }
+}

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Captures with other lights, glare, poor light and things in the way: a lamp may be missed when
+/// something hides it, but what is said to be a lamp is right.
+#include "rendered_captures.h"
+
+namespace vlp {
+namespace {
+
+class Clutter : public testing::TestWithParam<const char*> {};
+
+TEST_P(Clutter, MisleadsNoDetection) {
+  const Score score = Captures("clutter", GetParam()).score(6);
+  EXPECT_GE(score.lamps, 20);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_EQ(score.missed, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Folders, Clutter,
+                         testing::Values("check", "low-light", "saturated", "fast"),
+                         [](const auto& folder) {
+                           std::string name = folder.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace vlp

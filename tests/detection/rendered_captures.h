@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "detection/lamp_detector.h"
+#include "simulation/exposure.h"
+#include "simulation/truth.h"
+
+namespace vlp {
+
+struct Score {
+  int lamps = 0, missed = 0, wrong = 0;
+  double squares = 0, worst_px = 0, chi_square = 0;
+
+  double rms_px() const { return std::sqrt(squares / lamps); }
+};
+
+/// Every so many captures of a folder of a scene.
+class Captures {
+ public:
+  explicit Captures(const std::string& scene, const std::string& folder)
+      : scene_(read_scene(VLP_SOURCE_DIR "/datasets/" + scene + "/scene.yaml")),
+        renderer_(scene_),
+        set_(*std::find_if(scene_.sets.begin(), scene_.sets.end(),
+                           [&](const CaptureSet& set) { return set.folder == folder; })) {}
+
+  LampShot shot(std::size_t index) const { return lamp_shot(scene_, set_, index); }
+  cv::Mat image(const LampShot& shot) const {
+    const cv::Mat lines = expose(scene_.sensor, renderer_.lamp_electrons(shot), shot.noise_seed);
+    return scene_.camera.readout == Readout::rows ? lines : cv::Mat(lines.t());
+  }
+  std::vector<TrueLamp> truth(const LampShot& shot) const {
+    return true_lamps(scene_, renderer_, shot);
+  }
+  LampDetector detector() const {
+    return {lamp_map_of(scene_, false), detector_camera(true_calibration(scene_))};
+  }
+
+  Score score(std::size_t step) const {
+    const LampDetector lamp_detector = detector();
+    Score score;
+    for (std::size_t i = 0; i < shots_in(set_); i += step) {
+      const LampShot shot = this->shot(i);
+      std::map<int, Light> found;
+      for (Light& light : lamp_detector.detect(image(shot))) {
+        if (light.kind != LightKind::lamp) continue;
+        EXPECT_FALSE(found.contains(*light.lamp)) << "one lamp twice in image " << i;
+        found[*light.lamp] = light;
+      }
+      add(truth(shot), found, score);
+    }
+    return score;
+  }
+
+ private:
+  void add(const std::vector<TrueLamp>& truth, std::map<int, Light>& found, Score& score) const {
+    for (const auto& [id, pixel, in_view] : truth) {
+      const auto light = found.find(id);
+      if (light == found.end()) {
+        score.missed += in_view == 1;
+        continue;
+      }
+      const double error_px = (light->second.pixel - pixel).norm();
+      const double sigma_px = light->second.sigma_px;
+      found.erase(light);
+      if (error_px > 5) ++score.wrong;
+      if (in_view < 1 || error_px > 5) continue;
+      ++score.lamps;
+      score.squares += error_px * error_px;
+      score.worst_px = std::max(score.worst_px, error_px);
+      score.chi_square += error_px * error_px / 2 / std::pow(sigma_px, 2);
+    }
+    score.wrong += static_cast<int>(found.size());
+  }
+
+  Scene scene_;
+  FrameRenderer renderer_;
+  CaptureSet set_;
+};
+
+}  // namespace vlp
