@@ -58,7 +58,7 @@ LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera,
 
 std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& blob,
                                               const Background& background) const {
-  constexpr double least_roundness = 0.5;
+  constexpr double least_roundness = 0.5, softest_edge = 0.3;
   constexpr std::size_t most_lights = 4;
   const cv::Rect box = box_of(blob);
   std::vector<LightPart> parts;
@@ -75,7 +75,9 @@ std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& 
     if (part.light) part.light->outside = double(rest.size()) / double(part.light->outline.size());
   }
   const std::optional<Light>& first = parts.front().light;
-  if (!first || first->roundness < least_roundness) {
+  const bool edge = first && first->roundness >= least_roundness &&
+                    first->rise_px <= softest_edge * first->radius_px;
+  if (!edge) {
     if (auto glow = glow_of(lines, blob, background, shape_)) return {{std::move(glow), {}, box}};
   }
   return parts;

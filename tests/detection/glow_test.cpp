@@ -73,7 +73,7 @@ TEST(Glow, IsFoundWithItsCentreAndItsStripes) {
 }
 
 TEST(Glow, IsIdentified) {
-  for_each_case({0}, [](const DrawnLamp& lamp, double noise) {
+  for_each_case({0, 0.5}, [](const DrawnLamp& lamp, double noise) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 17.5)}};
     const auto lights =
         LampDetector(map, drawn_camera(kSize)).detect(drawn({lamp}, kSize, CV_8U, noise));
