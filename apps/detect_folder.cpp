@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <thread>
 
@@ -56,6 +57,15 @@ CaptureDetections detect_folder(const std::string& folder, const LampMap& lamps,
         found.images, found.refused.size(), cut, unknown, steady));
   }
   return found;
+}
+
+std::vector<Frame> frames_of(const std::string& captures, const LampMap& lamps,
+                             const std::string& lamps_file, const Calibration& calibration,
+                             const std::string& calibration_file, const std::string& output) {
+  if (!std::filesystem::is_directory(captures)) return read_detections(captures);
+  return detect_folder(captures, lamps, lamps_file, calibration, calibration_file, output,
+                       all_cores())
+      .frames;
 }
 
 }  // namespace vlp

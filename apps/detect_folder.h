@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "detection/detect_captures.h"
 #include "rig/calibration.h"
@@ -17,6 +18,11 @@ CaptureDetections detect_folder(const std::string& folder, const LampMap& lamps,
                                 const std::string& lamps_file, const Calibration& calibration,
                                 const std::string& calibration_file, const std::string& output,
                                 int threads);
+
+/// The captures of a detections.csv, or of a folder of images: detect_folder() on all cores.
+std::vector<Frame> frames_of(const std::string& captures, const LampMap& lamps,
+                             const std::string& lamps_file, const Calibration& calibration,
+                             const std::string& calibration_file, const std::string& output);
 
 /// How many threads there are when nobody says so.
 int all_cores();

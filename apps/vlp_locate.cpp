@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <map>
 #include <optional>
 
@@ -160,17 +159,6 @@ void report_image(const std::vector<Frame>& frames, const Camera& camera) {
   }
 }
 
-/// From detections.csv, or from the images themselves.
-std::vector<Frame> frames_of(const Options& options, const LampMap& lamps,
-                             const Calibration& calibration) {
-  if (!std::filesystem::is_directory(options.detections)) {
-    return read_detections(options.detections);
-  }
-  return detect_folder(options.detections, lamps, options.lamps, calibration, options.calibration,
-                       options.output, all_cores())
-      .frames;
-}
-
 void run(const Options& options) {
   check_output(options.output,
                {options.detections, options.lamps, options.calibration, options.captures});
@@ -178,7 +166,8 @@ void run(const Options& options) {
   const Calibration calibration = read_calibration(options.calibration);
   const CapturesTable captures =
       options.captures.empty() ? CapturesTable{} : read_captures(options.captures);
-  std::vector<Frame> frames = frames_of(options, lamps, calibration);
+  std::vector<Frame> frames = frames_of(options.detections, lamps, options.lamps, calibration,
+                                        options.calibration, options.output);
   if (options.sigma_px) set_sigma(frames, *options.sigma_px);
   PositionerOptions how;
   how.correction = kCorrections.at(options.correction);

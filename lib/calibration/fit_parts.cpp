@@ -9,13 +9,12 @@ namespace vlp {
 RotationCenter rotation_center_at(const Eigen::Vector2d& z, RotationModel model,
                                   const Camera& camera, const std::optional<Matrix2>& covariance) {
   const Eigen::Vector2d focal_px(camera.intrinsics[0], camera.intrinsics[1]);
-  const Eigen::Vector2d center_px(camera.intrinsics[2], camera.intrinsics[3]);
   RotationCenter center;
   center.model = model;
-  center.center_px = focal_px.cwiseProduct(z) + center_px;
+  center.center_px = undistorted_pixel(camera, z);
   center.zenith_in_camera = z.homogeneous().normalized();
   if (covariance) {
-    center.covariance = focal_px.asDiagonal() * *covariance * focal_px.asDiagonal();
+    center.covariance = covariance->cwiseProduct((focal_px * focal_px.transpose()).eval());
   }
   return center;
 }
@@ -27,10 +26,10 @@ std::vector<double> yaws_of(const SpotCaptures& spot) {
   return yaws_rad;
 }
 
-std::vector<double*> pointers_to(std::vector<double>& values) {
-  std::vector<double*> pointers;
+std::vector<const double*> pointers_to(const std::vector<double>& values) {
+  std::vector<const double*> pointers;
   pointers.reserve(values.size());
-  for (double& value : values) pointers.push_back(&value);
+  for (const double& value : values) pointers.push_back(&value);
   return pointers;
 }
 

@@ -17,7 +17,7 @@ RotationCenter rotation_center_at(const Eigen::Vector2d& z, RotationModel model,
 
 std::vector<double> yaws_of(const SpotCaptures& spot);
 
-std::vector<double*> pointers_to(std::vector<double>& values);
+std::vector<const double*> pointers_to(const std::vector<double>& values);
 
 /// Fills in residual_px and the outliers of a fit whose residuals are the sightings in their order.
 void describe(RotationFit& result, const RobustFit& fit, const SpotCaptures& spot);

@@ -43,9 +43,9 @@ std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width) const {
     if (used_[i]) problem->AddResidualBlock(blocks_[i].cost.get(), loss, blocks_[i].parameters);
   }
   for (const auto& candidates : held_) {
-    const auto first = std::find_if(candidates.begin(), candidates.end(), [&](double* parameter) {
-      return problem->HasParameterBlock(parameter);
-    });
+    const auto first = std::find_if(
+        candidates.begin(), candidates.end(),
+        [&](const double* parameter) { return problem->HasParameterBlock(parameter); });
     if (first != candidates.end()) problem->SetParameterBlockConstant(*first);
   }
   return problem;
@@ -114,7 +114,7 @@ std::vector<std::size_t> RobustFit::outliers() const {
   return left_out;
 }
 
-std::optional<Matrix2> RobustFit::covariance(double* parameter) const {
+std::optional<Matrix2> RobustFit::covariance(const double* parameter) const {
   const auto all = problem(0);
   if (!all->HasParameterBlock(parameter) || all->IsParameterBlockConstant(parameter)) {
     return std::nullopt;

@@ -24,10 +24,12 @@ class RobustFit {
   /// A residual of two rows and the parameters it depends on, which stay the caller's.
   void add(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
   /// Keeps a parameter at its value.
-  void hold(double* parameter) { held_.push_back({parameter}); }
+  void hold(const double* parameter) { held_.push_back({parameter}); }
   /// Keeps the first of them that a residual still depends on: all of them together have a freedom
   /// that no residual shows.
-  void hold_one_of(std::vector<double*> parameters) { held_.push_back(std::move(parameters)); }
+  void hold_one_of(std::vector<const double*> parameters) {
+    held_.push_back(std::move(parameters));
+  }
 
   /// False when it does not converge.
   bool solve();
@@ -37,7 +39,7 @@ class RobustFit {
   const std::vector<double>& lengths() const { return lengths_; }
   /// Of a parameter block of two, for the scatter found: s^2 (J^T J)^-1. Nothing when there are no
   /// more residuals than parameters, or the residuals do not determine it.
-  std::optional<Matrix2> covariance(double* parameter) const;
+  std::optional<Matrix2> covariance(const double* parameter) const;
 
  private:
   struct Block {
@@ -50,7 +52,7 @@ class RobustFit {
   double scatter() const;
 
   std::vector<Block> blocks_;
-  std::vector<std::vector<double*>> held_;
+  std::vector<std::vector<const double*>> held_;
   std::vector<bool> used_;
   std::vector<double> lengths_;
 };

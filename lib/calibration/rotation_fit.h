@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "rig/calibration.h"
@@ -30,5 +32,19 @@ struct RotationFit {
   double residual_px = 0;
   std::vector<SpotOutlier> outliers = {};
 };
+
+/// How far a camera leans, and towards where in its image up is: from x to y.
+struct Tilt {
+  double angle_rad;
+  double azimuth_rad;
+};
+Tilt tilt_of(const RotationCenter& center);
+
+/// Standard deviation of the axis' direction: of the two across it the root of their mean square.
+/// Nothing without a covariance.
+std::optional<double> axis_sd_rad(const RotationCenter& center, const Camera& camera);
+
+/// A normalized point in the undistorted image: f * z + c.
+Eigen::Vector2d undistorted_pixel(const Camera& camera, const Eigen::Vector2d& z);
 
 }  // namespace vlp

@@ -74,6 +74,7 @@ class Search {
     return turn();
   }
 
+  /// After a run that ended well.
   SpotCaptures result() const {
     SpotCaptures spot;
     spot.zenith_in_camera = zenith();
@@ -172,10 +173,9 @@ SpotCaptures spot_captures(const std::vector<Frame>& frames, const LampMap& map,
   spot.status = status_of(frames, map);
   if (spot.status != SpotStatus::ok) return spot;
   Search search(frames, map, camera);
-  const SpotStatus status = search.run();
+  spot.status = search.run();
+  if (spot.status != SpotStatus::ok) return spot;
   spot = search.result();
-  spot.status = status;
-  if (status != SpotStatus::ok) return spot;
   std::set<int> seen;
   for (const std::size_t i : search.frames()) {
     for (const Detection& detection : frames[i].detections) seen.insert(detection.lamp);
