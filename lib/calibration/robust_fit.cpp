@@ -91,11 +91,17 @@ double RobustFit::scatter() const {
 bool RobustFit::solve() {
   used_.assign(blocks_.size(), true);
   measure();
-  constexpr int loss_rounds = 4, trimming_rounds = 6;
+  constexpr int loss_rounds = 4;
   for (int round = 0; round < loss_rounds; ++round) {
     if (!minimize(2 * scatter())) return false;
   }
-  for (int round = 0; round < trimming_rounds; ++round) {
+  return refine();
+}
+
+bool RobustFit::refine() {
+  measure();
+  constexpr int rounds = 6;
+  for (int round = 0; round < rounds; ++round) {
     constexpr double far = 4.5;
     const double limit = far * scatter();
     const std::vector<bool> before = used_;

@@ -33,6 +33,8 @@ class RobustFit {
 
   /// False when it does not converge.
   bool solve();
+  /// The last fit again, from where the parameters are now.
+  bool refine();
   /// Indices of the residuals that were left out, in the order in which they were added.
   std::vector<std::size_t> outliers() const;
   /// Length of each residual, the outliers among them.

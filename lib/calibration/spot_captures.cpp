@@ -48,8 +48,13 @@ double mean_height(const LampMap& map) {
 /// The search for the turning, see SpotCaptures.
 class Search {
  public:
-  Search(const std::vector<Frame>& frames, const LampMap& map, const Camera& camera)
-      : frames_(frames), map_(map), lamps_z_m_(mean_height(map)), left_out_(frames.size()) {
+  /// With `lever_arm` it looks for one before it knows the heights.
+  Search(const std::vector<Frame>& frames, const LampMap& map, const Camera& camera, bool lever_arm)
+      : frames_(frames),
+        map_(map),
+        lamps_z_m_(mean_height(map)),
+        lever_arm_(lever_arm),
+        left_out_(frames.size()) {
     calibration_.camera = camera;
     calibration_.rotation_center = {RotationModel::tilt, {0, 0}, Eigen::Vector3d::UnitZ()};
     // A tilt that is not corrected yet is not noise.
@@ -59,20 +64,24 @@ class Search {
   }
 
   SpotStatus run() {
-    constexpr int rough_rounds = 4, rounds = 12;
-    for (int round = 0; round < rounds; ++round) {
+    constexpr int rough_rounds = 4, rounds = 40;
+    for (int round = 0; round < rounds && !(round > rough_rounds && settled()); ++round) {
       // Lamps contradict each other a little while the tilt is in them.
       locate(round < rough_rounds ? 0.3 : PositionerOptions().max_residual_share);
       if (fixes_.fixes.size() < kLeastCaptures) return status_of(statuses_);
       if (round >= rough_rounds) tell_heights_apart(fixes_);
-      if (const SpotStatus status = turn(); status != SpotStatus::ok) return status;
+      const bool rough_arm = round < rough_rounds && lever_arm_;
+      if (const SpotStatus status = turn(rough_arm); status != SpotStatus::ok) return status;
     }
-    if (median_of(turning_.residuals_m) > 0.05 * height_of(fixes_, 0)) return SpotStatus::moved;
+    if (misfit_m() > 0.05 * height_of(fixes_, 0)) return SpotStatus::moved;
     leave_out_strays();
     locate(PositionerOptions().max_residual_share);
     tell_heights_apart(fixes_);
-    return turn();
+    return turn(false);
   }
+
+  /// How far, typically, the fixes are from where they turn.
+  double misfit_m() const { return median_of(turning_.residuals_m); }
 
   /// After a run that ended well.
   SpotCaptures result() const {
@@ -118,20 +127,25 @@ class Search {
     }
   }
 
-  SpotStatus turn() {
+  SpotStatus turn(bool lever_arm) {
     const auto arcs = arcs_of(fixes_);
     if (const SpotStatus status = vlp::status_of(arcs); status != SpotStatus::ok) return status;
     for (const std::size_t i : fixes_.frames) left_out_[i] = "its height has too few captures";
     drop_weak_spots(fixes_, arcs);
     for (const std::size_t i : fixes_.frames) left_out_[i].clear();
-    turning_ = fit_turning(fixes_.fixes, fixes_.spots, fixes_.spots > 1);
+    turning_ = fit_turning(fixes_.fixes, fixes_.spots, lever_arm || fixes_.spots > 1);
     const Eigen::Vector3d up(-turning_.delta.x(), -turning_.delta.y(), 1);
     zenith() = (level_from_zenith(zenith()).transpose() * up).normalized();
     return SpotStatus::ok;
   }
 
+  bool settled() const {
+    constexpr double enough_rad = 1e-10;
+    return turning_.delta.norm() < enough_rad;
+  }
+
   void leave_out_strays() {
-    const double far_m = std::max(8 * median_of(turning_.residuals_m), 0.01 * height_of(fixes_, 0));
+    const double far_m = std::max(8 * misfit_m(), 0.01 * height_of(fixes_, 0));
     for (std::size_t i = 0; i < fixes_.fixes.size(); ++i) {
       if (!(turning_.residuals_m[i] > far_m)) continue;
       strays_.insert(fixes_.frames[i]);
@@ -142,6 +156,7 @@ class Search {
   std::vector<Frame> frames_;
   const LampMap& map_;
   double lamps_z_m_;
+  bool lever_arm_;
   Calibration calibration_;
   std::vector<std::string> left_out_;  // why, for each frame; empty for those that are used
   std::set<std::size_t> strays_;
@@ -172,9 +187,16 @@ SpotCaptures spot_captures(const std::vector<Frame>& frames, const LampMap& map,
   SpotCaptures spot;
   spot.status = status_of(frames, map);
   if (spot.status != SpotStatus::ok) return spot;
-  Search search(frames, map, camera);
-  spot.status = search.run();
+  // A long lever arm that is taken for a tilt can hide that there are two heights; looked for at
+  // one height, it can hide the tilt.
+  Search plain(frames, map, camera, false), with_arm(frames, map, camera, true);
+  spot.status = plain.run();
+  const bool both = with_arm.run() == SpotStatus::ok;
+  const bool better = both && (spot.status != SpotStatus::ok ||
+                               with_arm.misfit_m() < 0.5 * plain.misfit_m() - 1e-9);
+  if (better) spot.status = SpotStatus::ok;
   if (spot.status != SpotStatus::ok) return spot;
+  const Search& search = better ? with_arm : plain;
   spot = search.result();
   std::set<int> seen;
   for (const std::size_t i : search.frames()) {

@@ -14,7 +14,7 @@ namespace vlp {
 /// over the zenith, a yaw g_k per capture, the place p_i of each lamp on the ceiling (the map only
 /// says what to start from, so that its errors do not matter; the heights Z_i are the map's), and,
 /// when there are captures at several heights, the lever arm e and where the axis stands, A_h, at
-/// what height z_h, at each but the first: there the map gives the scale.
+/// what height z_h. The scale is then the map's: the lamps keep their size as a whole.
 ///
 /// At one height a lever arm and a tilt shift the image alike, by zeta - e/H, and cannot be told
 /// apart. There e is taken as zero: what is found is where the camera sees the point of the ceiling

@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "calibration/spot.h"
 #include "geometry/angles.h"
 #include "support/near.h"
@@ -55,6 +57,37 @@ TEST(TurningAxis, IsExactWithAnyLeverArmAtTwoHeights) {
       scene.heights_m = {0, 0.3};
       expect_exact(scene);
     }
+  }
+}
+
+/// Lamps anywhere in view, few captures, small arcs: no start but the closed form's is needed.
+TEST(TurningAxis, IsExactFromAnywhere) {
+  Random random(11);
+  for (int i = 0; i < 150; ++i) {
+    SCOPED_TRACE(i);
+    SpotScene scene;
+    scene.tilt_rad = rad_from_deg(random.uniform(0, 10));
+    scene.azimuth_rad = random.uniform(-3, 3);
+    scene.axis_m = {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1)};
+    if (i % 2 == 0) {
+      scene.heights_m = {0, random.uniform(0.2, 0.6)};
+      scene.lever_arm_m = {random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2)};
+    }
+    std::vector<Eigen::Vector3d> lamps_m;
+    const std::size_t lamps = 2 + random.index(5);
+    while (lamps_m.size() < lamps) {
+      const Eigen::Vector3d at_m(random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8),
+                                 random.uniform(1.5, 1.7));
+      const bool apart = std::all_of(lamps_m.begin(), lamps_m.end(), [&](const auto& other) {
+        return (other - at_m).norm() > 0.4;
+      });
+      if (apart) lamps_m.push_back(at_m);
+    }
+    scene.map = lamp_map_of(lamps_m);
+    scene.only_in_image = false;
+    scene.captures = 3 + static_cast<int>(random.index(20));
+    scene.arc_rad = random.uniform(2.2, 6);
+    expect_exact(scene);
   }
 }
 
