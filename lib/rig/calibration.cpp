@@ -65,6 +65,7 @@ RotationCenter read_rotation_center(YamlMap map) {
     center.lever_arm_m = Eigen::Vector2d(value->numbers(2).data());
   }
   if (const auto value = map.optional("lever_arm_covariance")) {
+    if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
     center.lever_arm_covariance = read_covariance(*value);
   }
   map.finish();
