@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <opencv2/core/utility.hpp>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -136,6 +138,19 @@ CaptureDetections detect_folder(const DetectOptions& options, const LampMap& lam
   for (const std::string& refused : found.refused) spdlog::warn("{}; skipped", refused);
   check_found(found, options.folder);
   return found;
+}
+
+std::vector<Frame> frames_of(const DetectOptions& options, const LampMap& lamps,
+                             const Calibration& calibration) {
+  if (std::filesystem::is_directory(options.folder)) {
+    return detect_folder(options, lamps, calibration).frames;
+  }
+  for (const auto& [name, value] :
+       {std::pair("--classifier", options.classifier), std::pair("--annotate", options.annotate)}) {
+    if (value.empty()) continue;
+    throw std::invalid_argument(fmt::format("{}: {} is no folder of images", name, options.folder));
+  }
+  return read_detections(options.folder);
 }
 
 }  // namespace vlp

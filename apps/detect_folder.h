@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "detection/detect_captures.h"
 #include "rig/calibration.h"
@@ -38,5 +39,10 @@ void add_detect_options(CLI::App& app, DetectOptions& options);
 /// or of another row time; Undetermined when no lamp is identified.
 CaptureDetections detect_folder(const DetectOptions& options, const LampMap& lamps,
                                 const std::optional<Calibration>& calibration);
+
+/// The captures of a detections.csv, or of a folder of images: detect_folder(). Throws
+/// std::invalid_argument when options for images are given with a table.
+std::vector<Frame> frames_of(const DetectOptions& options, const LampMap& lamps,
+                             const Calibration& calibration);
 
 }  // namespace vlp

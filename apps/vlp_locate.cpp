@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -162,19 +161,6 @@ void report_image(const std::vector<Frame>& frames, const Camera& camera) {
   }
 }
 
-/// From detections.csv, or from the images themselves.
-std::vector<Frame> frames_of(const Options& options, const LampMap& lamps,
-                             const Calibration& calibration) {
-  if (std::filesystem::is_directory(options.detect.folder)) {
-    return detect_folder(options.detect, lamps, calibration).frames;
-  }
-  if (!options.detect.classifier.empty()) {
-    throw std::invalid_argument("--classifier: " + options.detect.folder +
-                                " is no folder of images");
-  }
-  return read_detections(options.detect.folder);
-}
-
 void run(const Options& options) {
   check_output(options.detect.output,
                {options.detect.folder, options.detect.lamps, options.detect.calibration,
@@ -183,7 +169,7 @@ void run(const Options& options) {
   const Calibration calibration = read_calibration(options.detect.calibration);
   const CapturesTable captures =
       options.captures.empty() ? CapturesTable{} : read_captures(options.captures);
-  std::vector<Frame> frames = frames_of(options, lamps, calibration);
+  std::vector<Frame> frames = frames_of(options.detect, lamps, calibration);
   if (options.sigma_px) set_sigma(frames, *options.sigma_px);
   PositionerOptions how;
   how.correction = kCorrections.at(options.correction);

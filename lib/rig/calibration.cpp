@@ -61,6 +61,13 @@ RotationCenter read_rotation_center(YamlMap map) {
     throw zenith.error("should be a unit vector with z > 0");
   }
   if (const auto value = map.optional("covariance")) center.covariance = read_covariance(*value);
+  if (const auto value = map.optional("lever_arm_m")) {
+    center.lever_arm_m = Eigen::Vector2d(value->numbers(2).data());
+  }
+  if (const auto value = map.optional("lever_arm_covariance")) {
+    if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
+    center.lever_arm_covariance = read_covariance(*value);
+  }
   map.finish();
   return center;
 }

@@ -55,7 +55,12 @@ struct RotationCenter {
   /// The direction of up, unit length.
   Eigen::Vector3d zenith_in_camera;
   /// Of center_px, in px^2.
-  std::optional<Matrix2> covariance;
+  std::optional<Matrix2> covariance = {};
+  /// From the axis of rotation to the camera, x and y in the level frame, and its covariance in
+  /// m^2. Fixes are of the camera whether it is there or not. With a robot's centre on the axis and
+  /// the camera's yaw on the robot zero, it is x and y of CameraMount::position_in_robot_m.
+  std::optional<Eigen::Vector2d> lever_arm_m = {};
+  std::optional<Matrix2> lever_arm_covariance = {};
 };
 
 /// The dispersion calibration (Chen and Guan, section 3.2).

@@ -39,17 +39,22 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
   out << YAML::EndMap;
 }
 
+void emit_covariance(YAML::Emitter& out, const char* key, const Matrix2& covariance) {
+  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  emit_row(out, std::array{covariance(0, 0), covariance(0, 1)});
+  emit_row(out, std::array{covariance(1, 0), covariance(1, 1)});
+  out << YAML::EndSeq;
+}
+
 void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
   begin_part(out, "rotation_center");
   emit_word(out, "model", center.model == RotationModel::tilt ? "tilt" : "shift");
   emit_numbers(out, "center_px", center.center_px);
   emit_numbers(out, "zenith_in_camera", center.zenith_in_camera);
-  if (center.covariance) {
-    const Matrix2& c = *center.covariance;
-    out << YAML::Key << "covariance" << YAML::Value << YAML::Flow << YAML::BeginSeq;
-    emit_row(out, std::array{c(0, 0), c(0, 1)});
-    emit_row(out, std::array{c(1, 0), c(1, 1)});
-    out << YAML::EndSeq;
+  if (center.covariance) emit_covariance(out, "covariance", *center.covariance);
+  if (center.lever_arm_m) emit_numbers(out, "lever_arm_m", *center.lever_arm_m);
+  if (center.lever_arm_covariance) {
+    emit_covariance(out, "lever_arm_covariance", *center.lever_arm_covariance);
   }
   out << YAML::EndMap;
 }

@@ -94,6 +94,11 @@ TEST(CalibrationRefusals, NameLineAndKeyOfARotationCentreThatCannotBe) {
        {matrix, "[[0.04, 0.1], [0.1, 0.09]]", covariance + "symmetric and not negative"},
        {matrix, "[[-0.04, 0], [0, -0.09]]", covariance + "symmetric and not negative"},
        {matrix, "[[0, 0], [0, -0.09]]", covariance + "symmetric and not negative"},
+       {"[0.012, -0.009]", "[0.012]", "rotation_center.lever_arm_m: should be 2 numbers, not 1"},
+       {"[[0.0004, 0], [0, 0.0025]]", "[[0.0004, 0], [0, -1]]",
+        "rotation_center.lever_arm_covariance: is not a covariance"},
+       {"  lever_arm_m: [0.012, -0.009]\n", "",
+        "rotation_center.lever_arm_covariance: is of no lever_arm_m"},
        {"center_px:", "centre_px:",
         "rotation_center: key 'center_px' is missing; there are: model, centre_px, "
         "zenith_in_camera",

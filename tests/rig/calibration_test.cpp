@@ -52,6 +52,11 @@ TEST(Calibration, KeepsEachPartWithoutEachOptionalKey) {
       [](Calibration& c) { c.intrinsics_report->board_warp_m.reset(); },
       [](Calibration& c) { c.intrinsics_report->uncertainty_px.reset(); },
       [](Calibration& c) { c.rotation_center->covariance.reset(); },
+      [](Calibration& c) { c.rotation_center->lever_arm_covariance.reset(); },
+      [](Calibration& c) {
+        c.rotation_center->lever_arm_covariance.reset();
+        c.rotation_center->lever_arm_m.reset();
+      },
       [](Calibration& c) { c.intrinsics_report.reset(); },
       [](Calibration& c) { c.rotation_center.reset(); },
       [](Calibration& c) { c.history.clear(); },

@@ -58,6 +58,8 @@ void expect_same(const RotationCenter& found, const RotationCenter& expected) {
   EXPECT_EQ(found.center_px, expected.center_px);
   EXPECT_EQ(found.zenith_in_camera, expected.zenith_in_camera);
   EXPECT_EQ(found.covariance, expected.covariance);
+  EXPECT_EQ(found.lever_arm_m, expected.lever_arm_m);
+  EXPECT_EQ(found.lever_arm_covariance, expected.lever_arm_covariance);
 }
 
 void expect_same(const Dispersion& found, const Dispersion& expected) {

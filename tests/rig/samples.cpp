@@ -49,6 +49,8 @@ rotation_center:
   center_px: [801.25, 597.5]
   zenith_in_camera: [0.6, 0, 0.8]
   covariance: [[0.04, 0.01], [0.01, 0.09]]
+  lever_arm_m: [0.012, -0.009]
+  lever_arm_covariance: [[0.0004, 0], [0, 0.0025]]
 dispersion:
   offset_px: [1.5, -0.75]
   radius_m: 0.0031
@@ -88,7 +90,9 @@ Calibration sample_calibration() {
                         Readout::columns};
   calibration.intrinsics_report = {40, 6400, 12, 0.21, std::array{1e-4, -2.5e-5}, 0.08};
   const Matrix2 covariance{{0.04, 0.01}, {0.01, 0.09}};
-  calibration.rotation_center = {RotationModel::tilt, {801.25, 597.5}, {0.6, 0, 0.8}, covariance};
+  const Matrix2 lever_arm_covariance{{4e-4, 0}, {0, 25e-4}};
+  calibration.rotation_center = {RotationModel::tilt, {801.25, 597.5},   {0.6, 0, 0.8},
+                                 covariance,          {{0.012, -0.009}}, lever_arm_covariance};
   calibration.dispersion = {{1.5, -0.75}, 0.0031, {0.002, -0.001}, 12};
   calibration.history = {{"camera",
                           "vlp-intrinsics",

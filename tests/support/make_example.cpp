@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Makes datasets/example: what a camera sees of five lamps from 36 places, computed, with noise.
+/// Makes datasets/example: what a camera sees of five lamps from 36 places, and while it turns on
+/// the spot, computed, with noise.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -25,8 +26,37 @@ LampMap example_lamps() {
   return map;
 }
 
+constexpr double kNoise_px = 0.05;
+
+/// What the camera of `rig` sees of the lamps that are wholly in its image, by that name.
+Frame frame_of(const SyntheticRig& rig, const char* name, int number, Random& random) {
+  std::array<char, 32> image{};
+  std::snprintf(image.data(), image.size(), "%s_%02d.png", name, number);
+  const auto visible = visible_lamps(rig.map, rig.calibration.camera, rig.camera);
+  auto detections = seen_from(rig, kNoise_px);
+  std::erase_if(detections, [&](const Detection& detection) {
+    const auto& lamp = rig.map.lamps[static_cast<std::size_t>(detection.lamp - 1)];
+    return std::find(visible.begin(), visible.end(), lamp.position_m) == visible.end();
+  });
+  return {image.data(), with_noise(detections, random)};
+}
+
+/// Twelve captures of a turn at each of two heights, the camera beside the axis that it turns
+/// about.
+std::vector<Frame> turn(SyntheticRig rig, Random& random) {
+  const Eigen::Vector2d axis_m(0.05, 0.02);
+  const Eigen::Vector3d lever_arm_m(0.004, -0.002, 0);
+  std::vector<Frame> frames;
+  for (int i = 0; i < 24; ++i) {
+    const double yaw_rad = rad_from_deg(30 * i + random.uniform(-8, 8));
+    const Eigen::Vector3d at_m(axis_m.x(), axis_m.y(), i < 12 ? 0 : 0.3);
+    rig.camera = {at_m + rotation_about_z(yaw_rad) * lever_arm_m, wrapped_rad(yaw_rad)};
+    frames.push_back(frame_of(rig, "turn", i, random));
+  }
+  return frames;
+}
+
 void make_example(const std::filesystem::path& folder) {
-  constexpr double sigma_px = 0.05;
   SyntheticRig rig{example_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
   rig.calibration.camera.id = "example";
   rig.calibration.camera.row_time_s = 30e-6;
@@ -40,23 +70,16 @@ void make_example(const std::filesystem::path& folder) {
   for (int i = 0; i < 36; ++i) {
     rig.camera = {{-0.35 + 0.14 * (i % 6), -0.35 + 0.14 * (i / 6), 0.1 * (i % 4)},
                   wrapped_rad(rad_from_deg(100 * i))};
-    std::array<char, 32> image{};
-    std::snprintf(image.data(), image.size(), "spot_%02d.png", i);
-    const auto visible = visible_lamps(rig.map, rig.calibration.camera, rig.camera);
-    auto detections = seen_from(rig, sigma_px);
-    std::erase_if(detections, [&](const Detection& detection) {
-      const auto& lamp = rig.map.lamps[static_cast<std::size_t>(detection.lamp - 1)];
-      return std::find(visible.begin(), visible.end(), lamp.position_m) == visible.end();
-    });
-    frames.push_back({image.data(), with_noise(detections, random)});
+    frames.push_back(frame_of(rig, "spot", i, random));
     const Eigen::Vector3d& p = rig.camera.position_m;
-    truth.row({image.data(), fixed(p.x(), 6), fixed(p.y(), 6), fixed(p.z(), 6),
+    truth.row({frames.back().image, fixed(p.x(), 6), fixed(p.y(), 6), fixed(p.z(), 6),
                fixed(rig.camera.yaw_rad, 9)});
   }
   write_lamp_map(folder / "lamps.yaml", rig.map);
   write_calibration(folder / "calibration.yaml", rig.calibration);
   write_detections(folder / "detections.csv", frames);
   truth.save();
+  write_detections(folder / "turning.csv", turn(rig, random));
 }
 
 }  // namespace

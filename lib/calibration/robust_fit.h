@@ -1,0 +1,62 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "geometry/types.h"
+
+namespace vlp {
+
+/// Least squares on residuals in the plane (pixels over their sigma) of which some are wrong:
+/// Cauchy's loss, its width from the residuals' median, finds them; the last fit is plain least
+/// squares without those farther off than 4.5 standard deviations. Inside this folder only: its
+/// users do not show Ceres in their headers.
+class RobustFit {
+ public:
+  /// A residual of two rows and the parameters it depends on, which stay the caller's.
+  void add(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
+  /// Keeps a parameter at its value.
+  void hold(const double* parameter) { held_.push_back({parameter}); }
+  /// Keeps the first of them that a residual still depends on: all of them together have a freedom
+  /// that no residual shows.
+  void hold_one_of(std::vector<const double*> parameters) {
+    held_.push_back(std::move(parameters));
+  }
+
+  /// False when it does not converge.
+  bool solve();
+  /// The last fit again, from where the parameters are now.
+  bool refine();
+  /// Indices of the residuals that were left out, in the order in which they were added.
+  std::vector<std::size_t> outliers() const;
+  /// Length of each residual, the outliers among them.
+  const std::vector<double>& lengths() const { return lengths_; }
+  /// Of a parameter block of two, for the scatter found: s^2 (J^T J)^-1. Nothing when there are no
+  /// more residuals than parameters, or the residuals do not determine it.
+  std::optional<Matrix2> covariance(const double* parameter) const;
+
+ private:
+  struct Block {
+    std::unique_ptr<ceres::CostFunction> cost;
+    std::vector<double*> parameters;
+  };
+  std::unique_ptr<ceres::Problem> problem(double loss_width) const;
+  bool minimize(double loss_width);
+  void measure();
+  double scatter() const;
+
+  std::vector<Block> blocks_;
+  std::vector<std::vector<const double*>> held_;
+  std::vector<bool> used_;
+  std::vector<double> lengths_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/rotation_plot.h"
+
+#include "captures/csv_writer.h"
+#include "evaluation/gnuplot.h"
+
+namespace vlp {
+namespace {
+
+std::string data_row(std::initializer_list<double> values) {
+  constexpr int digits = 7;
+  std::string row;
+  for (const double value : values) row += significant(value, digits) + " ";
+  return row + "\n";
+}
+
+}  // namespace
+
+void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot& plot) {
+  std::string places, ellipses;
+  for (const auto& [lamp, places_px, center_px, radii_px] : plot.traces) {
+    for (const auto& place : places_px) places += data_row({place.x(), place.y(), double(lamp)});
+    ellipses +=
+        data_row({center_px.x(), center_px.y(), 2 * radii_px.x(), 2 * radii_px.y(), double(lamp)});
+  }
+  const Eigen::Vector2d &axis = plot.rotation_center_px, &principal = plot.principal_point_px;
+  const std::string marks =
+      "$principal using 1:2 with points pointtype 1 pointsize 2 linewidth 2 linecolor rgb "
+      "'#3b528b' title 'principal point', "
+      "$axis using 1:2 with points pointtype 2 pointsize 2 linewidth 2 linecolor rgb '#d1495b' "
+      "title 'rotation centre'\n";
+  const std::string commands =
+      "$places << END\n" + places + "END\n$ellipses << END\n" + ellipses + "END\n$axis << END\n" +
+      data_row({axis.x(), axis.y()}) + "END\n$principal << END\n" +
+      data_row({principal.x(), principal.y()}) +
+      "END\n"
+      "set encoding utf8\n"
+      "set size ratio -1\n"
+      "set yrange [*:*] reverse\n"  // as in the image
+      "set tics out nomirror\n"
+      "set xlabel 'u (px)'\n"
+      "set ylabel 'v (px)'\n"
+      "set key below\n"
+      "unset colorbox\n"
+      "set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#e0b000')\n"
+      "set multiplot layout 1,2 title " +
+      gnuplot_quoted(plot.title) +
+      " noenhanced\n"
+      "set title 'lamps while turning, undistorted image'\n"
+      "plot $ellipses using 1:2:3:4 with ellipses linecolor rgb '#999999' notitle, "
+      "$places using 1:2:3 with points pointtype 7 pointsize 0.6 linecolor palette notitle, " +
+      marks +
+      "set title 'centres of the ellipses'\n"
+      "set offsets graph 0.15, graph 0.15, graph 0.15, graph 0.15\n"
+      "plot $ellipses using 1:2:5 with points pointtype 6 pointsize 1.2 linewidth 2 linecolor "
+      "palette notitle, "
+      "$ellipses using 1:2:(sprintf('%d', int($5))) with labels offset 0,0.9 notitle, " +
+      marks + "unset multiplot\n";
+  draw(picture, 1200, 620, commands);
+}
+
+}  // namespace vlp
