@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
@@ -28,14 +29,7 @@ bool has(const LampMap& lamps, int id) {
                      [&](const Lamp& lamp) { return lamp.id == id; });
 }
 
-void check_frequencies(const DetectOptions& options, const LampMap& lamps,
-                       const DetectorCamera& camera) {
-  const bool frequencies =
-      std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
-                  [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); });
-  if (!frequencies) {
-    throw InputError(options.lamps, "no lamp has a frequency_hz: none could be told from another");
-  }
+void check_row_time(const DetectOptions& options, const DetectorCamera& camera) {
   if (!camera.row_time_s) {
     throw InputError(options.calibration,
                      "camera.row_time_s is missing: without it no stripe tells its lamp");
@@ -61,7 +55,9 @@ LampClassifier classifier_for(const DetectOptions& options, const LampMap& lamps
     throw InputError(
         options.classifier,
         fmt::format("row_time_s is {:.4g}, that of {} is {:.4g}: train it for this camera",
-                    *classifier.row_time_s, options.calibration, *camera.row_time_s));
+                    *classifier.row_time_s,
+                    options.calibration.empty() ? "--row-time-s" : options.calibration,
+                    *camera.row_time_s));
   }
   return classifier;
 }
@@ -85,12 +81,21 @@ void check_found(const CaptureDetections& found, const std::string& folder) {
   if (identified > 0) return;
   throw Undetermined(fmt::format(
       "no lamp was identified wholly in view in {} images ({} skipped; {} lamps are cut by the "
-      "image's edge, {} lights flicker unlike any lamp of the map, {} are steady): are lamp map "
-      "and row time right, and is the exposure short?",
+      "image's edge, {} lights flicker unlike any lamp of the map, {} are steady): are lamp map, "
+      "row time and read-out (or classifier) right, and is the exposure short?",
       found.images, found.refused.size(), cut, unknown, steady));
 }
 
 }  // namespace
+
+void check_frequencies(const LampMap& lamps, const std::string& lamps_file) {
+  const bool frequencies =
+      std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
+                  [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); });
+  if (!frequencies) {
+    throw InputError(lamps_file, "no lamp has a frequency_hz: none could be told from another");
+  }
+}
 
 int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
 
@@ -111,7 +116,8 @@ CaptureDetections detect_folder(const DetectOptions& options, const LampMap& lam
                                       : DetectorCamera{Readout::rows, options.row_time_s, {}};
   std::optional<LampClassifier> classifier;
   if (options.classifier.empty()) {
-    check_frequencies(options, lamps, camera);
+    check_frequencies(lamps, options.lamps);
+    check_row_time(options, camera);
   } else {
     classifier = classifier_for(options, lamps, camera);
   }
@@ -125,9 +131,7 @@ CaptureDetections detect_folder(const DetectOptions& options, const LampMap& lam
     calibrated = calibration->camera.readout;
   }
   camera.readout = readout_for(options.readout, calibrated, images);
-  if (!classifier && calibration) {
-    warn_of_lamps(lamps, camera, calibration->camera, options.exposure_s);
-  }
+  if (!classifier) warn_of_lamps(lamps, camera, calibration, options.exposure_s);
   if (!options.annotate.empty()) run.annotate = picture_folder(options);
   CaptureDetections found;
   {
@@ -145,9 +149,13 @@ std::vector<Frame> frames_of(const DetectOptions& options, const LampMap& lamps,
   if (std::filesystem::is_directory(options.folder)) {
     return detect_folder(options, lamps, calibration).frames;
   }
-  for (const auto& [name, value] :
-       {std::pair("--classifier", options.classifier), std::pair("--annotate", options.annotate)}) {
-    if (value.empty()) continue;
+  const std::array<std::pair<const char*, bool>, 4> of_images{
+      {{"--classifier", !options.classifier.empty()},
+       {"--annotate", !options.annotate.empty()},
+       {"--readout", options.readout.has_value()},
+       {"--exposure-s", options.exposure_s.has_value()}}};
+  for (const auto& [name, given] : of_images) {
+    if (!given) continue;
     throw std::invalid_argument(fmt::format("{}: {} is no folder of images", name, options.folder));
   }
   return read_detections(options.folder);

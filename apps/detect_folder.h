@@ -30,6 +30,9 @@ struct DetectOptions {
   int threads = all_cores();
 };
 
+/// Throws InputError when no lamp has a frequency.
+void check_frequencies(const LampMap& lamps, const std::string& lamps_file);
+
 /// Adds --classifier, --annotate, --readout and --exposure-s.
 void add_detect_options(CLI::App& app, DetectOptions& options);
 

@@ -24,18 +24,6 @@ std::vector<Frame> labels_in(const fs::path& folder, const std::string& table, b
                    "has no detections.csv that says which lamp is where (image, lamp, u_px, v_px)");
 }
 
-/// The order is the order of the images.
-void report_refused(ImageLights& image, const std::array<int, 2>& imager_px) {
-  const bool any_size = imager_px[0] == 0;
-  if (image.refused.empty() && !any_size && image.size != cv::Size(imager_px[0], imager_px[1])) {
-    image.refused =
-        fmt::format("{}: is {} x {}, the calibration's camera has {} x {} px", image.file.string(),
-                    image.size.width, image.size.height, imager_px[0], imager_px[1]);
-    image.lights.clear();
-  }
-  if (!image.refused.empty()) spdlog::warn("{}; skipped", image.refused);
-}
-
 }  // namespace
 
 std::vector<LabelledFolder> labelled_folders(const std::vector<std::string>& folders,
@@ -50,7 +38,8 @@ std::vector<LabelledFolder> labelled_folders(const std::vector<std::string>& fol
 
 std::vector<std::vector<ImageLights>> lights_of(const LampDetector& detector,
                                                 const std::vector<LabelledFolder>& folders,
-                                                const std::array<int, 2>& imager_px, int threads) {
+                                                const std::optional<std::array<int, 2>>& imager_px,
+                                                int threads) {
   std::size_t total = 0, before = 0;
   for (const LabelledFolder& folder : folders) total += folder.images.size();
   std::vector<std::vector<ImageLights>> all;
@@ -58,14 +47,23 @@ std::vector<std::vector<ImageLights>> lights_of(const LampDetector& detector,
   {
     Progress progress("images");
     for (const LabelledFolder& folder : folders) {
-      all.push_back(detect_lights(detector, folder.images, threads, [&](std::size_t done) {
-        progress.update(before + done, total);
-      }));
+      all.push_back(
+          detect_lights(detector, folder.images, imager_px, threads,
+                        [&](std::size_t done) { progress.update(before + done, total); }));
       before += folder.images.size();
     }
   }
-  for (auto& images : all) {
-    for (ImageLights& image : images) report_refused(image, imager_px);
+  std::size_t refused = 0;
+  for (const auto& images : all) {
+    for (const ImageLights& image : images) {
+      if (image.refused.empty()) continue;
+      spdlog::warn("{}; skipped", image.refused);
+      ++refused;
+    }
+  }
+  if (refused == total) {
+    throw InputError(folders.front().folder,
+                     fmt::format("none of the {} images can be used", total));
   }
   return all;
 }

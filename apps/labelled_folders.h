@@ -23,9 +23,11 @@ std::vector<LabelledFolder> labelled_folders(const std::vector<std::string>& fol
                                              const std::string& table, bool needed);
 
 /// The lights of each folder's images, with progress, and a warning for each image that cannot be
-/// used or is not of this size (any size when it is {0, 0}); such images have no lights.
+/// used or is not of this size, when there is one; such images have no lights. Throws InputError
+/// when none can be used.
 std::vector<std::vector<ImageLights>> lights_of(const LampDetector& detector,
                                                 const std::vector<LabelledFolder>& folders,
-                                                const std::array<int, 2>& imager_px, int threads);
+                                                const std::optional<std::array<int, 2>>& imager_px,
+                                                int threads);
 
 }  // namespace vlp

@@ -8,8 +8,10 @@
 
 #include "app.h"
 #include "detect_folder.h"
+#include "history.h"
 #include "labelled_folders.h"
 #include "readout_option.h"
+#include "rig/input_error.h"
 #include "train_report.h"
 
 namespace vlp {
@@ -49,7 +51,7 @@ Inputs read_inputs(const Options& options) {
   const auto images = images_of(inputs.folders);
   for (const auto& image : images) check_output(options.output, {image.string()});
   cv::setNumThreads(1);  // the images themselves go in parallel
-  std::array<int, 2> imager_px{};
+  std::optional<std::array<int, 2>> imager_px;
   std::optional<Readout> readout;
   if (inputs.calibration) {
     inputs.camera = detector_camera(*inputs.calibration);
@@ -70,6 +72,11 @@ void train(const Options& options) {
   for (std::size_t i = 0; i < inputs.folders.size(); ++i) {
     add_labelled(inputs.lights[i], inputs.folders[i].labels, labelled);
   }
+  if (labelled.labels == 0) {
+    throw InputError(inputs.folders.front().folder,
+                     "the table names none of the images that can be used: image names have to be "
+                     "equal, with their endings");
+  }
   check_examples(labelled.lights, inputs.lamps);
   LampClassifier classifier = trained(labelled.lights);
   classifier.row_time_s = inputs.camera.row_time_s;
@@ -80,11 +87,12 @@ void train(const Options& options) {
   warn_of_inseparable(classifier);
 }
 
-void find_row_time(const Options& options) {
+void find_row_time(const CLI::App& app, const Options& options) {
   if (!options.output.empty() && options.calibration.empty()) {
     throw std::invalid_argument("-o with --row-time: needs --calibration, which it completes");
   }
   Inputs inputs = read_inputs(options);
+  check_frequencies(inputs.lamps, options.lamps);
   std::vector<MeasuredPeriod> periods;
   for (std::size_t i = 0; i < inputs.folders.size(); ++i) {
     const auto more = measured_periods(inputs.lights[i], inputs.folders[i].labels);
@@ -96,7 +104,15 @@ void find_row_time(const Options& options) {
     Camera& camera = inputs.calibration->camera;
     camera.row_time_s = result.found->row_time_s;
     camera.readout = inputs.camera.readout;
-    inputs.calibration->history.push_back({"camera", "vlp-train", VLP_VERSION, "--row-time", {}});
+    std::vector<std::string> files = options.folders;
+    files.push_back(options.lamps);
+    auto& history = inputs.calibration->history;
+    HistoryEntry entry = history_entry(app, files);
+    entry.part = "camera";
+    std::erase_if(history, [](const HistoryEntry& other) {
+      return other.part == "camera" && other.program == "vlp-train";
+    });
+    history.push_back(std::move(entry));
     write_calibration(options.output, *inputs.calibration);
   }
   print_row_time(*result.found, inputs.camera.readout);
@@ -140,6 +156,10 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1024));
   return vlp::run_app(app, argc, argv, [&] {
     if (row_time->count() == 0 && output->count() == 0) throw CLI::RequiredError("--output");
-    options.row_time ? vlp::find_row_time(options) : vlp::train(options);
+    if (options.row_time) {
+      vlp::find_row_time(app, options);
+    } else {
+      vlp::train(options);
+    }
   });
 }

@@ -19,9 +19,13 @@ void warn_of_rest(std::size_t count, const char* what) {
 
 }  // namespace
 
-void warn_of_lamps(const LampMap& lamps, const DetectorCamera& detector, const Camera& camera,
+void warn_of_lamps(const LampMap& lamps, const DetectorCamera& detector,
+                   const std::optional<Calibration>& calibration,
                    const std::optional<double>& exposure_s) {
-  const double focal_px = camera.intrinsics[detector.readout == Readout::rows ? 1 : 0];
+  std::optional<double> focal_px;
+  if (calibration) {
+    focal_px = calibration->camera.intrinsics[detector.readout == Readout::rows ? 1 : 0];
+  }
   const StripeConditions conditions{*detector.row_time_s, focal_px, 0, exposure_s};
   const auto alike = lamps_alike(lamps, conditions);
   for (std::size_t i = 0; i < std::min(alike.size(), kMostLines); ++i) {
@@ -34,8 +38,12 @@ void warn_of_lamps(const LampMap& lamps, const DetectorCamera& detector, const C
   warn_of_rest(alike.size(), "pairs of lamps with frequencies that are too near");
   const auto unreadable = lamps_unreadable(lamps, conditions);
   for (std::size_t i = 0; i < std::min(unreadable.size(), kMostLines); ++i) {
-    const auto& [lamp, periods, contrast] = unreadable[i];
-    if (periods < kLeastPeriods) {
+    const auto& [lamp, period_lines, periods, contrast] = unreadable[i];
+    if (period_lines < kShortestPeriod_lines) {
+      spdlog::warn(
+          "lamp {} has stripes of {:.2g} lines, too fine to be seen: a lower frequency shows them",
+          lamp, period_lines);
+    } else if (periods < kLeastPeriods) {
       spdlog::warn(
           "lamp {} shows only {:.1f} stripes, seen from z = 0: a higher frequency, a larger lamp "
           "or "

@@ -9,9 +9,11 @@
 namespace vlp {
 
 /// Warns of lamps of the map that can hardly be identified from the floor (z = 0): by two that are
-/// too much alike, and by one that shows too few stripes; a few lines at most. The camera has a row
-/// time.
-void warn_of_lamps(const LampMap& lamps, const DetectorCamera& detector, const Camera& camera,
+/// too much alike, and by one that shows too few stripes, too fine or too smeared ones; a few lines
+/// at most. The camera has a row time; without a calibration lamps' sizes in the image are not
+/// known.
+void warn_of_lamps(const LampMap& lamps, const DetectorCamera& detector,
+                   const std::optional<Calibration>& calibration,
                    const std::optional<double>& exposure_s);
 
 }  // namespace vlp

@@ -64,6 +64,21 @@ cv::Mat brightened(const cv::Mat& image) {
   return result;
 }
 
+/// Beside the light, on the side where there is room.
+void write_label(cv::Mat& picture, const Light& light, double size) {
+  const std::string label = label_of(light);
+  const int thickness = static_cast<int>(std::lround(size));
+  const double scale = 0.5 * size;
+  const cv::Size box = cv::getTextSize(label, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, nullptr);
+  const int gap = static_cast<int>(3 * size);
+  int left = static_cast<int>(light.high.x()) + gap;
+  if (left + box.width > picture.cols) left = static_cast<int>(light.low.x()) - gap - box.width;
+  const int bottom = std::clamp(static_cast<int>(light.pixel.y()) + box.height / 2, box.height,
+                                std::max(box.height, picture.rows - 1));
+  cv::putText(picture, label, {std::max(0, left), bottom}, cv::FONT_HERSHEY_SIMPLEX, scale,
+              color_of(light.kind), thickness, cv::LINE_AA);
+}
+
 }  // namespace
 
 cv::Mat annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout) {
@@ -82,10 +97,7 @@ cv::Mat annotated(const cv::Mat& image, const std::vector<Light>& lights, Readou
              cv::LINE_AA, kShift);
     cv::line(picture, fine(light.pixel - along), fine(light.pixel + along), color, thickness,
              cv::LINE_AA, kShift);
-    const cv::Point text(static_cast<int>(light.high.x() + 3 * size),
-                         static_cast<int>(light.pixel.y() + 5 * size));
-    cv::putText(picture, label_of(light), text, cv::FONT_HERSHEY_SIMPLEX, 0.5 * size, color,
-                thickness, cv::LINE_AA);
+    write_label(picture, light, size);
   }
   return picture;
 }
@@ -93,7 +105,7 @@ cv::Mat annotated(const cv::Mat& image, const std::vector<Light>& lights, Readou
 void write_annotated(const std::filesystem::path& folder, const std::filesystem::path& image_file,
                      const cv::Mat& picture) {
   std::filesystem::path file = folder / image_file.filename();
-  if (file.extension() != ".png") file += ".png";
+  file += ".png";
   std::vector<std::uint8_t> bytes;
   if (!cv::imencode(".png", picture, bytes)) throw InputError(file, "cannot be made a PNG");
   const std::string content(bytes.begin(), bytes.end());

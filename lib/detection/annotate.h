@@ -16,8 +16,8 @@ namespace vlp {
 /// ones blue. `image` has one channel of 8 or 16 bits.
 cv::Mat annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout);
 
-/// Writes it as PNG into `folder`, whole or not at all, named like the image; `.png` is added to
-/// other endings. Throws InputError.
+/// Writes it as PNG into `folder`, whole or not at all, named like the image with `.png` added.
+/// Throws InputError.
 void write_annotated(const std::filesystem::path& folder, const std::filesystem::path& image_file,
                      const cv::Mat& picture);
 

@@ -110,9 +110,9 @@ std::vector<EdgePoint> outline(const cv::Mat& image, const Blob& blob, const Bac
                                    direction};
       const auto edge = profile.crossing(at, outside, run.width());
       if (!edge) continue;
-      const auto half = profile.crossing(background.level + own / 4, outside, run.width());
+      const auto low = profile.crossing(background.level + own / 4, outside, run.width());
       const auto high = profile.crossing(background.level + 3 * own / 4, outside, run.width());
-      const double rise_px = half && high ? *high - *half : run.width();
+      const double rise_px = low && high ? *high - *low : run.width();
       points.push_back(
           {{profile.edge + direction * *edge, run.row}, level, rise_px, direction > 0});
     }

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 
 #include "rig/input_error.h"
@@ -21,6 +23,15 @@ bool is_image(const fs::path& file) {
     if (extension == known) return true;
   }
   return false;
+}
+
+/// A JPEG that is cut short is decoded all the same, grey from there on: its scan has to end with
+/// the marker of the end (FF D9).
+bool is_cut_jpeg(const std::string& bytes) {
+  constexpr std::size_t marker = 2;
+  if (!bytes.starts_with("\xff\xd8")) return false;
+  const auto scan = bytes.rfind("\xff\xda"), end = bytes.rfind("\xff\xd9");
+  return scan == std::string::npos || end == std::string::npos || end < scan + marker;
 }
 
 }  // namespace
@@ -43,10 +54,15 @@ std::vector<fs::path> images_in(const fs::path& folder) {
 }
 
 cv::Mat read_image(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (bytes.empty()) throw InputError(file, "cannot be read as an image");
+  if (is_cut_jpeg(bytes)) throw InputError(file, "cannot be read as an image: it is cut short");
   cv::Mat image;
   try {
-    image = cv::imread(file.string(),
-                       cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+    image =
+        cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, bytes.data()),
+                     cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception& failure) {
     throw InputError(file, "cannot be read as an image: " + failure.err);
   }

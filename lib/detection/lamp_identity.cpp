@@ -21,12 +21,12 @@ std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
 }
 
 void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) const {
-  constexpr double least_contrast = 0.2, least_clarity = 0.5, least_periods = 1.3;
+  constexpr double least_clarity = 0.5;
   constexpr double much_softer = 5, least_roundness = 0.45, most_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity();
   for (Light& light : lights) {
     const Stripes& stripes = light.stripes;
-    const bool flickers = stripes.contrast >= least_contrast && stripes.periods >= least_periods &&
+    const bool flickers = stripes.contrast >= kLeastContrast && stripes.periods >= kLeastPeriods &&
                           stripes.clarity >= least_clarity;
     light.kind = flickers ? LightKind::unknown : LightKind::steady;
     if (!flickers) continue;

@@ -29,8 +29,8 @@ double period_sd_of(const Lamp& lamp, const StripeConditions& conditions) {
 
 std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions) {
   const double above_m = lamp.position_m.z() - conditions.camera_height_m;
-  if (!lamp.diameter_m || !(above_m > 0)) return std::nullopt;
-  return *lamp.diameter_m * conditions.focal_px / above_m;
+  if (!lamp.diameter_m || !conditions.focal_px || !(above_m > 0)) return std::nullopt;
+  return *lamp.diameter_m * *conditions.focal_px / above_m;
 }
 
 double period_sd(double period_lines, double lines, double exposure_lines) {
@@ -62,7 +62,6 @@ std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions
 
 std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
                                              const StripeConditions& conditions) {
-  constexpr double least_contrast = 0.2;
   std::vector<LampUnreadable> unreadable;
   for (const Lamp& lamp : lamps.lamps) {
     if (!lamp.frequency_hz) continue;
@@ -71,8 +70,10 @@ std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
     const auto lines = lines_on(lamp, conditions);
     const double periods = lines ? kUsedHeight * *lines * *lamp.frequency_hz * conditions.row_time_s
                                  : std::numeric_limits<double>::infinity();
-    if (periods < kLeastPeriods || contrast < least_contrast) {
-      unreadable.push_back({lamp.id, periods, contrast});
+    const double period_lines = 1 / (*lamp.frequency_hz * conditions.row_time_s);
+    if (period_lines < kShortestPeriod_lines || periods < kLeastPeriods ||
+        contrast < kLeastContrast) {
+      unreadable.push_back({lamp.id, period_lines, periods, contrast});
     }
   }
   return unreadable;

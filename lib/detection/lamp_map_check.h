@@ -14,7 +14,7 @@ namespace vlp {
 struct StripeConditions {
   double row_time_s;
   /// Of the lens, in pixels along the direction in which the lines follow one another.
-  double focal_px;
+  std::optional<double> focal_px;
   /// Of the image plane of the camera above the world's origin.
   double camera_height_m;
   /// When it is not known, it is taken to be short: the worst case for a period.
@@ -22,11 +22,8 @@ struct StripeConditions {
 };
 
 /// Lines of the image on the lamp, of which kUsedHeight are used: diameter focal / height above the
-/// camera. Nothing without a diameter, or when the lamp is not above the camera.
+/// camera. Nothing without a diameter or a focal length, or when the lamp is not above the camera.
 std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions);
-
-/// Periods on a lamp below which there is none to measure.
-inline constexpr double kLeastPeriods = 1.3;
 
 /// Relative standard deviation of the period that stripes_of() measures on so many lines. A period
 /// comes from the least-squares line through the numbered begins and through the numbered ends of
@@ -57,17 +54,19 @@ struct LampsAlike {
 /// diameter only the drift counts.
 std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions& conditions);
 
-/// A lamp that shows too few stripes to be identified from there, or whose stripes an
-/// exposure of about a whole period wipes out.
+/// A lamp that shows too few stripes to be identified from there, whose stripes an exposure of
+/// about a whole period wipes out, or that is too fast for the shutter's lines.
 struct LampUnreadable {
   int lamp;
+  double period_lines;
   /// Periods on the lamp.
   double periods;
   /// |sinc(frequency exposure)|, what is left of the stripes (theory, "Identity").
   double contrast;
 };
 
-/// Lamps with less than kLeastPeriods or a contrast below 0.2.
+/// Lamps with a period below kShortestPeriod_lines, less than kLeastPeriods, or a contrast below
+/// kLeastContrast.
 std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
                                              const StripeConditions& conditions);
 

@@ -13,7 +13,7 @@ bool near(const cv::Rect& a, const cv::Rect& b) {
   const int gap_across = std::max(a.x, b.x) - std::min(a.x + a.width, b.x + b.width);
   const int gap_along = std::max(a.y, b.y) - std::min(a.y + a.height, b.y + b.height);
   const int size = std::max({a.width, a.height, b.width, b.height});
-  return 2 * gap_across < size && 2 * gap_along < size && std::max(gap_across, gap_along) < size;
+  return 2 * gap_across < size && 2 * gap_along < size;
 }
 
 bool glows(const LightPart& part) { return part.light && part.light->glows; }
@@ -51,9 +51,13 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
 
 std::vector<Light> joined(std::vector<LightPart> parts, const LightShape& shape,
                           const Background& background) {
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    for (std::size_t j = i + 1; j < parts.size(); ++j) {
+  // A lamp is in a few pieces; an image of thousands of them shows something else.
+  constexpr int most_tries = 2000;
+  int tries = 0;
+  for (std::size_t i = 0; i < parts.size() && tries < most_tries; ++i) {
+    for (std::size_t j = i + 1; j < parts.size() && tries < most_tries; ++j) {
       if (glows(parts[i]) || glows(parts[j]) || !near(parts[i].box, parts[j].box)) continue;
+      ++tries;
       std::vector<EdgePoint> both = parts[i].outline;
       both.insert(both.end(), parts[j].outline.begin(), parts[j].outline.end());
       both = outermost(std::move(both));

@@ -15,6 +15,7 @@ template <typename Level>
 double level_of(const Level* pixels, int begin, int end) {
   constexpr int parts = 5;
   double most = 0, second = 0;
+  int counted = 0;
   for (int part = 0; part < parts; ++part) {
     const int from = begin + (end - begin) * part / parts;
     const int to = begin + (end - begin) * (part + 1) / parts;
@@ -24,8 +25,9 @@ double level_of(const Level* pixels, int begin, int end) {
     const double mean = sum / (to - from);
     second = std::max(second, std::min(most, mean));
     most = std::max(most, mean);
+    ++counted;
   }
-  return second > 0 ? second : most;
+  return counted > 1 ? second : most;
 }
 
 template <typename Level>

@@ -3,6 +3,7 @@
 #include "detection/lines.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -45,12 +46,12 @@ std::vector<bool> tiles_to_turn(const cv::Mat& image, const cv::Size& tiles, dou
 
 }  // namespace
 
-cv::Mat lines_of(const cv::Mat& image, Readout readout, double threshold) {
+cv::Mat lines_of(const cv::Mat& image, Readout readout, const Background& background) {
   if (readout == Readout::rows) return image;
   const cv::Size tiles((image.cols + kTile - 1) / kTile, (image.rows + kTile - 1) / kTile);
-  const auto turn = tiles_to_turn(image, tiles, threshold);
+  const auto turn = tiles_to_turn(image, tiles, background.threshold);
   const cv::Rect all({0, 0}, image.size());
-  cv::Mat lines(cv::Mat::zeros(image.cols, image.rows, image.type()));
+  cv::Mat lines(image.cols, image.rows, image.type(), cv::Scalar(std::round(background.level)));
   for (int row = 0; row < tiles.height; ++row) {
     for (int column = 0; column < tiles.width; ++column) {
       if (!turn[static_cast<std::size_t>(row * tiles.width + column)]) continue;

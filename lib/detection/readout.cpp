@@ -38,10 +38,11 @@ std::optional<Readout> find_readout(std::size_t images,
   ReadoutEvidence evidence;
   int used = 0;
   for (std::size_t i = 0; i < images && used < most_used; ++i) {
-    const cv::Mat lights = image(i);
-    if (lights.empty()) continue;
-    add_evidence(lights, evidence);
-    ++used;
+    const cv::Mat frame = image(i);
+    if (frame.empty()) continue;
+    const double before = evidence.rows + evidence.columns;
+    add_evidence(frame, evidence);
+    if (evidence.rows + evidence.columns > before) ++used;
     if (evidence.rows + evidence.columns >= enough && evidence.readout()) break;
   }
   return evidence.readout();

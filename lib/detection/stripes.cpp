@@ -131,7 +131,7 @@ Stripes stripes_of(const std::vector<double>& signal) {
   if (!(high > low) || !(variance > rounding * high * high)) return stripes;
 
   // Steps are fine enough for a parabola through the best three.
-  const double step = 0.2 / n, lowest = 0.9 / n, highest = 1 / 2.2;
+  const double step = 0.2 / n, lowest = 0.9 / n, highest = 1 / kShortestPeriod_lines;
   const auto at = [&](double frequency) { return explained(signal, mean, variance, frequency); };
   double best = lowest;
   for (double frequency = lowest; frequency <= highest; frequency += step) {

@@ -8,6 +8,13 @@
 
 namespace vlp {
 
+/// The shortest period that stripes are looked for with: two lines would be all that a shutter can
+/// show.
+inline constexpr double kShortestPeriod_lines = 2.2;
+
+/// The least of what flickers, and of what can be identified: see Stripes.
+inline constexpr double kLeastContrast = 0.2, kLeastPeriods = 1.3;
+
 /// The share of a disc's height whose lines are used: those at the rim are short and dim.
 inline constexpr double kUsedHeight = 0.9;
 
@@ -44,9 +51,9 @@ bool trustworthy(const Stripes& stripes);
 bool readable(const Stripes& stripes);
 
 /// The period is that of the sine with a constant that fits best (least squares, Lomb 1976),
-/// between 2.2 lines and the length of the signal. The signal is that of line_signal(): of a disc,
-/// from `kUsedHeight` of its radius above the middle to as much below. Without 8 lines or more
-/// contrast and clarity are 0.
+/// between kShortestPeriod_lines and the length of the signal. The signal is that of line_signal():
+/// of a disc, from `kUsedHeight` of its radius above the middle to as much below. Without 8 lines
+/// or more contrast and clarity are 0.
 Stripes stripes_of(const std::vector<double>& signal);
 
 }  // namespace vlp

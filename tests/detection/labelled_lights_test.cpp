@@ -13,7 +13,7 @@ const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample"
 
 std::vector<ImageLights> sample_lights() {
   const LampDetector detector({}, {Readout::rows, {}, {}});
-  return detect_lights(detector, images_in(kSample), 1, [](std::size_t) {});
+  return detect_lights(detector, images_in(kSample), {}, 1, [](std::size_t) {});
 }
 
 TEST(LabelledLights, AreThoseThatTheTableNames) {
@@ -71,7 +71,7 @@ TEST(DetectLights, SaysWhyAnImageCannotBeUsed) {
   const LampDetector detector({}, {Readout::rows, {}, {}});
   std::size_t last = 0;
   const std::vector<std::filesystem::path> files{"none.png", kSample + "/0000.png"};
-  const auto images = detect_lights(detector, files, 2, [&](std::size_t done) { last = done; });
+  const auto images = detect_lights(detector, files, {}, 2, [&](std::size_t done) { last = done; });
   EXPECT_EQ(last, 2);
   EXPECT_EQ(images[0].refused, "none.png: cannot be read as an image");
   EXPECT_EQ(images[1].refused, "");

@@ -55,7 +55,7 @@ TEST_F(Detect, FindsWhatLocateTurnsIntoTheTruePlace) {
 TEST_F(Detect, DrawsWhatItFinds) {
   const fs::path pictures = folder / "new" / "pictures";
   ASSERT_EQ(detect(kRig + "/sample", "--annotate " + pictures.string()).exit_code, 0);
-  for (const char* name : {"0000.png", "0001.png"}) {
+  for (const char* name : {"0000.png.png", "0001.png.png"}) {
     const cv::Mat picture = cv::imread((pictures / name).string(), cv::IMREAD_UNCHANGED);
     ASSERT_EQ(picture.type(), CV_8UC3);
     ASSERT_EQ(picture.size(), cv::Size(800, 600));
@@ -119,10 +119,14 @@ TEST_F(Detect, SkipsAndCountsImagesThatItCannotUse) {
   folder.file("images/text.png", "no image\n");
   folder.file("images/half.PNG", whole.substr(0, 300));
   fs::copy(VLP_SOURCE_DIR "/datasets/example/limits.png", images / "another.png");
+  cv::imwrite((images / "cut.jpg").string(), cv::imread((images / "0000.png").string()));
+  const std::string jpeg = TemporaryFolder::content_of(images / "cut.jpg");
+  folder.file("images/cut.jpg", jpeg.substr(0, jpeg.size() * 9 / 10));
   const auto result = detect(images.string());
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.output, HasSubstr("images      6\n  skipped   4\n"));
+  EXPECT_THAT(result.output, HasSubstr("images      7\n  skipped   5\n"));
   EXPECT_THAT(result.errors, HasSubstr("empty.png: cannot be read as an image; skipped"));
+  EXPECT_THAT(result.errors, HasSubstr("cut.jpg: cannot be read as an image: it is cut short"));
   EXPECT_THAT(result.errors, HasSubstr("text.png: cannot be read as an image; skipped"));
   EXPECT_THAT(result.errors, HasSubstr("the calibration's camera has 800 x 600 px; skipped"));
   EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
