@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drive.h"
 
-#include <Eigen/Geometry>
-
 namespace vlp {
 
 SyntheticRig leaning_rig(double tilt_rad, double azimuth_rad) {
@@ -20,15 +18,6 @@ std::vector<Frame> drive(SyntheticRig rig, int captures, Random& random, double 
     frames.push_back({std::to_string(i), seen_from(rig, sigma_px)});
   }
   return frames;
-}
-
-std::vector<Frame> with_noise(std::vector<Frame> frames, Random& random) {
-  for (Frame& frame : frames) frame.detections = with_noise(frame.detections, random);
-  return frames;
-}
-
-double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 }  // namespace vlp

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
+#include "spot.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {
@@ -14,10 +15,5 @@ SyntheticRig leaning_rig(double tilt_rad, double azimuth_rad);
 
 /// Captures from places and yaws at random under the lamps, at two heights.
 std::vector<Frame> drive(SyntheticRig rig, int captures, Random& random, double sigma_px = 1);
-
-std::vector<Frame> with_noise(std::vector<Frame> frames, Random& random);
-
-/// In radians.
-double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
 }  // namespace vlp
