@@ -16,14 +16,16 @@
 #include "evaluation/rotation_plot.h"
 #include "geometry/angles.h"
 #include "history.h"
+#include "print_rotation.h"
 #include "rig/input_error.h"
 #include "rig/stage.h"
+#include "rotation_by_lamps.h"
 
 namespace vlp {
 namespace {
 
 struct Options {
-  std::string captures, lamps, calibration, output, plot;
+  std::string captures, lamps, calibration, output, plot, refined_map;
   std::string method = "axis";
 };
 
@@ -47,24 +49,6 @@ SpotCaptures captures_of(const Options& options, const LampMap& lamps,
   const std::string why(explanation_of(spot.status));
   if (spot.status == SpotStatus::other_map) throw InputError(options.lamps, why);
   throw Undetermined(why);
-}
-
-std::string sd_of(const std::optional<Matrix2>& covariance, double factor, const char* unit) {
-  if (!covariance) return ", sd not known";
-  const Eigen::Vector2d sd = factor * covariance->diagonal().cwiseSqrt();
-  return fmt::format(", sd {:.4f} {:.4f} {}", sd.x(), sd.y(), unit);
-}
-
-void print_center(const RotationCenter& center, const Camera& camera) {
-  fmt::print("centre      {:.3f} {:.3f} px in the undistorted image{}\n", center.center_px.x(),
-             center.center_px.y(), sd_of(center.covariance, 1, "px"));
-  const Eigen::Vector3d& up = center.zenith_in_camera;
-  fmt::print("zenith      {:.6f} {:.6f} {:.6f} in the camera\n", up.x(), up.y(), up.z());
-  const auto [angle_rad, azimuth_rad] = tilt_of(center);
-  const auto sd_rad = axis_sd_rad(center, camera);
-  fmt::print("tilt        {:.4f} deg towards {:.1f} deg in the image{}\n", deg_from_rad(angle_rad),
-             deg_from_rad(azimuth_rad),
-             sd_rad ? fmt::format(", sd {:.4f} deg", deg_from_rad(*sd_rad)) : "");
 }
 
 void print_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
@@ -136,6 +120,14 @@ void draw_plot(const Options& options, const SpotCaptures& spot, const CircleCen
 }
 
 void run(const CLI::App& app, const Options& options) {
+  if (options.method == "lamps") {
+    if (!options.plot.empty()) throw std::invalid_argument("--plot is of a turn on the spot");
+    return rotate_by_lamps(app, {options.captures, options.lamps, options.calibration,
+                                 options.output, options.refined_map});
+  }
+  if (!options.refined_map.empty()) {
+    throw std::invalid_argument("--refine-map needs --method lamps");
+  }
   const std::vector<std::string> inputs{options.captures, options.lamps, options.calibration};
   check_output(options.output, inputs);
   if (!options.plot.empty()) check_output(options.plot, inputs);
@@ -188,9 +180,15 @@ int main(int argc, char** argv) {
          "--method", options.method,
          "axis (default): the direction about which all lamp rays turn, exact with tilt and "
          "lens; joint: one centre in the undistorted image for all lamps; circle: the mean "
-         "of a circle per lamp")
-      ->check(CLI::IsMember({"axis", "joint", "circle"}))
-      ->option_text("axis|joint|circle");
+         "of a circle per lamp; lamps: level the camera from captures taken anywhere, while "
+         "driving, that see three lamps or more")
+      ->check(CLI::IsMember({"axis", "joint", "circle", "lamps"}))
+      ->option_text("axis|joint|circle|lamps");
+  app.add_option(
+         "--refine-map", options.refined_map,
+         "With --method lamps: correct the lamp map, too, and write it to this file; place, "
+         "turn about the vertical and size of the map as a whole stay")
+      ->option_text("FILE");
   app.add_option("--plot", options.plot,
                  "Where to draw lamps, circles, rotation centre and principal point, .png or .svg");
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });

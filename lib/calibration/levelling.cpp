@@ -225,8 +225,9 @@ Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, cons
     return result;
   }
   const double excess = fit->chi_squared / fit->degrees_of_freedom;
-  const Eigen::MatrixXd covariance =
-      fit->covariance * (all_stated(frames) ? std::max(excess, 1.0) : excess);
+  const bool stated = all_stated(frames);
+  const Eigen::MatrixXd covariance = fit->covariance * (stated ? std::max(excess, 1.0) : excess);
+  if (stated) result.excess = std::sqrt(excess);
   result.center = center_of(bundle.level_from_camera, covariance.topLeftCorner<2, 2>(), lens);
   result.residual_px = residual_px(bundle, lens, fit->degrees_of_freedom);
   result.residual_before_px = residual_before_px(bundle, lamps_m, lens);

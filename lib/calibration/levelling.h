@@ -55,6 +55,8 @@ struct Levelling {
   /// taken off: sqrt(sum of squares / (2 detections - unknowns)). Before: of a level camera and
   /// the map as it was.
   double residual_before_px = 0, residual_px = 0;
+  /// Of the residuals, over what the detections state; 1 where not all of them state it.
+  double excess = 1;
 };
 
 /// Levels the camera from identified lamps: three or more over-determine a fix unless the camera
