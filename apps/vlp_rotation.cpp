@@ -51,6 +51,12 @@ SpotCaptures captures_of(const Options& options, const LampMap& lamps,
   throw Undetermined(why);
 }
 
+/// A height in metres, without a sign where it rounds to zero.
+std::string metres(double z_m) {
+  const std::string text = fmt::format("{:.3f}", z_m);
+  return text == "-0.000" ? "0.000" : text;
+}
+
 void print_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
   if (const auto& arm_m = center.lever_arm_m) {
     fmt::print("lever arm   {:.3f} {:.3f} mm{}\n", 1e3 * arm_m->x(), 1e3 * arm_m->y(),
@@ -59,8 +65,8 @@ void print_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
     fmt::print("lever arm   taken as zero\n");
     spdlog::warn(
         "at one height a lever arm cannot be told from a tilt; it is taken as zero, and fixes at "
-        "z = {:.3f} m will be of the axis of rotation: add captures at a second height",
-        spot.heights.front().z_m);
+        "z = {} m will be of the axis of rotation: add captures at a second height",
+        metres(spot.heights.front().z_m));
   } else {
     fmt::print("lever arm   taken as zero\n");
     spdlog::warn(
@@ -75,8 +81,8 @@ void print_summary(const RotationFit& fit, const SpotCaptures& spot, const Circl
   fmt::print("captures    {} of {}\n", spot.captures.size(),
              spot.captures.size() + spot.left_out.size());
   for (const SpotHeight& height : spot.heights) {
-    fmt::print("  height    {:.3f} m: {} captures over {:.0f} deg\n", height.z_m, height.captures,
-               deg_from_rad(height.arc_rad));
+    fmt::print("  height    {} m: {} captures over {:.0f} deg\n", metres(height.z_m),
+               height.captures, deg_from_rad(height.arc_rad));
   }
   fmt::print("lamps       {}\n", spot.lamps.size());
   print_center(fit.center, camera);
@@ -94,9 +100,18 @@ void print_summary(const RotationFit& fit, const SpotCaptures& spot, const Circl
   fmt::print("\n{:>10} {:>10}  image\n", "z (m)", "yaw (deg)");
   for (std::size_t i = 0; i < spot.captures.size(); ++i) {
     const SpotCapture& capture = spot.captures[i];
-    fmt::print("{:10.3f} {:10.3f}  {}\n", spot.heights[capture.height].z_m,
+    fmt::print("{:>10} {:10.3f}  {}\n", metres(spot.heights[capture.height].z_m),
                deg_from_rad(wrapped_rad(fit.yaws_rad[i])), capture.image);
   }
+}
+
+void report_noise(const RotationFit& fit, const SpotCaptures& spot) {
+  constexpr double too_noisy = 5;
+  if (!spot.stated_px || fit.residual_px <= too_noisy * *spot.stated_px) return;
+  spdlog::warn(
+      "the residuals show {:.2g} px of noise, {:.2g} px are stated: is the lens calibrated, the "
+      "camera beside its axis, the method exact?",
+      fit.residual_px, *spot.stated_px);
 }
 
 void draw_plot(const Options& options, const SpotCaptures& spot, const CircleCenters& circles,
@@ -146,6 +161,7 @@ void run(const CLI::App& app, const Options& options) {
                     with_rotation_center(calibration, fit.center, history_entry(app, inputs)));
   if (!options.plot.empty()) draw_plot(options, spot, circles, fit, camera);
   print_summary(fit, spot, circles, camera);
+  report_noise(fit, spot);
 }
 
 }  // namespace

@@ -133,6 +133,7 @@ std::optional<Matrix2> RobustFit::covariance(const double* parameter) const {
   }
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // SuiteSparse takes threads
   options.num_threads = 1;
   ceres::Covariance inverse(options);
   Eigen::Matrix<double, 2, 2, Eigen::RowMajor> block;

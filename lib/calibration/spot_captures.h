@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -76,6 +77,8 @@ struct SpotCaptures {
   /// From low to high.
   std::vector<SpotHeight> heights;
   std::vector<SpotSighting> sightings;
+  /// The middle one of the detections' sigma_px; nothing unless all state it.
+  std::optional<double> stated_px = {};
   Eigen::Vector3d zenith_in_camera = Eigen::Vector3d::UnitZ();
   /// Zero at one height, where it cannot be told from the tilt.
   Eigen::Vector2d lever_arm_m = Eigen::Vector2d::Zero();

@@ -110,6 +110,13 @@ TEST_F(Rotation, SaysAtOneHeightWhatItAssumes) {
   EXPECT_FALSE(found().lever_arm_m);
 }
 
+/// On a camera that leans no centre in the image is exact, and the residuals tell.
+TEST_F(Rotation, SaysWhenTheNoiseDoesNotExplainTheResiduals) {
+  const auto result = rotation(kExample + "turning.csv", "--method joint");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.errors, HasSubstr("px of noise, 0.05 px are stated"));
+}
+
 TEST_F(Rotation, HasTheOtherMethods) {
   for (const std::string method : {"joint", "circle"}) {
     ASSERT_EQ(rotation(kExample + "turning.csv", "--method " + method).exit_code, 0);
