@@ -88,6 +88,10 @@ void check_found(const CaptureDetections& found, const std::string& folder) {
 
 }  // namespace
 
+std::vector<std::string> inputs_of(const DetectOptions& options) {
+  return {options.folder, options.lamps, options.calibration, options.classifier};
+}
+
 void check_frequencies(const LampMap& lamps, const std::string& lamps_file) {
   const bool frequencies =
       std::any_of(lamps.lamps.begin(), lamps.lamps.end(),

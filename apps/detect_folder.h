@@ -30,6 +30,10 @@ struct DetectOptions {
   int threads = all_cores();
 };
 
+/// What the result depends on: captures, lamp map, calibration, classifier; an empty name is an
+/// input that was not given.
+std::vector<std::string> inputs_of(const DetectOptions& options);
+
 /// Throws InputError when no lamp has a frequency.
 void check_frequencies(const LampMap& lamps, const std::string& lamps_file);
 

@@ -49,10 +49,13 @@ std::string last_name(const std::string& path) {
 }
 
 bool changes_the_result(const CLI::Option& option) {
-  constexpr std::array<std::string_view, 5> others = {"--output", "--plot", "--threads", "--quiet",
-                                                      "--verbose"};
+  constexpr std::array<std::string_view, 6> others = {"--output",  "--plot",  "--annotate",
+                                                      "--threads", "--quiet", "--verbose"};
   return std::find(others.begin(), others.end(), option.get_name()) == others.end();
 }
+
+/// Its value is the name of a file that is written.
+bool names_output(const CLI::Option& option) { return option.get_name() == "--refine-map"; }
 
 std::string options_of(const CLI::App& app, const std::vector<std::string>& inputs) {
   std::string text;
@@ -61,7 +64,8 @@ std::string options_of(const CLI::App& app, const std::vector<std::string>& inpu
     text += (text.empty() ? "" : " ") + option->get_name();
     if (option->get_items_expected_max() == 0) continue;  // a flag
     for (const std::string& value : option->results()) {
-      const bool file = std::find(inputs.begin(), inputs.end(), value) != inputs.end();
+      const bool file =
+          names_output(*option) || std::find(inputs.begin(), inputs.end(), value) != inputs.end();
       text += " " + (file ? last_name(value) : value);
     }
   }

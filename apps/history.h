@@ -22,7 +22,8 @@ std::string sha256_of_images(const std::filesystem::path& folder);
 /// that were given, in the order of --help, and a digest of each input, a file or a folder of
 /// images; an empty name is an input that was not given. The same on every machine: of files and
 /// folders only the last name is kept, and what does not change the result (--output, --plot,
-/// --threads, --quiet, --verbose) is left out. Call it after parsing. Throws InputError.
+/// --annotate, --threads, --quiet, --verbose) is left out. Call it after parsing. Throws
+/// InputError.
 HistoryEntry history_entry(const CLI::App& app, const std::vector<std::string>& inputs);
 
 }  // namespace vlp

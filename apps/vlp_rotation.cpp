@@ -16,14 +16,17 @@
 #include "evaluation/rotation_plot.h"
 #include "geometry/angles.h"
 #include "history.h"
+#include "print_rotation.h"
 #include "rig/input_error.h"
 #include "rig/stage.h"
+#include "rotation_by_lamps.h"
 
 namespace vlp {
 namespace {
 
 struct Options {
-  std::string captures, lamps, calibration, output, plot;
+  DetectOptions detect;
+  std::string plot, refined_map;
   std::string method = "axis";
 };
 
@@ -37,44 +40,21 @@ const std::map<std::string, Method> kMethods{
 
 SpotCaptures captures_of(const Options& options, const LampMap& lamps,
                          const Calibration& calibration) {
-  DetectOptions detect;
-  detect.folder = options.captures;
-  detect.lamps = options.lamps;
-  detect.calibration = options.calibration;
-  detect.output = options.output;
-  const auto frames = frames_of(detect, lamps, calibration);
+  const auto frames = frames_of(options.detect, lamps, calibration);
   SpotCaptures spot = spot_captures(frames, lamps, calibration.camera);
   for (const auto& [image, reason] : spot.left_out) {
     spdlog::warn("{}: left out: {}", image, reason);
   }
   if (spot.status == SpotStatus::ok) return spot;
   const std::string why(explanation_of(spot.status));
-  if (spot.status == SpotStatus::other_map) throw InputError(options.lamps, why);
+  if (spot.status == SpotStatus::other_map) throw InputError(options.detect.lamps, why);
   throw Undetermined(why);
-}
-
-std::string sd_of(const std::optional<Matrix2>& covariance, double factor, const char* unit) {
-  if (!covariance) return ", sd not known";
-  const Eigen::Vector2d sd = factor * covariance->diagonal().cwiseSqrt();
-  return fmt::format(", sd {:.4f} {:.4f} {}", sd.x(), sd.y(), unit);
 }
 
 /// A height in metres, without a sign where it rounds to zero.
 std::string metres(double z_m) {
   const std::string text = fmt::format("{:.3f}", z_m);
   return text == "-0.000" ? "0.000" : text;
-}
-
-void print_center(const RotationCenter& center, const Camera& camera) {
-  fmt::print("centre      {:.3f} {:.3f} px in the undistorted image{}\n", center.center_px.x(),
-             center.center_px.y(), sd_of(center.covariance, 1, "px"));
-  const Eigen::Vector3d& up = center.zenith_in_camera;
-  fmt::print("zenith      {:.6f} {:.6f} {:.6f} in the camera\n", up.x(), up.y(), up.z());
-  const auto [angle_rad, azimuth_rad] = tilt_of(center);
-  const auto sd_rad = axis_sd_rad(center, camera);
-  fmt::print("tilt        {:.4f} deg towards {:.1f} deg in the image{}\n", deg_from_rad(angle_rad),
-             deg_from_rad(azimuth_rad),
-             sd_rad ? fmt::format(", sd {:.4f} deg", deg_from_rad(*sd_rad)) : "");
 }
 
 void print_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
@@ -155,11 +135,18 @@ void draw_plot(const Options& options, const SpotCaptures& spot, const CircleCen
 }
 
 void run(const CLI::App& app, const Options& options) {
-  const std::vector<std::string> inputs{options.captures, options.lamps, options.calibration};
-  check_output(options.output, inputs);
+  if (options.method == "lamps") {
+    if (!options.plot.empty()) throw std::invalid_argument("--plot is of a turn on the spot");
+    return rotate_by_lamps(app, options.detect, options.refined_map);
+  }
+  if (!options.refined_map.empty()) {
+    throw std::invalid_argument("--refine-map needs --method lamps");
+  }
+  const std::vector<std::string> inputs = inputs_of(options.detect);
+  check_output(options.detect.output, inputs);
   if (!options.plot.empty()) check_output(options.plot, inputs);
-  const LampMap lamps = read_lamp_map(options.lamps);
-  const Calibration calibration = read_calibration(options.calibration);
+  const LampMap lamps = read_lamp_map(options.detect.lamps);
+  const Calibration calibration = read_calibration(options.detect.calibration);
   const Camera& camera = calibration.camera;
   const SpotCaptures spot = captures_of(options, lamps, calibration);
   const RotationFit fit = kMethods.at(options.method)(spot, camera);
@@ -169,7 +156,7 @@ void run(const CLI::App& app, const Options& options) {
         "the lamps in view");
   }
   const CircleCenters circles = fit_circle_centers(spot, camera);
-  write_calibration(options.output,
+  write_calibration(options.detect.output,
                     with_rotation_center(calibration, fit.center, history_entry(app, inputs)));
   if (!options.plot.empty()) draw_plot(options, spot, circles, fit, camera);
   print_summary(fit, spot, circles, camera);
@@ -194,24 +181,31 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml -o rotated.yaml --plot rotation.png\n",
       "vlp-rotation");
   vlp::Options options;
-  app.add_option("captures", options.captures,
+  app.add_option("captures", options.detect.folder,
                  "detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images")
       ->required();
-  app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
-  app.add_option("--calibration", options.calibration,
+  app.add_option("--lamps", options.detect.lamps, "Lamp map, lamps.yaml")->required();
+  app.add_option("--calibration", options.detect.calibration,
                  "Calibration of the camera; a rotation centre in it is replaced")
       ->required();
-  app.add_option("-o,--output", options.output,
+  app.add_option("-o,--output", options.detect.output,
                  "Where to write the calibration with its rotation centre")
       ->required();
   app.add_option(
          "--method", options.method,
          "axis (default): the direction about which all lamp rays turn, exact with tilt and "
          "lens; joint: one centre in the undistorted image for all lamps; circle: the mean "
-         "of a circle per lamp")
-      ->check(CLI::IsMember({"axis", "joint", "circle"}))
-      ->option_text("axis|joint|circle");
+         "of a circle per lamp; lamps: level the camera from captures taken anywhere, while "
+         "driving, that see three lamps or more")
+      ->check(CLI::IsMember({"axis", "joint", "circle", "lamps"}))
+      ->option_text("axis|joint|circle|lamps");
+  app.add_option(
+         "--refine-map", options.refined_map,
+         "With --method lamps: correct the lamp map, too, and write it to this file; place, "
+         "turn about the vertical and size of the map as a whole stay")
+      ->option_text("FILE");
   app.add_option("--plot", options.plot,
                  "Where to draw lamps, circles, rotation centre and principal point, .png or .svg");
+  vlp::add_detect_options(app, options.detect);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -78,6 +78,9 @@ Dispersion read_dispersion(YamlMap map) {
   dispersion.radius_m = map.required("radius_m").number_within(0, kInfinity, "m");
   dispersion.center_m = Eigen::Vector2d(map.required("center_m").numbers(2).data());
   dispersion.captures = map.required("captures").integer_within(1, kLarge);
+  if (const auto value = map.optional("covariance")) {
+    dispersion.covariance = read_covariance(*value);
+  }
   map.finish();
   return dispersion;
 }

@@ -68,10 +68,13 @@ struct Dispersion {
   /// What is left of the image centre's error after the rotation centre is applied, in the
   /// undistorted image of the level camera: f * (x/z, y/z) is too large by it.
   Eigen::Vector2d offset_px;
-  /// Radius of the dispersion circle, and its centre: mean fix minus truth, in the world.
+  /// Radius of the dispersion circle, and its centre: fixes minus truth, in the world, before the
+  /// offset is taken off.
   double radius_m;
   Eigen::Vector2d center_m;
   int captures;
+  /// Of offset_px, in px^2.
+  std::optional<Matrix2> covariance = {};
 };
 
 /// How a part came to be.

@@ -65,6 +65,7 @@ void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
   emit_number(out, "radius_m", dispersion.radius_m);
   emit_numbers(out, "center_m", dispersion.center_m);
   emit_integer(out, "captures", dispersion.captures);
+  if (dispersion.covariance) emit_covariance(out, "covariance", *dispersion.covariance);
   out << YAML::EndMap;
 }
 

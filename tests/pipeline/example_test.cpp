@@ -40,8 +40,8 @@ double mean(const std::vector<double>& values) {
 TEST(Example, IsWhatItsGeneratorMakes) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_program(VLP_MAKE_EXAMPLE " '" + (folder / "example").string() + "'").exit_code, 0);
-  for (const std::string name :
-       {"lamps.yaml", "calibration.yaml", "detections.csv", "truth.csv", "turning.csv"}) {
+  for (const std::string name : {"lamps.yaml", "calibration.yaml", "detections.csv", "truth.csv",
+                                 "turning.csv", "station.csv"}) {
     EXPECT_EQ(TemporaryFolder::content_of(folder / ("example/" + name)),
               TemporaryFolder::content_of(kExample + name))
         << name;

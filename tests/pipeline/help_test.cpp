@@ -46,8 +46,8 @@ TEST_P(Help, NamesTheVersion) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Programs, Help,
-                         testing::Values("vlp-detect", "vlp-limits", "vlp-locate", "vlp-rotation",
-                                         "vlp-simulate", "vlp-train"),
+                         testing::Values("vlp-detect", "vlp-dispersion", "vlp-limits", "vlp-locate",
+                                         "vlp-rotation", "vlp-simulate", "vlp-train"),
                          [](const auto& instance) {
                            return std::string(instance.param).substr(4);
                          });

@@ -57,6 +57,7 @@ TEST(Calibration, KeepsEachPartWithoutEachOptionalKey) {
         c.rotation_center->lever_arm_covariance.reset();
         c.rotation_center->lever_arm_m.reset();
       },
+      [](Calibration& c) { c.dispersion->covariance.reset(); },
       [](Calibration& c) { c.intrinsics_report.reset(); },
       [](Calibration& c) { c.rotation_center.reset(); },
       [](Calibration& c) { c.history.clear(); },
@@ -125,7 +126,8 @@ TEST(Calibration, KeepsRandomFiguresExactly) {
     calibration.intrinsics_report->rms_px = std::abs(figure());
     calibration.intrinsics_report->board_warp_m = {figure(), figure()};
     calibration.rotation_center->center_px = {figure(), figure()};
-    calibration.dispersion = {{figure(), figure()}, std::abs(figure()), {figure(), figure()}, 1};
+    calibration.dispersion = {
+        {figure(), figure()}, std::abs(figure()), {figure(), figure()}, 1, {}};
     expect_kept(calibration);
   }
 }

@@ -67,6 +67,7 @@ void expect_same(const Dispersion& found, const Dispersion& expected) {
   EXPECT_EQ(found.radius_m, expected.radius_m);
   EXPECT_EQ(found.center_m, expected.center_m);
   EXPECT_EQ(found.captures, expected.captures);
+  EXPECT_EQ(found.covariance, expected.covariance);
 }
 
 void expect_same(const HistoryEntry& found, const HistoryEntry& expected) {

@@ -56,6 +56,7 @@ dispersion:
   radius_m: 0.0031
   center_m: [0.002, -0.001]
   captures: 12
+  covariance: [[0.25, 0], [0, 0.0625]]
 camera:
   id: "007"
   pixel_pitch_m: 3.45e-06
@@ -93,7 +94,8 @@ Calibration sample_calibration() {
   const Matrix2 lever_arm_covariance{{4e-4, 0}, {0, 25e-4}};
   calibration.rotation_center = {RotationModel::tilt, {801.25, 597.5},   {0.6, 0, 0.8},
                                  covariance,          {{0.012, -0.009}}, lever_arm_covariance};
-  calibration.dispersion = {{1.5, -0.75}, 0.0031, {0.002, -0.001}, 12};
+  calibration.dispersion = {
+      {1.5, -0.75}, 0.0031, {0.002, -0.001}, 12, Matrix2{{0.25, 0}, {0, 0.0625}}};
   calibration.history = {{"camera",
                           "vlp-intrinsics",
                           "0.1.0",

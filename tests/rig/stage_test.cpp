@@ -54,7 +54,7 @@ TEST(Stage, ARotationCenterReplacesTheOldOneAndDropsTheDispersion) {
 }
 
 TEST(Stage, ADispersionKeepsWhatItRestsOnAndReplacesTheOldOne) {
-  const Dispersion dispersion{{3, 4}, 0.5, {6, 7}, 8};
+  const Dispersion dispersion{{3, 4}, 0.5, {6, 7}, 8, {}};
   Calibration expected = whole_calibration();
   expected.dispersion = dispersion;
   expected.history[2] = {"dispersion", "vlp-dispersion", "1.2.3", "", {}};

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Makes datasets/example: what a camera sees of five lamps from 36 places, and while it turns on
-/// the spot, computed, with noise.
+/// Makes datasets/example: what a camera sees of five lamps from 36 places, while it turns on the
+/// spot, and while it turns at a known station, computed, with noise.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -56,6 +56,16 @@ std::vector<Frame> turn(SyntheticRig rig, Random& random) {
   return frames;
 }
 
+/// Twelve captures at one place, turned.
+std::vector<Frame> at_station(SyntheticRig rig, Random& random) {
+  std::vector<Frame> frames;
+  for (int i = 0; i < 12; ++i) {
+    rig.camera = {{0.1, 0, 0}, wrapped_rad(rad_from_deg(30 * i + random.uniform(-8, 8)))};
+    frames.push_back(frame_of(rig, "station", i, random));
+  }
+  return frames;
+}
+
 void make_example(const std::filesystem::path& folder) {
   SyntheticRig rig{example_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
   rig.calibration.camera.id = "example";
@@ -80,6 +90,7 @@ void make_example(const std::filesystem::path& folder) {
   write_detections(folder / "detections.csv", frames);
   truth.save();
   write_detections(folder / "turning.csv", turn(rig, random));
+  write_detections(folder / "station.csv", at_station(rig, random));
 }
 
 }  // namespace

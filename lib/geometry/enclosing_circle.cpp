@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/enclosing_circle.h"
+
+#include <cassert>
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+using Points = std::span<const Eigen::Vector2d>;
+
+bool holds(const Circle& circle, const Eigen::Vector2d& point) {
+  constexpr double rounding = 1e-12;
+  return (point - circle.center).norm() <= circle.radius * (1 + rounding);
+}
+
+Circle across(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return {(a + b) / 2, (a - b).norm() / 2};
+}
+
+/// Through three points; of points on one line, across the two that are farthest apart.
+Circle through(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+  const Eigen::Vector2d p = b - a, q = c - a;
+  const double twice_area = 2 * (p.x() * q.y() - p.y() * q.x());
+  const Eigen::Vector2d center(q.y() * p.squaredNorm() - p.y() * q.squaredNorm(),
+                               p.x() * q.squaredNorm() - q.x() * p.squaredNorm());
+  const Eigen::Vector2d offset = center / twice_area;
+  if (offset.allFinite()) return {a + offset, offset.norm()};
+  Circle widest = across(a, b);
+  for (const Circle& other : {across(a, c), across(b, c)}) {
+    if (other.radius > widest.radius) widest = other;
+  }
+  return widest;
+}
+
+/// The smallest that holds `points` and has both `a` and `b` on its rim.
+Circle with_two_on_rim(Points points, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  Circle circle = across(a, b);
+  for (const auto& point : points) {
+    if (!holds(circle, point)) circle = through(a, b, point);
+  }
+  return circle;
+}
+
+Circle with_one_on_rim(Points points, const Eigen::Vector2d& a) {
+  Circle circle{a, 0};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!holds(circle, points[i])) circle = with_two_on_rim(points.first(i), a, points[i]);
+  }
+  return circle;
+}
+
+}  // namespace
+
+Circle enclosing_circle(Points points) {
+  assert(!points.empty());
+  Circle circle{points.front(), 0};
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    if (!holds(circle, points[i])) circle = with_one_on_rim(points.first(i), points[i]);
+  }
+  return circle;
+}
+
+}  // namespace vlp

@@ -1,0 +1,174 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-dispersion as its users call it.
+#include <gmock/gmock.h>
+
+#include "captures/csv_reader.h"
+#include "captures/detections_table.h"
+#include "support/program.h"
+#include "support/synthetic_rig.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class DispersionProgram : public testing::Test {
+ protected:
+  TemporaryFolder folder;
+  SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0, 0, 0}, 0}, {}};
+  Calibration believed;
+
+  DispersionProgram() {
+    rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
+    believed = rig.calibration;
+    believed.rotation_center = tilted_by(believed.camera, 0.02, 1.5);
+    believed.dispersion = Dispersion{{50, 50}, 0, {0, 0}, 1, {}};  // an old one
+    write_lamp_map(folder / "lamps.yaml", rig.map);
+    write_calibration(folder / "rotated.yaml", believed);
+  }
+  std::string path(const std::string& name) const { return (folder / name).string() + " "; }
+
+  std::vector<Frame> turn(int count, double arc_rad) {
+    std::vector<Frame> frames;
+    for (int i = 0; i < count; ++i) {
+      rig.camera = {{0.1, -0.05, 0.02}, arc_rad * i / count};
+      frames.push_back({std::to_string(i) + ".png", seen_from(rig, 0.1)});
+    }
+    return frames;
+  }
+  ProgramResult dispersion(const std::vector<Frame>& frames, const std::string& options) {
+    write_detections(folder / "detections.csv", frames);
+    return run_program("vlp-dispersion " + path("detections.csv") + "--lamps " +
+                       path("lamps.yaml") + "--calibration " + path("rotated.yaml") + "-o " +
+                       path("calibration.yaml") + options);
+  }
+};
+
+TEST_F(DispersionProgram, MakesFixesExactElsewhere) {
+  const auto result = dispersion(turn(12, 6.28), "--station 0.102 -0.051");
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("captures    12, 12 used, 0 left out"));
+  EXPECT_THAT(result.output, HasSubstr("world       -2.000 1.000 mm"));
+  EXPECT_THAT(result.output, HasSubstr("after       radius 0.000 mm, centre -2.000 1.000 mm"));
+  const Calibration written = read_calibration(folder / "calibration.yaml");
+  EXPECT_EQ(written.rotation_center->zenith_in_camera, believed.rotation_center->zenith_in_camera);
+  EXPECT_EQ(written.dispersion->captures, 12);
+  EXPECT_GT(written.dispersion->radius_m, 0.01) << "of the circle before";
+  ASSERT_EQ(written.history.size(), 1);
+  EXPECT_EQ(written.history[0].options,
+            "--lamps lamps.yaml --calibration rotated.yaml --station 0.102 -0.051");
+
+  rig.camera = {{-0.3, 0.2, 0.25}, -2};
+  write_detections(folder / "elsewhere.csv", {{"a", seen_from(rig, 0.1)}});
+  const auto located =
+      run_program("vlp-locate " + path("elsewhere.csv") + "--lamps " + path("lamps.yaml") +
+                  "--calibration " + path("calibration.yaml") + "-o " + path("fixes.csv"));
+  ASSERT_EQ(located.exit_code, 0) << located.errors;
+  const CsvTable fixes(folder / "fixes.csv");
+  EXPECT_NEAR(fixes.number(0, fixes.required("x_m")), -0.3, 2e-6);
+  EXPECT_NEAR(fixes.number(0, fixes.required("y_m")), 0.2, 2e-6);
+  EXPECT_NEAR(fixes.number(0, fixes.required("z_m")), 0.25, 2e-6);
+}
+
+TEST_F(DispersionProgram, TakesThePlacesFromCapturesCsv) {
+  const auto frames = turn(6, 6.28);
+  std::string table = "image,x_m,y_m\n";
+  for (const Frame& frame : frames) table += frame.image + ",0.1,-0.05\n";
+  const auto captures = folder.file("captures.csv", table).string();
+  EXPECT_EQ(dispersion(frames, "--captures " + captures).exit_code, 0);
+
+  folder.file("captures.csv", table.substr(0, table.find("5.png")));
+  const auto fewer = dispersion(frames, "--captures " + captures);
+  EXPECT_EQ(fewer.exit_code, 0);
+  EXPECT_THAT(fewer.errors, HasSubstr("1 of 6 captures left out"));
+
+  folder.file("captures.csv", "image,time_s\n0.png,0\n");
+  const auto none = dispersion(frames, "--captures " + captures);
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.errors, HasSubstr("captures.csv: tells no place"));
+  EXPECT_THAT(dispersion(frames, "").errors, HasSubstr("where is the station?"));
+}
+
+TEST_F(DispersionProgram, NeedsYawsOrThePapersMethodAndSaysWhatThatSupposes) {
+  const auto refused = dispersion(turn(6, 0), "--station 0.1 -0.05");
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the station"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "calibration.yaml"));
+  for (const std::string circle : {"", " --circle enclosing"}) {
+    const auto paper = dispersion(turn(6, 0), "--station 0.1 -0.05 --method paper" + circle);
+    EXPECT_EQ(paper.exit_code, 0) << paper.errors;
+    EXPECT_THAT(paper.output, HasSubstr("supposed right"));
+  }
+  EXPECT_EQ(dispersion(turn(6, 6.28), "--station 0.1 -0.05 --method paper").exit_code, 3);
+}
+
+TEST_F(DispersionProgram, SaysWhatIsWrong) {
+  const auto far = dispersion(turn(6, 6.28), "--station 100 -50");
+  EXPECT_EQ(far.exit_code, 2);
+  EXPECT_THAT(far.errors, HasSubstr("in the frame of the lamp map?"));
+  const auto one = dispersion(turn(1, 0), "--station 0.1 -0.05");
+  EXPECT_EQ(one.exit_code, 3);
+  EXPECT_THAT(one.errors, HasSubstr("add captures"));
+  auto frames = turn(6, 6.28);
+  for (Frame& frame : frames) {
+    for (Detection& detection : frame.detections) detection.lamp += 100;
+  }
+  const auto other_map = dispersion(frames, "--station 0.1 -0.05");
+  EXPECT_EQ(other_map.exit_code, 2);
+  EXPECT_THAT(other_map.errors, HasSubstr("lamps.yaml: has none of the lamps"));
+  for (Frame& frame : frames) frame.detections.resize(1), frame.detections[0].lamp = 1;
+  EXPECT_EQ(dispersion(frames, "--station 0.1 -0.05").exit_code, 3);
+}
+
+TEST_F(DispersionProgram, DrawsTheFixes) {
+  const auto result =
+      dispersion(turn(12, 6.28), "--station 0.1 -0.05 --plot " + path("picture.svg"));
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "picture.svg"), HasSubstr("<svg"));
+}
+
+TEST_F(DispersionProgram, DropsNothingThatCameBefore) {
+  rig.calibration.rotation_center.reset();
+  believed.rotation_center.reset();
+  believed.dispersion.reset();
+  write_calibration(folder / "rotated.yaml", believed);
+  const auto result = dispersion(turn(6, 6.28), "--station 0.1 -0.05");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.errors, HasSubstr("run vlp-rotation first"));
+  EXPECT_THAT(result.output, Not(HasSubstr("nan")));
+}
+
+/// From images: a camera whose tilt is not known at all, at the station of a scene.
+TEST(DispersionOfImages, IsTheCamerasTilt) {
+  const TemporaryFolder folder;
+  const std::string rendered = (folder / "rendered").string();
+  const auto simulated = run_program("vlp-simulate -q " VLP_SOURCE_DIR
+                                     "/datasets/paper-rig/scene.yaml --only "
+                                     "dispersion-turning -o " +
+                                     rendered);
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.errors;
+  Calibration calibration = read_calibration(rendered + "/true_calibration.yaml");
+  // As if the rotation centre were wrong by 2 and -3 px.
+  RotationCenter& center = *calibration.rotation_center;
+  center.zenith_in_camera += Eigen::Vector3d(2 / calibration.camera.intrinsics[0],
+                                             -3 / calibration.camera.intrinsics[1], 0);
+  center.zenith_in_camera.normalize();
+  write_calibration(folder / "rotated.yaml", calibration);
+  const std::string files = " --lamps " + rendered + "/lamps.yaml --calibration ";
+  const auto result = run_program("vlp-dispersion " + rendered + "/dispersion-turning" + files +
+                                  (folder / "rotated.yaml").string() + " -o " +
+                                  (folder / "calibration.yaml").string());
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const Dispersion found = *read_calibration(folder / "calibration.yaml").dispersion;
+  EXPECT_NEAR(found.offset_px.x(), -2, 0.01);
+  EXPECT_NEAR(found.offset_px.y(), 3, 0.01);
+  // A tilt puts fixes off by more than H delta, as the lamps are not straight above.
+  EXPECT_NEAR(found.radius_m, 1.6 * std::hypot(2, 3) / 520, 0.0015);
+  EXPECT_EQ(found.captures, 40);
+}
+
+}  // namespace
+}  // namespace vlp
