@@ -11,7 +11,7 @@ packages=(
   g++ cmake ninja-build ccache git pkg-config clang-format clang-tidy
   # libraries
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
-  libopencv-dev libapriltag-dev
+  libopencv-dev libapriltag-dev libceres-dev libssl-dev
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev libmrcal-dev

@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/stage.h"
+
+#include <utility>
+
+namespace vlp {
+namespace {
+
+void forget(Calibration& calibration, const std::string& part) {
+  std::erase_if(calibration.history, [&](const HistoryEntry& entry) { return entry.part == part; });
+}
+
+void remember(Calibration& calibration, const std::string& part, HistoryEntry entry) {
+  forget(calibration, part);
+  entry.part = part;
+  calibration.history.push_back(std::move(entry));
+}
+
+}  // namespace
+
+Calibration with_camera(Camera camera, std::optional<IntrinsicsReport> report, HistoryEntry entry) {
+  Calibration calibration;
+  calibration.camera = std::move(camera);
+  calibration.intrinsics_report = report;
+  remember(calibration, "camera", std::move(entry));
+  return calibration;
+}
+
+Calibration with_rotation_center(Calibration calibration, const RotationCenter& rotation_center,
+                                 HistoryEntry entry) {
+  calibration.dispersion.reset();
+  forget(calibration, "dispersion");
+  calibration.rotation_center = rotation_center;
+  remember(calibration, "rotation_center", std::move(entry));
+  return calibration;
+}
+
+Calibration with_dispersion(Calibration calibration, const Dispersion& dispersion,
+                            HistoryEntry entry) {
+  calibration.dispersion = dispersion;
+  remember(calibration, "dispersion", std::move(entry));
+  return calibration;
+}
+
+}  // namespace vlp
