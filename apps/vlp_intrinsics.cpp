@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
 #include <map>
 #include <string>
 
@@ -11,6 +12,7 @@
 #include "board_images.h"
 #include "calibration/board_check.h"
 #include "calibration/calibration_report.h"
+#include "calibration/mrcal_files.h"
 #include "detect_folder.h"
 #include "geometry/angles.h"
 #include "history.h"
@@ -128,11 +130,19 @@ IntrinsicsGates gates_of(const Options& options) {
   return gates;
 }
 
+/// camera.yaml and ".cameramodel" to camera.cameramodel.
+std::string beside(const std::string& output, const char* ending) {
+  return std::filesystem::path(output).replace_extension(ending).string();
+}
+
 void run(const CLI::App& app, const Options& options) {
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
-  check_output(options.output, inputs);
+  for (const std::string& output : {options.output, beside(options.output, ".cameramodel"),
+                                    beside(options.output, ".corners.vnl")}) {
+    check_output(output, inputs);
+  }
   const Board board = read_board(options.board);
   const auto views = board_views(images, board, options.board, options.threads, options.cache);
   const Sorted input = sorted(options, board, views);
@@ -145,6 +155,8 @@ void run(const CLI::App& app, const Options& options) {
   write_calibration(options.output, with_camera(camera_of(options, solution.problem),
                                                 report_of(solution, input.solved, report),
                                                 history_entry(app, inputs)));
+  write_cameramodel(beside(options.output, ".cameramodel"), solution);
+  write_corners(beside(options.output, ".corners.vnl"), solution, input.names);
   print_summary(solution, report, coverage, held_out_fit(solution, input.held_out));
   const auto failed = gates_not_met(gates_of(options), solution, report);
   std::string all;
@@ -182,7 +194,8 @@ int main(int argc, char** argv) {
   app.add_option("images", options.images, "Images of the board, or folders of them")->required();
   app.add_option("--board", options.board, "The board, board.yaml")->required();
   app.add_option("-o,--output", options.output,
-                 "Where to write the calibration with its camera part")
+                 "Where to write the calibration with its camera part; mrcal's .cameramodel and "
+                 ".corners.vnl go beside it")
       ->required();
   app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
   app.add_option("--lens", options.lens, "Lens model (default: LENSMODEL_OPENCV8)")
