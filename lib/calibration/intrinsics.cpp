@@ -121,7 +121,9 @@ class Solver {
       remove_edge_bias();
       if (!solve(IntrinsicsSolution::solved_for)) return false;
     }
-    return std::isfinite(solution().rms_px);
+    SolveFor without_outliers = IntrinsicsSolution::solved_for;
+    without_outliers.without_outliers = true;
+    return solve(without_outliers) && std::isfinite(solution().rms_px);
   }
 
   IntrinsicsSolution solution() const {

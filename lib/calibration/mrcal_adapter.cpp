@@ -12,6 +12,11 @@ extern "C" {
 #include <suitesparse/cholmod.h>
 }
 
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <mutex>
 #include <stdexcept>
 
 #include "calibration/board_problem.h"
@@ -64,12 +69,43 @@ void unpack(Unpack* function, double* state, const Arguments& the) {
   }
 }
 
+/// mrcal reports outliers on stderr, asked or not; a library should not. The whole process is
+/// without stderr meanwhile.
+class Silence {
+ public:
+  Silence() : alone_(only_one()) {
+    std::fflush(stderr);
+    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (nowhere < 0) return;
+    kept_ = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
+    if (kept_ >= 0) ::dup2(nowhere, STDERR_FILENO);
+    ::close(nowhere);
+  }
+  ~Silence() {
+    if (kept_ < 0) return;
+    std::fflush(stderr);
+    ::dup2(kept_, STDERR_FILENO);
+    ::close(kept_);
+  }
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+
+ private:
+  static std::mutex& only_one() {
+    static std::mutex mutex;
+    return mutex;
+  }
+  std::lock_guard<std::mutex> alone_;
+  int kept_ = -1;
+};
+
 }  // namespace
 
 bool solve(BoardProblem& problem, const SolveFor& what) {
   const Arguments the(problem, what);
   if (the.measurements < the.states) return false;
   Eigen::VectorXd state(the.states), residuals(the.measurements);
+  const Silence silence;
   const mrcal_stats_t stats = mrcal_optimize(
       state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()),
       problem.intrinsics.data(), nullptr, reinterpret_cast<mrcal_pose_t*>(problem.poses.data()),
@@ -102,6 +138,7 @@ Linearization linearized(const BoardProblem& problem, const SolveFor& what) {
   jacobian.dtype = CHOLMOD_DOUBLE;
   jacobian.sorted = 1;
   jacobian.packed = 1;
+  const Silence silence;
   const bool done = mrcal_optimizer_callback(
       state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()), &jacobian,
       problem.intrinsics.data(), nullptr,
