@@ -110,7 +110,9 @@ class Solver {
       if (used_.size() < kLeastViews) return false;
       assemble(lens());
     }
-    return true;
+    if (!take_back()) return true;
+    assemble(lens());
+    return solve({true, distortions, false, false});
   }
 
   /// Stage 4.
@@ -121,6 +123,9 @@ class Solver {
       remove_edge_bias();
       if (!solve(IntrinsicsSolution::solved_for)) return false;
     }
+    // Without noise what is left is the regularization's, and would be taken for outliers.
+    constexpr double exact_px = 0.005;
+    if (solution().rms_px < exact_px) return true;
     SolveFor without_outliers = IntrinsicsSolution::solved_for;
     without_outliers.without_outliers = true;
     return solve(without_outliers) && std::isfinite(solution().rms_px);
@@ -240,9 +245,9 @@ class Solver {
   /// Tries both poses of each view that fits badly, and drops the worst of those that stay bad.
   /// True when there is something to solve again.
   bool change_poses() {
-    constexpr double fair_px = 1, fair = 4, better = 0.7;
+    constexpr double better = 0.7;
     const auto rms = rms_of_views();
-    const double limit_px = std::max(fair_px, fair * median(rms));
+    const double limit_px = limit_for(rms);
     const double worst_px = *std::max_element(rms.begin(), rms.end());
     if (worst_px <= limit_px) return false;
     const Lens lens = this->lens();
@@ -260,6 +265,33 @@ class Solver {
     }
     used_ = kept;
     return true;
+  }
+
+  /// What a view's corners may be off, given what those of the others are.
+  static double limit_for(const std::vector<double>& rms) {
+    constexpr double fair_px = 1, fair = 4;
+    return std::max(fair_px, fair * median(rms));
+  }
+
+  /// Views that were dropped because a worse one had spoilt the lens, and that fit it now.
+  bool take_back() {
+    const double limit_px = limit_for(rms_of_views());
+    const Lens lens = this->lens();
+    const std::size_t before = dropped_.size();
+    std::erase_if(dropped_, [&](const auto& dropped) {
+      const auto pose = view_pose(input_.views[dropped.view], lens);
+      if (!pose || pose->rms_px > limit_px) return false;
+      seeds_.poses[dropped.view] = pose->camera_from_board;
+      used_.push_back(dropped.view);
+      return true;
+    });
+    std::sort(used_.begin(), used_.end());
+    for (std::size_t i = 0; i < used_.size() && dropped_.size() < before; ++i) {
+      if (const auto pose = view_pose(input_.views[used_[i]], lens)) {
+        seeds_.poses[used_[i]] = pose->camera_from_board;
+      }
+    }
+    return dropped_.size() < before;
   }
 
   const IntrinsicsInput& input_;

@@ -20,7 +20,9 @@ constexpr int kLargePixels = 1'000'000;
 struct Detector {
   explicit Detector(const Board& board) : family(tag_family(board.family)) {
     for (int extra = 1; extra < board.border_bits; ++extra) widen_border();
-    apriltag_detector_add_family(detector.get(), family.get());
+    // The table of what corrects to what takes gigabytes for large families.
+    constexpr uint32_t large = 3000;
+    apriltag_detector_add_family_bits(detector.get(), family.get(), family->ncodes > large ? 1 : 2);
     detector->nthreads = 1;
     detector->refine_edges = true;
     detector->quad_sigma = 0;  // it would write into the image
