@@ -12,10 +12,12 @@
 #include "board_images.h"
 #include "calibration/board_check.h"
 #include "calibration/calibration_report.h"
+#include "calibration/camera_exports.h"
 #include "calibration/mrcal_files.h"
 #include "detect_folder.h"
 #include "geometry/angles.h"
 #include "history.h"
+#include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/stage.h"
 
@@ -24,7 +26,8 @@ namespace {
 
 struct Options {
   std::vector<std::string> images;
-  std::string board, output, cache, camera_id = "camera", lens = "LENSMODEL_OPENCV8";
+  std::string board, output, cache, ros, kalibr, opencv, camera_id = "camera",
+                                                         lens = "LENSMODEL_OPENCV8";
   std::optional<double> row_time_s, pixel_pitch_m;
   int threads = all_cores();
   int held_out = 0;
@@ -135,12 +138,19 @@ std::string beside(const std::string& output, const char* ending) {
   return std::filesystem::path(output).replace_extension(ending).string();
 }
 
+void write_exports(const Options& options, const Camera& camera) {
+  if (!options.ros.empty()) write_file(options.ros, ros_camera_info(camera));
+  if (!options.kalibr.empty()) write_file(options.kalibr, kalibr_camchain(camera));
+  if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
+}
+
 void run(const CLI::App& app, const Options& options) {
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
-  for (const std::string& output : {options.output, beside(options.output, ".cameramodel"),
-                                    beside(options.output, ".corners.vnl")}) {
+  for (const std::string& output :
+       {options.output, beside(options.output, ".cameramodel"),
+        beside(options.output, ".corners.vnl"), options.ros, options.kalibr, options.opencv}) {
     check_output(output, inputs);
   }
   const Board board = read_board(options.board);
@@ -155,6 +165,7 @@ void run(const CLI::App& app, const Options& options) {
   write_calibration(options.output, with_camera(camera_of(options, solution.problem),
                                                 report_of(solution, input.solved, report),
                                                 history_entry(app, inputs)));
+  write_exports(options, camera_of(options, solution.problem));
   write_cameramodel(beside(options.output, ".cameramodel"), solution);
   write_corners(beside(options.output, ".corners.vnl"), solution, input.names);
   print_summary(solution, report, coverage, held_out_fit(solution, input.held_out));
@@ -219,6 +230,9 @@ int main(int argc, char** argv) {
          "between the lenses of two halves of the views)")
       ->check([](const std::string& text) { return vlp::gate_problem(text); })
       ->option_text("NAME=VALUE ...");
+  app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
+  app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");
+  app.add_option("--opencv", options.opencv, "Write the camera for OpenCV, too (FileStorage)");
   app.add_option("--cache", options.cache,
                  "Folder to keep the corners of each image in, for the next time");
   app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
