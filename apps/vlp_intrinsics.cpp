@@ -103,8 +103,8 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("views         {} used, {} dropped\n", solution.views.size(), solution.dropped.size());
   fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
   fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
-  fmt::print("focal length  {:.2f}, {:.2f} px\ncentre        {:.2f}, {:.2f} px\n", parameters[0],
-             parameters[1], parameters[2], parameters[3]);
+  fmt::print("focal length  {:.2f}, {:.2f} px, sd {:.2f}\ncentre        {:.2f}, {:.2f} px\n",
+             parameters[0], parameters[1], report.focal_sd_px, parameters[2], parameters[3]);
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst, at ({:.0f}, {:.0f})\n",
              report.uncertainty_mean_px, report.uncertainty_worst_px,
              report.uncertainty_worst_at.x(), report.uncertainty_worst_at.y());

@@ -26,7 +26,7 @@ IntrinsicsInput every_other(const IntrinsicsSolution& solution, const Intrinsics
 
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
   const ProjectionUncertainty uncertainty(solution);
-  CalibrationReport report{0, 0, {0, 0}, {}};
+  CalibrationReport report{0, 0, {0, 0}, uncertainty.focal_sd_px(), {}};
   const auto pixels = pixel_grid(input.imager_px);
   for (const Eigen::Vector2d& pixel : pixels) {
     const double sigma_px = uncertainty.worst_px(pixel);

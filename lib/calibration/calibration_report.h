@@ -18,6 +18,8 @@ struct CalibrationReport {
   /// ProjectionUncertainty::worst_px() over pixel_grid().
   double uncertainty_mean_px, uncertainty_worst_px;
   Eigen::Vector2d uncertainty_worst_at;
+  /// Standard deviation of fx.
+  double focal_sd_px;
   /// Between the lens of every other view and that of the rest: twice the uncertainty when the lens
   /// model fits and the corners' errors are independent; more when they are not. Nothing when a
   /// half does not determine a lens.

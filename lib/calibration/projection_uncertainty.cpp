@@ -84,4 +84,8 @@ double ProjectionUncertainty::worst_px(const Eigen::Vector2d& pixel) const {
   return std::sqrt(mean + std::hypot(half, c(0, 1)));
 }
 
+double ProjectionUncertainty::focal_sd_px() const {
+  return determined_ ? std::sqrt(covariance_(0, 0)) : std::numeric_limits<double>::infinity();
+}
+
 }  // namespace vlp

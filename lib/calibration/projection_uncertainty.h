@@ -31,6 +31,9 @@ class ProjectionUncertainty {
   /// Standard deviation in the direction in which it is largest.
   double worst_px(const Eigen::Vector2d& pixel) const;
 
+  /// Of the focal length along x. Infinite when nothing is determined.
+  double focal_sd_px() const;
+
  private:
   Lens lens_;
   bool determined_;
