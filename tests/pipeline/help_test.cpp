@@ -46,7 +46,8 @@ TEST_P(Help, NamesTheVersion) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Programs, Help,
-                         testing::Values("vlp-detect", "vlp-limits", "vlp-locate", "vlp-simulate"),
+                         testing::Values("vlp-board", "vlp-detect", "vlp-intrinsics", "vlp-limits",
+                                         "vlp-locate", "vlp-simulate"),
                          [](const auto& instance) {
                            return std::string(instance.param).substr(4);
                          });
