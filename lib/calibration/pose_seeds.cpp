@@ -59,6 +59,7 @@ std::vector<double> focal_lengths(const IntrinsicsInput& input) {
   }
   std::sort(tried.begin(), tried.end());
   std::vector<double> order;
+  order.reserve(tried.size());
   for (const auto& [rms_px, focal_px] : tried) order.push_back(focal_px);
   return order;
 }

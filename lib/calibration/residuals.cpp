@@ -20,7 +20,8 @@ std::vector<Eigen::Vector2d> residuals_of(const BoardProblem& problem) {
     for (std::size_t i = 0; i < count; ++i) {
       const Eigen::Vector3d& seen = problem.points[pose * count + i];
       if (seen.z() == BoardProblem::kUnseen) continue;
-      const Eigen::Array2d node(static_cast<double>(i % cols), static_cast<double>(i / cols));
+      const std::size_t col = i % cols, row = i / cols;
+      const Eigen::Array2d node(static_cast<double>(col), static_cast<double>(row));
       const Eigen::Array2d share = 2 * node / last - 1;
       Eigen::Vector3d point;
       point << problem.spacing_m * node.matrix(), problem.warp_m.dot((1 - share.square()).matrix());
