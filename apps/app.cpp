@@ -76,6 +76,10 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   } catch (const CLI::ParseError& error) {
     spdlog::error("{}; see {} --help", error.what(), app.get_name());
     return kBadInput;
+  } catch (const GateNotMet& error) {
+    if (std::fflush(stdout) != 0) return kBadInput;
+    spdlog::error("{}", error.what());
+    return kGateNotMet;
   } catch (const Undetermined& error) {
     spdlog::error("{}", error.what());
     return kUndetermined;

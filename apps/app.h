@@ -18,6 +18,11 @@ class Undetermined : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// All is done and written, but a gate is not met; what() says which. Exit code 1.
+class GateNotMet : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Checks for options: a number that is finite, and positive, or not negative.
 CLI::Validator finite();
 CLI::Validator finite_positive();
@@ -28,7 +33,7 @@ void check_output(const std::string& output, const std::vector<std::string>& inp
 
 /// The common shell of a program: adds --quiet, --verbose and --version to `app`, parses, and calls
 /// `run`. Messages go through spdlog to stderr. Bad usage and bad input end with one line and
-/// exit code 2, Undetermined with 3.
+/// exit code 2, Undetermined with 3, GateNotMet with 1.
 int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run);
 
 }  // namespace vlp

@@ -49,8 +49,9 @@ std::string last_name(const std::string& path) {
 }
 
 bool changes_the_result(const CLI::Option& option) {
-  constexpr std::array<std::string_view, 6> others = {"--output",  "--plot",  "--annotate",
-                                                      "--threads", "--quiet", "--verbose"};
+  constexpr std::array<std::string_view, 10> others = {
+      "--output",  "--plot",  "--annotate", "--threads", "--quiet",
+      "--verbose", "--cache", "--ros",      "--kalibr",  "--opencv"};
   return std::find(others.begin(), others.end(), option.get_name()) == others.end();
 }
 
@@ -73,6 +74,12 @@ std::string options_of(const CLI::App& app, const std::vector<std::string>& inpu
 }
 
 }  // namespace
+
+std::string sha256_of_text(std::string_view text) {
+  Sha256 sha;
+  sha.add(text);
+  return sha.digits();
+}
 
 std::string sha256_of_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);

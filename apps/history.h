@@ -5,11 +5,15 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rig/calibration.h"
 
 namespace vlp {
+
+/// SHA-256 of a text, in hexadecimal digits.
+std::string sha256_of_text(std::string_view text);
 
 /// SHA-256 of a file's content, in hexadecimal digits. Throws InputError.
 std::string sha256_of_file(const std::filesystem::path& file);
@@ -22,8 +26,8 @@ std::string sha256_of_images(const std::filesystem::path& folder);
 /// that were given, in the order of --help, and a digest of each input, a file or a folder of
 /// images; an empty name is an input that was not given. The same on every machine: of files and
 /// folders only the last name is kept, and what does not change the result (--output, --plot,
-/// --annotate, --threads, --quiet, --verbose) is left out. Call it after parsing. Throws
-/// InputError.
+/// --annotate, --threads, --quiet, --verbose, other outputs, a cache) is left out. Call it after
+/// parsing. Throws InputError.
 HistoryEntry history_entry(const CLI::App& app, const std::vector<std::string>& inputs);
 
 }  // namespace vlp

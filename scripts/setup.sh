@@ -12,9 +12,10 @@ packages=(
   # libraries
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
   libopencv-dev libapriltag-dev libceres-dev libssl-dev
+  libmrcal-dev libsuitesparse-dev libcairo2-dev
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks
-  libgtest-dev libgmock-dev libbenchmark-dev libmrcal-dev
+  libgtest-dev libgmock-dev libbenchmark-dev python3-mrcal poppler-utils unzip
 )
 
 missing=()

@@ -19,11 +19,6 @@ constexpr std::array kFamilies{"tag36h11",         "tag25h9",         "tag16h5",
 // In the order of BoardCorner.
 constexpr std::array kCorners{"bottom-left", "bottom-right", "top-left", "top-right"};
 
-std::string name_of(const IdOrder& order) {
-  return std::string(order.column_major ? "column" : "row") + "-major-from-" +
-         kCorners[static_cast<std::size_t>(order.from)];
-}
-
 IdOrder read_id_order(const YamlValue& value) {
   std::string names;
   for (const bool column_major : {false, true}) {
@@ -45,6 +40,11 @@ std::string read_family(const YamlValue& value) {
 }
 
 }  // namespace
+
+std::string name_of(const IdOrder& order) {
+  return std::string(order.column_major ? "column" : "row") + "-major-from-" +
+         kCorners[static_cast<std::size_t>(order.from)];
+}
 
 Board read_board(YamlMap& map) {
   constexpr int most_tags = 1000, largest_id = 1'000'000;  // families have fewer

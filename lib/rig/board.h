@@ -17,6 +17,9 @@ struct IdOrder {
   BoardCorner from;
 };
 
+/// The order as YAML names it.
+std::string name_of(const IdOrder& order);
+
 /// A printed board of AprilTags, flat and upright.
 struct Board {
   /// AprilTag family, for example "tag36h11".

@@ -1,0 +1,107 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-board: a board of AprilTags to print.
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "app.h"
+#include "rig/board.h"
+#include "rig/file.h"
+#include "simulation/board_pdf.h"
+
+namespace vlp {
+namespace {
+
+struct Options {
+  std::string output, paper = "A4", family = "tag36h11";
+  int cols = 6, rows = 5, first_id = 0;
+  std::optional<double> tag_mm, spacing;
+  bool kalibr = false;
+};
+
+constexpr double kMillimetresPerMetre = 1000;
+
+Board board_of(const Options& options) {
+  constexpr double lattice = 1, kalibr = 0.3;
+  const IdOrder order{false, options.kalibr ? BoardCorner::bottom_left : BoardCorner::top_left};
+  return {options.family,
+          options.cols,
+          options.rows,
+          options.tag_mm.value_or(0) / kMillimetresPerMetre,
+          options.spacing.value_or(options.kalibr ? kalibr : lattice),
+          options.kalibr ? 2 : 1,
+          options.kalibr,
+          options.first_id,
+          order};
+}
+
+const Paper& paper_of(const std::string& name) {
+  for (const Paper& paper : papers()) {
+    if (paper.name == name) return paper;
+  }
+  std::string names;
+  for (const Paper& paper : papers()) names.append(names.empty() ? "" : ", ").append(paper.name);
+  throw std::invalid_argument("there is no paper '" + name + "', only " + names);
+}
+
+void run(const Options& options) {
+  const Paper& paper = paper_of(options.paper);
+  Board board = board_of(options);
+  if (!options.tag_mm) {
+    const auto largest_m = largest_tag_m(board, paper);
+    if (!largest_m) throw std::invalid_argument("so many tags do not fit on " + paper.name);
+    board.tag_size_m = *largest_m;
+  }
+  const std::string pdf = board_pdf(board, paper);
+  const std::string yaml =
+      std::filesystem::path(options.output).replace_extension(".yaml").string();
+  write_file(options.output, pdf);
+  write_board(yaml, board);
+  fmt::print("{}: {} x {} tags of {:g} mm, gap {:g} mm, on {}\n", options.output, board.cols,
+             board.rows, board.tag_size_m * kMillimetresPerMetre,
+             board.tag_size_m * board.tag_spacing * kMillimetresPerMetre, paper.name);
+  fmt::print("{}: for vlp-intrinsics; measure the ruler on the print first\n", yaml);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Makes a board of AprilTags to print at true scale, and the board.yaml that tells\n"
+      "vlp-intrinsics of it. Print it at 100 %, measure its ruler, and glue it to something "
+      "flat.\n\n"
+      "Examples:\n"
+      "  build/bin/vlp-board -o board.pdf\n"
+      "  build/bin/vlp-board --kalibr --cols 6 --rows 6 --paper A3 -o board.pdf\n",
+      "vlp-board");
+  vlp::Options options;
+  app.add_option("-o,--output", options.output,
+                 "Where to write the PDF; board.yaml goes beside it, under the same name")
+      ->required()
+      ->check([](const std::string& name) {
+        return name.ends_with(".pdf") ? std::string() : "the file's name should end in .pdf";
+      });
+  app.add_option("--paper", options.paper, "A0 to A4 or Letter (default: A4)");
+  app.add_option("--cols", options.cols, "Tags along the width (default: 6)")
+      ->check(CLI::Range(1, 100));
+  app.add_option("--rows", options.rows, "Tags along the height (default: 5)")
+      ->check(CLI::Range(1, 100));
+  app.add_option("--tag-mm", options.tag_mm,
+                 "Width of a tag's black border (default: as wide as the paper allows)")
+      ->check(CLI::Range(1.0, 1000.0));
+  app.add_option("--spacing", options.spacing,
+                 "Gap between tags over the width of a tag (default: 1; 0.3 with --kalibr)")
+      ->check(CLI::Range(0.05, 5.0));
+  app.add_option("--family", options.family, "Family of the tags (default: tag36h11)")
+      ->check(CLI::IsMember({"tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagCircle49h12",
+                             "tagCustom48h12", "tagStandard41h12", "tagStandard52h13"}));
+  app.add_option("--first-id", options.first_id, "Id of the first tag (default: 0)")
+      ->check(CLI::Range(0, 100000));
+  app.add_flag("--kalibr", options.kalibr,
+               "A Kalibr AprilGrid: borders of two bits, corner squares");
+  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+}

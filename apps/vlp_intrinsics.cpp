@@ -1,0 +1,246 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-intrinsics: the lens of a camera from images of a board.
+#include <fmt/core.h>
+#include <spdlog/spdlog.h>
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "app.h"
+#include "board_images.h"
+#include "calibration/board_check.h"
+#include "calibration/calibration_report.h"
+#include "calibration/camera_exports.h"
+#include "calibration/mrcal_files.h"
+#include "detect_folder.h"
+#include "geometry/angles.h"
+#include "history.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "rig/stage.h"
+
+namespace vlp {
+namespace {
+
+struct Options {
+  std::vector<std::string> images;
+  std::string board, output, cache, ros, kalibr, opencv, camera_id = "camera",
+                                                         lens = "LENSMODEL_OPENCV8";
+  std::optional<double> row_time_s, pixel_pitch_m;
+  int threads = all_cores();
+  int held_out = 0;
+  std::map<std::string, double> gates;
+};
+
+/// The views that can be used, apart from those that are held out.
+struct Sorted {
+  IntrinsicsInput solved, held_out;
+  std::vector<std::string> names;  // of the solved
+};
+
+Sorted sorted(const Options& options, const Board& board, const std::vector<BoardView>& views) {
+  const auto model = lens_model_from_name(options.lens);
+  const IntrinsicsInput none{
+      BoardLattice(board), {}, views.front().imager_px, *model, !board.corner_squares};
+  Sorted sorted{none, none, {}};
+  int usable = 0;
+  for (const BoardView& view : views) {
+    if (!none.lattice.enough(view.seen)) {
+      spdlog::warn("{}: only {} tags of the board can be used; skipped", view.image,
+                   view.seen.tags.size());
+      continue;
+    }
+    const bool held_out = options.held_out > 0 && ++usable % options.held_out == 0;
+    auto& part = held_out ? sorted.held_out : sorted.solved;
+    part.views.push_back(none.lattice.corners(view.seen));
+    if (!held_out) sorted.names.push_back(view.image);
+  }
+  return sorted;
+}
+
+IntrinsicsSolution solved(const Sorted& views) {
+  const IntrinsicsSolution solution = solve_intrinsics(views.solved);
+  if (!solution.ok()) {
+    throw Undetermined(fmt::format("{} views with the board: {}", views.solved.views.size(),
+                                   explanation_of(solution.status)));
+  }
+  for (const auto& [view, rms_px] : solution.dropped) {
+    spdlog::warn(
+        "{}: fits no pose that goes with the other views ({:.1f} px are left over); dropped",
+        views.names[view], rms_px);
+  }
+  return solution;
+}
+
+IntrinsicsReport report_of(const IntrinsicsSolution& solution, const IntrinsicsInput& input,
+                           const CalibrationReport& report) {
+  const Eigen::Vector2d warp_m =
+      solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
+  return {static_cast<int>(solution.views.size()),
+          solution.corners,
+          solution.outliers,
+          solution.rms_px,
+          std::array{warp_m.x(), warp_m.y()},
+          report.uncertainty_worst_px};
+}
+
+Camera camera_of(const Options& options, const BoardProblem& problem) {
+  Camera camera{options.camera_id,
+                problem.imager_px,
+                problem.lens_model,
+                problem.intrinsics,
+                options.pixel_pitch_m,
+                options.row_time_s,
+                {}};
+  return camera;
+}
+
+void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
+                   const ViewCoverage& coverage, const HeldOut& held_out) {
+  const auto& parameters = solution.problem.intrinsics;
+  fmt::print("views         {} used, {} dropped\n", solution.views.size(), solution.dropped.size());
+  fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
+  fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
+  fmt::print("focal length  {:.2f}, {:.2f} px, sd {:.2f}\ncentre        {:.2f}, {:.2f} px\n",
+             parameters[0], parameters[1], report.focal_sd_px, parameters[2], parameters[3]);
+  fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst, at ({:.0f}, {:.0f})\n",
+             report.uncertainty_mean_px, report.uncertainty_worst_px,
+             report.uncertainty_worst_at.x(), report.uncertainty_worst_at.y());
+  if (report.halves) {
+    fmt::print("halves        {:.3f} px rms apart per axis, {:.3f} px worst\n",
+               report.halves->rms_px, report.halves->worst_px);
+  }
+  if (held_out.views > 0) {
+    fmt::print("held out      {} views, {} corners, {:.3f} px rms per axis\n", held_out.views,
+               held_out.corners, held_out.rms_px);
+  }
+  const auto& [left, right, upper, lower] = coverage.tilts_rad;
+  fmt::print("coverage      {:.0f} % of the image\n", 100 * coverage.share);
+  fmt::print("tilts         left {:.0f}, right {:.0f}, upper {:.0f}, lower {:.0f} degrees\n",
+             deg_from_rad(left), deg_from_rad(right), deg_from_rad(upper), deg_from_rad(lower));
+  fmt::print("next view     {}\n", next_view(coverage));
+}
+
+IntrinsicsGates gates_of(const Options& options) {
+  IntrinsicsGates gates;
+  for (const auto& [name, value] : options.gates) {
+    if (name == "rms_px") gates.rms_px = value;
+    if (name == "uncertainty_px") gates.uncertainty_px = value;
+    if (name == "halves_px") gates.halves_px = value;
+  }
+  return gates;
+}
+
+/// camera.yaml and ".cameramodel" to camera.cameramodel.
+std::string beside(const std::string& output, const char* ending) {
+  return std::filesystem::path(output).replace_extension(ending).string();
+}
+
+void write_exports(const Options& options, const Camera& camera) {
+  if (!options.ros.empty()) write_file(options.ros, ros_camera_info(camera));
+  if (!options.kalibr.empty()) write_file(options.kalibr, kalibr_camchain(camera));
+  if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
+}
+
+void run(const CLI::App& app, const Options& options) {
+  const auto images = image_files(options.images);
+  std::vector<std::string> inputs{options.board};
+  for (const auto& image : images) inputs.push_back(image.string());
+  for (const std::string& output :
+       {options.output, beside(options.output, ".cameramodel"),
+        beside(options.output, ".corners.vnl"), options.ros, options.kalibr, options.opencv}) {
+    check_output(output, inputs);
+  }
+  const Board board = read_board(options.board);
+  const auto views = board_views(images, board, options.board, options.threads, options.cache);
+  const Sorted input = sorted(options, board, views);
+  const IntrinsicsSolution solution = solved(input);
+  const BoardCheck check = check_board(board, views, solution.lens());
+  if (!check.problem.empty()) throw InputError(options.board, check.problem);
+
+  const CalibrationReport report = report_on(solution, input.solved);
+  const ViewCoverage coverage = coverage_of(solution, input.solved);
+  write_calibration(options.output, with_camera(camera_of(options, solution.problem),
+                                                report_of(solution, input.solved, report),
+                                                history_entry(app, inputs)));
+  write_exports(options, camera_of(options, solution.problem));
+  write_cameramodel(beside(options.output, ".cameramodel"), solution);
+  write_corners(beside(options.output, ".corners.vnl"), solution, input.names);
+  print_summary(solution, report, coverage, held_out_fit(solution, input.held_out));
+  const auto failed = gates_not_met(gates_of(options), solution, report);
+  std::string all;
+  for (const std::string& gate : failed) all += (all.empty() ? "" : "; ") + gate;
+  if (!failed.empty()) {
+    throw GateNotMet(fmt::format("{}; add views, next {}", all, next_view(coverage)));
+  }
+}
+
+/// NAME=VALUE of a gate.
+std::string gate_problem(const std::string& text) {
+  const std::size_t sign = text.find('=');
+  const std::string name = text.substr(0, sign);
+  if (name != "rms_px" && name != "uncertainty_px" && name != "halves_px") {
+    return "the gates are rms_px, uncertainty_px and halves_px, not '" + name + "'";
+  }
+  if (sign == std::string::npos) return "a gate is NAME=VALUE";
+  std::string value = text.substr(sign + 1);
+  return finite_positive()(value);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Calibrates the lens of a camera from images of a board of AprilTags (see vlp-board), and "
+      "says\n"
+      "how far the result can be trusted. Exit code 1 when it is worse than the gates allow.\n\n"
+      "Example, from the project's folder:\n"
+      "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only boards -o out/rig\n"
+      "  build/bin/vlp-intrinsics out/rig/boards/*.png --board out/rig/board.yaml -o camera.yaml\n",
+      "vlp-intrinsics");
+  vlp::Options options;
+  app.add_option("images", options.images, "Images of the board, or folders of them")->required();
+  app.add_option("--board", options.board, "The board, board.yaml")->required();
+  app.add_option("-o,--output", options.output,
+                 "Where to write the calibration with its camera part; mrcal's .cameramodel and "
+                 ".corners.vnl go beside it")
+      ->required();
+  app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
+  app.add_option("--lens", options.lens, "Lens model (default: LENSMODEL_OPENCV8)")
+      ->check([](const std::string& name) {
+        return vlp::lens_model_from_name(name) ? std::string()
+                                               : "the models are: " + vlp::lens_model_names();
+      });
+  app.add_option("--row-time-s", options.row_time_s,
+                 "Time from one row of the read-out to the next, for vlp-detect")
+      ->check(CLI::Range(1e-8, 1e-3));
+  app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Width of a pixel")
+      ->check(CLI::Range(1e-7, 1e-4));
+  app.add_option("--held-out", options.held_out,
+                 "Keep every Nth view out of the solve, and say how well the lens fits it")
+      ->check(CLI::Range(2, 1000))
+      ->option_text("N");
+  std::vector<std::string> gates;
+  app.add_option(
+         "--gate", gates,
+         "Change a gate: rms_px=1, uncertainty_px=2 (worst over the image), halves_px=1 (rms, "
+         "between the lenses of two halves of the views)")
+      ->check([](const std::string& text) { return vlp::gate_problem(text); })
+      ->option_text("NAME=VALUE ...");
+  app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
+  app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");
+  app.add_option("--opencv", options.opencv, "Write the camera for OpenCV, too (FileStorage)");
+  app.add_option("--cache", options.cache,
+                 "Folder to keep the corners of each image in, for the next time");
+  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
+  return vlp::run_app(app, argc, argv, [&] {
+    for (const std::string& gate : gates) {
+      options.gates[gate.substr(0, gate.find('='))] = std::stod(gate.substr(gate.find('=') + 1));
+    }
+    vlp::run(app, options);
+  });
+}

@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <array>
+#include <vector>
+
+#include "camera/lens_model.h"
+
+namespace vlp {
+
+/// Where a board is: x_in_camera = R(rotation) x_in_board + translation_m, with the rotation's axis
+/// times its angle.
+struct BoardPose {
+  Eigen::Vector3d rotation;
+  Eigen::Vector3d translation_m;
+};
+
+/// A camera and the boards that it saw, as mrcal solves for them (mrcal documentation,
+/// "Formulation"): boards are uniform lattices of cols x rows points, spacing_m apart, bent by
+///   z = warp_m.x (1 - (2 i / (cols - 1) - 1)^2) + warp_m.y (1 - (2 j / (rows - 1) - 1)^2).
+struct BoardProblem {
+  LensModel lens_model;
+  std::vector<double> intrinsics;
+  std::array<int, 2> imager_px;
+  int cols, rows;
+  double spacing_m;
+  Eigen::Vector2d warp_m = Eigen::Vector2d::Zero();
+  std::vector<BoardPose> poses;
+  /// u_px, v_px, weight; row by row, pose by pose. The weight is 1, kUnseen, or another below 0 for
+  /// an outlier. Every pose needs four points or more, not on a line.
+  std::vector<Eigen::Vector3d> points;
+  static constexpr double kUnseen = -2;
+
+  std::size_t points_of_a_board() const {
+    return static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);
+  }
+};
+
+/// What a solve may change besides the poses.
+struct SolveFor {
+  bool core = false;         // fx fy cx cy
+  bool distortions = false;  // regularized, as mrcal does it
+  bool warp = false;
+  bool without_outliers = false;  // gives outliers a negative weight
+};
+
+/// Minimizes the residuals in place by mrcal_optimize. False when it fails: points that no lens of
+/// the model can see there, or too few for the unknowns.
+bool solve(BoardProblem& problem, const SolveFor& what);
+
+/// The problem at its solution. State and Jacobian are mrcal's, packed: the state is divided by
+/// `scale`, so that its entries are of like size.
+struct Linearization {
+  /// Of the points, u and v in turn, in their order; 0 for those with a negative weight.
+  Eigen::VectorXd residuals_px;
+  /// A column for each row of the Jacobian: of the points first, then of the regularization.
+  Eigen::SparseMatrix<double> jacobian_transposed;
+  /// State / packed state.
+  Eigen::VectorXd scale;
+  /// Where in the state the intrinsics that were solved for, the poses (6 each) and the warp begin.
+  Eigen::Index intrinsics, poses;
+};
+Linearization linearized(const BoardProblem& problem, const SolveFor& what);
+
+}  // namespace vlp

@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "rig/calibration.h"
+
+namespace vlp {
+
+/// A camera as others write it, in YAML. All of them have pixel centres at whole numbers, as here.
+/// Each throws std::invalid_argument for a lens model that the format does not have.
+
+/// ROS camera_info: plumb_bob for PINHOLE, OPENCV4 and OPENCV5, rational_polynomial for OPENCV8.
+std::string ros_camera_info(const Camera& camera);
+/// Kalibr's camchain: pinhole with radtan, for PINHOLE and OPENCV4.
+std::string kalibr_camchain(const Camera& camera);
+/// OpenCV's FileStorage: camera_matrix and distortion_coefficients, for all but STEREOGRAPHIC.
+std::string opencv_camera(const Camera& camera);
+
+}  // namespace vlp

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace vlp {
+
+/// A .npz file in the making: NumPy's arrays in a ZIP archive, not compressed (NumPy documentation,
+/// "numpy.lib.format", version 1.0; PKWARE's APPNOTE, 4.3). For little-endian machines. The same
+/// arrays give the same bytes.
+class NumpyArchive {
+ public:
+  using Shape = std::vector<std::size_t>;
+
+  /// Values in C order; their number is the product of `shape`, which is {} for one value.
+  void add(std::string_view name, const Shape& shape, std::span<const double> values);
+  void add(std::string_view name, const Shape& shape, std::span<const std::int32_t> values);
+  void add(std::string_view name, double value) { add(name, {}, std::span(&value, 1)); }
+  void add(std::string_view name, bool value);
+  /// ASCII.
+  void add(std::string_view name, std::string_view text);
+
+  /// The whole archive.
+  std::string bytes() const;
+
+ private:
+  void add_array(std::string_view name, std::string_view type, const Shape& shape,
+                 std::string_view data);
+  void add_file(const std::string& name, const std::string& content);
+
+  std::string files_, directory_;
+  std::uint16_t count_ = 0;
+};
+
+/// As Python's base64.b85encode() has it.
+std::string base85(std::string_view bytes);
+
+}  // namespace vlp

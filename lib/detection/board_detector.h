@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <set>
+#include <vector>
+
+#include "rig/board.h"
+
+namespace vlp {
+
+class TagFinder;
+class TouchingTags;
+
+/// A tag as an image shows it.
+struct SeenTag {
+  int id;
+  /// As BoardTag::corners_m: bottom left, bottom right, top right, top left of the black border.
+  std::array<Eigen::Vector2d, 4> corners_px;
+};
+
+/// What of a board an image shows.
+struct SeenBoard {
+  /// By id, each once.
+  std::vector<SeenTag> tags;
+  /// Tags of the family that the board does not have.
+  int foreign = 0;
+  /// Tags of the board that are left out: seen twice, or with a corner that cannot be found to a
+  /// fraction of a pixel (at the image's edge, hidden, blurred away).
+  int unusable = 0;
+};
+
+/// Finds a board's tags. Boards without corner squares by libapriltag, whose fit of lines to the
+/// tag's edges gives the corners; the gap between tags has to be white. Boards with corner squares,
+/// where tags touch, by OpenCV's ArUco module and from one to the
+/// next; their corners are saddle points (saddle_point()).
+/// Safe to share between threads.
+class BoardDetector {
+ public:
+  /// Throws std::invalid_argument when the detector that the board needs lacks the family.
+  explicit BoardDetector(const Board& board);
+  ~BoardDetector();
+  BoardDetector(const BoardDetector&) = delete;
+  BoardDetector& operator=(const BoardDetector&) = delete;
+
+  /// image: grey levels of 8 or 16 bits. The result depends on the image only.
+  SeenBoard detect(const cv::Mat& image) const;
+
+ private:
+  std::unique_ptr<TagFinder> finder_;
+  std::set<int> ids_;
+  /// Of boards with corner squares.
+  std::unique_ptr<TouchingTags> touching_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,18 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <apriltag/apriltag.h>
+
+#include <memory>
+#include <string>
+
+namespace vlp {
+
+using TagFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*)>;
+
+/// libapriltag's family of that name, one of those of Board::family; not to be shared between
+/// detectors. Throws std::invalid_argument.
+TagFamily tag_family(const std::string& name);
+
+}  // namespace vlp

@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/homography.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+/// Takes one side of the pairs to points with mean 0 and spread 1.
+Eigen::Matrix3d normalization(std::span<const PlanePair> pairs, Eigen::Vector2d PlanePair::*side) {
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const PlanePair& pair : pairs) mean += pair.*side / double(pairs.size());
+  double spread = 0;
+  for (const PlanePair& pair : pairs) {
+    spread += (pair.*side - mean).squaredNorm() / double(pairs.size());
+  }
+  const double scale = spread > 0 ? 1 / std::sqrt(spread) : 1;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Identity();
+  normal.topLeftCorner<2, 2>() *= scale;
+  normal.topRightCorner<2, 1>() = -scale * mean;
+  return normal;
+}
+
+}  // namespace
+
+Eigen::Matrix3d homography(std::span<const PlanePair> pairs) {
+  const Eigen::Matrix3d from_normal = normalization(pairs, &PlanePair::from);
+  const Eigen::Matrix3d to_normal = normalization(pairs, &PlanePair::to);
+  Eigen::Matrix<double, 9, 9> squares = Eigen::Matrix<double, 9, 9>::Zero();
+  for (const PlanePair& pair : pairs) {
+    const Eigen::Vector3d from = from_normal * pair.from.homogeneous();
+    const Eigen::Vector3d to = to_normal * pair.to.homogeneous();
+    Eigen::Matrix<double, 2, 9> rows;
+    rows << from.transpose(), Eigen::RowVector3d::Zero(), -to.x() * from.transpose(),
+        Eigen::RowVector3d::Zero(), from.transpose(), -to.y() * from.transpose();
+    squares += rows.transpose() * rows;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(squares);
+  const Eigen::Matrix<double, 9, 1> smallest = solver.eigenvectors().col(0);
+  const Eigen::Matrix3d fitted =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(smallest.data());
+  return to_normal.inverse() * fitted * from_normal;
+}
+
+}  // namespace vlp

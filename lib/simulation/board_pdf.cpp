@@ -1,0 +1,172 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/board_pdf.h"
+
+#include <cairo-pdf.h>
+
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+
+#include "rig/board_layout.h"
+#include "rig/yaml_text.h"
+#include "simulation/tag_pattern.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kPointsPerMetre = 72 / 0.0254;
+/// Most printers leave out 5 mm; ruler and parameters stand below the board.
+constexpr double kMargin_m = 0.008, kFooter_m = 0.022;
+
+using Context = std::unique_ptr<cairo_t, void (*)(cairo_t*)>;
+using Surface = std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)>;
+
+/// From the first tag to the end of what has to stay white, or is a corner square.
+double border_m(const Board& board) {
+  const double gap_m = board.tag_size_m * board.tag_spacing;
+  return board.corner_squares ? gap_m : std::min(gap_m, board.tag_size_m) / 2;
+}
+
+Eigen::Vector2d print_m(const Board& board) {
+  return tag_field_m(board) + 2 * Eigen::Vector2d::Constant(border_m(board));
+}
+
+bool fits(const Board& board, const Eigen::Vector2d& sheet_m) {
+  const Eigen::Vector2d room_m =
+      sheet_m - 2 * Eigen::Vector2d::Constant(kMargin_m) - Eigen::Vector2d(0, kFooter_m);
+  return (print_m(board).array() <= room_m.array() + 1e-9).all();
+}
+
+/// The sheet, turned if the board fits only so; nothing when it does not fit.
+std::optional<Eigen::Vector2d> sheet_for(const Board& board, const Paper& paper) {
+  if (fits(board, paper.size_m)) return paper.size_m;
+  const Eigen::Vector2d lying = paper.size_m.reverse();
+  if (fits(board, lying)) return lying;
+  return {};
+}
+
+/// Everything black, in one path: no seams between neighbouring bits.
+void draw_board(cairo_t* context, const Board& board) {
+  const double gap_m = board.tag_size_m * board.tag_spacing;
+  if (board.corner_squares) {
+    for (int row = 0; row <= board.rows; ++row) {
+      for (int col = 0; col <= board.cols; ++col) {
+        cairo_rectangle(context, col * tag_pitch_m(board) - gap_m, row * tag_pitch_m(board) - gap_m,
+                        gap_m, gap_m);
+      }
+    }
+  }
+  for (const BoardTag& tag : board_layout(board)) {
+    const TagPattern pattern = tag_pattern(board.family, tag.id, board.border_bits);
+    const double bit_m = board.tag_size_m / pattern.border_width;
+    if (2 * pattern.outside * bit_m > gap_m) {
+      throw std::invalid_argument("the gap between the tags is too small for " + board.family);
+    }
+    const Eigen::Vector2d corner_m =
+        tag.corners_m[3] - Eigen::Vector2d::Constant(pattern.outside * bit_m);
+    for (int row = 0; row < pattern.width(); ++row) {
+      for (int col = 0; col < pattern.width(); ++col) {
+        if (pattern.white[pattern.index(col, row)]) continue;
+        cairo_rectangle(context, corner_m.x() + col * bit_m, corner_m.y() + row * bit_m, bit_m,
+                        bit_m);
+      }
+    }
+  }
+  cairo_fill(context);
+}
+
+std::string in_mm(double length_m) {
+  constexpr double um_per_m = 1e6, um_per_mm = 1e3;
+  return shortest(std::round(length_m * um_per_m) / um_per_mm) + " mm";
+}
+
+std::string parameters_of(const Board& board) {
+  std::string text = board.family + ", ";
+  text.append(std::to_string(board.cols)).append(" x ").append(std::to_string(board.rows));
+  text.append(" tags of ").append(in_mm(board.tag_size_m)).append(", gap ");
+  text.append(in_mm(board.tag_size_m * board.tag_spacing)).append(", ids from ");
+  text.append(std::to_string(board.first_id)).append(", ").append(name_of(board.id_order));
+  if (board.border_bits == 2) text += ", Kalibr AprilGrid";
+  return text;
+}
+
+void draw_footer(cairo_t* context, const Board& board) {
+  constexpr double ruler_m = 0.1, thin_m = 0.0002, tick_m = 0.003, text_m = 0.003;
+  constexpr int ticks = 10;
+  cairo_set_line_width(context, thin_m);
+  for (int i = 0; i <= ticks; ++i) {
+    cairo_move_to(context, i * ruler_m / ticks, 0);
+    cairo_line_to(context, i * ruler_m / ticks, i % 5 == 0 ? 2 * tick_m : tick_m);
+  }
+  cairo_move_to(context, 0, 0);
+  cairo_line_to(context, ruler_m, 0);
+  cairo_stroke(context);
+  cairo_select_font_face(context, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  cairo_set_font_size(context, text_m);
+  cairo_move_to(context, 0, 2 * tick_m + 1.2 * text_m);
+  cairo_show_text(context, "The ruler is 100 mm long; else print again at 100 %.");
+  cairo_move_to(context, 0, 2 * tick_m + 2.6 * text_m);
+  cairo_show_text(context, parameters_of(board).c_str());
+}
+
+cairo_status_t append(void* text, const unsigned char* bytes, unsigned int count) {
+  static_cast<std::string*>(text)->append(reinterpret_cast<const char*>(bytes), count);
+  return CAIRO_STATUS_SUCCESS;
+}
+
+}  // namespace
+
+const std::vector<Paper>& papers() {
+  static const std::vector<Paper> all{{"A4", {0.210, 0.297}}, {"A3", {0.297, 0.420}},
+                                      {"A2", {0.420, 0.594}}, {"A1", {0.594, 0.841}},
+                                      {"A0", {0.841, 1.189}}, {"Letter", {0.2159, 0.2794}}};
+  return all;
+}
+
+std::optional<double> largest_tag_m(const Board& board, const Paper& paper) {
+  constexpr int least_mm = 5, most_mm = 1000;
+  Board tried = board;
+  for (int size_mm = most_mm; size_mm >= least_mm; --size_mm) {
+    tried.tag_size_m = size_mm / 1000.0;
+    if (sheet_for(tried, paper)) return tried.tag_size_m;
+  }
+  return {};
+}
+
+std::string board_pdf(const Board& board, const Paper& paper) {
+  const auto sheet_m = sheet_for(board, paper);
+  if (!sheet_m) {
+    const Eigen::Vector2d needed_m = print_m(board);
+    throw std::invalid_argument("the board is " + in_mm(needed_m.x()) + " x " +
+                                in_mm(needed_m.y()) + " and does not fit on " + paper.name);
+  }
+  std::string bytes;
+  {
+    const Surface surface(
+        cairo_pdf_surface_create_for_stream(append, &bytes, sheet_m->x() * kPointsPerMetre,
+                                            sheet_m->y() * kPointsPerMetre),
+        cairo_surface_destroy);
+    // Else the time of day would be in it.
+    cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE,
+                                   "2000-01-01T00:00:00Z");
+    const Context context(cairo_create(surface.get()), cairo_destroy);
+    cairo_scale(context.get(), kPointsPerMetre, kPointsPerMetre);
+    cairo_save(context.get());
+    const Eigen::Vector2d room_m = *sheet_m - Eigen::Vector2d(0, kFooter_m);
+    const Eigen::Vector2d begin_m = (room_m - tag_field_m(board)) / 2;
+    cairo_translate(context.get(), begin_m.x(), begin_m.y());
+    draw_board(context.get(), board);
+    cairo_restore(context.get());
+    cairo_translate(context.get(), 2 * kMargin_m, sheet_m->y() - kFooter_m);
+    draw_footer(context.get(), board);
+    cairo_show_page(context.get());
+    cairo_surface_finish(surface.get());
+    if (cairo_surface_status(surface.get()) != CAIRO_STATUS_SUCCESS) {
+      throw std::runtime_error("the board cannot be drawn");
+    }
+  }
+  return bytes;
+}
+
+}  // namespace vlp
