@@ -21,7 +21,4 @@ namespace vlp {
 std::optional<Light> glow_of(const cv::Mat& image, const Blob& blob, const Background& background,
                              const LightShape& shape);
 
-/// The lines' brightness over what it would be without stripes, where that is not lost in the dark.
-std::vector<double> without_glow(const std::vector<double>& signal);
-
 }  // namespace vlp

@@ -8,6 +8,7 @@
 
 #include "detection/background.h"
 #include "detection/glow.h"
+#include "detection/glow_envelope.h"
 #include "detection/lines.h"
 #include "detection/runs.h"
 #include "geometry/frames.h"

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "detection/glow_envelope.h"
 #include "detection/lamp_detector.h"
 #include "drawn_lamp.h"
 #include "support/near.h"
