@@ -1,0 +1,154 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/intrinsics_plot.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "captures/csv_writer.h"
+#include "evaluation/gnuplot.h"
+#include "evaluation/round_numbers.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kDigits = 7;
+
+std::string data_row(std::initializer_list<double> values) {
+  std::string row;
+  for (const double value : values) row += significant(value, kDigits) + " ";
+  return row + "\n";
+}
+
+/// The data, in blocks: corners and outliers as u v du dv, and the map as u v sd.
+std::string data_of(const IntrinsicsPlot& plot) {
+  std::string corners, outliers, map;
+  for (const auto& [seen_px, residual_px, outlier] : plot.corners) {
+    (outlier ? outliers : corners) +=
+        data_row({seen_px.x(), seen_px.y(), residual_px.x(), residual_px.y()});
+  }
+  const auto [width, height] = plot.imager_px;
+  const auto cols = static_cast<std::size_t>(plot.cols), rows = plot.sd_px.size() / cols;
+  for (std::size_t row = 0; row < rows; ++row) {
+    const double v = (height - 1) * double(row) / double(rows - 1);
+    for (std::size_t col = 0; col < cols; ++col) {
+      const double u = (width - 1) * double(col) / double(cols - 1);
+      const double sd_px = plot.sd_px[row * cols + col];
+      map += std::isfinite(sd_px)
+                 ? data_row({u, v, sd_px})
+                 : significant(u, kDigits) + " " + significant(v, kDigits) + " NaN\n";
+    }
+    map += "\n";
+  }
+  return "$corners << END\n" + corners + "END\n$outliers << END\n" + outliers +
+         "END\n$map << END\n" + map + "END\n";
+}
+
+/// A layer of corners, and one of outliers where there are any.
+std::string layers(const IntrinsicsPlot& plot, const std::string& of_corners,
+                   const std::string& of_outliers) {
+  const auto outliers = std::count_if(plot.corners.begin(), plot.corners.end(),
+                                      [](const auto& corner) { return corner.outlier; });
+  const auto used = static_cast<std::ptrdiff_t>(plot.corners.size()) - outliers;
+  std::string layers = "plot $corners " + of_corners + " linecolor rgb '#3b528b' title '" +
+                       std::to_string(used) + " corners'";
+  if (outliers > 0) {
+    layers += ", $outliers " + of_outliers + " linecolor rgb '#d55e00' title '" +
+              std::to_string(outliers) + " outliers'";
+  }
+  return layers + "\n";
+}
+
+double rms_px(const IntrinsicsPlot& plot) {
+  double squares = 0, count = 0;
+  for (const auto& corner : plot.corners) {
+    if (corner.outlier) continue;
+    squares += corner.residual_px.squaredNorm();
+    count += 2;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
+/// Colours by the logarithm, and lines at round numbers.
+std::string map_of(const IntrinsicsPlot& plot) {
+  double least = INFINITY, most = 0;
+  for (const double sd_px : plot.sd_px) {
+    if (!std::isfinite(sd_px) || !(sd_px > 0)) continue;
+    least = std::min(least, sd_px);
+    most = std::max(most, sd_px);
+  }
+  if (most == 0) return "plot NaN title 'not determined'\n";
+  const auto levels = round_numbers(least, most);
+  std::string tics, lines;
+  for (const double level : levels) {
+    const std::string text = significant(level, kDigits);
+    tics.append(tics.empty() ? "" : ",").append(text);
+    if (level > least && level < most) lines.append(lines.empty() ? "" : ",").append(text);
+  }
+  std::string commands;
+  if (!lines.empty()) {
+    commands = "set contour base\nunset surface\nset cntrparam levels discrete " + lines +
+               "\nset table $lines\nsplot $map using 1:2:3\nunset table\nunset contour\n";
+  }
+  const auto rows = plot.sd_px.size() / static_cast<std::size_t>(plot.cols);
+  const std::string half_u = significant((plot.imager_px[0] - 1) / 2.0 / (plot.cols - 1), kDigits),
+                    half_v = significant((plot.imager_px[1] - 1) / 2.0 / double(rows - 1), kDigits);
+  commands += "set cbrange [" + significant(levels.front(), kDigits) + ":" +
+              significant(levels.back(), kDigits) + "]\nset cbtics (" + tics +
+              ")\nset logscale cb\nset cblabel 'standard deviation (px)'\n"
+              "plot $map using 1:2:(" +
+              half_u + "):(" + half_v +
+              "):3 with boxxyerror fillstyle solid linecolor palette notitle";
+  if (!lines.empty()) {
+    commands +=
+        ", $lines using 1:2 with lines linewidth 1.5 linecolor rgb 'white' notitle"
+        ", $lines using 1:2:(sprintf('%g', $3)) every 1000::3 with labels boxed notitle";
+  }
+  return commands + "\n";
+}
+
+}  // namespace
+
+double residual_magnification(double rms_px, int width_px) {
+  return rms_px > 0 ? round_below(width_px / 40.0 / rms_px) : 1;
+}
+
+void draw_intrinsics_plot(const std::filesystem::path& picture, const IntrinsicsPlot& plot) {
+  assert(plot.cols >= 2 && plot.sd_px.size() >= 2 * static_cast<std::size_t>(plot.cols));
+  const auto [width, height] = plot.imager_px;
+  const std::string times = significant(residual_magnification(rms_px(plot), width), kDigits);
+  const std::string arrows =
+      "using 1:2:($3 * " + times + "):($4 * " + times + ") with vectors nohead ";
+  const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.25";
+  const std::string commands =
+      data_of(plot) +
+      "set encoding utf8\n"
+      "set size ratio -1\n"
+      "set xrange [-0.5:" +
+      significant(width - 0.5, kDigits) +
+      "]\n"
+      "set yrange [" +
+      significant(height - 0.5, kDigits) +
+      ":-0.5]\n"  // as in the image
+      "set tics out nomirror\n"
+      "set xlabel 'u (px)'\n"
+      "set ylabel 'v (px)'\n"
+      "set key below\n"
+      "set style textbox opaque noborder margins 0.5,0.5\n"
+      // Viridis: even in lightness, legible to the colour-blind and in grey.
+      "set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#fde725')\n"
+      "set multiplot layout 1,3 margins 0.05,0.93,0.16,0.86 spacing 0.06 title " +
+      gnuplot_quoted(plot.title) +
+      " noenhanced\n"
+      "set title 'corners of all views'\n" +
+      layers(plot, dots, "using 1:2 with points pointtype 2 pointsize 1.2 linewidth 2") +
+      "set title 'residuals, seen minus projected, drawn " + times +
+      " times as long, from a dot'\n" +
+      layers(plot, dots + " linecolor rgb '#3b528b' notitle, $corners " + arrows + "linewidth 0.7",
+             arrows + "linewidth 2") +
+      "set title 'uncertainty of the projection'\n" + map_of(plot) + "unset multiplot\n";
+  draw(picture, 1950, 150 + 560 * height / width, commands);
+}
+
+}  // namespace vlp

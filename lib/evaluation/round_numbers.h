@@ -1,0 +1,17 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+namespace vlp {
+
+/// The largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that is no larger, but for rounding.
+/// Precondition: value > 0.
+double round_below(double value);
+
+/// Those numbers in turn, two or more, from the last that is no larger than `least` to the first
+/// that is no smaller than `most`. Precondition: 0 < least <= most.
+std::vector<double> round_numbers(double least, double most);
+
+}  // namespace vlp
