@@ -15,8 +15,8 @@
 #include "calibration/camera_exports.h"
 #include "calibration/mrcal_files.h"
 #include "detect_folder.h"
-#include "geometry/angles.h"
 #include "history.h"
+#include "print_intrinsics.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/stage.h"
@@ -26,8 +26,8 @@ namespace {
 
 struct Options {
   std::vector<std::string> images;
-  std::string board, output, cache, ros, kalibr, opencv, camera_id = "camera",
-                                                         lens = "LENSMODEL_OPENCV8";
+  std::string board, output, cache, ros, kalibr, opencv, plot, camera_id = "camera",
+                                                               lens = "LENSMODEL_OPENCV8";
   std::optional<double> row_time_s, pixel_pitch_m;
   int threads = all_cores();
   int held_out = 0;
@@ -97,32 +97,6 @@ Camera camera_of(const Options& options, const BoardProblem& problem) {
   return camera;
 }
 
-void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
-                   const ViewCoverage& coverage, const HeldOut& held_out) {
-  const auto& parameters = solution.problem.intrinsics;
-  fmt::print("views         {} used, {} dropped\n", solution.views.size(), solution.dropped.size());
-  fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
-  fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
-  fmt::print("focal length  {:.2f}, {:.2f} px, sd {:.2f}\ncentre        {:.2f}, {:.2f} px\n",
-             parameters[0], parameters[1], report.focal_sd_px, parameters[2], parameters[3]);
-  fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst, at ({:.0f}, {:.0f})\n",
-             report.uncertainty_mean_px, report.uncertainty_worst_px,
-             report.uncertainty_worst_at.x(), report.uncertainty_worst_at.y());
-  if (report.halves) {
-    fmt::print("halves        {:.3f} px rms apart per axis, {:.3f} px worst\n",
-               report.halves->rms_px, report.halves->worst_px);
-  }
-  if (held_out.views > 0) {
-    fmt::print("held out      {} views, {} corners, {:.3f} px rms per axis\n", held_out.views,
-               held_out.corners, held_out.rms_px);
-  }
-  const auto& [left, right, upper, lower] = coverage.tilts_rad;
-  fmt::print("coverage      {:.0f} % of the image\n", 100 * coverage.share);
-  fmt::print("tilts         left {:.0f}, right {:.0f}, upper {:.0f}, lower {:.0f} degrees\n",
-             deg_from_rad(left), deg_from_rad(right), deg_from_rad(upper), deg_from_rad(lower));
-  fmt::print("next view     {}\n", next_view(coverage));
-}
-
 IntrinsicsGates gates_of(const Options& options) {
   IntrinsicsGates gates;
   for (const auto& [name, value] : options.gates) {
@@ -148,9 +122,9 @@ void run(const CLI::App& app, const Options& options) {
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
-  for (const std::string& output :
-       {options.output, beside(options.output, ".cameramodel"),
-        beside(options.output, ".corners.vnl"), options.ros, options.kalibr, options.opencv}) {
+  for (const std::string& output : {options.output, beside(options.output, ".cameramodel"),
+                                    beside(options.output, ".corners.vnl"), options.ros,
+                                    options.kalibr, options.opencv, options.plot}) {
     check_output(output, inputs);
   }
   const Board board = read_board(options.board);
@@ -168,6 +142,9 @@ void run(const CLI::App& app, const Options& options) {
   write_exports(options, camera_of(options, solution.problem));
   write_cameramodel(beside(options.output, ".cameramodel"), solution);
   write_corners(beside(options.output, ".corners.vnl"), solution, input.names);
+  if (!options.plot.empty()) {
+    draw_solution(options.plot, fmt::format("{}, {}", options.camera_id, options.lens), solution);
+  }
   print_summary(solution, report, coverage, held_out_fit(solution, input.held_out));
   const auto failed = gates_not_met(gates_of(options), solution, report);
   std::string all;
@@ -233,6 +210,13 @@ int main(int argc, char** argv) {
   app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
   app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");
   app.add_option("--opencv", options.opencv, "Write the camera for OpenCV, too (FileStorage)");
+  app.add_option("--plot", options.plot,
+                 "Draw the corners, their residuals and the uncertainty over the image, .png or "
+                 ".svg")
+      ->check([](const std::string& name) {
+        const bool known = name.ends_with(".png") || name.ends_with(".svg");
+        return known ? std::string() : "a picture's name should end in .png or .svg";
+      });
   app.add_option("--cache", options.cache,
                  "Folder to keep the corners of each image in, for the next time");
   app.add_option("--threads", options.threads, "Images at a time (default: one a core)")

@@ -81,6 +81,16 @@ TEST_P(RenderedRig, GivesItsLensWhateverTheThreads) {
     EXPECT_EQ(content("camera.corners.vnl"), corners);
   }
   fs::copy(folder / "camera.cameramodel", folder / "first.cameramodel");
+  // Pictures, which change nothing in the calibration, not even its history.
+  for (const std::string name : {"plot.png", "plot.svg"}) {
+    const auto drawn = calibrate(rig + "/boards", board,
+                                 "--cache " + cache + " --plot " + (folder / name).string());
+    EXPECT_EQ(drawn.exit_code, 0);
+    EXPECT_EQ(drawn.errors, "");  // gnuplot says nothing either
+    EXPECT_EQ(content("camera.yaml"), yaml);
+  }
+  EXPECT_TRUE(content("plot.png").starts_with("\x89PNG"));
+  EXPECT_THAT(content("plot.svg"), HasSubstr("standard deviation (px)"));
   // A gate that is not met: everything is written all the same.
   const auto gated = calibrate(rig + "/boards", board,
                                "--gate uncertainty_px=0.001 --held-out 6 --cache " + cache);
@@ -181,6 +191,7 @@ TEST_F(IntrinsicsProgram, RefusesBadOptions) {
   EXPECT_EQ(calibrate(images, board, "--gate mean=3").exit_code, 2);
   EXPECT_EQ(calibrate(images, board, "--gate rms_px=no").exit_code, 2);
   EXPECT_EQ(calibrate(images, board, "--lens FISHEYE").exit_code, 2);
+  EXPECT_EQ(calibrate(images, board, "--plot plot.gif").exit_code, 2);
   EXPECT_EQ(calibrate(images, board, "--held-out 1").exit_code, 2);
   EXPECT_EQ(calibrate(images + "/missing.png", board).exit_code, 2);
 }

@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "print_intrinsics.h"
+
+#include <fmt/core.h>
+
+#include "calibration/projection_uncertainty.h"
+#include "evaluation/intrinsics_plot.h"
+#include "geometry/angles.h"
+
+namespace vlp {
+
+void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
+                   const ViewCoverage& coverage, const HeldOut& held_out) {
+  const auto& parameters = solution.problem.intrinsics;
+  fmt::print("views         {} used, {} dropped\n", solution.views.size(), solution.dropped.size());
+  fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
+  fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
+  fmt::print("focal length  {:.2f}, {:.2f} px, sd {:.2f}\ncentre        {:.2f}, {:.2f} px\n",
+             parameters[0], parameters[1], report.focal_sd_px, parameters[2], parameters[3]);
+  fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst, at ({:.0f}, {:.0f})\n",
+             report.uncertainty_mean_px, report.uncertainty_worst_px,
+             report.uncertainty_worst_at.x(), report.uncertainty_worst_at.y());
+  if (report.halves) {
+    fmt::print("halves        {:.3f} px rms apart per axis, {:.3f} px worst\n",
+               report.halves->rms_px, report.halves->worst_px);
+  }
+  if (held_out.views > 0) {
+    fmt::print("held out      {} views, {} corners, {:.3f} px rms per axis\n", held_out.views,
+               held_out.corners, held_out.rms_px);
+  }
+  const auto& [left, right, upper, lower] = coverage.tilts_rad;
+  fmt::print("coverage      {:.0f} % of the image\n", 100 * coverage.share);
+  fmt::print("tilts         left {:.0f}, right {:.0f}, upper {:.0f}, lower {:.0f} degrees\n",
+             deg_from_rad(left), deg_from_rad(right), deg_from_rad(upper), deg_from_rad(lower));
+  fmt::print("next view     {}\n", next_view(coverage));
+}
+
+void draw_solution(const std::filesystem::path& picture, const std::string& title,
+                   const IntrinsicsSolution& solution) {
+  const BoardProblem& problem = solution.problem;
+  IntrinsicsPlot plot{title, problem.imager_px, {}, 0, {}};
+  const auto residuals_px = residuals_of(problem);
+  for (std::size_t i = 0; i < residuals_px.size(); ++i) {
+    if (!residuals_px[i].allFinite()) continue;
+    const Eigen::Vector3d& point = problem.points[i];
+    plot.corners.push_back({point.head<2>(), residuals_px[i], point.z() <= 0});
+  }
+  const ProjectionUncertainty uncertainty(solution);
+  for (const Eigen::Vector2d& pixel : pixel_grid(problem.imager_px)) {
+    if (pixel.y() == 0) ++plot.cols;
+    plot.sd_px.push_back(uncertainty.worst_px(pixel));
+  }
+  draw_intrinsics_plot(picture, plot);
+}
+
+}  // namespace vlp
