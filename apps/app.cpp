@@ -56,6 +56,13 @@ void check_output(const std::string& output, const std::vector<std::string>& inp
   }
 }
 
+void check_plot(const std::string& plot, const std::string& output,
+                const std::vector<std::string>& inputs) {
+  if (plot.empty()) return;
+  check_output(plot, inputs);
+  if (plot == output) throw std::invalid_argument("--output and --plot name one file");
+}
+
 int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run) {
   bool quiet = false, verbose = false;
   auto* quiet_flag = app.add_flag("-q,--quiet", quiet, "Only errors on stderr, nothing on stdout");

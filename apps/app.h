@@ -31,6 +31,10 @@ CLI::Validator finite_not_negative();
 /// Throws std::invalid_argument when `output` is one of the files that are read.
 void check_output(const std::string& output, const std::vector<std::string>& inputs);
 
+/// The same of a picture, which may be none, and must not be the output.
+void check_plot(const std::string& plot, const std::string& output,
+                const std::vector<std::string>& inputs);
+
 /// The common shell of a program: adds --quiet, --verbose and --version to `app`, parses, and calls
 /// `run`. Messages go through spdlog to stderr. Bad usage and bad input end with one line and
 /// exit code 2, Undetermined with 3, GateNotMet with 1.

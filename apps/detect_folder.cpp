@@ -31,8 +31,10 @@ bool has(const LampMap& lamps, int id) {
 
 void check_row_time(const DetectOptions& options, const DetectorCamera& camera) {
   if (!camera.row_time_s) {
-    throw InputError(options.calibration,
-                     "camera.row_time_s is missing: without it no stripe tells its lamp");
+    throw InputError(
+        options.calibration,
+        "camera.row_time_s is missing: without it no stripe tells its lamp; --row-time-s of "
+        "vlp-intrinsics states it, vlp-train --row-time finds it");
   }
 }
 

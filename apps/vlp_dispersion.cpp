@@ -141,7 +141,7 @@ void run(const CLI::App& app, const Options& options) {
   std::vector<std::string> inputs = inputs_of(options.detect);
   inputs.push_back(table);
   check_output(options.detect.output, inputs);
-  check_output(options.plot, inputs);
+  check_plot(options.plot, options.detect.output, inputs);
   const LampMap lamps = read_lamp_map(options.detect.lamps);
   const Calibration calibration = read_calibration(options.detect.calibration);
   const auto frames = frames_of(options.detect, lamps, calibration);

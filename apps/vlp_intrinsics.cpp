@@ -17,6 +17,7 @@
 #include "detect_folder.h"
 #include "history.h"
 #include "print_intrinsics.h"
+#include "readout_option.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/stage.h"
@@ -28,6 +29,7 @@ struct Options {
   std::vector<std::string> images;
   std::string board, output, cache, ros, kalibr, opencv, plot, camera_id = "camera",
                                                                lens = "LENSMODEL_OPENCV8";
+  std::optional<Readout> readout;
   std::optional<double> row_time_s, pixel_pitch_m;
   int threads = all_cores();
   int held_out = 0;
@@ -87,13 +89,8 @@ IntrinsicsReport report_of(const IntrinsicsSolution& solution, const IntrinsicsI
 }
 
 Camera camera_of(const Options& options, const BoardProblem& problem) {
-  Camera camera{options.camera_id,
-                problem.imager_px,
-                problem.lens_model,
-                problem.intrinsics,
-                options.pixel_pitch_m,
-                options.row_time_s,
-                {}};
+  Camera camera{options.camera_id,     problem.imager_px,  problem.lens_model, problem.intrinsics,
+                options.pixel_pitch_m, options.row_time_s, options.readout};
   return camera;
 }
 
@@ -176,7 +173,8 @@ int main(int argc, char** argv) {
       "how far the result can be trusted. Exit code 1 when it is worse than the gates allow.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only boards -o out/rig\n"
-      "  build/bin/vlp-intrinsics out/rig/boards/*.png --board out/rig/board.yaml -o camera.yaml\n",
+      "  build/bin/vlp-intrinsics out/rig/boards/*.png --board out/rig/board.yaml \\\n"
+      "    --row-time-s 3e-5 --readout rows -o camera.yaml\n",
       "vlp-intrinsics");
   vlp::Options options;
   app.add_option("images", options.images, "Images of the board, or folders of them")->required();
@@ -192,8 +190,10 @@ int main(int argc, char** argv) {
                                                : "the models are: " + vlp::lens_model_names();
       });
   app.add_option("--row-time-s", options.row_time_s,
-                 "Time from one row of the read-out to the next, for vlp-detect")
+                 "Time from one row of the read-out to the next, which every program that finds "
+                 "lamps needs; vlp-train --row-time finds it, too")
       ->check(CLI::Range(1e-8, 1e-3));
+  vlp::add_readout_option(app, options.readout);
   app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Width of a pixel")
       ->check(CLI::Range(1e-7, 1e-4));
   app.add_option("--held-out", options.held_out,

@@ -144,7 +144,7 @@ void run(const CLI::App& app, const Options& options) {
   }
   const std::vector<std::string> inputs = inputs_of(options.detect);
   check_output(options.detect.output, inputs);
-  if (!options.plot.empty()) check_output(options.plot, inputs);
+  check_plot(options.plot, options.detect.output, inputs);
   const LampMap lamps = read_lamp_map(options.detect.lamps);
   const Calibration calibration = read_calibration(options.detect.calibration);
   const Camera& camera = calibration.camera;
@@ -152,13 +152,14 @@ void run(const CLI::App& app, const Options& options) {
   const RotationFit fit = kMethods.at(options.method)(spot, camera);
   if (!fit.converged) {
     throw Undetermined(
-        "no rotation centre fits the captures: add captures over more of the turn, with more of "
-        "the lamps in view");
+        "no rotation centre fits the captures: take them on one spot at each height, over more of "
+        "the turn, with more of the lamps in view, and see that lens and lamp map are right");
   }
   const CircleCenters circles = fit_circle_centers(spot, camera);
-  write_calibration(options.detect.output,
-                    with_rotation_center(calibration, fit.center, history_entry(app, inputs)));
+  HistoryEntry entry = history_entry(app, inputs);
   if (!options.plot.empty()) draw_plot(options, spot, circles, fit, camera);
+  write_calibration(options.detect.output,
+                    with_rotation_center(calibration, fit.center, std::move(entry)));
   print_summary(fit, spot, circles, camera);
   report_noise(fit, spot);
 }

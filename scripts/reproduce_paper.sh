@@ -25,8 +25,8 @@ for program in simulate detect rotation dispersion locate; do
     exit 2
   fi
 done
-mkdir -p "$out"
-log=$out/log.txt
+mkdir -p out
+log=$out.log
 : >"$log"
 vlp() {  # PROGRAM ARGUMENT...
   if ! build/bin/vlp-"$1" --quiet "${@:2}" 2>>"$log"; then

@@ -144,11 +144,32 @@ void fit_paper(DispersionFit& fit, const StationFixes& station, const Eigen::Vec
   apply(fit, station, used, kind);
 }
 
+/// Of the yaws whatever single fix is left out: one alone is not to tell camera from world.
+double yaw_variety_without_one(const Fixes& fixes, std::vector<bool> used) {
+  double least = 1;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!fixes[i] || !used[i]) continue;
+    used[i] = false;
+    least = std::min(least, typical_of(fixes, used).yaw_variety());
+    used[i] = true;
+  }
+  return least;
+}
+
 void fit_camera(DispersionFit& fit, const StationFixes& station, bool noise_is_stated,
                 DispersionCircle kind) {
   const auto separation = separate_offsets(station);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
+    return;
+  }
+  const Fixes fixes = station.at({0, 0});
+  if (typical_of(fixes, separation->used).count < 3) {
+    fit.status = DispersionStatus::too_few_captures;
+    return;
+  }
+  if (yaw_variety_without_one(fixes, separation->used) < std::sin(kOneYaw_rad)) {
+    fit.status = DispersionStatus::one_yaw;
     return;
   }
   const double excess = noise_is_stated ? std::max(1.0, separation->excess) : separation->excess;
@@ -170,14 +191,17 @@ std::string_view explanation_of(DispersionStatus status) {
     case DispersionStatus::no_fix:
       return "no capture has a fix";
     case DispersionStatus::too_few_captures:
-      return "too few captures have a fix: three or more are needed (two for --method paper); add "
-             "captures";
+      return "too few captures have a fix that agrees with the others: three or more are needed "
+             "(two "
+             "for --method paper); add captures";
     case DispersionStatus::station_far:
       return "every fix is farther from the station than a fifth of the lamps' height: is it in "
              "metres, and in the frame of the lamp map? Are these the captures taken there?";
     case DispersionStatus::one_yaw:
-      return "all captures are at one yaw, where an error of the camera and one of the station or "
-             "the lamp map look alike: turn the camera at the station and add those captures, or "
+      return "all captures, or all but one, are at one yaw, where an error of the camera and one "
+             "of "
+             "the station or the lamp map look alike: turn the camera at the station and add those "
+             "captures, or "
              "take --method paper, which supposes that station and map are right";
     case DispersionStatus::many_yaws:
       return "the captures are at different yaws, over which the paper's circle averages the "

@@ -3,6 +3,7 @@
 #include "calibration/turning_axis.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
@@ -87,6 +88,11 @@ RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera) {
     result.center.lever_arm_covariance = fit.covariance(state.lever_arm_m.data());
   }
   describe(result, fit, spot);
+  // The method is exact: what is left is noise, or the captures are of no turn about one axis.
+  constexpr double most_share = 0.01, most_times = 5;
+  const double most_px =
+      std::max(most_share * camera.intrinsics[0], most_times * spot.stated_px.value_or(0));
+  if (result.residual_px > most_px) return {};
   result.yaws_rad = std::move(state.yaws_rad);
   return result;
 }

@@ -23,16 +23,20 @@ std::string points(const std::string& name, const std::vector<Eigen::Vector2d>& 
   return block + "END\n";
 }
 
+/// With the corners of the box around, because gnuplot's ranges leave circles out.
 std::string circle(const std::string& name, const Circle& circle_m) {
+  const Eigen::Vector2d half(circle_m.radius, circle_m.radius);
+  const std::vector<Eigen::Vector2d> corners{circle_m.center - half, circle_m.center + half};
   return "$" + name + " << END\n" + mm(circle_m.center.x()) + " " + mm(circle_m.center.y()) + " " +
-         mm(circle_m.radius) + "\nEND\n";
+         mm(circle_m.radius) + "\nEND\n" + points(name + "_box", corners);
 }
 
 /// Points with their circle and its centre, for the plot command.
 std::string layer(const std::string& name, const std::string& color, const std::string& title) {
   const std::string style = " linecolor rgb '" + color + "' ";
   return "$" + name + "_circle using 1:2:3 with circles linewidth 1.5" + style + "notitle, " + "$" +
-         name + "_circle using 1:2 with points pointtype 2 pointsize 1.5 linewidth 2" + style +
+         name + "_circle_box using 1:2 with points pointtype -1 notitle, $" + name +
+         "_circle using 1:2 with points pointtype 2 pointsize 1.5 linewidth 2" + style +
          "notitle, $" + name + " using 1:2 with points pointtype 7 pointsize 0.8" + style +
          "title '" + title + "'";
 }

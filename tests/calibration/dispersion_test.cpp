@@ -129,6 +129,11 @@ TEST(DispersionRefusal, SaysWhatIsWrongOrToAdd) {
   EXPECT_EQ(status_of({turned[0]}, DispersionMethod::paper), DispersionStatus::too_few_captures);
   EXPECT_EQ(status_of(turned, DispersionMethod::paper), DispersionStatus::many_yaws);
   EXPECT_EQ(status_of(station.captures_at(1, 20)), DispersionStatus::one_yaw);
+  // One capture at another yaw, and that one wrong, is not to decide.
+  auto one_other = station.captures_at(1, 12);
+  one_other.push_back(station.captures_at(2.5, 1)[0]);
+  one_other.back().station_m.x() += 0.05;
+  EXPECT_EQ(status_of(one_other), DispersionStatus::one_yaw);
   auto far = turned;
   for (auto& capture : far) capture.station_m.x() += 1;
   EXPECT_EQ(status_of(far), DispersionStatus::station_far);

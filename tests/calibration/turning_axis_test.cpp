@@ -45,6 +45,16 @@ TEST(TurningAxis, IsExactWithoutALeverArmAtOneHeight) {
   }
 }
 
+TEST(TurningAxis, IsRefusedWhenHalfOfTheCapturesAreFromElsewhere) {
+  SpotScene scene, elsewhere;
+  elsewhere.axis_m.x() += 0.07;
+  auto frames = scene.frames(0.1);
+  const auto others = elsewhere.frames(0.1);
+  for (std::size_t i = 0; i < frames.size(); i += 2) frames[i].detections = others[i].detections;
+  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
+  EXPECT_TRUE(spot.status != SpotStatus::ok || !fit_turning_axis(spot, scene.camera).converged);
+}
+
 TEST(TurningAxis, IsExactWithAnyLeverArmAtTwoHeights) {
   for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
     for (const Eigen::Vector2d& lever_arm_m :
