@@ -24,10 +24,15 @@ bool any_above(const cv::Mat& tile, double threshold) {
   return brightest > threshold;
 }
 
+std::size_t index_of(const cv::Size& tiles, int row, int column) {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(tiles.width) +
+         static_cast<std::size_t>(column);
+}
+
 /// Tiles with something bright, and those around them, where outlines are seen from outside.
 std::vector<bool> tiles_to_turn(const cv::Mat& image, const cv::Size& tiles, double threshold) {
   const cv::Rect all({0, 0}, image.size());
-  std::vector<bool> turn(static_cast<std::size_t>(tiles.area()));
+  std::vector<bool> turn(index_of(tiles, tiles.height, 0));
   for (int row = 0; row < tiles.height; ++row) {
     for (int column = 0; column < tiles.width; ++column) {
       const cv::Mat tile = image(cv::Rect(column * kTile, row * kTile, kTile, kTile) & all);
@@ -36,7 +41,7 @@ std::vector<bool> tiles_to_turn(const cv::Mat& image, const cv::Size& tiles, dou
       if (!lit) continue;
       for (int r = std::max(0, row - 1); r <= std::min(tiles.height - 1, row + 1); ++r) {
         for (int c = std::max(0, column - 1); c <= std::min(tiles.width - 1, column + 1); ++c) {
-          turn[static_cast<std::size_t>(r * tiles.width + c)] = true;
+          turn[index_of(tiles, r, c)] = true;
         }
       }
     }
@@ -54,7 +59,7 @@ cv::Mat lines_of(const cv::Mat& image, Readout readout, const Background& backgr
   cv::Mat lines(image.cols, image.rows, image.type(), cv::Scalar(std::round(background.level)));
   for (int row = 0; row < tiles.height; ++row) {
     for (int column = 0; column < tiles.width; ++column) {
-      if (!turn[static_cast<std::size_t>(row * tiles.width + column)]) continue;
+      if (!turn[index_of(tiles, row, column)]) continue;
       const cv::Rect tile = cv::Rect(column * kTile, row * kTile, kTile, kTile) & all;
       cv::Mat target = lines(cv::Rect(tile.y, tile.x, tile.height, tile.width));
       cv::transpose(image(tile), target);
