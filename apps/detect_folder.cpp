@@ -103,6 +103,16 @@ void check_frequencies(const LampMap& lamps, const std::string& lamps_file) {
   }
 }
 
+void check_lamps(const std::vector<Frame>& frames, const LampMap& lamps,
+                 const std::string& lamps_file) {
+  for (const Frame& frame : frames) {
+    for (const Detection& detection : frame.detections) {
+      if (has(lamps, detection.lamp)) return;
+    }
+  }
+  throw InputError(lamps_file, "has none of the lamps that the captures show");
+}
+
 int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
 
 void add_detect_options(CLI::App& app, DetectOptions& options) {

@@ -37,6 +37,10 @@ std::vector<std::string> inputs_of(const DetectOptions& options);
 /// Throws InputError when no lamp has a frequency.
 void check_frequencies(const LampMap& lamps, const std::string& lamps_file);
 
+/// Throws InputError when the map has none of the lamps that the captures show.
+void check_lamps(const std::vector<Frame>& frames, const LampMap& lamps,
+                 const std::string& lamps_file);
+
 /// Adds --classifier, --annotate, --readout and --exposure-s.
 void add_detect_options(CLI::App& app, DetectOptions& options);
 

@@ -5,28 +5,14 @@
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
-
 #include "app.h"
 #include "calibration/levelling.h"
 #include "history.h"
 #include "print_rotation.h"
-#include "rig/input_error.h"
 #include "rig/stage.h"
 
 namespace vlp {
 namespace {
-
-void check_lamps(const std::vector<Frame>& frames, const LampMap& map, const std::string& file) {
-  for (const Frame& frame : frames) {
-    for (const Detection& detection : frame.detections) {
-      const bool known = std::any_of(map.lamps.begin(), map.lamps.end(),
-                                     [&](const Lamp& lamp) { return lamp.id == detection.lamp; });
-      if (known) return;
-    }
-  }
-  throw InputError(file, "has none of the lamps that the captures show");
-}
 
 void print_corrections(const Levelling& result) {
   fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "moved by x y z (mm)", "sd (mm)");

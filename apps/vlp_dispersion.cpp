@@ -68,18 +68,6 @@ std::vector<StationCapture> at_station(const std::vector<Frame>& frames, const O
   return captures;
 }
 
-void check_lamps(const std::vector<StationCapture>& captures, const LampMap& lamps,
-                 const std::string& lamps_file) {
-  for (const StationCapture& capture : captures) {
-    for (const Detection& detection : capture.detections) {
-      for (const Lamp& lamp : lamps.lamps) {
-        if (lamp.id == detection.lamp) return;
-      }
-    }
-  }
-  throw InputError(lamps_file, "has none of the lamps that the captures show");
-}
-
 void check(const DispersionFit& fit) {
   switch (fit.status) {
     case DispersionStatus::ok:
@@ -145,8 +133,8 @@ void run(const CLI::App& app, const Options& options) {
   const LampMap lamps = read_lamp_map(options.detect.lamps);
   const Calibration calibration = read_calibration(options.detect.calibration);
   const auto frames = frames_of(options.detect, lamps, calibration);
+  check_lamps(frames, lamps, options.detect.lamps);
   const auto captures = at_station(frames, options, table);
-  check_lamps(captures, lamps, options.detect.lamps);
   const DispersionFit fit = fit_dispersion(
       captures, lamps, calibration, kMethods.at(options.method), kCircles.at(options.circle));
   check(fit);

@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluation/rotation_plot.h"
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <set>
+
 #include "captures/csv_writer.h"
 #include "evaluation/gnuplot.h"
 
@@ -15,14 +19,36 @@ std::string data_row(std::initializer_list<double> values) {
   return row + "\n";
 }
 
+/// Ranges of one length that show the whole box, v downwards as in the image.
+std::string square_around(const Eigen::AlignedBox2d& box) {
+  constexpr double margin = 0.1, least_px = 1e-3;
+  const Eigen::Vector2d center = box.center();
+  const double half = (0.5 + margin) * std::max(box.sizes().maxCoeff(), least_px);
+  const auto range = [](double from, double to) {
+    constexpr int digits = 7;
+    return "[" + significant(from, digits) + ":" + significant(to, digits) + "]\n";
+  };
+  return "set xrange " + range(center.x() - half, center.x() + half) + "set yrange " +
+         range(center.y() + half, center.y() - half);
+}
+
 }  // namespace
 
 void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot& plot) {
-  std::string places, ellipses;
+  std::string places, ellipses, labels;
+  std::set<int> labelled;
+  Eigen::AlignedBox2d image, centers(plot.rotation_center_px);
+  centers.extend(plot.principal_point_px);
   for (const auto& [lamp, places_px, center_px, radii_px] : plot.traces) {
     for (const auto& place : places_px) places += data_row({place.x(), place.y(), double(lamp)});
     ellipses +=
         data_row({center_px.x(), center_px.y(), 2 * radii_px.x(), 2 * radii_px.y(), double(lamp)});
+    // A lamp has one number, although it has an ellipse at each height.
+    if (labelled.insert(lamp).second) {
+      labels += data_row({center_px.x(), center_px.y(), double(lamp)});
+    }
+    image.extend(center_px - radii_px).extend(center_px + radii_px);
+    centers.extend(center_px);
   }
   const Eigen::Vector2d &axis = plot.rotation_center_px, &principal = plot.principal_point_px;
   const std::string marks =
@@ -31,13 +57,12 @@ void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot
       "$axis using 1:2 with points pointtype 2 pointsize 2 linewidth 2 linecolor rgb '#d1495b' "
       "title 'rotation centre'\n";
   const std::string commands =
-      "$places << END\n" + places + "END\n$ellipses << END\n" + ellipses + "END\n$axis << END\n" +
-      data_row({axis.x(), axis.y()}) + "END\n$principal << END\n" +
+      "$places << END\n" + places + "END\n$ellipses << END\n" + ellipses + "END\n$labels << END\n" +
+      labels + "END\n$axis << END\n" + data_row({axis.x(), axis.y()}) + "END\n$principal << END\n" +
       data_row({principal.x(), principal.y()}) +
       "END\n"
       "set encoding utf8\n"
       "set size ratio -1\n"
-      "set yrange [*:*] reverse\n"  // as in the image
       "set tics out nomirror\n"
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
@@ -47,15 +72,14 @@ void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot
       "set multiplot layout 1,2 title " +
       gnuplot_quoted(plot.title) +
       " noenhanced\n"
-      "set title 'lamps while turning, undistorted image'\n"
+      "set title 'lamps while turning, undistorted image'\n" +
+      square_around(image.extend(centers)) +
       "plot $ellipses using 1:2:3:4 with ellipses linecolor rgb '#999999' notitle, "
       "$places using 1:2:3 with points pointtype 7 pointsize 0.6 linecolor palette notitle, " +
-      marks +
-      "set title 'centres of the ellipses'\n"
-      "set offsets graph 0.15, graph 0.15, graph 0.15, graph 0.15\n"
+      marks + "set title 'centres of the ellipses'\n" + square_around(centers) +
       "plot $ellipses using 1:2:5 with points pointtype 6 pointsize 1.2 linewidth 2 linecolor "
       "palette notitle, "
-      "$ellipses using 1:2:(sprintf('%d', int($5))) with labels offset 0,0.9 notitle, " +
+      "$labels using 1:2:(sprintf('%d', int($3))) with labels left offset 0.8,0 notitle, " +
       marks + "unset multiplot\n";
   draw(picture, 1200, 620, commands);
 }
