@@ -9,10 +9,10 @@
 #include <opencv2/core/utility.hpp>
 
 #include "app.h"
-#include "calibration/board_check.h"
+#include "calibration/intrinsics/board_check.h"
 #include "corner_cache.h"
+#include "detection/boards/other_tags.h"
 #include "detection/image_file.h"
-#include "detection/other_tags.h"
 #include "progress.h"
 #include "rig/input_error.h"
 

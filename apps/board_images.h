@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "detection/detect_boards.h"
+#include "detection/boards/detect_boards.h"
 
 namespace vlp {
 

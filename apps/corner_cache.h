@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "detection/detect_boards.h"
+#include "detection/boards/detect_boards.h"
 
 namespace vlp {
 

@@ -4,7 +4,7 @@
 
 #include <fmt/core.h>
 
-#include "calibration/projection_uncertainty.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
 #include "evaluation/intrinsics_plot.h"
 #include "geometry/angles.h"
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "calibration/calibration_report.h"
+#include "calibration/intrinsics/calibration_report.h"
 
 namespace vlp {
 

@@ -4,7 +4,7 @@
 
 #include <fmt/core.h>
 
-#include "calibration/rotation_fit.h"
+#include "calibration/rotation/rotation_fit.h"
 #include "geometry/angles.h"
 
 namespace vlp {

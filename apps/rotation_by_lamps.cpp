@@ -6,7 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include "app.h"
-#include "calibration/levelling.h"
+#include "calibration/levelling/levelling.h"
 #include "history.h"
 #include "print_rotation.h"
 #include "rig/stage.h"

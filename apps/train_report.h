@@ -4,8 +4,8 @@
 
 #include <span>
 
-#include "detection/confusion.h"
-#include "detection/labelled_lights.h"
+#include "detection/identity/confusion.h"
+#include "detection/identity/labelled_lights.h"
 
 namespace vlp {
 

@@ -9,7 +9,7 @@
 #include <map>
 
 #include "app.h"
-#include "calibration/dispersion.h"
+#include "calibration/dispersion/dispersion.h"
 #include "captures/captures_table.h"
 #include "detect_folder.h"
 #include "evaluation/dispersion_plot.h"

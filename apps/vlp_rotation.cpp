@@ -9,9 +9,9 @@
 #include <string>
 
 #include "app.h"
-#include "calibration/circle_center.h"
-#include "calibration/joint_center.h"
-#include "calibration/turning_axis.h"
+#include "calibration/rotation/circle_center.h"
+#include "calibration/rotation/joint_center.h"
+#include "calibration/rotation/turning_axis.h"
 #include "detect_folder.h"
 #include "evaluation/rotation_plot.h"
 #include "geometry/angles.h"

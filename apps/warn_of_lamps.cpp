@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "detection/lamp_map_check.h"
+#include "detection/identity/lamp_map_check.h"
 
 namespace vlp {
 namespace {

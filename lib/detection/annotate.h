@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "detection/light.h"
+#include "detection/lights/light.h"
 #include "rig/calibration.h"
 
 namespace vlp {

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <utility>
 
-#include "detection/background.h"
-#include "detection/glow.h"
-#include "detection/glow_envelope.h"
-#include "detection/lines.h"
-#include "detection/runs.h"
+#include "detection/lights/background.h"
+#include "detection/lights/glow.h"
+#include "detection/lights/glow_envelope.h"
+#include "detection/lights/lines.h"
+#include "detection/lights/runs.h"
 #include "geometry/frames.h"
 
 namespace vlp {

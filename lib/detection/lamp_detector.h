@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "detection/lamp_classifier.h"
-#include "detection/light.h"
-#include "detection/light_parts.h"
-#include "detection/light_shape.h"
+#include "detection/identity/lamp_classifier.h"
+#include "detection/lights/light.h"
+#include "detection/lights/light_parts.h"
+#include "detection/lights/light_shape.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 

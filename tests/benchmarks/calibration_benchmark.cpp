@@ -3,8 +3,8 @@
 /// Boards found in an image, and lenses solved for.
 #include <benchmark/benchmark.h>
 
-#include "calibration/calibration_report.h"
-#include "calibration/synthetic_views.h"
+#include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/synthetic_views.h"
 #include "detection/image_file.h"
 
 namespace vlp {

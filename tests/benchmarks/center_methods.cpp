@@ -13,9 +13,9 @@
 #include <map>
 
 #include "captures/csv_reader.h"
-#include "detection/background.h"
 #include "detection/image_file.h"
 #include "detection/lamp_detector.h"
+#include "detection/lights/background.h"
 
 namespace vlp {
 namespace {

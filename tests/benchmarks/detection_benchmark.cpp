@@ -7,8 +7,8 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "detection/background.h"
 #include "detection/lamp_detector.h"
+#include "detection/lights/background.h"
 #include "simulation/exposure.h"
 #include "simulation/truth.h"
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Captures with other lights, glare, poor light and things in the way: a lamp may be missed when
 /// something hides it, but what is said to be a lamp is right.
-#include "rendered_captures.h"
+#include "detection/rendered_captures.h"
 
 namespace vlp {
 namespace {

@@ -10,8 +10,11 @@
 #include <optional>
 #include <vector>
 
-#include "detection/light_shape.h"
-#include "drawn_disc.h"
+#include "camera/lens.h"
+#include "detection/lamp_detector.h"
+#include "detection/lights/drawn_disc.h"
+#include "detection/lights/light_shape.h"
+#include "rig/lamp_map.h"
 #include "support/random.h"
 
 namespace vlp {

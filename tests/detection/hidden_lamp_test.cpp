@@ -4,8 +4,8 @@
 
 #include <numbers>
 
+#include "detection/drawn_lamp.h"
 #include "detection/lamp_detector.h"
-#include "drawn_lamp.h"
 
 namespace vlp {
 namespace {

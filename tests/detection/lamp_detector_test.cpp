@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <map>
 
-#include "rendered_captures.h"
+#include "detection/rendered_captures.h"
 
 namespace vlp {
 namespace {

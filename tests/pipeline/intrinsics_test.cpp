@@ -7,8 +7,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "calibration/projection_difference.h"
-#include "detection/board_detector.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "detection/boards/board_detector.h"
 #include "rig/board_layout.h"
 #include "rig/calibration.h"
 #include "support/program.h"

@@ -1,0 +1,139 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/dispersion/offset_separation.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+using Fixes = std::vector<std::optional<StationFixes::At>>;
+
+/// A fix's residual and its derivative by (offset_px, world_m), whitened.
+struct Equation {
+  std::size_t capture;
+  Eigen::Vector2d residual;
+  Eigen::Matrix<double, 2, 4> jacobian;
+};
+
+std::vector<Equation> linearize(const StationFixes& fixes, const OffsetSeparation& at) {
+  constexpr double step_px = 0.25;  // fixes are smooth over it, and far above their rounding
+  const Eigen::Vector2d along_u(step_px, 0), along_v(0, step_px);
+  const Fixes here = fixes.at(at.offset_px);
+  const Fixes right = fixes.at(at.offset_px + along_u), left = fixes.at(at.offset_px - along_u);
+  const Fixes down = fixes.at(at.offset_px + along_v), up = fixes.at(at.offset_px - along_v);
+  std::vector<Equation> equations;
+  equations.reserve(here.size());
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    if (!here[i] || !right[i] || !left[i] || !down[i] || !up[i]) continue;
+    const Eigen::LLT<Eigen::Matrix2d> factor(here[i]->covariance);
+    Eigen::Matrix<double, 2, 4> jacobian;
+    jacobian << (right[i]->error_m - left[i]->error_m) / (2 * step_px),
+        (down[i]->error_m - up[i]->error_m) / (2 * step_px), -Eigen::Matrix2d::Identity();
+    equations.push_back({i, factor.matrixL().solve(here[i]->error_m - at.world_m),
+                         factor.matrixL().solve(jacobian)});
+  }
+  return equations;
+}
+
+std::vector<double> squares_of(const std::vector<Equation>& equations) {
+  std::vector<double> squares;
+  squares.reserve(equations.size());
+  for (const Equation& equation : equations) squares.push_back(equation.residual.squaredNorm());
+  return squares;
+}
+
+/// One step of weighted least squares; nothing where that is not determined.
+std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
+                                       const std::vector<double>& weights, OffsetSeparation& at) {
+  Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
+  double chi_squared = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < equations.size(); ++i) {
+    const auto& [capture, residual, jacobian] = equations[i];
+    information += weights[i] * jacobian.transpose() * jacobian;
+    gradient -= weights[i] * jacobian.transpose() * residual;
+    chi_squared += weights[i] * residual.squaredNorm();
+    count += weights[i] > 0 ? 1 : 0;
+  }
+  const Eigen::LLT<Eigen::Matrix4d> factor(information);
+  const Eigen::Vector4d step = factor.solve(gradient);
+  if (factor.info() != Eigen::Success || !step.allFinite()) return std::nullopt;
+  at.offset_px += step.head<2>();
+  at.world_m += step.tail<2>();
+  at.covariance = information.inverse();
+  at.excess = count > 2 ? chi_squared / (2 * count - 4) : 0;
+  return step;
+}
+
+/// Close enough that what is off by more than five standard deviations can be told.
+bool approach(const StationFixes& fixes, OffsetSeparation& at) {
+  constexpr int iterations = 6;
+  constexpr double width_squared = 2.385 * 2.385;  // 95 % as good as least squares on normal noise
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    const auto equations = linearize(fixes, at);
+    if (equations.empty()) return false;
+    std::vector<double> weights = squares_of(equations);
+    const double variance = iteration == 0 ? 0 : robust_variance(weights);
+    for (double& one : weights) {
+      one = iteration == 0 ? 1 : 1 / (1 + one / (width_squared * variance));
+    }
+    if (!step_of(equations, weights, at)) return false;
+  }
+  return true;
+}
+
+/// Least squares without what contradicts the rest; whether that is another set than `at.used`.
+std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
+  constexpr int max_iterations = 30;
+  constexpr double small_px = 1e-7, small_m = 1e-10;
+  auto equations = linearize(fixes, at);
+  if (equations.empty()) return std::nullopt;
+  const auto squares = squares_of(equations);
+  const double limit = kOutlierVariances * robust_variance(squares);
+  std::vector<bool> used(at.used.size());
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    used[equations[i].capture] = squares[i] <= limit;
+  }
+  const bool changed = used != at.used;
+  at.used = std::move(used);
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    std::vector<double> weights;
+    weights.reserve(equations.size());
+    for (const Equation& equation : equations) weights.push_back(at.used[equation.capture] ? 1 : 0);
+    const auto step = step_of(equations, weights, at);
+    if (!step) return std::nullopt;
+    if (step->head<2>().norm() < small_px && step->tail<2>().norm() < small_m) return changed;
+    equations = linearize(fixes, at);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+double robust_variance(std::vector<double> squares) {
+  constexpr double rounding = 1e-24;
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  const double median_of_unit_variance = 2 * std::log(2.0);
+  return std::max(*middle / median_of_unit_variance, rounding);
+}
+
+std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes) {
+  OffsetSeparation result;
+  result.used.resize(fixes.at(result.offset_px).size());
+  if (!approach(fixes, result)) return std::nullopt;
+  constexpr int max_rounds = 10;
+  for (int round = 0; round < max_rounds; ++round) {
+    const auto changed = settle(fixes, result);
+    if (!changed) return std::nullopt;
+    if (!*changed) break;
+  }
+  return result;
+}
+
+}  // namespace vlp

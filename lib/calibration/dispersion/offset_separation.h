@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "calibration/dispersion/station_fixes.h"
+
+namespace vlp {
+
+/// What is wrong in the camera and what in the world, see fit_dispersion().
+struct OffsetSeparation {
+  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d world_m = Eigen::Vector2d::Zero();
+  /// Of both when the fixes scatter as their covariances say.
+  Eigen::Matrix4d covariance;
+  /// Squared residuals over what those let expect; zero when as many fixes as unknowns are used.
+  double excess;
+  /// Of each capture.
+  std::vector<bool> used;
+};
+
+/// Gauss-Newton on fix_k(offset) - station - world, the fixes' derivatives from differences; Cauchy
+/// weights first, then plain least squares without what is off by more than five standard
+/// deviations. Nothing when the captures do not determine it, or it does not converge.
+std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes);
+
+/// The variance per axis of a plane normal distribution, from the median of squared distances of
+/// which some are wrong; above zero, so that it can be divided by. Precondition: not empty.
+double robust_variance(std::vector<double> squares);
+
+/// A squared distance beyond this many variances contradicts the others.
+inline constexpr double kOutlierVariances = 25;
+
+}  // namespace vlp

@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calibration/dispersion/dispersion.h"
+
+namespace vlp {
+
+/// The fixes of captures at a station, as functions of the dispersion's offset.
+class StationFixes {
+ public:
+  struct At {
+    /// Fix minus station.
+    Eigen::Vector2d error_m;
+    Eigen::Matrix2d covariance;
+    double yaw_rad;
+    /// Of the lamps it rests on, above it.
+    double height_m;
+  };
+
+  StationFixes(std::span<const StationCapture> captures, const LampMap& map,
+               const Calibration& calibration);
+
+  /// Of each capture; nothing where there is no fix.
+  std::vector<std::optional<At>> at(const Eigen::Vector2d& offset_px) const;
+  /// Of captures without one.
+  FixStatus first_refusal() const { return first_refusal_; }
+
+ private:
+  std::span<const StationCapture> captures_;
+  const LampMap& map_;
+  Calibration calibration_;
+  FixStatus first_refusal_ = FixStatus::ok;
+};
+
+}  // namespace vlp

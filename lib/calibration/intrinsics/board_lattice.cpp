@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/board_lattice.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "rig/board_layout.h"
+
+namespace vlp {
+namespace {
+
+Eigen::Vector3d turned(const BoardPose& pose, const Eigen::Vector2d& in_board_m) {
+  const Eigen::AngleAxisd rotation(pose.rotation.norm(), pose.rotation.normalized());
+  return rotation * Eigen::Vector3d(in_board_m.x(), in_board_m.y(), 0);
+}
+
+}  // namespace
+
+BoardLattice::BoardLattice(const Board& board) {
+  constexpr double rounding = 1e-9;
+  const bool uniform = std::abs(board.tag_spacing - 1) < rounding;
+  if (!uniform && (board.cols < 2 || board.rows < 2)) {
+    throw std::invalid_argument("a board of one row of tags needs tag_spacing 1");
+  }
+  parts_ = uniform ? 1 : 4;
+  cols_ = uniform ? 2 * board.cols : board.cols;
+  rows_ = uniform ? 2 * board.rows : board.rows;
+  spacing_m_ = uniform ? board.tag_size_m : tag_pitch_m(board);
+  const auto tags = board_layout(board);
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    const int index = static_cast<int>(i);
+    places_[tags[i].id] = {index % board.cols, index / board.cols, tags[i].corners_m};
+  }
+  origins_m_ = tags.front().corners_m;
+  if (uniform) origins_m_.fill(Eigen::Vector2d::Zero());
+  const Eigen::Array2d part_m = spacing_m_ * Eigen::Array2d(cols_ - 1, rows_ - 1);
+  field_m_ = tag_field_m(board);
+  warp_of_board_ = (field_m_.array() / part_m).square();
+}
+
+std::vector<BoardLattice::Corner> BoardLattice::corners(const SeenBoard& seen) const {
+  constexpr int right[] = {0, 1, 1, 0}, down[] = {1, 1, 0, 0};  // bottom left, bottom right, ...
+  std::vector<Corner> all;
+  all.reserve(4 * seen.tags.size());
+  for (const SeenTag& tag : seen.tags) {
+    const Place& place = places_.at(tag.id);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const int col = parts_ == 1 ? 2 * place.col + right[k] : place.col;
+      const int row = parts_ == 1 ? 2 * place.row + down[k] : place.row;
+      all.push_back({{place.corners_m[k].x(), place.corners_m[k].y(), 0},
+                     tag.corners_px[k],
+                     parts_ == 1 ? 0 : k,
+                     static_cast<std::size_t>(row * cols_ + col)});
+    }
+  }
+  return all;
+}
+
+std::vector<BoardLattice::Corner> BoardLattice::bent(std::vector<Corner> corners,
+                                                     const Eigen::Vector2d& warp_of_part_m) const {
+  const Eigen::Vector2d warp_m = warp_of_part_m.cwiseProduct(warp_of_board_);
+  for (Corner& corner : corners) {
+    const Eigen::Array2d share = 2 * corner.in_board_m.head<2>().array() / field_m_.array() - 1;
+    corner.in_board_m.z() = warp_m.dot((1 - share.square()).matrix());
+  }
+  return corners;
+}
+
+BoardPose BoardLattice::pose_of_part(const BoardPose& camera_from_board, std::size_t part) const {
+  return {camera_from_board.rotation,
+          camera_from_board.translation_m + turned(camera_from_board, origins_m_[part])};
+}
+
+BoardPose BoardLattice::pose_of_board(const BoardPose& camera_from_part) const {
+  return {camera_from_part.rotation,
+          camera_from_part.translation_m - turned(camera_from_part, origins_m_[0])};
+}
+
+bool BoardLattice::enough(const SeenBoard& seen) const {
+  constexpr std::size_t least = 3, least_of_parts = 6;
+  std::set<int> cols, rows;
+  for (const SeenTag& tag : seen.tags) {
+    cols.insert(places_.at(tag.id).col);
+    rows.insert(places_.at(tag.id).row);
+  }
+  if (parts_ == 1) return seen.tags.size() >= least;
+  return seen.tags.size() >= least_of_parts && cols.size() > 1 && rows.size() > 1;
+}
+
+}  // namespace vlp

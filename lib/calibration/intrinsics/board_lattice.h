@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <map>
+#include <vector>
+
+#include "calibration/intrinsics/board_problem.h"
+#include "detection/boards/board_detector.h"
+#include "rig/board.h"
+
+namespace vlp {
+
+/// A board's corners as uniform lattices, which is what mrcal solves for. When the gap is as wide
+/// as a tag all corners form one; otherwise corner k of every tag is a lattice of its own, with a
+/// pose of its own, a part.
+class BoardLattice {
+ public:
+  /// Throws std::invalid_argument for a board whose parts would be lines: one row or column of tags
+  /// with gaps of another width.
+  explicit BoardLattice(const Board& board);
+
+  /// Parts of a board: 1 or 4. Points along its width and height, and their distance.
+  std::size_t parts() const { return parts_; }
+  int cols() const { return cols_; }
+  int rows() const { return rows_; }
+  double spacing_m() const { return spacing_m_; }
+  std::size_t points() const {
+    return static_cast<std::size_t>(cols_) * static_cast<std::size_t>(rows_);
+  }
+  /// Deflection of a whole board over that of a part, along x and y: a part is smaller.
+  const Eigen::Vector2d& warp_of_board() const { return warp_of_board_; }
+
+  struct Corner {
+    /// z = 0 for a flat board.
+    Eigen::Vector3d in_board_m;
+    Eigen::Vector2d pixel;
+    std::size_t part, point;
+  };
+  /// Every corner of what was seen, of a flat board: four of each tag, in its order.
+  std::vector<Corner> corners(const SeenBoard& seen) const;
+  /// The corners of a board of which a part is bent by so much.
+  std::vector<Corner> bent(std::vector<Corner> corners,
+                           const Eigen::Vector2d& warp_of_part_m) const;
+
+  /// The pose of a part from that of the board, and of the board from that of its first part.
+  BoardPose pose_of_part(const BoardPose& camera_from_board, std::size_t part) const;
+  BoardPose pose_of_board(const BoardPose& camera_from_part) const;
+  /// Tags that fix every part's pose: not all in one row or column, where that matters.
+  bool enough(const SeenBoard& seen) const;
+
+ private:
+  struct Place {
+    int col, row;
+    std::array<Eigen::Vector2d, 4> corners_m;
+  };
+  std::map<int, Place> places_;
+  std::size_t parts_;
+  int cols_, rows_;
+  double spacing_m_;
+  /// Where the parts begin in the board.
+  std::array<Eigen::Vector2d, 4> origins_m_;
+  Eigen::Vector2d warp_of_board_, field_m_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/calibration_report.h"
+
+#include <cmath>
+
+#include "calibration/intrinsics/edge_bias.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
+#include "calibration/intrinsics/view_pose.h"
+#include "captures/csv_writer.h"
+
+namespace vlp {
+namespace {
+
+IntrinsicsInput every_other(const IntrinsicsSolution& solution, const IntrinsicsInput& input,
+                            std::size_t first) {
+  IntrinsicsInput half = input;
+  half.views.clear();
+  for (std::size_t i = first; i < solution.views.size(); i += 2) {
+    half.views.push_back(input.views[solution.views[i]]);
+  }
+  return half;
+}
+
+}  // namespace
+
+CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
+  const ProjectionUncertainty uncertainty(solution);
+  CalibrationReport report{0, 0, {0, 0}, uncertainty.focal_sd_px(), {}};
+  const auto pixels = pixel_grid(input.imager_px);
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const double sigma_px = uncertainty.worst_px(pixel);
+    report.uncertainty_mean_px += sigma_px / static_cast<double>(pixels.size());
+    if (sigma_px <= report.uncertainty_worst_px) continue;
+    report.uncertainty_worst_px = sigma_px;
+    report.uncertainty_worst_at = pixel;
+  }
+  const IntrinsicsSolution even = solve_intrinsics(every_other(solution, input, 0));
+  const IntrinsicsSolution odd = solve_intrinsics(every_other(solution, input, 1));
+  if (even.ok() && odd.ok()) {
+    report.halves = projection_difference(
+        even.lens(), odd.lens(), input.imager_px,
+        [&](const Eigen::Vector2d& pixel) { return uncertainty.worst_px(pixel); });
+  }
+  return report;
+}
+
+std::vector<std::string> gates_not_met(const IntrinsicsGates& gates,
+                                       const IntrinsicsSolution& solution,
+                                       const CalibrationReport& report) {
+  std::vector<std::string> failed;
+  const auto check = [&](const char* name, double value, double limit) {
+    if (value <= limit) return;
+    failed.push_back(std::string(name) + " is " + significant(value, 3) + ", the gate is " +
+                     significant(limit, 3));
+  };
+  check("rms_px", solution.rms_px, gates.rms_px);
+  check("uncertainty_px", report.uncertainty_worst_px, gates.uncertainty_px);
+  if (report.halves) {
+    check("halves_px", report.halves->rms_px, gates.halves_px);
+  } else {
+    failed.emplace_back("halves_px: half of the views do not determine a lens");
+  }
+  return failed;
+}
+
+HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out) {
+  const Lens lens = solution.lens();
+  HeldOut fit;
+  double squares = 0;
+  for (const auto& view : held_out.views) {
+    auto corners = held_out.lattice.bent(view, solution.problem.warp_m);
+    auto pose = view_pose(corners, lens);
+    if (!pose) continue;
+    if (held_out.from_edges) {
+      const auto bias_px = edge_bias_px(corners, pose->camera_from_board, lens);
+      for (std::size_t i = 0; i < corners.size(); ++i) corners[i].pixel -= bias_px[i];
+      pose = view_pose(corners, lens);
+      if (!pose) continue;
+    }
+    ++fit.views;
+    fit.corners += static_cast<int>(corners.size());
+    squares += pose->rms_px * pose->rms_px * 2 * static_cast<double>(corners.size());
+  }
+  if (fit.corners > 0) fit.rms_px = std::sqrt(squares / (2 * fit.corners));
+  return fit;
+}
+
+}  // namespace vlp

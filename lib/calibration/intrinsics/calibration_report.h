@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "rig/calibration.h"
+
+namespace vlp {
+
+/// How far a solution can be trusted.
+struct CalibrationReport {
+  /// ProjectionUncertainty::worst_px() over pixel_grid().
+  double uncertainty_mean_px, uncertainty_worst_px;
+  Eigen::Vector2d uncertainty_worst_at;
+  /// Standard deviation of fx.
+  double focal_sd_px;
+  /// Between the lens of every other view and that of the rest: twice the uncertainty when the lens
+  /// model fits and the corners' errors are independent; more when they are not. Nothing when a
+  /// half does not determine a lens.
+  std::optional<ProjectionDifference> halves;
+};
+/// Precondition: solution.ok(). Two more solves.
+CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
+
+/// What a calibration has to reach. By what was seen on rendered and real boards of 800 to 4000 px.
+struct IntrinsicsGates {
+  /// Residuals per axis: more means blurred images or the wrong lens model.
+  double rms_px = 1;
+  /// Worst uncertainty over the image, and what the halves differ by, as rms per axis: more means
+  /// too few views, too much alike.
+  double uncertainty_px = 2;
+  double halves_px = 1;
+};
+/// Each gate that is not met, in one line.
+std::vector<std::string> gates_not_met(const IntrinsicsGates& gates,
+                                       const IntrinsicsSolution& solution,
+                                       const CalibrationReport& report);
+
+/// What views that took no part in a solution say of its lens: their poses are fitted, nothing
+/// else.
+struct HeldOut {
+  int views = 0, corners = 0;
+  /// Per axis.
+  double rms_px = 0;
+};
+/// Views without a pose are left out.
+HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out);
+
+/// Where the views have corners, and how they tilt.
+struct ViewCoverage {
+  /// Corners in each of 3 x 3 parts of the image, row by row from the top left.
+  std::array<int, 9> corners{};
+  /// Share of 8 x 6 parts of the image that have corners.
+  double share = 0;
+  /// The largest angle, over the views, by which the board's left, right, upper and lower side (as
+  /// the image shows it) is nearer to the camera.
+  std::array<double, 4> tilts_rad{};
+};
+ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
+
+/// One line: where in the image to show the board, and how to tilt it, next; the place with the
+/// fewest corners and the side that was tilted least.
+std::string next_view(const ViewCoverage& coverage);
+
+}  // namespace vlp

@@ -1,0 +1,95 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/camera_exports.h"
+
+#include <stdexcept>
+#include <vector>
+
+#include "rig/yaml_text.h"
+
+namespace vlp {
+namespace {
+
+std::string list_of(const std::vector<double>& values) {
+  std::string text = "[";
+  for (const double value : values) {
+    text.append(text.size() > 1 ? ", " : "").append(shortest(value));
+  }
+  return text + "]";
+}
+
+std::vector<double> matrix_of(const Camera& camera) {
+  const auto& p = camera.intrinsics;
+  return {p[0], 0, p[2], 0, p[1], p[3], 0, 0, 1};
+}
+
+/// mrcal's order is OpenCV's; filled up with zeros.
+std::vector<double> distortions_of(const Camera& camera, std::size_t least) {
+  std::vector<double> values(camera.intrinsics.begin() + 4, camera.intrinsics.end());
+  if (values.size() < least) values.resize(least, 0);
+  return values;
+}
+
+[[noreturn]] void refuse(const Camera& camera, const char* format, const char* known) {
+  throw std::invalid_argument(std::string(format) + " has no lens model like " +
+                              std::string(name_of(camera.lens_model)) + "; take --lens " + known);
+}
+
+std::string opencv_matrix(const char* name, int rows, const std::vector<double>& values) {
+  const std::size_t cols = values.size() / static_cast<std::size_t>(rows);
+  std::string text(name);
+  text.append(": !!opencv-matrix\n   rows: ").append(std::to_string(rows));
+  text.append("\n   cols: ").append(std::to_string(cols));
+  text.append("\n   dt: d\n   data: ").append(list_of(values)).append("\n");
+  return text;
+}
+
+}  // namespace
+
+std::string ros_camera_info(const Camera& camera) {
+  const LensModel model = camera.lens_model;
+  if (model == LensModel::stereographic || model == LensModel::opencv12) {
+    refuse(camera, "ROS", "LENSMODEL_OPENCV8");
+  }
+  const bool rational = model == LensModel::opencv8;
+  const std::size_t count = rational ? 8 : 5;
+  const auto& p = camera.intrinsics;
+  std::string text = "image_width: " + std::to_string(camera.imager_px[0]);
+  text.append("\nimage_height: ").append(std::to_string(camera.imager_px[1]));
+  text.append("\ncamera_name: ").append(in_quotes(camera.id));
+  text.append("\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: ")
+      .append(list_of(matrix_of(camera)));
+  text.append("\ndistortion_model: ").append(rational ? "rational_polynomial" : "plumb_bob");
+  text.append("\ndistortion_coefficients:\n  rows: 1\n  cols: ").append(std::to_string(count));
+  text.append("\n  data: ").append(list_of(distortions_of(camera, count)));
+  text.append("\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: ");
+  text.append("[1, 0, 0, 0, 1, 0, 0, 0, 1]\nprojection_matrix:\n  rows: 3\n  cols: 4\n  data: ");
+  text.append(list_of({p[0], 0, p[2], 0, 0, p[1], p[3], 0, 0, 0, 1, 0}));
+  return text + "\n";
+}
+
+std::string kalibr_camchain(const Camera& camera) {
+  if (camera.lens_model != LensModel::pinhole && camera.lens_model != LensModel::opencv4) {
+    refuse(camera, "Kalibr", "LENSMODEL_OPENCV4");
+  }
+  const std::vector<double> core(camera.intrinsics.begin(), camera.intrinsics.begin() + 4);
+  std::string text = "cam0:\n  camera_model: pinhole\n  intrinsics: " + list_of(core);
+  text.append("\n  distortion_model: radtan\n  distortion_coeffs: ");
+  text.append(list_of(distortions_of(camera, 4)));
+  text.append("\n  resolution: [").append(std::to_string(camera.imager_px[0])).append(", ");
+  text.append(std::to_string(camera.imager_px[1])).append("]\n  rostopic: /cam0/image_raw\n");
+  return text;
+}
+
+std::string opencv_camera(const Camera& camera) {
+  if (camera.lens_model == LensModel::stereographic) {
+    refuse(camera, "OpenCV", "LENSMODEL_OPENCV8");
+  }
+  std::string text = "%YAML:1.0\n---\nimage_width: " + std::to_string(camera.imager_px[0]);
+  text.append("\nimage_height: ").append(std::to_string(camera.imager_px[1])).append("\n");
+  text.append(opencv_matrix("camera_matrix", 3, matrix_of(camera)));
+  text.append(opencv_matrix("distortion_coefficients", 1, distortions_of(camera, 4)));
+  return text;
+}
+
+}  // namespace vlp

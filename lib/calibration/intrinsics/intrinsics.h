@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "calibration/intrinsics/board_lattice.h"
+#include "calibration/intrinsics/board_problem.h"
+#include "camera/lens.h"
+
+namespace vlp {
+
+/// What is solved: the corners of each view, of one camera.
+struct IntrinsicsInput {
+  BoardLattice lattice;
+  std::vector<std::vector<BoardLattice::Corner>> views;
+  std::array<int, 2> imager_px;
+  LensModel lens_model;
+  /// The corners are crossings of lines fitted to the tags' edges: see edge_bias_px().
+  bool from_edges;
+};
+
+enum class IntrinsicsStatus {
+  ok,
+  too_few_views,  // fewer than three that can be used
+  all_alike,      // every view shows the board at the same angle: any focal length fits
+  no_solution,    // no lens of the model fits
+};
+/// One line, with what to add.
+std::string_view explanation_of(IntrinsicsStatus status);
+
+/// A solution and how it fits.
+struct IntrinsicsSolution {
+  IntrinsicsStatus status;
+  /// At the solution; with status ok only, as is all below. Its poses are those of the parts of
+  /// views[0], views[1], ... in turn, and have points for each.
+  BoardProblem problem;
+  /// The views that it rests on, by their index in the input.
+  std::vector<std::size_t> views;
+  /// Views that fit no pose while the others do, and what is left over there.
+  struct Dropped {
+    std::size_t view;
+    double rms_px;
+  };
+  std::vector<Dropped> dropped;
+  /// Root of the sum of the squared residuals over 2 x corners, those that are no outliers: per
+  /// axis.
+  double rms_px;
+  int corners, outliers;
+
+  bool ok() const { return status == IntrinsicsStatus::ok; }
+  Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
+  static constexpr SolveFor solved_for{true, true, true, false};
+};
+
+/// Solves for lens, poses and the board's warp, with no guess of the focal length:
+///  1. a focal length of a geometric series, STEREOGRAPHIC, that fits the views' poses best;
+///  2. STEREOGRAPHIC with every pose, and the poses again with that lens, until they stay;
+///  3. the model wanted, regularized as mrcal does it, and the poses again; views that fit no pose
+///     are dropped;
+///  4. all of it with the board's warp, without outliers; again without the bias of the corners.
+/// Planar flips cannot live: both poses of every view are tried with each lens (view_pose()).
+/// Depends on the input only, not on threads.
+IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
+
+/// Residuals of a problem's points, seen minus projected, outliers too; NaN where nothing was seen.
+std::vector<Eigen::Vector2d> residuals_of(const BoardProblem& problem);
+
+}  // namespace vlp

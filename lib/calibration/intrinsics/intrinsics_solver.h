@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/pose_seeds.h"
+
+namespace vlp {
+
+/// The stages of solve_intrinsics(), in turn; each is false when it fails.
+class IntrinsicsSolver {
+ public:
+  static constexpr std::size_t kLeastViews = 3;
+
+  /// `input` outlives it.
+  explicit IntrinsicsSolver(const IntrinsicsInput& input);
+
+  /// Stage 2, from a focal length.
+  bool start(double focal_px);
+  /// Stage 3.
+  bool refine();
+  /// Stage 4.
+  bool finish();
+
+  IntrinsicsSolution solution() const;
+  /// No two boards are tilted differently, by five degrees or more.
+  bool all_alike() const;
+
+ private:
+  Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
+  bool solve(SolveFor what);
+  /// Poses of every view through this lens; views without one wait for another lens.
+  void seed(const Lens& lens);
+  /// The problem of the views used, at their seeds.
+  void assemble(const Lens& lens);
+  void remove_edge_bias();
+  /// Of the views used, in their order.
+  std::vector<double> rms_of_views() const;
+  /// Tries both poses of each view that fits badly, and drops the worst of those that stay bad.
+  /// True when there is something to solve again.
+  bool change_poses();
+  /// Views that were dropped because a worse one had spoilt the lens, and that fit it now.
+  bool take_back();
+
+  const IntrinsicsInput& input_;
+  PoseSeeds seeds_;
+  std::vector<std::size_t> used_;
+  std::vector<IntrinsicsSolution::Dropped> dropped_;
+  BoardProblem problem_{};
+};
+
+}  // namespace vlp

@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+// The only file that knows mrcal. Its headers lack extern "C" before version 2.4; what they include
+// in turn must come before it.
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <string>
+#include <type_traits>
+extern "C" {
+#include <mrcal/mrcal.h>
+#include <suitesparse/cholmod.h>
+}
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <mutex>
+#include <stdexcept>
+
+#include "calibration/intrinsics/board_problem.h"
+
+namespace vlp {
+namespace {
+
+static_assert(sizeof(BoardPose) == sizeof(mrcal_pose_t));
+static_assert(sizeof(Eigen::Vector3d) == sizeof(mrcal_point3_t));
+static_assert(sizeof(Eigen::Vector2d) == sizeof(mrcal_calobject_warp_t));
+
+/// mrcal's arguments for a problem.
+struct Arguments {
+  Arguments(const BoardProblem& problem, const SolveFor& what)
+      : frames(static_cast<int>(problem.poses.size())) {
+    const std::string name(name_of(problem.lens_model));
+    if (!mrcal_lensmodel_from_name(&lens, name.c_str())) {
+      throw std::runtime_error("mrcal does not know " + name);
+    }
+    selections.do_optimize_intrinsics_core = what.core;
+    selections.do_optimize_intrinsics_distortions = what.distortions;
+    selections.do_optimize_frames = true;
+    selections.do_optimize_calobject_warp = what.warp;
+    selections.do_apply_regularization = what.distortions;
+    selections.do_apply_outlier_rejection = what.without_outliers;
+    for (int frame = 0; frame < frames; ++frame) observations.push_back({{0, -1}, frame});
+    measurements = mrcal_num_measurements(frames, 0, problem.cols, problem.rows, 1, 0, frames, 0, 0,
+                                          selections, &lens);
+    states = mrcal_num_states(1, 0, frames, 0, 0, frames, selections, &lens);
+  }
+
+  int frames;
+  mrcal_lensmodel_t lens{};
+  mrcal_problem_selections_t selections{};
+  mrcal_problem_constants_t constants{};
+  std::vector<mrcal_observation_board_t> observations;
+  int measurements, states;
+};
+
+int bytes(Eigen::Index doubles) { return static_cast<int>(doubles) * int(sizeof(double)); }
+
+/// mrcal 2.4 has one argument more.
+template <typename Unpack>
+void unpack(Unpack* function, double* state, const Arguments& the) {
+  if constexpr (std::is_invocable_v<Unpack*, double*, int, int, int, int, int, int,
+                                    mrcal_problem_selections_t, const mrcal_lensmodel_t*>) {
+    function(state, 1, 0, the.frames, 0, 0, the.frames, the.selections, &the.lens);
+  } else {
+    function(state, 1, 0, the.frames, 0, 0, the.selections, &the.lens);
+  }
+}
+
+/// mrcal reports outliers on stderr, asked or not; a library should not. The whole process is
+/// without stderr meanwhile.
+class Silence {
+ public:
+  Silence() : alone_(only_one()) {
+    std::fflush(stderr);
+    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (nowhere < 0) return;
+    kept_ = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
+    if (kept_ >= 0) ::dup2(nowhere, STDERR_FILENO);
+    ::close(nowhere);
+  }
+  ~Silence() {
+    if (kept_ < 0) return;
+    std::fflush(stderr);
+    ::dup2(kept_, STDERR_FILENO);
+    ::close(kept_);
+  }
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+
+ private:
+  static std::mutex& only_one() {
+    static std::mutex mutex;
+    return mutex;
+  }
+  std::lock_guard<std::mutex> alone_;
+  int kept_ = -1;
+};
+
+}  // namespace
+
+bool solve(BoardProblem& problem, const SolveFor& what) {
+  const Arguments the(problem, what);
+  if (the.measurements < the.states) return false;
+  Eigen::VectorXd state(the.states), residuals(the.measurements);
+  const Silence silence;
+  const mrcal_stats_t stats = mrcal_optimize(
+      state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()),
+      problem.intrinsics.data(), nullptr, reinterpret_cast<mrcal_pose_t*>(problem.poses.data()),
+      nullptr, reinterpret_cast<mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, the.frames,
+      0, 0, the.observations.data(), nullptr, the.frames, 0,
+      reinterpret_cast<mrcal_point3_t*>(problem.points.data()), &the.lens, problem.imager_px.data(),
+      the.selections, &the.constants, problem.spacing_m, problem.cols, problem.rows, false, false);
+  return stats.rms_reproj_error__pixels >= 0 && residuals.allFinite();
+}
+
+Linearization linearized(const BoardProblem& problem, const SolveFor& what) {
+  const Arguments the(problem, what);
+  const int entries =
+      _mrcal_num_j_nonzero(the.frames, 0, problem.cols, problem.rows, 1, 0, the.frames, 0, 0,
+                           the.observations.data(), nullptr, the.selections, &the.lens);
+  Linearization result;
+  Eigen::VectorXd state(the.states), residuals(the.measurements);
+  std::vector<int> starts(static_cast<std::size_t>(the.measurements) + 1);
+  std::vector<int> rows(static_cast<std::size_t>(entries));
+  std::vector<double> values(static_cast<std::size_t>(entries));
+  cholmod_sparse jacobian{};
+  jacobian.nrow = static_cast<std::size_t>(the.states);
+  jacobian.ncol = static_cast<std::size_t>(the.measurements);
+  jacobian.nzmax = static_cast<std::size_t>(entries);
+  jacobian.p = starts.data();
+  jacobian.i = rows.data();
+  jacobian.x = values.data();
+  jacobian.itype = CHOLMOD_INT;
+  jacobian.xtype = CHOLMOD_REAL;
+  jacobian.dtype = CHOLMOD_DOUBLE;
+  jacobian.sorted = 1;
+  jacobian.packed = 1;
+  const Silence silence;
+  const bool done = mrcal_optimizer_callback(
+      state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()), &jacobian,
+      problem.intrinsics.data(), nullptr,
+      reinterpret_cast<const mrcal_pose_t*>(problem.poses.data()), nullptr,
+      reinterpret_cast<const mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, the.frames, 0,
+      0, the.observations.data(), nullptr, the.frames, 0,
+      reinterpret_cast<const mrcal_point3_t*>(problem.points.data()), &the.lens,
+      problem.imager_px.data(), the.selections, &the.constants, problem.spacing_m, problem.cols,
+      problem.rows, false);
+  if (!done) throw std::runtime_error("mrcal_optimizer_callback failed");
+  result.residuals_px =
+      residuals.head(mrcal_num_measurements_boards(the.frames, problem.cols, problem.rows));
+  result.jacobian_transposed = Eigen::Map<const Eigen::SparseMatrix<double>>(
+      the.states, the.measurements, starts.back(), starts.data(), rows.data(), values.data());
+  result.scale.setOnes(the.states);
+  unpack(mrcal_unpack_solver_state_vector, result.scale.data(), the);
+  result.intrinsics = 0;
+  result.poses =
+      mrcal_state_index_frames(0, 1, 0, the.frames, 0, 0, the.frames, the.selections, &the.lens);
+  return result;
+}
+
+}  // namespace vlp

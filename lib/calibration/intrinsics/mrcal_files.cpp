@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/mrcal_files.h"
+
+#include "calibration/intrinsics/numpy_archive.h"
+#include "captures/csv_writer.h"
+#include "rig/file.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kDigits = 17;
+
+/// All that mrcal.optimize() takes, at the solution.
+std::string optimization_inputs(const BoardProblem& problem) {
+  const std::size_t boards = problem.poses.size();
+  const auto rows = static_cast<std::size_t>(problem.rows);
+  const auto cols = static_cast<std::size_t>(problem.cols);
+  std::vector<double> poses, points;
+  std::vector<std::int32_t> indices;
+  for (std::size_t i = 0; i < boards; ++i) {
+    const auto& [rotation, translation_m] = problem.poses[i];
+    poses.insert(poses.end(), rotation.begin(), rotation.end());
+    poses.insert(poses.end(), translation_m.begin(), translation_m.end());
+    indices.insert(indices.end(), {static_cast<std::int32_t>(i), 0, -1});
+  }
+  points.reserve(3 * problem.points.size());
+  for (const auto& point : problem.points) points.insert(points.end(), point.begin(), point.end());
+  const std::array<std::int32_t, 2> imager{problem.imager_px[0], problem.imager_px[1]};
+
+  NumpyArchive archive;
+  archive.add("lensmodel", name_of(problem.lens_model));
+  archive.add("intrinsics", {1, problem.intrinsics.size()}, problem.intrinsics);
+  archive.add("extrinsics_rt_fromref", {0, 6}, std::span<const double>{});
+  archive.add("frames_rt_toref", {boards, 6}, poses);
+  archive.add("observations_board", {boards, rows, cols, 3}, points);
+  archive.add("indices_frame_camintrinsics_camextrinsics", {boards, 3}, indices);
+  archive.add("calobject_warp", {2}, std::span(problem.warp_m.data(), 2));
+  archive.add("imagersizes", {1, 2}, imager);
+  archive.add("calibration_object_spacing", problem.spacing_m);
+  archive.add("do_optimize_intrinsics_core", true);
+  archive.add("do_optimize_intrinsics_distortions", problem.intrinsics.size() > 4);
+  archive.add("do_optimize_extrinsics", true);
+  archive.add("do_optimize_frames", true);
+  archive.add("do_optimize_calobject_warp", true);
+  archive.add("do_apply_regularization", problem.intrinsics.size() > 4);
+  archive.add("do_apply_outlier_rejection", true);
+  archive.add("verbose", false);
+  for (const char* none :
+       {"points", "observations_point", "indices_point_camintrinsics_camextrinsics"}) {
+    archive.add(none, std::string_view());
+  }
+  return base85(archive.bytes());
+}
+
+}  // namespace
+
+void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution) {
+  const BoardProblem& problem = solution.problem;
+  std::string text = "{\n    'lensmodel':  '";
+  text.append(name_of(problem.lens_model)).append("',\n    'intrinsics': [");
+  for (const double value : problem.intrinsics) {
+    text.append(" ").append(significant(value, kDigits)).append(",");
+  }
+  text += "],\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ";
+  text.append(std::to_string(problem.imager_px[0])).append(", ");
+  text.append(std::to_string(problem.imager_px[1])).append(" ],\n    'icam_intrinsics': 0,\n");
+  text.append("    'optimization_inputs': b'")
+      .append(optimization_inputs(problem))
+      .append("',\n}\n");
+  write_file(file, text);
+}
+
+void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
+                   std::span<const std::string> images) {
+  const BoardProblem& problem = solution.problem;
+  const std::size_t parts = problem.poses.size() / solution.views.size();
+  const std::size_t count = problem.points_of_a_board();
+  std::string text = "# filename x y level\n";
+  for (std::size_t board = 0; board < problem.poses.size(); ++board) {
+    std::string name = images[solution.views[board / parts]];
+    if (parts > 1) name += "-corner" + std::to_string(board % parts);
+    for (std::size_t i = board * count; i < (board + 1) * count; ++i) {
+      const Eigen::Vector3d& point = problem.points[i];
+      text += name;
+      if (point.z() > 0) {
+        text.append(" ").append(significant(point.x(), kDigits));
+        text.append(" ").append(significant(point.y(), kDigits)).append(" 0\n");
+      } else {
+        text += " -1 -1 -\n";
+      }
+    }
+  }
+  write_file(file, text);
+}
+
+}  // namespace vlp

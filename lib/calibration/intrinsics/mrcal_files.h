@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "calibration/intrinsics/intrinsics.h"
+
+namespace vlp {
+
+/// Writes mrcal's .cameramodel: the lens with 17 digits, and all of the solved problem
+/// (optimization_inputs), on which mrcal's own tools work, such as
+/// mrcal-show-projection-uncertainty and mrcal-show-residuals. Throws InputError.
+void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
+
+/// Writes the corners that were solved for as mrcal-calibrate-cameras reads them (--corners-cache):
+/// filename x y level, row by row of the lattice, "-" for a corner not seen or left out. Of a board
+/// in four parts each image stands four times, as NAME-corner0 to NAME-corner3. images: the names
+/// of the input's views. Throws InputError.
+void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
+                   std::span<const std::string> images);
+
+}  // namespace vlp

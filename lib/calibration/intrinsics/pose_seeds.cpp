@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/pose_seeds.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "calibration/intrinsics/view_pose.h"
+
+namespace vlp {
+namespace {
+
+/// A few of the views, evenly chosen, tell how good a focal length is.
+IntrinsicsInput some_of(const IntrinsicsInput& input) {
+  constexpr std::size_t enough = 12;
+  IntrinsicsInput some = input;
+  const std::size_t count = input.views.size();
+  if (count <= enough) return some;
+  some.views.clear();
+  for (std::size_t i = 0; i < enough; ++i) some.views.push_back(input.views[i * count / enough]);
+  return some;
+}
+
+}  // namespace
+
+PoseSeeds poses_through(const IntrinsicsInput& input, const Lens& lens) {
+  PoseSeeds seeds;
+  for (const auto& corners : input.views) {
+    const auto pose = view_pose(corners, lens);
+    seeds.poses.push_back(pose ? pose->camera_from_board : BoardPose{});
+    seeds.rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
+  }
+  return seeds;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Lens stereographic(const IntrinsicsInput& input, double focal_px) {
+  const auto [width, height] = input.imager_px;
+  const std::array parameters{focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0};
+  return Lens(LensModel::stereographic, parameters);
+}
+
+std::vector<double> focal_lengths(const IntrinsicsInput& input) {
+  const IntrinsicsInput some = some_of(input);
+  std::vector<std::pair<double, double>> tried;
+  constexpr int least = -5, most = 6;  // of the image's width: 0.18 to 8
+  for (int half_octaves = least; half_octaves <= most; ++half_octaves) {
+    const double focal_px = input.imager_px[0] * std::exp2(half_octaves / 2.0);
+    tried.emplace_back(median(poses_through(some, stereographic(input, focal_px)).rms_px),
+                       focal_px);
+  }
+  std::sort(tried.begin(), tried.end());
+  std::vector<double> order;
+  order.reserve(tried.size());
+  for (const auto& [rms_px, focal_px] : tried) order.push_back(focal_px);
+  return order;
+}
+
+}  // namespace vlp

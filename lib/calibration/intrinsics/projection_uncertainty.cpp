@@ -1,0 +1,91 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/projection_uncertainty.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/SparseCholesky>
+#include <cmath>
+#include <limits>
+
+namespace vlp {
+namespace {
+
+Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+/// exp(r + dr) = exp(J dr) exp(r), to first order in dr: the left Jacobian of the rotations.
+Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& r) {
+  const double angle = r.norm();
+  constexpr double tiny = 1e-6;
+  if (angle < tiny) return Eigen::Matrix3d::Identity() + cross(r) / 2;
+  const Eigen::Matrix3d k = cross(r / angle);
+  return Eigen::Matrix3d::Identity() + (1 - std::cos(angle)) / angle * k +
+         (1 - std::sin(angle) / angle) * k * k;
+}
+
+double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& residuals_px) {
+  double sum = 0, squares = 0, count = 0;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    if (problem.points[i].z() <= 0) continue;
+    const auto at = residuals_px.segment<2>(2 * static_cast<Eigen::Index>(i));
+    sum += at.sum();
+    squares += at.squaredNorm();
+    count += 2;
+  }
+  return std::sqrt(squares / count - (sum / count) * (sum / count));
+}
+
+}  // namespace
+
+ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
+    : lens_(solution.lens()), determined_(false) {
+  const BoardProblem& problem = solution.problem;
+  const Linearization at = linearized(problem, IntrinsicsSolution::solved_for);
+  const Eigen::SparseMatrix<double>& jt = at.jacobian_transposed;
+  const Eigen::SparseMatrix<double> normal = jt * jt.transpose();
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) return;
+
+  const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
+  Eigen::MatrixXd wanted = Eigen::MatrixXd::Zero(jt.rows(), intrinsics + 3);
+  wanted.block(at.intrinsics, 0, intrinsics, intrinsics).setIdentity();
+  const double share = 1 / static_cast<double>(problem.poses.size());
+  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+    wanted.block<3, 3>(at.poses + 6 * static_cast<Eigen::Index>(i), intrinsics) =
+        share * left_jacobian(problem.poses[i].rotation).transpose();
+  }
+  wanted = at.scale.asDiagonal() * wanted;
+  const Eigen::MatrixXd by_residual =
+      (jt.leftCols(at.residuals_px.size()).transpose() * factor.solve(wanted)).eval();
+  const double sigma_px = standard_deviation(problem, at.residuals_px);
+  covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
+  determined_ = covariance_.allFinite();
+}
+
+Eigen::Matrix2d ProjectionUncertainty::covariance(const Eigen::Vector2d& pixel) const {
+  const auto ray = lens_.unproject(pixel);
+  const auto projection = ray ? lens_.project_with_jacobians(ray->direction) : std::nullopt;
+  if (!determined_ || !projection) {
+    return Eigen::Matrix2d::Identity() * std::numeric_limits<double>::infinity();
+  }
+  Eigen::Matrix<double, 2, Eigen::Dynamic> gradient(2, covariance_.rows());
+  gradient << projection->d_pixel_d_parameters,
+      -projection->d_pixel_d_point * cross(ray->direction);
+  return gradient * covariance_ * gradient.transpose();
+}
+
+double ProjectionUncertainty::worst_px(const Eigen::Vector2d& pixel) const {
+  const Eigen::Matrix2d c = covariance(pixel);
+  if (!c.allFinite()) return std::numeric_limits<double>::infinity();
+  const double mean = c.trace() / 2, half = (c(0, 0) - c(1, 1)) / 2;
+  return std::sqrt(mean + std::hypot(half, c(0, 1)));
+}
+
+double ProjectionUncertainty::focal_sd_px() const {
+  return determined_ ? std::sqrt(covariance_(0, 0)) : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace vlp

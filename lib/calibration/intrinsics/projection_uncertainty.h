@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "calibration/intrinsics/intrinsics.h"
+
+namespace vlp {
+
+/// How far the noise of the corners moves the projection of a point at infinity, as mrcal reports
+/// it
+/// ("Projection uncertainty" in its documentation): the state's covariance is
+///   s^2 N^-1 (Jo' Jo) N^-1,  N = J' J,
+/// with J the Jacobian at the solution, Jo its rows of the corners (without those of the
+/// regularization) and s the standard deviation of the residuals. A pixel depends on the intrinsics
+/// and, because the camera's own orientation is what the boards make it, on the mean over all
+/// boards of the changes of their rotations.
+class ProjectionUncertainty {
+ public:
+  /// Precondition: solution.ok().
+  explicit ProjectionUncertainty(const IntrinsicsSolution& solution);
+
+  /// False when the views leave something open.
+  bool determined() const { return determined_; }
+
+  /// Of the projection of the ray seen at `pixel`, in px^2. Infinite where the lens sees no ray, or
+  /// when nothing is determined.
+  Eigen::Matrix2d covariance(const Eigen::Vector2d& pixel) const;
+
+  /// Standard deviation in the direction in which it is largest.
+  double worst_px(const Eigen::Vector2d& pixel) const;
+
+  /// Of the focal length along x. Infinite when nothing is determined.
+  double focal_sd_px() const;
+
+ private:
+  Lens lens_;
+  bool determined_;
+  /// Of the intrinsics and of the mean rotation, in rad, in the camera.
+  Eigen::MatrixXd covariance_;
+};
+
+}  // namespace vlp

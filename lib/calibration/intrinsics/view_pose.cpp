@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/view_pose.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+
+namespace vlp {
+namespace {
+
+using Corners = std::span<const BoardLattice::Corner>;
+
+struct Placed {
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation_m;
+
+  Eigen::Vector3d in_camera(const Eigen::Vector3d& in_board_m) const {
+    return rotation * in_board_m + translation_m;
+  }
+};
+
+double squares_of(Corners corners, const Lens& lens, const Placed& pose) {
+  double squares = 0;
+  for (const auto& corner : corners) {
+    const auto pixel = lens.project(pose.in_camera(corner.in_board_m));
+    if (!pixel) return INFINITY;
+    squares += (*pixel - corner.pixel).squaredNorm();
+  }
+  return squares;
+}
+
+/// The step that minimizes the linearized residuals, the rotation turned on from the left.
+std::optional<Placed> stepped(Corners corners, const Lens& lens, const Placed& pose,
+                              double damping) {
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+  for (const auto& corner : corners) {
+    const Eigen::Vector3d point = pose.in_camera(corner.in_board_m);
+    const auto projection = lens.project_with_jacobians(point);
+    if (!projection) return {};
+    const Eigen::Vector3d turned = point - pose.translation_m;
+    Eigen::Matrix3d cross;
+    cross << 0, turned.z(), -turned.y(), -turned.z(), 0, turned.x(), turned.y(), -turned.x(), 0;
+    Eigen::Matrix<double, 2, 6> jacobian;
+    jacobian << projection->d_pixel_d_point * cross, projection->d_pixel_d_point;
+    normal += jacobian.transpose() * jacobian;
+    right += jacobian.transpose() * (corner.pixel - projection->pixel);
+  }
+  normal.diagonal() *= 1 + damping;
+  const Eigen::Matrix<double, 6, 1> step = normal.ldlt().solve(right);
+  if (!step.allFinite()) return {};
+  const double angle = step.head<3>().norm();
+  const Eigen::Vector3d axis =
+      angle > 0 ? (step.head<3>() / angle).eval() : Eigen::Vector3d::UnitX();
+  return Placed{Eigen::AngleAxisd(angle, axis) * pose.rotation,
+                pose.translation_m + step.tail<3>()};
+}
+
+std::optional<ViewPose> refined(Corners corners, const Lens& lens, Placed pose) {
+  constexpr int most_steps = 20;
+  constexpr double enough = 1e-4;  // share of the squares that a step still takes away
+  double damping = 1e-4;
+  double squares = squares_of(corners, lens, pose);
+  if (!std::isfinite(squares)) return {};
+  for (int step = 0; step < most_steps; ++step) {
+    const auto next = stepped(corners, lens, pose, damping);
+    const double less = next ? squares_of(corners, lens, *next) : INFINITY;
+    if (less < squares) {
+      const bool done = squares - less < enough * squares;
+      pose = *next;
+      squares = less;
+      damping /= 10;
+      if (done) break;
+    } else {
+      damping *= 10;
+    }
+  }
+  const Eigen::AngleAxisd rotation(pose.rotation);
+  constexpr double no_rotation = 1e-9;  // mrcal divides by the angle
+  return ViewPose{{rotation.axis() * std::max(rotation.angle(), no_rotation), pose.translation_m},
+                  std::sqrt(squares / (2 * static_cast<double>(corners.size())))};
+}
+
+Placed placed(const cv::Mat& rotation, const cv::Mat& translation) {
+  const Eigen::Vector3d r(rotation.ptr<double>()), t(translation.ptr<double>());
+  const double angle = r.norm();
+  const Eigen::Vector3d axis = angle > 0 ? (r / angle).eval() : Eigen::Vector3d::UnitX();
+  return {Eigen::AngleAxisd(angle, axis).toRotationMatrix(), t};
+}
+
+}  // namespace
+
+std::optional<ViewPose> view_pose(Corners corners, const Lens& lens) {
+  std::vector<cv::Point3d> in_board;
+  std::vector<cv::Point2d> normalized;
+  for (const auto& corner : corners) {
+    const auto ray = lens.unproject(corner.pixel);
+    if (!ray || ray->direction.z() < 1e-3 * ray->direction.norm()) continue;
+    const Eigen::Vector2d z = ray->direction.hnormalized();
+    in_board.emplace_back(corner.in_board_m.x(), corner.in_board_m.y(), 0);
+    normalized.emplace_back(z.x(), z.y());
+  }
+  if (in_board.size() < 4) return {};
+  std::vector<cv::Mat> rotations, translations;
+  cv::solvePnPGeneric(in_board, normalized, cv::Matx33d::eye(), cv::noArray(), rotations,
+                      translations, false, cv::SOLVEPNP_IPPE);
+  std::optional<ViewPose> best;
+  for (std::size_t i = 0; i < rotations.size(); ++i) {
+    const auto pose = refined(corners, lens, placed(rotations[i], translations[i]));
+    if (pose && (!best || pose->rms_px < best->rms_px)) best = pose;
+  }
+  return best;
+}
+
+}  // namespace vlp

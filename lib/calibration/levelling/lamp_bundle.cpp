@@ -1,0 +1,137 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/levelling/lamp_bundle.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "calibration/levelling/lamp_equations.h"
+
+namespace vlp {
+namespace {
+
+using Capture = LampBundle::Capture;
+using Seen = LampBundle::Seen;
+
+double chi_squared(const LampBundle& bundle) {
+  double sum = 0;
+  for (const Capture& capture : bundle.captures) {
+    for (const Seen& seen : capture.seen) {
+      sum += whitened_residual(bundle, capture, seen).squaredNorm();
+    }
+  }
+  return sum;
+}
+
+/// The inverse of the information along `free`; nothing where that is nothing but rounding.
+std::optional<Eigen::MatrixXd> covariance_of(const SharedEquations& shared,
+                                             const Eigen::MatrixXd& free) {
+  constexpr double rounding = 1e-10;
+  const Eigen::MatrixXd information = free.transpose() * shared.information * free;
+  // Radians and metres are made comparable by what each would be worth if the poses were known.
+  const Eigen::VectorXd scale =
+      (free.cwiseAbs2().transpose() * shared.undiminished).cwiseSqrt().cwiseInverse();
+  if (!scale.allFinite()) return std::nullopt;
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues().minCoeff() > rounding)) {
+    return std::nullopt;
+  }
+  const Eigen::MatrixXd directions = free * scale.asDiagonal() * eigen.eigenvectors() *
+                                     eigen.eigenvalues().cwiseInverse().cwiseSqrt().asDiagonal();
+  return directions * directions.transpose();
+}
+
+struct Step {
+  Eigen::VectorXd shared;
+  std::vector<Eigen::Vector4d> own;
+
+  double largest() const {
+    double largest = shared.cwiseAbs().maxCoeff();
+    for (const auto& one : own) largest = std::max(largest, one.cwiseAbs().maxCoeff());
+    return largest;
+  }
+  void halve() {
+    shared /= 2;
+    for (auto& one : own) one /= 2;
+  }
+};
+
+LampBundle moved(const LampBundle& bundle, const Step& step) {
+  LampBundle next = bundle;
+  const Eigen::Vector3d turn(step.shared[0], step.shared[1], 0);
+  if (const double angle = turn.norm(); angle > 0) {
+    next.level_from_camera =
+        Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() * bundle.level_from_camera;
+  }
+  for (std::size_t i = 0; i < next.lamps_m.size(); ++i) {
+    next.lamps_m[i] += step.shared.segment<3>(static_cast<Eigen::Index>(2 + 3 * i));
+  }
+  for (std::size_t k = 0; k < next.captures.size(); ++k) {
+    LevelPose& camera = next.captures[k].camera;
+    camera = LevelPose(camera.position_m + step.own[k].head<3>(),
+                       times(camera.heading, {1, step.own[k][3]}).normalized());
+  }
+  return next;
+}
+
+}  // namespace
+
+Eigen::Vector2d whitened_residual(const LampBundle& bundle, const Capture& capture,
+                                  const Seen& seen) {
+  const Eigen::Vector3d x =
+      bundle.level_from_camera.transpose() * x_in_level(capture.camera, bundle.lamps_m[seen.lamp]);
+  if (!(x.z() > 0)) return Eigen::Vector2d::Constant(std::nan(""));
+  return seen.whitening * (seen.z_in_camera - x.head<2>() / x.z());
+}
+
+std::optional<BundleFit> adjust(LampBundle& bundle, const Eigen::MatrixXd& free) {
+  constexpr int max_iterations = 50;
+  constexpr double small_step = 1e-10;  // metres and radians: far below any noise
+  constexpr double rounding = 1e-12;    // of the sum of squares, near the minimum
+  BundleFit fit{chi_squared(bundle), static_cast<int>(-free.cols()), {}};
+  if (!std::isfinite(fit.chi_squared)) return std::nullopt;
+  for (const Capture& capture : bundle.captures) {
+    fit.degrees_of_freedom += 2 * static_cast<int>(capture.seen.size()) - 4;
+  }
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    SharedEquations shared{Eigen::MatrixXd::Zero(free.rows(), free.rows()),
+                           Eigen::VectorXd::Zero(free.rows()), Eigen::VectorXd::Zero(free.rows())};
+    std::vector<OwnEquations> own;
+    own.reserve(bundle.captures.size());
+    for (const Capture& capture : bundle.captures) {
+      own.push_back(eliminate(bundle, capture, shared));
+      if (own.back().own.info() != Eigen::Success) return std::nullopt;
+    }
+    const auto covariance = covariance_of(shared, free);
+    if (!covariance) return std::nullopt;
+    Step step{*covariance * shared.gradient, {}};
+    step.own.reserve(own.size());
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      const auto indices = shared_of(bundle.captures[k]);
+      step.own.emplace_back(
+          own[k].own.solve(own[k].own_gradient - own[k].mixed * step.shared(indices)));
+    }
+    for (;; step.halve()) {
+      const double largest = step.largest();
+      if (!std::isfinite(largest)) return std::nullopt;
+      LampBundle next = moved(bundle, step);
+      const double next_chi_squared = chi_squared(next);
+      const bool helps = next_chi_squared <= fit.chi_squared * (1 + rounding);
+      if (helps) {
+        bundle = std::move(next);
+        fit.chi_squared = next_chi_squared;
+      }
+      if (helps || largest <= small_step) {
+        if (largest > small_step) break;
+        fit.covariance = *covariance;
+        return fit;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace vlp

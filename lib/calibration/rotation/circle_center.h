@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "calibration/rotation/rotation_fit.h"
+#include "calibration/rotation/spot_captures.h"
+#include "geometry/circle_fit.h"
+
+namespace vlp {
+
+/// The circle that a lamp traces at one height in the plane of normalized points (x/z, y/z), which
+/// is the undistorted image in units of the focal length.
+struct LampCircle {
+  /// Indices in SpotCaptures.
+  std::size_t lamp;
+  std::size_t height;
+  CircleFit fit;
+};
+
+struct CircleCenters {
+  /// The mean of the centres. `yaws_rad` are those of the captures' fixes.
+  RotationFit mean;
+  std::vector<LampCircle> circles;
+  /// Root of the mean squared distance of the centres from their mean: a symptom of tilt.
+  double spread_px = 0;
+};
+
+/// The method of Chen and Guan (section 3.1, eq. 9): a circle through the places of each lamp in
+/// the undistorted image, and the mean of their centres. On a camera that is tilted by t the centre
+/// of what a lamp at angle phi from the axis traces is not at f tan t but at
+///   f sin t cos t / (cos^2 t - sin^2 phi),
+/// so that the circles disagree, and their mean is too far out. Points that are farther from their
+/// circle than 4.5 standard deviations are left out. Needs three sightings of a lamp
+/// at a height; not converged when no lamp has them. The model is RotationModel::shift.
+CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera);
+
+}  // namespace vlp

@@ -1,0 +1,149 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/rotation/robust_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "calibration/rotation/turning.h"
+
+namespace vlp {
+namespace {
+
+/// Below this, in sigmas, residuals are rounding.
+constexpr double kRounding = 1e-6;
+
+int free_parameters(const ceres::Problem& problem) {
+  std::vector<double*> parameters;
+  problem.GetParameterBlocks(&parameters);
+  int count = 0;
+  for (double* parameter : parameters) {
+    if (!problem.IsParameterBlockConstant(parameter)) {
+      count += problem.ParameterBlockSize(parameter);
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+void RobustFit::add(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters) {
+  blocks_.push_back({std::move(cost), std::move(parameters)});
+  used_.push_back(true);
+}
+
+std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width) const {
+  ceres::Problem::Options options;
+  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  auto problem = std::make_unique<ceres::Problem>(options);
+  // One loss for all: Ceres deletes it once.
+  ceres::LossFunction* loss = loss_width > 0 ? new ceres::CauchyLoss(loss_width) : nullptr;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (used_[i]) problem->AddResidualBlock(blocks_[i].cost.get(), loss, blocks_[i].parameters);
+  }
+  for (const auto& candidates : held_) {
+    const auto first = std::find_if(
+        candidates.begin(), candidates.end(),
+        [&](const double* parameter) { return problem->HasParameterBlock(parameter); });
+    if (first != candidates.end()) problem->SetParameterBlockConstant(*first);
+  }
+  return problem;
+}
+
+bool RobustFit::minimize(double loss_width) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_SCHUR;
+  options.max_num_iterations = 100;
+  options.function_tolerance = loss_width > 0 ? 1e-4 : 1e-15;  // the last fits start from the first
+  options.gradient_tolerance = 1e-14;
+  options.parameter_tolerance = 1e-13;
+  options.num_threads = 1;  // the order of sums, and so their rounding, stays
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, problem(loss_width).get(), &summary);
+  measure();
+  return summary.IsSolutionUsable();
+}
+
+void RobustFit::measure() {
+  lengths_.clear();
+  lengths_.reserve(blocks_.size());
+  for (const Block& block : blocks_) {
+    Eigen::Vector2d residual;
+    block.cost->Evaluate(block.parameters.data(), residual.data(), nullptr);
+    lengths_.push_back(residual.norm());
+  }
+}
+
+double RobustFit::scatter() const {
+  std::vector<double> used;
+  for (std::size_t i = 0; i < lengths_.size(); ++i) {
+    if (used_[i]) used.push_back(lengths_[i]);
+  }
+  const auto all = problem(0);
+  const double rows = std::max(all->NumResiduals(), 1);
+  const double share = std::max(rows - free_parameters(*all), 1.0) / rows;
+  constexpr double median_of_rayleigh = 1.17741;  // sqrt(2 ln 2)
+  return std::max(median_of(used) / (median_of_rayleigh * std::sqrt(share)), kRounding);
+}
+
+bool RobustFit::solve() {
+  used_.assign(blocks_.size(), true);
+  measure();
+  constexpr int loss_rounds = 4;
+  for (int round = 0; round < loss_rounds; ++round) {
+    if (!minimize(2 * scatter())) return false;
+  }
+  return refine();
+}
+
+bool RobustFit::refine() {
+  measure();
+  constexpr int rounds = 6;
+  for (int round = 0; round < rounds; ++round) {
+    constexpr double far = 4.5;
+    const double limit = far * scatter();
+    const std::vector<bool> before = used_;
+    for (std::size_t i = 0; i < used_.size(); ++i) used_[i] = lengths_[i] <= limit;
+    if (round > 0 && used_ == before) break;
+    if (!minimize(0)) return false;
+  }
+  return true;
+}
+
+std::vector<std::size_t> RobustFit::outliers() const {
+  std::vector<std::size_t> left_out;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    if (!used_[i]) left_out.push_back(i);
+  }
+  return left_out;
+}
+
+std::optional<Matrix2> RobustFit::covariance(const double* parameter) const {
+  const auto all = problem(0);
+  if (!all->HasParameterBlock(parameter) || all->IsParameterBlockConstant(parameter)) {
+    return std::nullopt;
+  }
+  const int excess = all->NumResiduals() - free_parameters(*all);
+  if (excess <= 0) return std::nullopt;
+  double squares = 0;
+  for (std::size_t i = 0; i < lengths_.size(); ++i) {
+    if (used_[i]) squares += lengths_[i] * lengths_[i];
+  }
+  ceres::Covariance::Options options;
+  options.algorithm_type = ceres::SPARSE_QR;
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // SuiteSparse takes threads
+  options.num_threads = 1;
+  ceres::Covariance inverse(options);
+  Eigen::Matrix<double, 2, 2, Eigen::RowMajor> block;
+  const std::vector<std::pair<const double*, const double*>> wanted{{parameter, parameter}};
+  if (!inverse.Compute(wanted, all.get()) ||
+      !inverse.GetCovarianceBlock(parameter, parameter, block.data())) {
+    return std::nullopt;
+  }
+  block = 0.5 * (block + block.transpose()).eval();
+  return Matrix2(block * (squares / excess));
+}
+
+}  // namespace vlp

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/rotation/spot_search.h"
+
+#include <algorithm>
+
+#include "positioning/positioner.h"
+
+namespace vlp {
+namespace {
+
+/// Why there are too few fixes.
+SpotStatus status_of(const std::vector<FixStatus>& statuses) {
+  const auto count = [&](FixStatus status) {
+    return std::count(statuses.begin(), statuses.end(), status);
+  };
+  const auto few = count(FixStatus::too_few_lamps);
+  const auto contradicting = count(FixStatus::inconsistent) + count(FixStatus::mirrored_map) +
+                             count(FixStatus::degenerate) + count(FixStatus::lamp_below_camera);
+  if (contradicting > few) return SpotStatus::other_map;
+  return few > 0 ? SpotStatus::too_few_lamps : SpotStatus::too_few_captures;
+}
+
+double mean_height(const LampMap& map) {
+  double sum = 0;
+  for (const Lamp& lamp : map.lamps) sum += lamp.position_m.z();
+  return sum / static_cast<double>(map.lamps.size());
+}
+
+}  // namespace
+
+SpotSearch::SpotSearch(const std::vector<Frame>& frames, const LampMap& map, const Camera& camera,
+                       bool lever_arm)
+    : frames_(frames),
+      map_(map),
+      lamps_z_m_(mean_height(map)),
+      lever_arm_(lever_arm),
+      left_out_(frames.size()) {
+  calibration_.camera = camera;
+  calibration_.rotation_center = {RotationModel::tilt, {0, 0}, Eigen::Vector3d::UnitZ()};
+  // A tilt that is not corrected yet is not noise.
+  for (Frame& frame : frames_) {
+    for (Detection& detection : frame.detections) detection.sigma_px.reset();
+  }
+}
+
+SpotStatus SpotSearch::run() {
+  constexpr int rough_rounds = 4, rounds = 40;
+  for (int round = 0; round < rounds && !(round > rough_rounds && settled()); ++round) {
+    // Lamps contradict each other a little while the tilt is in them.
+    locate(round < rough_rounds ? 0.3 : PositionerOptions().max_residual_share);
+    if (fixes_.fixes.size() < kLeastCaptures) return status_of(statuses_);
+    if (round >= rough_rounds) tell_heights_apart(fixes_);
+    const bool rough_arm = round < rough_rounds && lever_arm_;
+    if (const SpotStatus status = turn(rough_arm); status != SpotStatus::ok) return status;
+  }
+  if (misfit_m() > 0.05 * height_of(fixes_, 0)) return SpotStatus::moved;
+  leave_out_strays();
+  locate(PositionerOptions().max_residual_share);
+  tell_heights_apart(fixes_);
+  return turn(false);
+}
+
+SpotCaptures SpotSearch::result() const {
+  SpotCaptures spot;
+  spot.zenith_in_camera = calibration_.rotation_center->zenith_in_camera;
+  spot.lever_arm_m = turning_.lever_arm_m;
+  const auto arcs = arcs_of(fixes_);
+  for (std::size_t i = 0; i < fixes_.spots; ++i) {
+    spot.heights.push_back({lamps_z_m_ - height_of(fixes_, i), turning_.axes_m[i], arcs[i].arc_rad,
+                            static_cast<int>(arcs[i].captures)});
+  }
+  for (std::size_t i = 0; i < fixes_.fixes.size(); ++i) {
+    const TurningFix& fix = fixes_.fixes[i];
+    spot.captures.push_back({frames_[fixes_.frames[i]].image, fix.spot, fix.pose.yaw_rad});
+  }
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (!left_out_[i].empty()) spot.left_out.push_back({frames_[i].image, left_out_[i]});
+  }
+  return spot;
+}
+
+void SpotSearch::locate(double max_residual_share) {
+  PositionerOptions options;
+  options.max_residual_share = max_residual_share;
+  const Positioner positioner(map_, calibration_, options);
+  fixes_ = {};
+  statuses_.clear();
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    if (strays_.contains(i)) continue;
+    const Fix fix = positioner.locate(frames_[i].detections);
+    statuses_.push_back(fix.status);
+    left_out_[i] = fix.ok() ? "" : explanation_of(fix.status);
+    if (!fix.ok()) continue;
+    const Pose& pose = fix.estimate.pose;
+    fixes_.frames.push_back(i);
+    fixes_.fixes.push_back({pose, lamps_z_m_ - pose.position_m.z(), 0});
+  }
+}
+
+SpotStatus SpotSearch::turn(bool lever_arm) {
+  const auto arcs = arcs_of(fixes_);
+  if (const SpotStatus status = vlp::status_of(arcs); status != SpotStatus::ok) return status;
+  for (const std::size_t i : fixes_.frames)
+    left_out_[i] = "too few captures, or too small an arc, at its height";
+  drop_weak_spots(fixes_, arcs);
+  for (const std::size_t i : fixes_.frames) left_out_[i].clear();
+  turning_ = fit_turning(fixes_.fixes, fixes_.spots, lever_arm || fixes_.spots > 1);
+  const Eigen::Vector3d up(-turning_.delta.x(), -turning_.delta.y(), 1);
+  zenith() = (level_from_zenith(zenith()).transpose() * up).normalized();
+  return SpotStatus::ok;
+}
+
+bool SpotSearch::settled() const {
+  constexpr double enough_rad = 1e-10;
+  return turning_.delta.norm() < enough_rad;
+}
+
+void SpotSearch::leave_out_strays() {
+  const double far_m = std::max(8 * misfit_m(), 0.01 * height_of(fixes_, 0));
+  for (std::size_t i = 0; i < fixes_.fixes.size(); ++i) {
+    if (!(turning_.residuals_m[i] > far_m)) continue;
+    strays_.insert(fixes_.frames[i]);
+    left_out_[fixes_.frames[i]] = "its fix is not where the others turn";
+  }
+}
+
+}  // namespace vlp

@@ -1,0 +1,100 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/rotation/turning_axis.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "calibration/rotation/axis_residual.h"
+#include "calibration/rotation/fit_parts.h"
+#include "calibration/rotation/robust_fit.h"
+#include "geometry/similarity.h"
+
+namespace vlp {
+namespace {
+
+/// What is estimated, in the world.
+struct State {
+  Eigen::Vector2d zenith;
+  Eigen::Vector2d lever_arm_m;
+  std::vector<Eigen::Vector2d> lamps_m;
+  std::vector<Eigen::Vector3d> axes_m;
+  std::vector<double> yaws_rad;
+};
+
+State start_from(const SpotCaptures& spot) {
+  State state{spot.zenith_in_camera.hnormalized(), spot.lever_arm_m, {}, {}, yaws_of(spot)};
+  for (const Lamp& lamp : spot.lamps) state.lamps_m.emplace_back(lamp.position_m.head<2>());
+  for (const SpotHeight& height : spot.heights) {
+    state.axes_m.emplace_back(height.axis_m.x(), height.axis_m.y(), height.z_m);
+  }
+  return state;
+}
+
+void add_residuals(RobustFit& fit, const SpotCaptures& spot, State& state) {
+  for (const SpotSighting& sighting : spot.sightings) {
+    const std::size_t height = spot.captures[sighting.capture].height;
+    fit.add(AxisResidual::create(sighting, spot.lamps[sighting.lamp].position_m.z()),
+            {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[sighting.lamp].data(),
+             state.axes_m[height].data(), &state.yaws_rad[sighting.capture]});
+  }
+  // Nothing shows where the world is, how it is turned, and, of lamps at one height, how large.
+  fit.hold(state.axes_m.front().data());
+  fit.hold_one_of(pointers_to(state.yaws_rad));
+  if (state.axes_m.size() == 1) fit.hold(state.lever_arm_m.data());
+}
+
+/// Gives the world the size that the map has. True when it had that already.
+bool scale_to_map(const SpotCaptures& spot, State& state) {
+  const auto similarity = fit_similarity(
+      spot.lamps.size(), [&](std::size_t i) { return state.lamps_m[i]; },
+      [&](std::size_t i) { return Eigen::Vector2d(spot.lamps[i].position_m.head<2>()); });
+  if (!similarity) return true;
+  double lamps_z_m = 0;
+  for (const Lamp& lamp : spot.lamps) lamps_z_m += lamp.position_m.z();
+  lamps_z_m /= static_cast<double>(spot.lamps.size());
+  const double scale = similarity->factor.norm();
+  const Eigen::Vector3d fixed(state.axes_m[0].x(), state.axes_m[0].y(), lamps_z_m);
+  for (Eigen::Vector3d& axis_m : state.axes_m) axis_m = fixed + scale * (axis_m - fixed);
+  for (Eigen::Vector2d& lamp_m : state.lamps_m) {
+    lamp_m = fixed.head<2>() + scale * (lamp_m - fixed.head<2>());
+  }
+  state.lever_arm_m *= scale;
+  constexpr double same = 1e-9;
+  return std::abs(scale - 1) < same;
+}
+
+}  // namespace
+
+RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera) {
+  assert(spot.status == SpotStatus::ok);
+  const bool lever_arm = spot.heights.size() > 1;
+  State state = start_from(spot);
+  RobustFit fit;
+  add_residuals(fit, spot, state);
+  RotationFit result;
+  constexpr int rounds = 10;
+  for (int round = 0; round < rounds; ++round) {
+    result.converged = round == 0 ? fit.solve() : fit.refine();
+    if (!result.converged) return result;
+    if (!lever_arm || scale_to_map(spot, state)) break;
+  }
+  result.center = rotation_center_at(state.zenith, RotationModel::tilt, camera,
+                                     fit.covariance(state.zenith.data()));
+  if (lever_arm) {
+    result.center.lever_arm_m = state.lever_arm_m;
+    result.center.lever_arm_covariance = fit.covariance(state.lever_arm_m.data());
+  }
+  describe(result, fit, spot);
+  // The method is exact: what is left is noise, or the captures are of no turn about one axis.
+  constexpr double most_share = 0.01, most_times = 5;
+  const double most_px =
+      std::max(most_share * camera.intrinsics[0], most_times * spot.stated_px.value_or(0));
+  if (result.residual_px > most_px) return {};
+  result.yaws_rad = std::move(state.yaws_rad);
+  return result;
+}
+
+}  // namespace vlp

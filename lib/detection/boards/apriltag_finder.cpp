@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <apriltag/apriltag.h>
+
+#include <mutex>
+#include <utility>
+
+#include "detection/boards/tag_families.h"
+#include "detection/boards/tag_finder.h"
+
+namespace vlp {
+namespace {
+
+/// libapriltag puts (0.5, 0.5) at the centre of the top-left pixel.
+constexpr double kPixelCenter = 0.5;
+/// Half the resolution to search larger images, with equal corners: these are fitted in the full
+/// one.
+constexpr int kLargePixels = 1'000'000;
+
+struct Detector {
+  explicit Detector(const Board& board) : family(tag_family(board.family)) {
+    for (int extra = 1; extra < board.border_bits; ++extra) widen_border();
+    // The table of what corrects to what takes gigabytes for large families.
+    constexpr uint32_t large = 3000;
+    apriltag_detector_add_family_bits(detector.get(), family.get(), family->ncodes > large ? 1 : 2);
+    detector->nthreads = 1;
+    detector->refine_edges = true;
+    detector->quad_sigma = 0;  // it would write into the image
+  }
+  void widen_border() const {
+    family->width_at_border += 2;
+    family->total_width += 2;
+    for (uint32_t bit = 0; bit < family->nbits; ++bit) {
+      ++family->bit_x[bit];
+      ++family->bit_y[bit];
+    }
+  }
+
+  TagFamily family;  // outlives the detector
+  std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)> detector{
+      apriltag_detector_create(), apriltag_detector_destroy};
+};
+
+class ApriltagFinder : public TagFinder {
+ public:
+  explicit ApriltagFinder(Board board) : board_(std::move(board)) { give(take()); }
+
+  std::vector<SeenTag> find(const cv::Mat1b& image) const override {
+    std::unique_ptr<Detector> mine = take();
+    mine->detector->quad_decimate = image.cols * image.rows >= kLargePixels ? 2 : 1;
+    // It does not write, but its interface is without const.
+    image_u8_t view{image.cols, image.rows, static_cast<int>(image.step), image.data};
+    const std::unique_ptr<zarray_t, void (*)(zarray_t*)> found(
+        apriltag_detector_detect(mine->detector.get(), &view), apriltag_detections_destroy);
+    std::vector<SeenTag> tags(static_cast<std::size_t>(zarray_size(found.get())));
+    for (std::size_t i = 0; i < tags.size(); ++i) {
+      apriltag_detection_t* detection = nullptr;
+      zarray_get(found.get(), static_cast<int>(i), static_cast<void*>(&detection));
+      tags[i].id = detection->id;
+      for (std::size_t k = 0; k < 4; ++k) {
+        tags[i].corners_px[k] = {detection->p[k][0] - kPixelCenter,
+                                 detection->p[k][1] - kPixelCenter};
+      }
+    }
+    give(std::move(mine));
+    return tags;
+  }
+
+ private:
+  /// A detector serves one thread at a time and is dear to make.
+  std::unique_ptr<Detector> take() const {
+    {
+      const std::lock_guard lock(taking_);
+      if (!idle_.empty()) {
+        std::unique_ptr<Detector> taken = std::move(idle_.back());
+        idle_.pop_back();
+        return taken;
+      }
+    }
+    return std::make_unique<Detector>(board_);
+  }
+  void give(std::unique_ptr<Detector> detector) const {
+    const std::lock_guard lock(taking_);
+    idle_.push_back(std::move(detector));
+  }
+
+  Board board_;
+  mutable std::mutex taking_;
+  mutable std::vector<std::unique_ptr<Detector>> idle_;
+};
+
+}  // namespace
+
+std::unique_ptr<TagFinder> apriltag_finder(const Board& board) {
+  return std::make_unique<ApriltagFinder>(board);
+}
+
+}  // namespace vlp

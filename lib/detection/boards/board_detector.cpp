@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/board_detector.h"
+
+#include <algorithm>
+#include <map>
+#include <opencv2/imgproc.hpp>
+
+#include "detection/boards/tag_finder.h"
+#include "detection/boards/touching_tags.h"
+#include "rig/board_layout.h"
+
+namespace vlp {
+namespace {
+
+/// A corner nearer to the image's edge was fitted to edges that are cut short.
+constexpr double kMargin = 2;
+
+cv::Mat1b eight_bits(const cv::Mat& image) {
+  if (image.depth() == CV_8U) return image;
+  double brightest = 0;
+  cv::minMaxLoc(image, nullptr, &brightest);
+  cv::Mat1b levels;
+  image.convertTo(levels, CV_8U, 255 / std::max(brightest, 1.0));
+  return levels;
+}
+
+cv::Mat1f smooth(const cv::Mat1b& levels) {
+  constexpr double sigma_px = 1;
+  cv::Mat exact;
+  levels.convertTo(exact, CV_32F);
+  cv::Mat1f smoothed;
+  cv::GaussianBlur(exact, smoothed, {}, sigma_px);
+  return smoothed;
+}
+
+bool inside(const SeenTag& tag, const cv::Mat& image) {
+  return std::all_of(tag.corners_px.begin(), tag.corners_px.end(), [&](const auto& corner) {
+    return corner.x() >= kMargin && corner.y() >= kMargin && corner.x() < image.cols - kMargin &&
+           corner.y() < image.rows - kMargin;
+  });
+}
+
+}  // namespace
+
+BoardDetector::BoardDetector(const Board& board)
+    : finder_(board.corner_squares ? aruco_finder(board) : apriltag_finder(board)) {
+  for (const BoardTag& tag : board_layout(board)) ids_.insert(tag.id);
+  if (board.corner_squares) touching_ = std::make_unique<TouchingTags>(board);
+}
+
+BoardDetector::~BoardDetector() = default;
+
+SeenBoard BoardDetector::detect(const cv::Mat& image) const {
+  const cv::Mat1b levels = eight_bits(image);
+  std::map<int, std::vector<SeenTag>> found;
+  SeenBoard seen;
+  for (SeenTag& tag : finder_->find(levels)) {
+    if (ids_.contains(tag.id)) {
+      found[tag.id].push_back(tag);
+    } else {
+      ++seen.foreign;
+    }
+  }
+  const cv::Mat1f smoothed = touching_ ? smooth(levels) : cv::Mat1f();
+  for (const auto& [id, same] : found) {
+    if (same.size() > 1) continue;
+    const auto tag = touching_ ? touching_->exact(same.front(), smoothed) : same.front();
+    if (tag) seen.tags.push_back(*tag);
+  }
+  if (touching_) {
+    for (const SeenTag& tag : touching_->others(seen.tags, smoothed)) {
+      if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
+    }
+  }
+  std::erase_if(seen.tags, [&](const SeenTag& tag) { return !inside(tag, levels); });
+  std::sort(seen.tags.begin(), seen.tags.end(),
+            [](const SeenTag& a, const SeenTag& b) { return a.id < b.id; });
+  for (const auto& [id, same] : found) {
+    const bool used = std::any_of(seen.tags.begin(), seen.tags.end(),
+                                  [id = id](const SeenTag& tag) { return tag.id == id; });
+    seen.unusable += used ? 0 : 1;
+  }
+  return seen;
+}
+
+}  // namespace vlp

@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/detect_boards.h"
+
+#include <algorithm>
+#include <exception>
+#include <mutex>
+#include <utility>
+
+#include "captures/in_parallel.h"
+#include "detection/image_file.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+struct Outcome {
+  std::optional<BoardView> view;
+  std::string refused;
+};
+
+BoardView view_of(const BoardDetector& detector, const std::filesystem::path& file,
+                  const BoardCache& cache) {
+  if (cache.find) {
+    if (auto known = cache.find(file)) return *known;
+  }
+  const cv::Mat image = read_image(file);
+  BoardView view{file.filename().string(), {image.cols, image.rows}, detector.detect(image)};
+  if (cache.keep) cache.keep(file, view);
+  return view;
+}
+
+/// One bad image does not end a run, whatever is bad about it.
+Outcome outcome_of(const BoardDetector& detector, const std::filesystem::path& file,
+                   const BoardCache& cache) {
+  try {
+    return {view_of(detector, file, cache), ""};
+  } catch (const InputError& error) {
+    return {{}, error.what()};
+  } catch (const std::exception& error) {
+    std::string reason = file.string() + ": cannot be used: " + error.what();
+    std::replace(reason.begin(), reason.end(), '\n', ' ');
+    return {{}, reason};
+  }
+}
+
+}  // namespace
+
+BoardViews detect_boards(const BoardDetector& detector,
+                         const std::vector<std::filesystem::path>& images, int threads,
+                         const BoardCache& cache,
+                         const std::function<void(std::size_t done)>& progress) {
+  std::vector<Outcome> outcomes(images.size());
+  std::mutex counting;
+  std::size_t done = 0;
+  in_parallel(images.size(), threads, [&](std::size_t i) {
+    outcomes[i] = outcome_of(detector, images[i], cache);
+    const std::lock_guard lock(counting);
+    progress(++done);
+  });
+  BoardViews result;
+  for (Outcome& outcome : outcomes) {
+    if (outcome.view) {
+      result.views.push_back(std::move(*outcome.view));
+    } else {
+      result.refused.push_back(std::move(outcome.refused));
+    }
+  }
+  return result;
+}
+
+}  // namespace vlp

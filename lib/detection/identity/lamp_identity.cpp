@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include "detection/identity/lamp_rule.h"
+#include "detection/lamp_detector.h"
+
+namespace vlp {
+
+bool wholly_in_view(const Light& light, const cv::Size& size) {
+  return light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
+         light.high.y() < size.height - 0.5;
+}
+
+std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
+  if (classifier_) return vlp::lamp_of(*classifier_, stripes);
+  if (!camera_.row_time_s) return std::nullopt;
+  return lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
+}
+
+void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) const {
+  constexpr double least_clarity = 0.5;
+  constexpr double much_softer = 5, least_roundness = 0.45, most_outside = 0.25;
+  double sharpest_px = std::numeric_limits<double>::infinity();
+  for (Light& light : lights) {
+    const Stripes& stripes = light.stripes;
+    const bool flickers = stripes.contrast >= kLeastContrast && stripes.periods >= kLeastPeriods &&
+                          stripes.clarity >= least_clarity;
+    light.kind = flickers ? LightKind::unknown : LightKind::steady;
+    if (!flickers) continue;
+    sharpest_px = std::min(sharpest_px, light.rise_px);
+    light.lamp = lamp_of(stripes);
+  }
+  for (Light& light : lights) {
+    // A lamp's reflection flickers like the lamp. Where most of the edge is not the lamp's, a
+    // circle through the rest is not to be trusted.
+    const bool soft = light.rise_px > much_softer * sharpest_px;
+    const bool strays = light.outside > most_outside;
+    if (soft || strays || light.roundness < least_roundness) light.lamp.reset();
+  }
+  // Of two lights with one identity the one with the surer centre has it.
+  for (const Lamp& lamp : lamps_.lamps) {
+    std::vector<Light*> claims;
+    for (Light& light : lights) {
+      if (light.lamp == lamp.id) claims.push_back(&light);
+    }
+    const auto best = std::min_element(claims.begin(), claims.end(),
+                                       [](auto* a, auto* b) { return a->sigma_px < b->sigma_px; });
+    for (Light* claim : claims) {
+      if (claim != *best) claim->lamp.reset();
+    }
+  }
+  for (Light& light : lights) {
+    if (!light.lamp) continue;
+    light.kind = wholly_in_view(light, size) ? LightKind::lamp : LightKind::cut;
+  }
+}
+
+}  // namespace vlp

@@ -1,0 +1,163 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/identity/stripes.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <numeric>
+#include <optional>
+
+namespace vlp {
+namespace {
+
+constexpr double kClear = 0.7;
+
+/// The share of the variance that a sine of that frequency (per line) and a constant explain.
+double explained(const std::vector<double>& signal, double mean, double variance,
+                 double frequency) {
+  const double step = 2 * std::numbers::pi * frequency;
+  const std::complex<double> turn(std::cos(step), std::sin(step));
+  std::complex<double> phasor(1, 0), sum_p(0, 0), sum_pp(0, 0), sum_sp(0, 0);
+  for (const double value : signal) {
+    sum_p += phasor;
+    sum_pp += phasor * phasor;
+    sum_sp += (value - mean) * phasor;
+    phasor *= turn;
+  }
+  const auto n = static_cast<double>(signal.size());
+  // Normal equations of cosine and sine, with the constant taken off.
+  const double cc = (n + sum_pp.real()) / 2 - sum_p.real() * sum_p.real() / n;
+  const double ss = (n - sum_pp.real()) / 2 - sum_p.imag() * sum_p.imag() / n;
+  const double cs = sum_pp.imag() / 2 - sum_p.real() * sum_p.imag() / n;
+  const double determinant = cc * ss - cs * cs;
+  if (!(determinant > 1e-6 * n * n)) return 0;
+  const double a = sum_sp.real(), b = sum_sp.imag();
+  return (ss * a * a - 2 * cs * a * b + cc * b * b) / determinant / (n * variance);
+}
+
+/// Where stripes begin or end: the signal passes the middle between dark and bright.
+std::vector<double> passages(const std::vector<double>& signal, double middle, bool rising) {
+  std::vector<double> places;
+  for (std::size_t i = 1; i < signal.size(); ++i) {
+    const double before = signal[i - 1] - middle, after = signal[i] - middle;
+    if ((rising && before < 0 && after >= 0) || (!rising && before >= 0 && after < 0)) {
+      places.push_back(double(i) - after / (after - before));
+    }
+  }
+  return places;
+}
+
+/// The period that begins and ends of stripes show, by least squares: one offset for the begins,
+/// one for the ends. Exact for square waves, of which a few periods mislead a sine. Nothing when
+/// they are too few or do not keep time with `guess`.
+std::optional<double> period_of(const std::vector<double>& signal, double middle, double guess) {
+  double moment = 0, square = 0, misfit = 0;
+  int count = 0;
+  std::array<std::vector<double>, 2> places, numbers;
+  for (const bool rising : {true, false}) {
+    auto& at = places[rising];
+    at = passages(signal, middle, rising);
+    double number = 0;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      if (i > 0) number += std::max(1.0, std::round((at[i] - at[i - 1]) / guess));
+      numbers[rising].push_back(number);
+    }
+    if (at.size() < 2) continue;
+    const double mean_at = std::accumulate(at.begin(), at.end(), 0.0) / double(at.size());
+    const double mean_number =
+        std::accumulate(numbers[rising].begin(), numbers[rising].end(), 0.0) / double(at.size());
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      at[i] -= mean_at;
+      numbers[rising][i] -= mean_number;
+      moment += numbers[rising][i] * at[i];
+      square += numbers[rising][i] * numbers[rising][i];
+    }
+    count += static_cast<int>(at.size());
+  }
+  if (!(square > 0)) return std::nullopt;
+  const double period = moment / square;
+  for (const std::size_t type : {std::size_t(0), std::size_t(1)}) {
+    if (places[type].size() < 2) continue;
+    for (std::size_t i = 0; i < places[type].size(); ++i) {
+      misfit += std::pow(places[type][i] - period * numbers[type][i], 2);
+    }
+  }
+  constexpr double most_misfit = 0.12, most_off = 0.35;
+  const bool in_time = std::sqrt(misfit / count) < most_misfit * period;
+  if (!in_time || std::abs(period / guess - 1) > most_off) return std::nullopt;
+  return period;
+}
+
+/// Share of the disc's area on lines brighter than `middle`: of chords, in the middle of the disc.
+double lit_area(const std::vector<double>& signal, double middle) {
+  const auto n = static_cast<double>(signal.size());
+  double lit = 0, all = 0;
+  for (std::size_t i = 0; i < signal.size(); ++i) {
+    const double off = kUsedHeight * (2 * (double(i) + 0.5) / n - 1);
+    const double chord = std::sqrt(1 - off * off);
+    all += chord;
+    if (signal[i] > middle) lit += chord;
+  }
+  return lit / all;
+}
+
+}  // namespace
+
+bool trustworthy(const Stripes& stripes) {
+  constexpr double many = 2.5;
+  return stripes.clarity > kClear && stripes.periods > many;
+}
+
+bool readable(const Stripes& stripes) { return stripes.regular || stripes.clarity > kClear; }
+
+Stripes stripes_of(const std::vector<double>& signal) {
+  constexpr std::size_t least_lines = 8;
+  if (signal.size() < least_lines) return {};
+  const auto n = static_cast<double>(signal.size());
+  std::vector<double> sorted = signal;
+  std::sort(sorted.begin(), sorted.end());
+  const double low = std::max(0.0, sorted[sorted.size() / 20]);
+  const double high = sorted[sorted.size() - 1 - sorted.size() / 20];
+  if (!(high > 0)) return {};
+  Stripes stripes{};
+  stripes.contrast = (high - low) / high;
+  double mean = 0, variance = 0;
+  for (const double value : signal) mean += value / n;
+  for (const double value : signal) variance += (value - mean) * (value - mean) / n;
+  constexpr double rounding = 1e-18;
+  if (!(high > low) || !(variance > rounding * high * high)) return stripes;
+
+  // Steps are fine enough for a parabola through the best three.
+  const double step = 0.2 / n, lowest = 0.9 / n, highest = 1 / kShortestPeriod_lines;
+  const auto at = [&](double frequency) { return explained(signal, mean, variance, frequency); };
+  double best = lowest;
+  for (double frequency = lowest; frequency <= highest; frequency += step) {
+    const double share = at(frequency);
+    if (share > stripes.clarity) stripes.clarity = share, best = frequency;
+  }
+  const double before = at(best - step), after = at(best + step);
+  const double bend = before - 2 * stripes.clarity + after;
+  if (bend < 0) best += std::clamp((before - after) / bend / 2, -1.0, 1.0) * step;
+  const double middle = (low + high) / 2;
+  const auto in_time = period_of(signal, middle, 1 / best);
+  stripes.regular = in_time.has_value();
+  stripes.period_lines = in_time.value_or(1 / best);
+  stripes.periods = n / stripes.period_lines;
+  // Over whole periods alone.
+  const double used = std::max(1.0, std::floor(stripes.periods)) * stripes.period_lines;
+  double lit = 0;
+  for (std::size_t i = 0; i < signal.size(); ++i) {
+    lit += std::clamp(used - double(i), 0.0, 1.0) * signal[i];
+  }
+  stripes.duty = std::clamp((lit / std::min(used, n) - low) / (high - low), 0.0, 1.0);
+  const std::size_t edges =
+      passages(signal, middle, true).size() + passages(signal, middle, false).size();
+  stripes.count_per_line = static_cast<double>(edges) / (2 * n);
+  stripes.lit_area = lit_area(signal, middle);
+  return stripes;
+}
+
+}  // namespace vlp

@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/lights/background.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace vlp {
+namespace {
+
+template <typename Level>
+std::vector<Level> sample_of(const cv::Mat& image) {
+  constexpr double enough = 8000;
+  const double pixels = static_cast<double>(image.rows) * image.cols;
+  // An odd step that shifts from row to row meets every kind of row and column.
+  const int step = static_cast<int>(std::sqrt(pixels / enough)) | 1;
+  std::vector<Level> sample;
+  sample.reserve(static_cast<std::size_t>(2 * enough));
+  for (int row = std::min(step / 2, image.rows / 2); row < image.rows; row += step) {
+    const auto* line = image.ptr<Level>(row);
+    for (int column = row / step % step; column < image.cols; column += step) {
+      sample.push_back(line[column]);
+    }
+  }
+  if (sample.empty()) sample.push_back(*image.ptr<Level>(0));
+  return sample;
+}
+
+template <typename Level>
+Background background(const cv::Mat& image) {
+  std::vector<Level> sample = sample_of<Level>(image);
+  const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
+  std::nth_element(sample.begin(), middle, sample.end());
+  const double median = *middle;
+  // Lit pixels are above; what is below is noise alone.
+  double squares = 0;
+  for (auto below = sample.begin(); below != middle; ++below) {
+    squares += (median - *below) * (median - *below);
+  }
+  double noise = std::sqrt(squares / double(std::max<std::ptrdiff_t>(1, middle - sample.begin())));
+  if (median == 0) {
+    // Noise below is clipped: one pixel of ten is brighter than 1.28 standard deviations.
+    const auto tenth = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() * 9 / 10);
+    std::nth_element(sample.begin(), tenth, sample.end());
+    noise = std::max(noise, *tenth / 1.2816);
+  }
+  // Grey levels are coarse: of those around, the mean and the scatter say more.
+  constexpr double around = 3, least_noise = 0.3;
+  double count = 0, sum = 0, sum_of_squares = 0;
+  for (const Level value : sample) {
+    const double off = value - median;
+    if (std::abs(off) > around * noise) continue;
+    ++count;
+    sum += off;
+    sum_of_squares += off * off;
+  }
+  const double level = median + sum / count;
+  if (median > 0) noise = std::sqrt(sum_of_squares / count - std::pow(sum / count, 2));
+  noise = std::max(noise, least_noise);
+  constexpr double clear = 4.5, least = 1.6;
+  return {level, noise, level + std::max(clear * noise, least)};
+}
+
+}  // namespace
+
+Background background_of(const cv::Mat& image) {
+  return image.depth() == CV_8U ? background<std::uint8_t>(image)
+                                : background<std::uint16_t>(image);
+}
+
+}  // namespace vlp

@@ -1,0 +1,151 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/lights/light_shape.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+
+#include "detection/lights/robust_circle.h"
+#include "detection/lights/robust_ellipse.h"
+#include "rig/detection.h"
+
+namespace vlp {
+namespace {
+
+/// The diagonal of the box around the points.
+double extent(const std::vector<Eigen::Vector2d>& points) {
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& point : points) box.extend(point);
+  return box.diagonal().norm();
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double median_rise_px(const std::vector<EdgePoint>& outline) {
+  std::vector<double> rises;
+  rises.reserve(outline.size());
+  for (const EdgePoint& edge : outline) rises.push_back(edge.rise_px);
+  return median(std::move(rises));
+}
+
+/// The points of the circle, but those next to a point that is not: where the edge of what hides a
+/// part of the light meets the outline, both are blurred.
+std::vector<EdgePoint> on_circle(const std::vector<EdgePoint>& outline,
+                                 const std::vector<bool>& inliers) {
+  constexpr double reach_px = 4;
+  std::vector<EdgePoint> all, clear;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    if (!inliers[i]) continue;
+    bool near = false;
+    for (std::size_t j = 0; j < outline.size() && !near; ++j) {
+      near = !inliers[j] && (outline[j].pixel - outline[i].pixel).norm() < reach_px;
+    }
+    all.push_back(outline[i]);
+    if (!near) clear.push_back(outline[i]);
+  }
+  return 2 * clear.size() < all.size() ? all : clear;
+}
+
+/// A circle is an ellipse, too.
+std::optional<RobustEllipse> fit_round(const std::vector<Eigen::Vector2d>& points,
+                                       const std::vector<double>& weights, double tolerance,
+                                       bool circle) {
+  if (!circle) return fit_robust_ellipse(points, weights, tolerance);
+  auto fit = fit_robust_circle(points, weights, tolerance);
+  if (!fit) return std::nullopt;
+  return RobustEllipse{fit->circle.center, fit->circle.radius * Matrix2::Identity(),
+                       fit->center_covariance, std::move(fit->inliers), fit->count};
+}
+
+}  // namespace
+
+Eigen::Vector2d LightShape::turned(const Eigen::Vector2d& at) const {
+  return camera_.readout == Readout::rows ? at : Eigen::Vector2d(at.reverse());
+}
+
+std::optional<Eigen::Vector2d> LightShape::plane_of(const Eigen::Vector2d& pixel) const {
+  if (!camera_.lens) return pixel;
+  const auto ray = camera_.lens->unproject(pixel);
+  if (!ray) return std::nullopt;
+  const Eigen::Vector3d level = camera_.level_from_camera * ray->direction;
+  if (!(level.z() > 0)) return std::nullopt;
+  return level.head<2>() / level.z();
+}
+
+std::optional<Eigen::Vector2d> LightShape::pixel_of(const Eigen::Vector2d& plane) const {
+  if (!camera_.lens) return plane;
+  return camera_.lens->project(camera_.level_from_camera.transpose() * plane.homogeneous());
+}
+
+std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
+                                          const Background& background) const {
+  constexpr std::size_t least_points = 5;
+  constexpr int least_support = 10;
+  std::vector<Eigen::Vector2d> points, pixels;
+  double brightest = 0;
+  std::erase_if(outline, [&](const EdgePoint& edge) {
+    const auto plane = plane_of(turned(edge.pixel));
+    if (plane) {
+      points.push_back(*plane);
+      pixels.push_back(edge.pixel);
+    }
+    brightest = std::max(brightest, edge.level);
+    return !plane;
+  });
+  if (points.size() < least_points) return std::nullopt;
+  std::vector<double> weights;
+  weights.reserve(outline.size());
+  for (const EdgePoint& edge : outline) weights.push_back(std::pow(edge.level / brightest, 2));
+  const double per_px = extent(points) / extent(pixels);
+  if (!(per_px > 0)) return std::nullopt;
+  // Half a level is passed within half a pixel or so; noise blurs that, and a soft edge.
+  const double tolerance_px =
+      std::max({0.35, 8 * background.noise / brightest, 0.4 * median_rise_px(outline)});
+  const auto fit = fit_round(points, weights, tolerance_px * per_px, camera_.lens.has_value());
+  if (!fit || fit->count < least_support) return std::nullopt;
+
+  Light light{};
+  const auto pixel = pixel_of(fit->center);
+  if (!pixel) return std::nullopt;
+  light.pixel = light.low = light.high = *pixel;
+  for (int i = 0; i < 16; ++i) {
+    const double angle = std::numbers::pi / 8 * i;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    const auto rim = pixel_of(fit->center + fit->rim_from_circle * direction);
+    if (!rim) return std::nullopt;
+    light.low = light.low.cwiseMin(*rim);
+    light.high = light.high.cwiseMax(*rim);
+  }
+  light.radius_px = std::sqrt(fit->rim_from_circle.determinant()) / per_px;
+  const double sigma_px = std::sqrt(fit->center_covariance.trace() / 2) / per_px;
+  if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
+  light.sigma_px = std::max(kMinSigma_px, sigma_px);
+  light.roundness = double(fit->count) / double(outline.size());
+  light.outline = on_circle(outline, fit->inliers);
+  light.rise_px = median_rise_px(light.outline);
+  return light;
+}
+
+std::vector<EdgePoint> LightShape::outside(const Light& light,
+                                           const std::vector<EdgePoint>& outline) const {
+  // Of the ellipse in its box, although the light may be one that lies aslant in it.
+  constexpr double clear = 1.1, clear_px = 1.5;
+  const Eigen::Vector2d center = (light.low + light.high) / 2;
+  const Eigen::Vector2d half =
+      clear * (light.high - light.low) / 2 + Eigen::Vector2d(clear_px, clear_px);
+  std::vector<EdgePoint> result;
+  std::copy_if(outline.begin(), outline.end(), std::back_inserter(result),
+               [&](const EdgePoint& edge) {
+                 return (turned(edge.pixel) - center).cwiseQuotient(half).norm() > 1;
+               });
+  return result;
+}
+
+}  // namespace vlp

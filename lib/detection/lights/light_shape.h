@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "camera/lens.h"
+#include "detection/lights/background.h"
+#include "detection/lights/light.h"
+#include "rig/calibration.h"
+
+namespace vlp {
+
+/// What a detector knows of the camera. The row time is needed for identities.
+struct DetectorCamera {
+  Readout readout;
+  std::optional<double> row_time_s;
+  /// Without it ellipses are fitted in the image itself.
+  std::optional<Lens> lens;
+  /// level_from_camera, for discs that a tilted camera sees.
+  Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();
+};
+
+/// The shape of lights by their outline. Edge points go through the lens into the level plane; a
+/// circle is fitted there robustly, and its centre is projected back, because the centre of an
+/// outline in the image is not the image of the centre (theory, "Lamp centroid"). Without a lens an
+/// ellipse is fitted in the image.
+class LightShape {
+ public:
+  explicit LightShape(const DetectorCamera& camera) : camera_(camera) {}
+
+  /// The light with that outline, or most of it: everything but kind, lamp and stripes. Nothing
+  /// when it is not round, or its centre is not known to a pixel or so.
+  std::optional<Light> light_of(std::vector<EdgePoint> outline, const Background& background) const;
+
+  /// The points that lie outside a light.
+  std::vector<EdgePoint> outside(const Light& light, const std::vector<EdgePoint>& outline) const;
+
+  /// (column, row) of the lines that the shutter reads from (u, v) of the image, and back.
+  Eigen::Vector2d turned(const Eigen::Vector2d& at) const;
+
+ private:
+  std::optional<Eigen::Vector2d> plane_of(const Eigen::Vector2d& pixel) const;
+  std::optional<Eigen::Vector2d> pixel_of(const Eigen::Vector2d& plane) const;
+
+  DetectorCamera camera_;
+};
+
+}  // namespace vlp

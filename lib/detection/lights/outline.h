@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "detection/lights/background.h"
+#include "detection/lights/runs.h"
+
+namespace vlp {
+
+/// A point of a light's outline: where a lit row begins or ends, at half the level between the dark
+/// and the light next to the edge, to a fraction of a pixel.
+struct EdgePoint {
+  /// (column, row)
+  Eigen::Vector2d pixel;
+  /// Of the light next to the edge, above the dark.
+  double level;
+  /// From a quarter to three quarters of the level, in pixels along the row.
+  double rise_px;
+  /// Whether the light begins here, or ends.
+  bool begins;
+};
+
+/// The points again, now that the light is known to be an ellipse in the box from `low` to `high`
+/// (column, row): the level is taken at the same depth below the outline everywhere, where a row
+/// cuts it at a flat angle further in. Points where it cuts flatter than 20 degrees are left out.
+std::vector<EdgePoint> refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
+                               const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                               const Background& background);
+
+/// Of each row the first begin and the last end: the outline of a light that something in the way
+/// splits.
+std::vector<EdgePoint> outermost(std::vector<EdgePoint> points);
+
+/// The two ends of each run, but those at the image's edge and those too short to tell.
+std::vector<EdgePoint> outline_of(const cv::Mat& image, const Blob& blob,
+                                  const Background& background);
+
+}  // namespace vlp

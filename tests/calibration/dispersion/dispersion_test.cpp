@@ -1,0 +1,152 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/dispersion/dispersion.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+
+#include "calibration/dispersion/station.h"
+#include "calibration/levelling/levelling.h"
+#include "positioning/positioner.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+TEST(Dispersion, SeparatesCameraFromWorldExactly) {
+  Random random(1);
+  for (const double error_rad : {0.0, 0.005, 0.05}) {
+    Station station(error_rad);
+    const Eigen::Vector2d wrong_m(0.004, -0.003);
+    const auto captures = station.captures(12, true, wrong_m);
+    const auto fit =
+        fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
+    ASSERT_EQ(fit.status, DispersionStatus::ok) << explanation_of(fit.status);
+    EXPECT_THAT(*fit.world_offset_m, IsNear(wrong_m, 1e-9));
+    EXPECT_LT(fit.after.radius, 1e-9);
+    EXPECT_TRUE(error_rad == 0 || fit.before.radius > 0.005);
+    EXPECT_EQ(fit.dispersion.captures, 12);
+    EXPECT_EQ(fit.dispersion.radius_m, fit.before.radius);
+
+    Calibration corrected = station.believed;
+    corrected.dispersion = fit.dispersion;
+    const Positioner positioner(station.rig.map, corrected);
+    for (int i = 0; i < 20; ++i) {  // elsewhere, at other heights and yaws
+      station.rig.camera = {{random.uniform(-0.4, 0.4), random.uniform(-0.3, 0.3), 0.02 * i},
+                            random.uniform(-3, 3)};
+      const Fix fix = positioner.locate(seen_from(station.rig));
+      ASSERT_TRUE(fix.ok());
+      EXPECT_THAT(fix.estimate.pose.position_m, IsNear(station.rig.camera.position_m, 1e-8));
+    }
+  }
+}
+
+TEST(Dispersion, OfAShiftedCentreIsThatShift) {
+  Station station(0);
+  station.believed.rotation_center.reset();
+  station.rig.calibration.rotation_center.reset();
+  station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1, {}};
+  const auto captures = station.captures(12, true, {0, 0});
+  const auto fit =
+      fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
+  ASSERT_EQ(fit.status, DispersionStatus::ok);
+  EXPECT_THAT(fit.dispersion.offset_px, IsNear(Eigen::Vector2d(6, -4), 1e-6));
+  const double radius_m = 1.6 * std::hypot(6 / 520., 4 / 522.);
+  EXPECT_NEAR(fit.before.radius, radius_m, 0.01 * radius_m) << "a full turn draws the circle";
+}
+
+/// The paper's equations hold for a shift under lamps of one height, whatever the yaw is.
+TEST(Dispersion, ByThePaperIsExactForAShiftAtOneYaw) {
+  for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
+    Station station(0);
+    station.believed.rotation_center.reset();
+    station.rig.calibration.rotation_center.reset();
+    station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1, {}};
+    for (const double yaw_rad : {0.0, 2.0, -1.0}) {
+      const auto captures = station.captures_at(yaw_rad, 5);
+      const auto fit = fit_dispersion(captures, station.rig.map, station.believed,
+                                      DispersionMethod::paper, circle);
+      ASSERT_EQ(fit.status, DispersionStatus::ok);
+      EXPECT_FALSE(fit.world_offset_m.has_value());
+      // Fixes of many lamps weigh them by the lens, which a shift does not leave alone.
+      EXPECT_THAT(fit.dispersion.offset_px, IsNear(Eigen::Vector2d(6, -4), 0.01));
+      EXPECT_LT(fit.after.center.norm(), 2e-5);
+    }
+  }
+}
+
+TEST(Dispersion, ByThePaperTakesAnErrorOfTheStationForTheCameras) {
+  Station station(0);
+  for (const auto& [yaw_rad, sign] : {std::pair(0.0, 1.0), std::pair(M_PI, -1.0)}) {
+    auto captures = station.captures_at(yaw_rad, 5);
+    for (auto& capture : captures) capture.station_m.x() -= 0.008;
+    const auto fit =
+        fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::paper);
+    EXPECT_NEAR(fit.dispersion.offset_px.x(), -sign * 520 * 0.008 / 1.6, 0.01);
+  }
+}
+
+TEST(Dispersion, IsNotMisledByWrongFixes) {
+  Station station(0.01);
+  Random random(2);
+  for (const auto method : {DispersionMethod::camera, DispersionMethod::paper}) {
+    auto captures = method == DispersionMethod::camera ? station.captures(40, true, {0, 0})
+                                                       : station.captures_at(0.5, 40);
+    const auto clean = fit_dispersion(captures, station.rig.map, station.believed, method);
+    for (std::size_t i = 0; i < 40; ++i) {
+      captures[i].detections = with_noise(captures[i].detections, random);
+      if (i % 4 == 0) captures[i].station_m += Eigen::Vector2d(0.05 + 5e-4 * double(i), -0.05);
+    }
+    const auto fit = fit_dispersion(captures, station.rig.map, station.believed, method);
+    ASSERT_EQ(fit.status, DispersionStatus::ok);
+    EXPECT_EQ(fit.dispersion.captures, 30);
+    const Eigen::Vector2d error = fit.dispersion.offset_px - clean.dispersion.offset_px;
+    EXPECT_LT(error.dot(fit.dispersion.covariance->inverse() * error), 20);
+  }
+}
+
+TEST(Dispersion, UsesTheInclinationSensor) {
+  Station station(0.01);
+  station.rig.inclination = Inclination{0.04, -0.03};
+  auto captures = station.captures(12, true, {0, 0});
+  for (auto& capture : captures) capture.inclination = station.rig.inclination;
+  const auto fit =
+      fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
+  ASSERT_EQ(fit.status, DispersionStatus::ok);
+  EXPECT_LT(fit.after.radius, 1e-9);
+}
+
+TEST(DispersionRefusal, SaysWhatIsWrongOrToAdd) {
+  Station station(0.01);
+  const auto status_of = [&](const std::vector<StationCapture>& captures,
+                             DispersionMethod method = DispersionMethod::camera) {
+    return fit_dispersion(captures, station.rig.map, station.believed, method).status;
+  };
+  const auto turned = station.captures(12, true, {0, 0});
+  EXPECT_EQ(status_of({}), DispersionStatus::no_fix);
+  EXPECT_EQ(status_of({turned[0]}), DispersionStatus::too_few_captures);
+  EXPECT_EQ(status_of({turned[0]}, DispersionMethod::paper), DispersionStatus::too_few_captures);
+  EXPECT_EQ(status_of(turned, DispersionMethod::paper), DispersionStatus::many_yaws);
+  EXPECT_EQ(status_of(station.captures_at(1, 20)), DispersionStatus::one_yaw);
+  // One capture at another yaw, and that one wrong, is not to decide.
+  auto one_other = station.captures_at(1, 12);
+  one_other.push_back(station.captures_at(2.5, 1)[0]);
+  one_other.back().station_m.x() += 0.05;
+  EXPECT_EQ(status_of(one_other), DispersionStatus::one_yaw);
+  auto far = turned;
+  for (auto& capture : far) capture.station_m.x() += 1;
+  EXPECT_EQ(status_of(far), DispersionStatus::station_far);
+  auto other_map = turned;
+  for (auto& capture : other_map) {
+    for (auto& detection : capture.detections) detection.lamp += 50;
+  }
+  const auto fit =
+      fit_dispersion(other_map, station.rig.map, station.believed, DispersionMethod::camera);
+  EXPECT_EQ(fit.status, DispersionStatus::no_fix);
+  EXPECT_EQ(fit.captures_without_fix, 12);
+  EXPECT_EQ(fit.no_fix_status, FixStatus::too_few_lamps);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "calibration/dispersion/dispersion.h"
+#include "calibration/levelling/drive.h"
+
+namespace vlp {
+
+/// A camera at a known place whose calibrated zenith is wrong by an angle.
+struct Station {
+  explicit Station(double error_rad) : believed(rig.calibration) {
+    believed.rotation_center = tilted_by(believed.camera, 0.05 - error_rad, 1 + error_rad);
+  }
+
+  /// Turning by even angles, maybe with the heights changing; the station is `wrong_m` from where
+  /// it is said to be.
+  std::vector<StationCapture> captures(int count, bool heights, const Eigen::Vector2d& wrong_m,
+                                       double sigma_px = 0.1) {
+    std::vector<StationCapture> captures;
+    for (int i = 0; i < count; ++i) {
+      rig.camera = {{0.05, -0.1, heights && i % 2 ? 0.3 : 0.0}, 6.28 * i / count};
+      captures.push_back({seen_from(rig, sigma_px), rig.camera.position_m.head<2>() - wrong_m});
+    }
+    return captures;
+  }
+  std::vector<StationCapture> captures_at(double yaw_rad, int count, double sigma_px = 0.1) {
+    rig.camera = {{0.05, -0.1, 0}, yaw_rad};
+    return {static_cast<std::size_t>(count),
+            {seen_from(rig, sigma_px), rig.camera.position_m.head<2>()}};
+  }
+
+  SyntheticRig rig = leaning_rig(0.05, 1);
+  Calibration believed;
+};
+
+}  // namespace vlp

@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/numpy_archive.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "support/program.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+TEST(Base85, IsPythons) {
+  EXPECT_EQ(base85(""), "");
+  EXPECT_EQ(base85("hello"), "Xk~0{Zv");
+  EXPECT_EQ(base85(std::string("\0\0\0\0", 4)), "00000");
+  EXPECT_EQ(base85("abcd"), "VPa!s");
+}
+
+// Read by an unzip that knows nothing of this project: its check of the archive fails for a wrong
+// CRC.
+TEST(NumpyArchive, IsAZipArchive) {
+  if (run_program("command -v unzip").exit_code != 0) GTEST_SKIP() << "no unzip here";
+  const TemporaryFolder folder;
+  NumpyArchive archive;
+  const std::array values{1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
+  archive.add("matrix", {2, 3}, values);
+  archive.add("text", "LENSMODEL_OPENCV8");
+  archive.add("flag", true);
+  const auto file = folder.file("a.npz", archive.bytes());
+  const auto checked = run_program("unzip -t '" + file.string() + "'");
+  EXPECT_EQ(checked.exit_code, 0) << checked.output << checked.errors;
+  const auto matrix = run_program("unzip -p '" + file.string() + "' matrix.npy | head -c 80");
+  EXPECT_NE(matrix.output.find("{'descr': '<f8', 'fortran_order': False, 'shape': (2,3,), }"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,100 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/projection_uncertainty.h"
+
+#include <gtest/gtest.h>
+
+#include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/synthetic_views.h"
+
+namespace vlp {
+namespace {
+
+// The rotation that lines two lenses up takes some of their difference away, the rest should be
+// what is reported.
+TEST(ProjectionUncertainty, IsTheScatterOfTheSolutions) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  constexpr int seeds = 20;
+  double found = 0, reported = 0;
+  for (int seed = 0; seed < seeds; ++seed) {
+    Random random(100 + static_cast<std::uint64_t>(seed));
+    const IntrinsicsSolution solution = solve_intrinsics(views.input(25, random, 0.1));
+    ASSERT_TRUE(solution.ok());
+    const ProjectionUncertainty uncertainty(solution);
+    ASSERT_TRUE(uncertainty.determined());
+    const auto sigma = [&](const Eigen::Vector2d& pixel) { return uncertainty.worst_px(pixel); };
+    found += projection_difference(views.lens, solution.lens(), views.imager_px, sigma)->mean_px;
+    double sum = 0;
+    const auto pixels = pixel_grid(views.imager_px);
+    for (const auto& pixel : pixels) sum += std::sqrt(uncertainty.covariance(pixel).trace());
+    reported += sum / static_cast<double>(pixels.size());
+  }
+  EXPECT_GT(found / reported, 0.4);
+  EXPECT_LT(found / reported, 0.9);
+}
+
+TEST(ProjectionUncertainty, IsLargeForViewsFromTheFront) {
+  SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  Random random(3);
+  const auto tilted = solve_intrinsics(views.input(12, random, 0.1));
+  views.tilt_rad = 0.12;
+  const auto frontal = solve_intrinsics(views.input(12, random, 0.1));
+  ASSERT_TRUE(tilted.ok());
+  ASSERT_TRUE(frontal.ok());
+  const Eigen::Vector2d place(700, 80);
+  EXPECT_GT(ProjectionUncertainty(frontal).worst_px(place),
+            5 * ProjectionUncertainty(tilted).worst_px(place));
+}
+
+TEST(CalibrationReport, HalvesAgreeAsTheUncertaintySays) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  Random random(5);
+  const IntrinsicsInput input = views.input(24, random, 0.1);
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok());
+  const CalibrationReport report = report_on(solution, input);
+  ASSERT_TRUE(report.halves);
+  EXPECT_LT(report.halves->mean_px, 6 * report.uncertainty_mean_px);
+  EXPECT_GT(report.halves->mean_px, 0.3 * report.uncertainty_mean_px);
+  EXPECT_TRUE(gates_not_met({}, solution, report).empty());
+  EXPECT_EQ(gates_not_met({0.01, 0.001, 0.001}, solution, report).size(), 3U);
+}
+
+TEST(CalibrationReport, HeldOutViewsFitAsWellAsTheOthers) {
+  SyntheticViews views{synthetic_board(true), synthetic_lens()};
+  views.warp_m = {0.0006, 0.0004};
+  Random random(6);
+  const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, 0.05));
+  ASSERT_TRUE(solution.ok());
+  const HeldOut held_out = held_out_fit(solution, views.input(6, random, 0.05));
+  EXPECT_EQ(held_out.views, 6);
+  EXPECT_NEAR(held_out.rms_px, 0.05, 0.006);
+}
+
+TEST(ViewCoverage, NamesWhatIsMissing) {
+  ViewCoverage coverage;
+  coverage.corners = {9, 9, 9, 9, 9, 2, 9, 9, 9};
+  coverage.tilts_rad = {0.5, 0.6, 0.1, 0.5};
+  EXPECT_EQ(next_view(coverage),
+            "the board in the right middle of the image, its upper side 30 to 40 degrees nearer to "
+            "the camera");
+}
+
+TEST(ViewCoverage, KnowsWhichSideIsNearer) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  Random random(9);
+  const IntrinsicsInput input = views.input(12, random, 0);
+  IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok());
+  solution.problem.poses.resize(1);
+  solution.problem.poses[0].rotation = {0, 0.3, 0};  // its right comes nearer
+  const auto [left, right, upper, lower] = coverage_of(solution, input).tilts_rad;
+  EXPECT_EQ(left, 0);
+  EXPECT_NEAR(right, 0.3, 1e-9);
+  EXPECT_NEAR(upper, 0, 1e-9);
+  EXPECT_NEAR(lower, 0, 1e-9);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "calibration/intrinsics/intrinsics.h"
+#include "rig/board_layout.h"
+#include "support/random.h"
+
+namespace vlp {
+
+/// A plain board, or a Kalibr board, of 6 x 5 tags of 20 mm.
+inline Board synthetic_board(bool kalibr) {
+  return {"tag36h11",
+          6,
+          5,
+          0.02,
+          kalibr ? 0.3 : 1.0,
+          kalibr ? 2 : 1,
+          kalibr,
+          0,
+          {false, BoardCorner::bottom_left}};
+}
+
+/// 800 x 600, with a lens that distorts strongly.
+inline Lens synthetic_lens() {
+  const std::array parameters{520.0,  521.0,   402.0,  297.0, -0.25, 0.08,
+                              0.0002, -0.0001, -0.012, 0.01,  0.002, 0.0001};
+  return Lens(LensModel::opencv8, parameters);
+}
+
+struct SyntheticViews {
+  Board board;
+  Lens lens;
+  std::array<int, 2> imager_px{800, 600};
+  /// At the middle of the whole board, as board_warp_m of a report.
+  Eigen::Vector2d warp_m{0, 0};
+  double tilt_rad = 0.7;
+  /// Distance over what fills the image with the board.
+  double farthest = 1.8;
+
+  /// The tags wholly in the image, of a board somewhere in front of the camera.
+  SeenBoard random_view(Random& random, double noise_px) const {
+    const Eigen::Vector2d field_m = tag_field_m(board);
+    const double fill_m = lens.focal_px().x() * field_m.x() / imager_px[0];
+    for (;;) {
+      const double azimuth = random.uniform(-3.2, 3.2), tilt = random.uniform(0, tilt_rad);
+      const Eigen::Matrix3d rotation =
+          Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), 0)) *
+          Eigen::AngleAxisd(random.uniform(-3.2, 3.2), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      const double z_m = fill_m * random.uniform(0.8, farthest);
+      const Eigen::Vector3d middle(random.uniform(-0.5, 0.5) * imager_px[0],
+                                   random.uniform(-0.5, 0.5) * imager_px[1], lens.focal_px().x());
+      const SeenBoard seen = view(rotation, middle * (z_m / middle.z()), random, noise_px);
+      if (seen.tags.size() >= 8) return seen;
+    }
+  }
+
+  /// rotation: camera from board; middle_m: the board's middle in the camera.
+  SeenBoard view(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& middle_m, Random& random,
+                 double noise_px) const {
+    const Eigen::Vector2d field_m = tag_field_m(board);
+    SeenBoard seen;
+    for (const BoardTag& place : board_layout(board)) {
+      SeenTag tag{place.id, {}};
+      bool whole = true;
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Eigen::Array2d share = 2 * place.corners_m[k].array() / field_m.array() - 1;
+        Eigen::Vector3d point;
+        point << place.corners_m[k] - field_m / 2, warp_m.dot((1 - share.square()).matrix());
+        const auto pixel = lens.project(rotation * point + middle_m);
+        whole = whole && pixel && (pixel->array() > 3).all() && pixel->x() < imager_px[0] - 3 &&
+                pixel->y() < imager_px[1] - 3;
+        if (!whole) break;
+        tag.corners_px[k] = *pixel + noise_px * Eigen::Vector2d(random.normal(), random.normal());
+      }
+      if (whole) seen.tags.push_back(tag);
+    }
+    return seen;
+  }
+
+  IntrinsicsInput input(int views, Random& random, double noise_px) const {
+    IntrinsicsInput input{BoardLattice(board), {}, imager_px, lens.model(), false};
+    while (static_cast<int>(input.views.size()) < views) {
+      const SeenBoard seen = random_view(random, noise_px);
+      if (input.lattice.enough(seen)) input.views.push_back(input.lattice.corners(seen));
+    }
+    return input;
+  }
+};
+
+}  // namespace vlp

@@ -1,0 +1,94 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// What captures cannot determine is refused, with what to add.
+#include <gmock/gmock.h>
+
+#include "calibration/levelling/drive.h"
+#include "calibration/levelling/levelling.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+class LevellingRefusal : public testing::Test {
+ protected:
+  Random random{31};
+  SyntheticRig rig = leaning_rig(0.05, 1);
+
+  std::string refusal_of(const std::vector<Frame>& frames, bool refine_map = false) {
+    LevellingOptions options;
+    options.refine_map = refine_map;
+    return level_by_lamps(with_noise(frames, random), rig.map, rig.calibration.camera, options)
+        .undetermined;
+  }
+  Frame seen_at(const Eigen::Vector3d& position_m, double yaw_rad) {
+    rig.camera = {position_m, yaw_rad};
+    return {"", seen_from(rig, 0.1)};
+  }
+};
+
+TEST_F(LevellingRefusal, OfCapturesThatAreTooFew) {
+  EXPECT_THAT(refusal_of({}), HasSubstr("there is none"));
+  EXPECT_THAT(refusal_of(drive(rig, 1, random, 0.1)), HasSubstr("there is one"));
+}
+
+TEST_F(LevellingRefusal, OfLampsThatAreTooFewOrOfAnotherMap) {
+  auto frames = drive(rig, 20, random, 0.1);
+  for (Frame& frame : frames) frame.detections.resize(2);
+  EXPECT_THAT(refusal_of(frames), HasSubstr("there is none"));
+  frames = drive(rig, 20, random, 0.1);
+  for (Lamp& lamp : rig.map.lamps) lamp.id += 100;
+  EXPECT_THAT(refusal_of(frames), HasSubstr("there is none"));
+  rig.map = synthetic_lamps();
+  for (Lamp& lamp : rig.map.lamps) lamp.position_m.y() = -lamp.position_m.y();
+  EXPECT_THAT(refusal_of(frames), HasSubstr("there is none")) << "mirrored";
+}
+
+TEST_F(LevellingRefusal, OfLampsInALineFromOneYaw) {
+  rig.map = lamp_map_of({{-0.8, 0, 1.6}, {0, 0, 1.6}, {0.8, 0, 1.6}, {0.3, 0, 1.6}});
+  std::vector<Frame> along;
+  for (int i = 0; i < 12; ++i) along.push_back(seen_at({-0.5 + 0.1 * i, 0.05 * i - 0.3, 0}, 1));
+  EXPECT_THAT(refusal_of(along), HasSubstr("add captures"));
+}
+
+TEST_F(LevellingRefusal, OfCapturesThatAreAlike) {
+  const Frame frame = seen_at({0.1, 0.1, 0}, 1);
+  EXPECT_THAT(refusal_of({20, frame}), HasSubstr("turn the camera"));
+}
+
+TEST_F(LevellingRefusal, OfAMapFromCapturesAtOneYawOrFromOnePlace) {
+  std::vector<Frame> along, around;
+  for (int i = 0; i < 12; ++i) {
+    along.push_back(seen_at({-0.5 + 0.1 * i, 0.05 * i - 0.3, 0.02 * i}, 1));
+    around.push_back(seen_at({0.1, -0.1, 0}, 0.5 * i));
+  }
+  EXPECT_EQ(refusal_of(along), "");
+  EXPECT_EQ(refusal_of(around), "");
+  EXPECT_THAT(refusal_of(along, true), HasSubstr("at one yaw"));
+  EXPECT_THAT(refusal_of(around, true), HasSubstr("from one place"));
+}
+
+TEST_F(LevellingRefusal, OfWhatWouldBeKnownTooBadly) {
+  auto frames = drive(rig, 3, random, 8);
+  EXPECT_THAT(refusal_of(frames), HasSubstr("degrees only"));
+  frames = drive(rig, 12, random, 0.9);
+  EXPECT_EQ(refusal_of(frames, true), "");
+  for (std::size_t i = 2; i < frames.size(); ++i) {
+    std::erase_if(frames[i].detections, [](const Detection& seen) { return seen.lamp == 3; });
+  }
+  EXPECT_THAT(refusal_of(frames, true), HasSubstr("lamp 3 would be known to"));
+  std::erase_if(frames[1].detections, [](const Detection& seen) { return seen.lamp == 3; });
+  EXPECT_THAT(refusal_of(frames, true), HasSubstr("lamp 3 is in one capture only"));
+}
+
+TEST_F(LevellingRefusal, IsOfCapturesWithALampTwiceAlone) {
+  auto frames = drive(rig, 10, random, 0.1);
+  frames[3].detections.push_back(frames[3].detections.front());
+  const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera);
+  EXPECT_EQ(result.undetermined, "");
+  EXPECT_EQ(result.captures_rejected, 1);
+}
+
+}  // namespace
+}  // namespace vlp

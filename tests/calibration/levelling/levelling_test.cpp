@@ -1,0 +1,159 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/levelling/levelling.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "calibration/levelling/drive.h"
+#include "geometry/angles.h"
+#include "geometry/similarity.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+/// The map with each lamp moved by up to `size_m` along each axis.
+LampMap shaken(LampMap map, double size_m, Random& random) {
+  for (Lamp& lamp : map.lamps) {
+    lamp.position_m +=
+        Eigen::Vector3d(random.uniform(-size_m, size_m), random.uniform(-size_m, size_m),
+                        random.uniform(-size_m, size_m));
+  }
+  return map;
+}
+
+/// The largest distance of a lamp from where it is, the map as a whole being moved, turned about
+/// the vertical and scaled to fit.
+double misshape_m(const LampMap& found, const LampMap& truth) {
+  const auto lamp = [](const LampMap& map, std::size_t i) { return map.lamps[i].position_m; };
+  const auto fit = fit_similarity(
+      truth.lamps.size(), [&](std::size_t i) { return Eigen::Vector2d(lamp(found, i).head<2>()); },
+      [&](std::size_t i) { return Eigen::Vector2d(lamp(truth, i).head<2>()); });
+  const double scale = fit->factor.norm();
+  double lift_m = 0, worst_m = 0;
+  for (std::size_t i = 0; i < truth.lamps.size(); ++i) {
+    lift_m += (lamp(truth, i).z() - scale * lamp(found, i).z()) / double(truth.lamps.size());
+  }
+  for (std::size_t i = 0; i < truth.lamps.size(); ++i) {
+    Eigen::Vector3d fitted;
+    fitted << fit->offset + times(fit->factor, lamp(found, i).head<2>()),
+        scale * lamp(found, i).z() + lift_m;
+    worst_m = std::max(worst_m, (fitted - lamp(truth, i)).norm());
+  }
+  return worst_m;
+}
+
+TEST(Levelling, IsExactWithoutNoise) {
+  Random random(1);
+  for (const double tilt_deg : {0.0, 0.5, 3.0, 6.0, 10.0}) {
+    for (const bool stated : {true, false}) {
+      const auto rig = leaning_rig(rad_from_deg(tilt_deg), random.uniform(-3, 3));
+      auto frames = drive(rig, 8, random);
+      for (Frame& frame : frames) {
+        for (auto& detection : frame.detections) {
+          if (!stated) detection.sigma_px.reset();
+        }
+      }
+      const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera);
+      ASSERT_EQ(result.undetermined, "") << tilt_deg;
+      const auto& truth = *rig.calibration.rotation_center;
+      EXPECT_LT(angle_between(result.center.zenith_in_camera, truth.zenith_in_camera), 1e-10);
+      EXPECT_THAT(result.center.center_px, IsNear(truth.center_px, 1e-7));
+      EXPECT_EQ(result.center.model, RotationModel::tilt);
+      EXPECT_EQ(result.captures, 8);
+      EXPECT_EQ(result.detections_rejected, 0);
+      EXPECT_LT(result.residual_px, 1e-8);
+      EXPECT_TRUE(tilt_deg == 0 || result.residual_before_px > 0.1);
+    }
+  }
+}
+
+TEST(Levelling, NeedsNoMoreThanThreeLampsACapture) {
+  Random random(2);
+  const auto rig = leaning_rig(0.05, 1);
+  auto frames = drive(rig, 10, random);
+  for (Frame& frame : frames) frame.detections.resize(3);
+  frames[4].detections.resize(2);
+  const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera);
+  ASSERT_EQ(result.undetermined, "");
+  EXPECT_LT(angle_between(result.center.zenith_in_camera,
+                          rig.calibration.rotation_center->zenith_in_camera),
+            1e-8);
+  EXPECT_EQ(result.captures_of_few_lamps, 1);
+  EXPECT_EQ(result.captures, 9);
+}
+
+TEST(Levelling, FindsTheShapeOfTheMap) {
+  Random random(3);
+  auto rig = leaning_rig(0.05, 2);
+  const LampMap surveyed = rig.map;
+  rig.map = shaken(surveyed, 0.005, random);
+  const auto frames = drive(rig, 12, random);
+  LevellingOptions options;
+  options.refine_map = true;
+  const auto result = level_by_lamps(frames, surveyed, rig.calibration.camera, options);
+  ASSERT_EQ(result.undetermined, "");
+  EXPECT_LT(angle_between(result.center.zenith_in_camera,
+                          rig.calibration.rotation_center->zenith_in_camera),
+            1e-8);
+  EXPECT_GT(misshape_m(surveyed, rig.map), 0.003);
+  EXPECT_LT(misshape_m(result.map, rig.map), 1e-8);
+
+  Eigen::Vector3d mean_m = Eigen::Vector3d::Zero(), moved = mean_m;
+  for (const Lamp& lamp : surveyed.lamps) mean_m += lamp.position_m / 8;
+  double turned = 0, scaled = 0;
+  for (std::size_t i = 0; i < 8; ++i) {
+    const Eigen::Vector3d p = surveyed.lamps[i].position_m - mean_m;
+    const Eigen::Vector3d& d = result.corrections[i].correction_m;
+    EXPECT_THAT(result.map.lamps[i].position_m, IsNear(surveyed.lamps[i].position_m + d, 1e-12));
+    moved += d;
+    turned += p.x() * d.y() - p.y() * d.x();
+    scaled += p.dot(d);
+  }
+  EXPECT_LT(moved.norm(), 1e-12) << "the mean of the map is held";
+  EXPECT_LT(std::abs(turned), 1e-12);
+  EXPECT_LT(std::abs(scaled), 1e-12);
+}
+
+TEST(Levelling, LeavesLampsAloneThatAreNotSeen) {
+  Random random(4);
+  const auto rig = leaning_rig(0.03, 2);
+  auto frames = drive(rig, 12, random);
+  for (Frame& frame : frames) {
+    std::erase_if(frame.detections, [](const Detection& seen) { return seen.lamp == 3; });
+  }
+  LevellingOptions options;
+  options.refine_map = true;
+  const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera, options);
+  ASSERT_EQ(result.undetermined, "");
+  EXPECT_EQ(result.corrections.size(), 7);
+  EXPECT_EQ(result.map.lamps[2].position_m, rig.map.lamps[2].position_m);
+}
+
+TEST(Levelling, IsNotMisledByWrongDetections) {
+  Random random(5);
+  const auto rig = leaning_rig(0.08, -1);
+  auto frames = with_noise(drive(rig, 40, random, 0.05), random);
+  for (std::size_t i = 0; i < 40; i += 4) {
+    auto& detections = frames[i].detections;
+    if (i % 8 == 0) {
+      std::swap(detections[0].lamp, detections[1].lamp);
+    } else {
+      detections[2].pixel += Eigen::Vector2d(random.uniform(2, 10), random.uniform(2, 10));
+    }
+  }
+  const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera);
+  ASSERT_EQ(result.undetermined, "");
+  EXPECT_GE(result.detections_rejected, 15);
+  EXPECT_LE(result.detections_rejected, 20);
+  const Eigen::Vector2d error =
+      result.center.center_px - rig.calibration.rotation_center->center_px;
+  EXPECT_LT(error.dot(result.center.covariance->inverse() * error), 20);
+  EXPECT_NEAR(result.residual_px, 0.05, 0.03);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,122 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/rotation/circle_center.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "calibration/rotation/joint_center.h"
+#include "calibration/rotation/spot.h"
+#include "geometry/angles.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+/// A pinhole camera, so that formulas are in pixels.
+SpotScene pinhole_scene() {
+  SpotScene scene;
+  scene.camera.lens_model = LensModel::pinhole;
+  scene.camera.intrinsics = {520, 522, 403, 296};
+  return scene;
+}
+
+SpotCaptures captures_of(const SpotScene& scene) {
+  SpotCaptures spot = spot_captures(scene.frames(), scene.map, scene.camera);
+  EXPECT_EQ(spot.status, SpotStatus::ok);
+  return spot;
+}
+
+/// zeta - e/H, where the axis of a level camera is seen.
+Eigen::Vector2d center_of_level_camera(const SpotScene& scene) {
+  const auto& f = scene.camera.intrinsics;
+  const Eigen::Vector2d z = -scene.lever_arm_m / (1.6 - scene.heights_m[0]);
+  return {f[2] + f[0] * z.x(), f[3] + f[1] * z.y()};
+}
+
+TEST(CircleCenter, IsTheLeverArmsOfALevelCamera) {
+  SpotScene scene;
+  scene.lever_arm_m = {0.05, -0.02};
+  const CircleCenters found = fit_circle_centers(captures_of(scene), scene.camera);
+  ASSERT_TRUE(found.mean.converged);
+  EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
+  EXPECT_LT(found.spread_px, 1e-6);
+  EXPECT_LT(found.mean.residual_px, 1e-6);
+  EXPECT_EQ(found.circles.size(), scene.map.lamps.size());
+  EXPECT_EQ(found.mean.center.model, RotationModel::shift);
+}
+
+/// A lamp traces a cone about the axis; a tilted camera sees an ellipse, whose centre is at
+/// f sin t cos t / (cos^2 t - sin^2 phi) from the principal point. A circle through many even
+/// points of it has the same centre but for its own fit to the ellipse, of second order in t.
+TEST(CircleCenter, OfATiltedCameraIsTooFarOutByTheFormula) {
+  for (const double tilt_deg : {0.5, 1.0, 2.0}) {
+    SCOPED_TRACE(tilt_deg);
+    SpotScene scene = pinhole_scene();
+    scene.tilt_rad = rad_from_deg(tilt_deg);
+    scene.axis_m = {0, 0};
+    scene.captures = 72;
+    scene.arc_rad = 2 * M_PI * (72 - 0.7) / 72;
+    scene.only_in_image = false;
+    const SpotCaptures spot = captures_of(scene);
+    const CircleCenters found = fit_circle_centers(spot, scene.camera);
+    ASSERT_EQ(found.circles.size(), scene.map.lamps.size());
+    const double t = scene.tilt_rad;
+    for (const auto& [lamp, height, fit] : found.circles) {
+      const double phi = std::atan(spot.lamps[lamp].position_m.head<2>().norm() / 1.6);
+      const double formula =
+          std::sin(t) * std::cos(t) / (std::pow(std::cos(t), 2) - std::pow(std::sin(phi), 2));
+      EXPECT_NEAR(fit.circle.center.norm() / formula, 1, 0.01) << deg_from_rad(phi);
+      EXPECT_GT(fit.circle.center.norm(), 1.01 * std::tan(t));
+    }
+    EXPECT_GT(found.spread_px, 0.02 * 520 * std::tan(t));
+  }
+}
+
+TEST(CircleCenter, LeavesOutAPointThatIsWrong) {
+  const SpotScene scene;
+  std::vector<Frame> frames = scene.frames();
+  frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
+  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(spot.status, SpotStatus::ok);
+  const CircleCenters found = fit_circle_centers(spot, scene.camera);
+  EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
+  ASSERT_EQ(found.mean.outliers.size(), 1U);
+  const SpotSighting& outlier = spot.sightings[found.mean.outliers[0].sighting];
+  EXPECT_EQ(spot.captures[outlier.capture].image, "3.png");
+  EXPECT_EQ(spot.lamps[outlier.lamp].id, frames[3].detections[2].lamp);
+}
+
+TEST(JointCenter, IsTheLeverArmsOfALevelCamera) {
+  SpotScene scene;
+  scene.lever_arm_m = {0.05, -0.02};
+  const RotationFit found = fit_joint_center(captures_of(scene), scene.camera);
+  ASSERT_TRUE(found.converged);
+  EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
+  EXPECT_LT(found.residual_px, 1e-7);
+  EXPECT_EQ(found.center.model, RotationModel::shift);
+}
+
+TEST(JointCenter, OfALevelCameraWithoutALeverArmIsOneAtAnyHeight) {
+  SpotScene scene;
+  scene.heights_m = {0, 0.3};
+  const RotationFit found = fit_joint_center(captures_of(scene), scene.camera);
+  ASSERT_TRUE(found.converged);
+  EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
+}
+
+TEST(JointCenter, LeavesOutAPointThatIsWrong) {
+  const SpotScene scene;
+  std::vector<Frame> frames = scene.frames();
+  frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
+  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(spot.status, SpotStatus::ok);
+  const RotationFit found = fit_joint_center(spot, scene.camera);
+  EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
+  ASSERT_EQ(found.outliers.size(), 1U);
+  EXPECT_NEAR(found.outliers[0].distance_px, 15, 0.3);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,143 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Boards as rendered, with known corners, and real ones.
+#include "detection/boards/board_detector.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <opencv2/core.hpp>
+#include <stdexcept>
+
+#include "captures/csv_reader.h"
+#include "detection/boards/detect_boards.h"
+#include "detection/image_file.h"
+#include "support/real_data.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RenderedBoard : public testing::TestWithParam<const char*> {
+ protected:
+  const fs::path rig = fs::path(VLP_SOURCE_DIR "/datasets") / GetParam() / "rendered";
+  const Board board = read_board(rig / "board.yaml");
+  const cv::Mat image = read_image(rig / "sample-boards/0000.png");
+
+  std::map<int, std::array<Eigen::Vector2d, 4>> true_corners() const {
+    const CsvTable table(rig / "sample-boards/true_corners.csv");
+    std::map<int, std::array<Eigen::Vector2d, 4>> corners;
+    for (std::size_t row = 0; row < static_cast<std::size_t>(table.rows()); ++row) {
+      const int tag = static_cast<int>(table.number(row, table.required("tag")));
+      const auto k = static_cast<std::size_t>(table.number(row, table.required("corner")));
+      corners[tag][k] = {table.number(row, table.required("u_px")),
+                         table.number(row, table.required("v_px"))};
+    }
+    return corners;
+  }
+  /// Root of the mean square per axis, with every tag where the truth has it.
+  double rms_px(const SeenBoard& seen) const {
+    const auto truth = true_corners();
+    double squares = 0;
+    for (const SeenTag& tag : seen.tags) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        squares += (tag.corners_px[k] - truth.at(tag.id)[k]).squaredNorm();
+      }
+    }
+    return std::sqrt(squares / (8 * static_cast<double>(seen.tags.size())));
+  }
+};
+
+TEST_P(RenderedBoard, IsFoundWithItsCorners) {
+  const SeenBoard seen = BoardDetector(board).detect(image);
+  EXPECT_EQ(seen.tags.size(), true_corners().size());
+  EXPECT_EQ(seen.foreign, 0);
+  EXPECT_EQ(seen.unusable, 0);
+  EXPECT_LT(rms_px(seen), 0.08);  // 0.06 over the whole set of views; 0.5 with the origin wrong
+}
+
+TEST_P(RenderedBoard, IsFoundInSixteenBits) {
+  cv::Mat deep;
+  image.convertTo(deep, CV_16U, 16);  // as a camera of 12 bits has it
+  const SeenBoard seen = BoardDetector(board).detect(deep);
+  EXPECT_EQ(seen.tags.size(), true_corners().size());
+  EXPECT_LT(rms_px(seen), 0.08);
+}
+
+TEST_P(RenderedBoard, CutByTheImagesEdgeKeepsWhatIsWhole) {
+  const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
+  const SeenBoard seen = BoardDetector(board).detect(part);
+  EXPECT_GT(seen.tags.size(), 3U);
+  EXPECT_LT(seen.tags.size(), true_corners().size());
+  EXPECT_LT(rms_px(seen), 0.08);
+}
+
+TEST_P(RenderedBoard, OfOtherIdsIsForeign) {
+  Board other = board;
+  other.first_id = 100;
+  const SeenBoard seen = BoardDetector(other).detect(image);
+  EXPECT_TRUE(seen.tags.empty());
+  EXPECT_GT(seen.foreign, 10);
+}
+
+TEST_P(RenderedBoard, SeenTwiceIsNotUsed) {
+  cv::Mat twice;
+  cv::hconcat(image, image, twice);
+  const SeenBoard seen = BoardDetector(board).detect(twice);
+  EXPECT_TRUE(seen.tags.empty()) << seen.tags.size();
+  EXPECT_GT(seen.unusable, 20);
+}
+
+TEST_P(RenderedBoard, IsTheSameWhateverTheThreads) {
+  const BoardDetector detector(board);
+  const std::vector<fs::path> images(6, rig / "sample-boards/0000.png");
+  std::size_t most = 0;
+  const auto four = detect_boards(detector, images, 4, {}, [&](std::size_t n) { most = n; });
+  EXPECT_EQ(most, images.size());
+  const SeenBoard one = detector.detect(image);
+  ASSERT_EQ(four.views.size(), images.size());
+  for (const BoardView& view : four.views) {
+    ASSERT_EQ(view.seen.tags.size(), one.tags.size());
+    for (std::size_t i = 0; i < one.tags.size(); ++i) {
+      EXPECT_EQ(view.seen.tags[i].id, one.tags[i].id);
+      EXPECT_EQ(view.seen.tags[i].corners_px, one.tags[i].corners_px);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Boards, RenderedBoard, testing::Values("paper-rig", "paper-rig-faulty"));
+
+TEST(BoardDetector, RefusesAFamilyThatArucoLacks) {
+  Board board = read_board(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered/board.yaml");
+  board.family = "tagStandard41h12";
+  EXPECT_THROW(BoardDetector{board}, std::invalid_argument);
+}
+
+/// How many images of a folder show so many tags.
+std::map<std::size_t, int> images_by_tags(const fs::path& folder, const fs::path& board) {
+  std::map<std::size_t, int> counts;
+  const BoardDetector detector(read_board(board));
+  for (const auto& view : detect_boards(detector, images_in(folder), 2, {}, [](auto) {}).views) {
+    ++counts[view.seen.tags.size()];
+  }
+  return counts;
+}
+
+TEST(RealBoards, OfAPhoneAreWhole) {
+  const auto folder = real_data("apriltag-lattice-phone");
+  if (folder.empty()) GTEST_SKIP() << "no real captures here";
+  EXPECT_EQ(images_by_tags(folder, folder / "board.yaml"), (std::map<std::size_t, int>{{40, 8}}));
+}
+
+TEST(RealBoards, OfAStereoCameraAreWholeButForFour) {
+  const auto folder = real_data("kalibr-aprilgrid-stereo");
+  if (folder.empty()) GTEST_SKIP() << "no real captures here";
+  const std::map<std::size_t, int> expected{{15, 2}, {20, 14}};  // the rest is out of the image
+  EXPECT_EQ(images_by_tags(folder / "cam0", folder / "board.yaml"), expected);
+  EXPECT_EQ(images_by_tags(folder / "cam1", folder / "board.yaml"), expected);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/lights/outline.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "detection/lights/drawn_disc.h"
+
+namespace vlp {
+namespace {
+
+TEST(RefinedOutline, IsRefinedToLieOnTheCircle) {
+  for (const int depth : {CV_8U, CV_16U}) {
+    for (const double blur_px : {0.7, 0.8}) {
+      const DrawnDisc disc{.blur_px = blur_px};
+      const auto points = refined_in(disc.image(depth), disc);
+      EXPECT_GT(points.size(), 120U);
+      EXPECT_LT(rms_off(disc, points), 0.02) << blur_px;
+      EXPECT_LT(worst_off(disc, points, 0), 0.05) << blur_px;
+    }
+  }
+}
+
+TEST(RefinedOutline, OfSoftDiscsIsRefinedToLieCloserToTheCircle) {
+  const DrawnDisc disc{.blur_px = 1.2};
+  const cv::Mat image = disc.image(CV_16U);
+  EXPECT_GT(worst_off(disc, outline_in(image), kSteep), 0.2);
+  EXPECT_LT(worst_off(disc, refined_in(image, disc), kSteep), 0.1);
+}
+
+TEST(RefinedOutline, OfSmallDiscsIsRefinedToLieOnTheCircle) {
+  for (const double radius_px : {8.0, 12.0, 16.0, 24.0}) {
+    const DrawnDisc disc{.radius_px = radius_px};
+    const auto points = refined_in(disc.image(CV_16U), disc);
+    EXPECT_GT(double(points.size()), radius_px);
+    EXPECT_LT(worst_off(disc, points, 0), 0.05) << radius_px;
+  }
+}
+
+TEST(RefinedOutline, IsRefinedOnTheCircleHoweverTheDiscsBrightnessChanges) {
+  for (const double change : {-0.3, 0.15, 0.3}) {
+    const DrawnDisc disc{.change = change};
+    const auto points = refined_in(disc.image(CV_16U), disc);
+    EXPECT_GT(points.size(), 120U);
+    EXPECT_LT(rms_off(disc, points), 0.02) << change;
+    EXPECT_LT(worst_off(disc, points, 0), 0.05) << change;
+  }
+}
+
+TEST(RefinedOutline, IsRefinedWithoutItsFlatParts) {
+  const DrawnDisc disc;
+  const cv::Mat image = disc.image(CV_16U);
+  const double sine_20_deg = 0.342;
+  EXPECT_TRUE(std::ranges::any_of(outline_in(image), [&](const EdgePoint& point) {
+    return disc.cosine(point.pixel) < sine_20_deg - 0.03;
+  }));
+  for (const EdgePoint& point : refined_in(image, disc)) {
+    EXPECT_GT(disc.cosine(point.pixel), sine_20_deg - 0.03);
+  }
+}
+
+}  // namespace
+}  // namespace vlp
