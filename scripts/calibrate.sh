@@ -134,3 +134,37 @@ locate() {  # FOLDER: to FOLDER-fixes.csv
   stage "locate-$1" "$station/$1" "$lamps" "$calibration" -- "$fixes" vlp-locate "$station/$1" \
     --lamps "$lamps" --calibration "$calibration" -o "$results/$fixes"
 }
+[ ! -e "$station/check" ] || locate check
+
+# Errors, where the truth is known, and the report with all pictures that there are.
+truth=$station/check/truth.csv
+if [ ! -e "$truth" ] && head -n 1 "$station/check/captures.csv" 2>/dev/null | grep -q x_m; then
+  truth=$station/check/captures.csv
+fi
+if [ -e "$truth" ]; then
+  fixes=$results/check-fixes.csv
+  inputs=("$fixes" "$truth" "$lamps" "$calibration")
+  report=()
+  for picture in camera rotation dispersion; do
+    [ ! -e "$results/$picture.svg" ] || report+=(--picture "$results/$picture.svg")
+  done
+  for line in "$station"/line-*/; do
+    [ -e "$line/truth.csv" ] || continue
+    line=$(basename "$line")
+    locate "$line"
+    read -ra ends_m < <(awk -F, 'NR == 2 { print $2, $3 } END { print $2, $3 }' \
+      "$station/$line/truth.csv" | paste -sd ' ')
+    inputs+=("$results/$line-fixes.csv")
+    report+=(--track "$results/$line-fixes.csv" "${ends_m[@]}")
+  done
+  if [ -e "$station/gates.yaml" ]; then
+    inputs+=("$station/gates.yaml")
+    report+=(--gates "$station/gates.yaml" --junit "$results/gates.xml")
+  fi
+  stage evaluate "${inputs[@]}" -- report.html vlp-evaluate "$fixes" --truth "$truth" \
+    --lamps "$lamps" --calibration "$calibration" --json "$results/evaluation.json" \
+    --report "$results/report.html" "${report[@]}"
+  echo
+  cat "$results/stages/evaluate.txt"
+fi
+exit "$verdict"
