@@ -95,7 +95,7 @@ stage() {  # NAME INPUT... -- OUTPUT PROGRAM ARGUMENT...
     local tenths=$(((${EPOCHREALTIME//[!0-9]/} - begin_us + 50000) / 100000))
     printf '%-11s %3d.%d s%s\n' "$name" $((tenths / 10)) $((tenths % 10)) \
       "$([ "$code" = 0 ] || echo ', a gate is not met:')"
-    sed 's/^/            /' "$log.messages"
+    sed '/: info: /d; s/^/            /' "$log.messages"
     rm "$log.messages"
     printf '%s\n%s\n' "$key" "$code" >"$log.key"
   fi
