@@ -100,25 +100,35 @@ std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& sca
       " using 1:2:3:4 with vectors filled head size graph 0.012,20 linewidth ";
   const auto cut = std::count_if(plot.fixes.begin(), plot.fixes.end(),
                                  [&](const auto& fix) { return error_m(fix) > scale.longest_m(); });
-  std::string layers = "plot $arrows" + arrow + "1.3" + color(plot_colors::blue) +
-                       "title 'error of a fix', $places using 1:2 with points pointtype 7 "
-                       "pointsize 0.25 linecolor rgb 'black' title 'truth'";
+  std::vector<std::string> layers;
+  if (!blocks.arrows.empty()) {
+    layers.push_back("$arrows" + arrow + "1.3" + color(plot_colors::blue) +
+                     "title 'error of a fix'");
+  }
+  if (!blocks.places.empty()) {
+    layers.emplace_back(
+        "$places using 1:2 with points pointtype 7 pointsize 0.25 linecolor rgb 'black' title "
+        "'truth'");
+  }
   if (cut > 0) {
-    layers += ", $cut" + arrow + "1.5 dashtype 2" + color(plot_colors::vermillion) + "title '" +
-              std::to_string(cut) + " beyond " + in_mm(scale.longest_m()) + ", cut short'";
+    layers.push_back("$cut" + arrow + "1.5 dashtype 2" + color(plot_colors::vermillion) +
+                     "title '" + std::to_string(cut) + " beyond " + in_mm(scale.longest_m()) +
+                     ", cut short'");
   }
   if (!blocks.missing.empty()) {
-    layers += ", $missing using 1:2 with points pointtype 2 linewidth 2" +
-              color(plot_colors::vermillion) + "title '" + std::to_string(plot.missing_m.size()) +
-              " without a fix'";
+    layers.push_back("$missing using 1:2 with points pointtype 2 linewidth 2" +
+                     color(plot_colors::vermillion) + "title '" +
+                     std::to_string(plot.missing_m.size()) + " without a fix'");
   }
   if (!blocks.lamps.empty()) {
-    layers += ", $lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
-              color(plot_colors::grey) +
-              "title 'lamps', $lamps using 1:2:(sprintf('%d', int($3))) with labels left offset "
-              "1,0.7 notitle";
+    layers.push_back("$lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
+                     color(plot_colors::grey) +
+                     "title 'lamps', $lamps using 1:2:(sprintf('%d', int($3))) with labels left "
+                     "offset 1,0.7 notitle");
   }
-  return layers + "\n";
+  std::string command;
+  for (const auto& layer : layers) command.append(command.empty() ? "plot " : ", ").append(layer);
+  return command + "\n";
 }
 
 }  // namespace
