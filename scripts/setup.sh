@@ -16,6 +16,7 @@ packages=(
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev python3-mrcal poppler-utils unzip
+  chromium-headless-shell python3  # the report is opened in a browser
 )
 
 missing=()
