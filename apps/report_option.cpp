@@ -47,11 +47,11 @@ std::string report_of(const CLI::App& app, const ReportOption& option,
   report.gates = subject.gates;
   report.figures = report_figures(subject.evaluation);
   report.notes = report_notes(subject.evaluation);
-  report.title = "Accuracy of " + subject.input.fixes.file.filename().string();
+  report.title = "Accuracy report: " + subject.input.fixes.file.filename().string();
   if (!subject.calibration.empty()) {
     report.calibration = read_calibration(subject.calibration);
     if (!report.calibration->camera.id.empty()) {
-      report.title = "Accuracy of camera " + report.calibration->camera.id;
+      report.title = "Accuracy report: " + report.calibration->camera.id;
     }
   }
   std::vector<std::string> inputs = subject.inputs;
