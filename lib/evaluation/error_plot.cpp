@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kMostArrows = 1000, kFurthest = 20;
+constexpr std::size_t kMostArrows = 500, kFurthest = 20, kMostMissing = 200;
 constexpr double kLongestShare = 0.25;
 
 double error_m(const ErrorPlot::Fix& fix) { return (fix.fix_m - fix.truth_m).norm(); }
@@ -67,7 +67,7 @@ struct Blocks {
       places += data_row({from_m.x(), from_m.y()});
       scale.paper.extend(from_m + arrow_m);
     }
-    const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMostArrows);
+    const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMostMissing);
     for (std::size_t i = 0; i < plot.missing_m.size(); i += missing_step) {
       missing += data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
     }
@@ -116,9 +116,10 @@ std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& sca
                      ", cut short'");
   }
   if (!blocks.missing.empty()) {
-    layers.push_back("$missing using 1:2 with points pointtype 2 linewidth 2" +
-                     color(plot_colors::vermillion) + "title '" +
-                     std::to_string(plot.missing_m.size()) + " without a fix'");
+    const std::size_t count = plot.missing_m.size(), step = thinning_step(count, kMostMissing);
+    layers.push_back(
+        "$missing using 1:2 with points pointtype 2 linewidth 2" + color(plot_colors::vermillion) +
+        "title 'no fix: " + (step == 1 ? std::to_string(count) : thinning_note(count, step)) + "'");
   }
   if (!blocks.lamps.empty()) {
     layers.push_back("$lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
