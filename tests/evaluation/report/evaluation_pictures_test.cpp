@@ -10,9 +10,7 @@ namespace {
 using testing::HasSubstr;
 
 FixRow fix(const std::string& image, double x_m, double y_m) {
-  FixRow row{image, "ok", FixRow::Fix{}, 3};
-  row.fix->pose.position_m = {x_m, y_m, 0};
-  return row;
+  return {image, "ok", FixRow::Fix{{{x_m, y_m, 0}, 0}, {}, 0.1}, 3};
 }
 
 /// Errors of 1, 2 and 3 mm, and an image without a fix.
