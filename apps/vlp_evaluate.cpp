@@ -11,6 +11,7 @@
 #include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
 #include "print_evaluation.h"
+#include "report_option.h"
 #include "rig/file.h"
 
 namespace vlp {
@@ -23,6 +24,7 @@ struct Options {
   double noise_px = 0;
   double station_mm = 1;
   int threads = all_cores();
+  ReportOption report;
 };
 
 /// The files' gates; those of the command line are added, and hold where both say something.
@@ -45,6 +47,11 @@ std::vector<Gate> gates_of(const Options& options) {
   return gates;
 }
 
+std::vector<std::string> inputs_of(const Options& options) {
+  return {options.fixes, options.truth,       options.path,      options.compare,
+          options.lamps, options.calibration, options.gates_file};
+}
+
 void check_options(const Options& options, const std::vector<Gate>& gates) {
   const int references = (options.truth.empty() ? 0 : 1) + (options.path.empty() ? 0 : 1) +
                          (options.line_m.empty() ? 0 : 1);
@@ -60,13 +67,30 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
     throw std::invalid_argument(
         "--junit tells of gates, and there are none: add --gate or --gates");
   }
-  const std::vector<std::string> inputs{options.fixes,     options.truth, options.path,
-                                        options.compare,   options.lamps, options.calibration,
-                                        options.gates_file};
+  if (options.noise_px == 0 && options.report.file.empty() && !options.lamps.empty()) {
+    throw std::invalid_argument("--lamps is for the theoretical limit, which needs --noise-px");
+  }
+  if (options.noise_px == 0 && options.report.file.empty() && !options.calibration.empty()) {
+    throw std::invalid_argument(
+        "--calibration is for the theoretical limit, which needs --lamps and --noise-px");
+  }
+  std::vector<std::string> inputs = inputs_of(options);
+  const ReportOption& report = options.report;
+  inputs.insert(inputs.end(), report.pictures.begin(), report.pictures.end());
+  for (const auto& track : report.tracks) {
+    inputs.push_back(std::get<0>(track));
+    if (std::get<1>(track) == std::get<3>(track) && std::get<2>(track) == std::get<4>(track)) {
+      throw std::invalid_argument("--track begins where it ends: " + std::get<0>(track));
+    }
+  }
   check_output(options.json, inputs);
   check_output(options.junit, inputs);
+  check_output(report.file, inputs);
   if (!options.json.empty() && options.json == options.junit) {
     throw std::invalid_argument("--json and --junit name one file");
+  }
+  if (!report.file.empty() && (report.file == options.json || report.file == options.junit)) {
+    throw std::invalid_argument("--report and another output name one file");
   }
 }
 
@@ -80,7 +104,7 @@ EvaluationInput input_of(const Options& options) {
   }
   input.station_m = 1e-3 * options.station_mm;
   if (!options.compare.empty()) input.others = {options.compare, read_fixes(options.compare)};
-  if (!options.lamps.empty()) {
+  if (options.noise_px > 0) {
     input.limit = {read_lamp_map(options.lamps), read_calibration(options.calibration).camera,
                    options.noise_px};
   }
@@ -102,7 +126,7 @@ void warn(const EvaluationInput& input, const Evaluation& evaluation) {
   }
 }
 
-void run(const Options& options) {
+void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = gates_of(options);
   check_options(options, gates);
   const EvaluationInput input = input_of(options);
@@ -113,8 +137,15 @@ void run(const Options& options) {
                                    options.fixes, evaluation.captures, count, status));
   }
   const std::vector<GateResult> results = check_gates(gates, evaluation);
+  std::string report;
+  if (!options.report.file.empty()) {
+    report = report_of(
+        app, options.report,
+        {input, evaluation, results, options.lamps, options.calibration, inputs_of(options)});
+  }
   if (!options.json.empty()) write_file(options.json, json_of(evaluation, results));
   if (!options.junit.empty()) write_file(options.junit, junit_of(results));
+  if (!report.empty()) write_file(options.report.file, report);
   warn(input, evaluation);
   print_evaluation(evaluation, results);
   std::string failed;
@@ -152,17 +183,16 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--gates", options.gates_file, "Gates from a file, vlp-gates/1");
   app.add_option("--json", options.json, "Write the figures for programs, evaluation.json");
   app.add_option("--junit", options.junit, "Write the gates for a CI system, JUnit XML");
-  auto* lamps =
-      app.add_option("--lamps", options.lamps,
-                     "Lamp map, lamps.yaml, for the theoretical limit at the true places");
+  auto* lamps = app.add_option(
+      "--lamps", options.lamps,
+      "Lamp map, lamps.yaml, for the theoretical limit at the true places, and the report");
   auto* calibration = app.add_option("--calibration", options.calibration,
                                      "... the camera; the limit is that of a level one");
   auto* noise = app.add_option("--noise-px", options.noise_px,
                                "... and the standard deviation of each lamp's pixel, per axis")
                     ->check(finite_positive());
-  lamps->needs(calibration)->needs(noise);
-  calibration->needs(lamps);
-  noise->needs(lamps);
+  noise->needs(lamps)->needs(calibration);
+  add_report_options(app, options.report);
   app.add_option("--threads", options.threads, "For the intervals (default: one a core)")
       ->check(CLI::Range(1, 1024));
 }
@@ -179,10 +209,12 @@ int main(int argc, char** argv) {
       "\\\n"
       "    --calibration datasets/example/calibration.yaml -o fixes.csv\n"
       "  build/bin/vlp-evaluate fixes.csv --truth datasets/example/truth.csv \\\n"
-      "    --gate mean_mm=0.2,p90_mm=0.4 --gate missing=0 --json evaluation.json\n",
+      "    --gate mean_mm=0.2,p90_mm=0.4 --gate missing=0 --json evaluation.json \\\n"
+      "    --calibration datasets/example/calibration.yaml --lamps datasets/example/lamps.yaml \\\n"
+      "    --report report.html\n",
       "vlp-evaluate");
   vlp::Options options;
   vlp::add_options(app, options);
   app.footer("Gates:\n" + vlp::gate_descriptions());
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -3,10 +3,10 @@
 #include "captures/fixes_table.h"
 
 #include <array>
-#include <unordered_set>
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
+#include "captures/name_index.h"
 
 namespace vlp {
 namespace {
@@ -79,14 +79,13 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
   const auto image = csv.required("image"), status = csv.required("status");
   const auto lamps = csv.optional("lamps");
   const FixColumns columns(csv);
-  std::unordered_set<std::string_view> images;
-  images.reserve(csv.rows());
+  NameIndex images(csv.rows());
   std::vector<FixRow> rows;
   rows.reserve(csv.rows());
   for (std::size_t row = 0; row < csv.rows(); ++row) {
     const auto name = csv.text(row, image);
     if (name.empty()) throw csv.error(row, image, "is empty");
-    if (!images.insert(name).second) {
+    if (!images.insert(name)) {
       throw csv.error(row, image, "'" + std::string(name) + "' stands twice");
     }
     FixRow& read = rows.emplace_back(FixRow{std::string(name),

@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "captures/truth_table.h"
 
-#include <unordered_set>
-
 #include "captures/csv_reader.h"
+#include "captures/name_index.h"
 
 namespace vlp {
 
@@ -13,14 +12,13 @@ std::vector<TruthRow> read_truth(const std::filesystem::path& file) {
   const auto image = csv.required("image");
   const auto x_m = csv.required("x_m"), y_m = csv.required("y_m");
   const auto z_m = csv.optional("z_m"), yaw_rad = csv.optional("yaw_rad");
-  std::unordered_set<std::string_view> images;
-  images.reserve(csv.rows());
+  NameIndex images(csv.rows());
   std::vector<TruthRow> rows;
   rows.reserve(csv.rows());
   for (std::size_t row = 0; row < csv.rows(); ++row) {
     const auto name = csv.text(row, image);
     if (name.empty()) throw csv.error(row, image, "is empty");
-    if (!images.insert(name).second) {
+    if (!images.insert(name)) {
       throw csv.error(row, image, "'" + std::string(name) + "' stands twice");
     }
     TruthRow& read = rows.emplace_back();

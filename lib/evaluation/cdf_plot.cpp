@@ -30,6 +30,25 @@ std::string steps_of(std::vector<double> errors_m) {
   return rows;
 }
 
+/// Its steps and its two marks.
+std::string blocks_of(const CdfPlot::Curve& curve, const std::string& number) {
+  return data_block("curve" + number, steps_of(curve.errors_m)) +
+         data_block("marks" + number,
+                    data_row({1e3 * curve.p50_m, 50}) + data_row({1e3 * curve.p90_m, 90}));
+}
+
+std::string layer_of(const CdfPlot::Curve& curve, std::size_t i) {
+  const std::string number = std::to_string(i),
+                    color = std::string(" linecolor rgb '") + kColors[i % kColors.size()] + "' ",
+                    style = " dashtype " + std::to_string(i + 1) + color,
+                    label = curve.label + ": p50 " + mm(curve.p50_m) + " mm, p90 " +
+                            mm(curve.p90_m) + " mm";
+  return "$curve" + number + " using 1:2 with steps linewidth 2.5" + style + "title " +
+         gnuplot_quoted(label) + " noenhanced, $marks" + number +
+         " using 1:2 with points pointtype " + std::to_string(5 + 2 * (i % kColors.size())) +
+         " pointsize 1.3" + color + "notitle";
+}
+
 }  // namespace
 
 Drawing drawing_of(const CdfPlot& plot) {
@@ -46,18 +65,8 @@ Drawing drawing_of(const CdfPlot& plot) {
 
   std::string blocks, layers;
   for (std::size_t i = 0; i < plot.curves.size(); ++i) {
-    const auto& [label, errors_m, p50_m, p90_m] = plot.curves[i];
-    const std::string number = std::to_string(i),
-                      color = std::string(" linecolor rgb '") + kColors[i % kColors.size()] + "' ",
-                      style = " dashtype " + std::to_string(i + 1) + color;
-    blocks += data_block("curve" + number, steps_of(errors_m));
-    blocks +=
-        data_block("marks" + number, data_row({1e3 * p50_m, 50}) + data_row({1e3 * p90_m, 90}));
-    layers += layers.empty() ? "plot " : ", ";
-    layers += "$curve" + number + " using 1:2 with steps linewidth 2.5" + style + "title " +
-              gnuplot_quoted(label + ": p50 " + mm(p50_m) + " mm, p90 " + mm(p90_m) + " mm") +
-              " noenhanced, $marks" + number + " using 1:2 with points pointtype " +
-              std::to_string(5 + 2 * (i % 4)) + " pointsize 1.3" + color + "notitle";
+    blocks += blocks_of(plot.curves[i], std::to_string(i));
+    layers.append(layers.empty() ? "plot " : ", ").append(layer_of(plot.curves[i], i));
   }
   const std::string beyond =
       cut ? "; the largest, " + mm(largest_m) + " mm, is off the picture" : "";

@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kMostArrows = 1000, kFurthest = 20;
+constexpr std::size_t kMostArrows = 500, kFurthest = 20, kMostMissing = 200;
 constexpr double kLongestShare = 0.25;
 
 double error_m(const ErrorPlot::Fix& fix) { return (fix.fix_m - fix.truth_m).norm(); }
@@ -67,7 +67,7 @@ struct Blocks {
       places += data_row({from_m.x(), from_m.y()});
       scale.paper.extend(from_m + arrow_m);
     }
-    const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMostArrows);
+    const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMostMissing);
     for (std::size_t i = 0; i < plot.missing_m.size(); i += missing_step) {
       missing += data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
     }
@@ -100,25 +100,36 @@ std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& sca
       " using 1:2:3:4 with vectors filled head size graph 0.012,20 linewidth ";
   const auto cut = std::count_if(plot.fixes.begin(), plot.fixes.end(),
                                  [&](const auto& fix) { return error_m(fix) > scale.longest_m(); });
-  std::string layers = "plot $arrows" + arrow + "1.3" + color(plot_colors::blue) +
-                       "title 'error of a fix', $places using 1:2 with points pointtype 7 "
-                       "pointsize 0.25 linecolor rgb 'black' title 'truth'";
+  std::vector<std::string> layers;
+  if (!blocks.arrows.empty()) {
+    layers.push_back("$arrows" + arrow + "1.3" + color(plot_colors::blue) +
+                     "title 'error of a fix'");
+  }
+  if (!blocks.places.empty()) {
+    layers.emplace_back(
+        "$places using 1:2 with points pointtype 7 pointsize 0.25 linecolor rgb 'black' title "
+        "'truth'");
+  }
   if (cut > 0) {
-    layers += ", $cut" + arrow + "1.5 dashtype 2" + color(plot_colors::vermillion) + "title '" +
-              std::to_string(cut) + " beyond " + in_mm(scale.longest_m()) + ", cut short'";
+    layers.push_back("$cut" + arrow + "1.5 dashtype 2" + color(plot_colors::vermillion) +
+                     "title '" + std::to_string(cut) + " beyond " + in_mm(scale.longest_m()) +
+                     ", cut short'");
   }
   if (!blocks.missing.empty()) {
-    layers += ", $missing using 1:2 with points pointtype 2 linewidth 2" +
-              color(plot_colors::vermillion) + "title '" + std::to_string(plot.missing_m.size()) +
-              " without a fix'";
+    const std::size_t count = plot.missing_m.size(), step = thinning_step(count, kMostMissing);
+    layers.push_back(
+        "$missing using 1:2 with points pointtype 2 linewidth 2" + color(plot_colors::vermillion) +
+        "title 'no fix: " + (step == 1 ? std::to_string(count) : thinning_note(count, step)) + "'");
   }
   if (!blocks.lamps.empty()) {
-    layers += ", $lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
-              color(plot_colors::grey) +
-              "title 'lamps', $lamps using 1:2:(sprintf('%d', int($3))) with labels left offset "
-              "1,0.7 notitle";
+    layers.push_back("$lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
+                     color(plot_colors::grey) +
+                     "title 'lamps', $lamps using 1:2:(sprintf('%d', int($3))) with labels left "
+                     "offset 1,0.7 notitle");
   }
-  return layers + "\n";
+  std::string command;
+  for (const auto& layer : layers) command.append(command.empty() ? "plot " : ", ").append(layer);
+  return command + "\n";
 }
 
 }  // namespace

@@ -30,9 +30,9 @@ struct ErrorPlot {
 /// the width; 1 for no errors.
 double error_magnification(double p90_m, double width_m);
 
-/// From each true place an arrow towards its fix. Of more than 1,000 fixes some are drawn, evenly
+/// From each true place an arrow towards its fix. Of more than 500 fixes some are drawn, evenly
 /// in their order, and the 20 that are furthest off; arrows longer than a quarter of the floor are
-/// cut short, dashed and counted.
+/// cut short, dashed and counted. Of more than 200 captures without a fix some are drawn.
 Drawing drawing_of(const ErrorPlot& plot);
 
 }  // namespace vlp

@@ -12,11 +12,6 @@ Path path_of(const EvaluationInput& input) {
   return {{(*input.line_m)[0], (*input.line_m)[1]}, {}};
 }
 
-FixErrors errors_of(const EvaluationInput& input, const FromFile<FixRow>& fixes) {
-  if (input.truth) return errors_against_truth(fixes, *input.truth, input.station_m);
-  return errors_against_path(fixes.rows, path_of(input));
-}
-
 void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors, int threads) {
   std::vector<double> sizes_m;
   std::vector<std::size_t> units;
@@ -51,6 +46,11 @@ void add_comparison(Evaluation& evaluation, const EvaluationInput& input,
 }
 
 }  // namespace
+
+FixErrors errors_of(const EvaluationInput& input, const FromFile<FixRow>& fixes) {
+  if (input.truth) return errors_against_truth(fixes, *input.truth, input.station_m);
+  return errors_against_path(fixes.rows, path_of(input));
+}
 
 Evaluation evaluate(const EvaluationInput& input) {
   const auto [captures, missing, errors] = errors_of(input, input.fixes);

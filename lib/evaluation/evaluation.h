@@ -66,6 +66,9 @@ struct Evaluation {
   std::optional<Comparison> comparison;
 };
 
+/// What single fixes are off. Throws InputError when image names do not match.
+FixErrors errors_of(const EvaluationInput& input, const FromFile<FixRow>& fixes);
+
 /// Throws InputError when image names do not match.
 Evaluation evaluate(const EvaluationInput& input);
 

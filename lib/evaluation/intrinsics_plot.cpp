@@ -39,17 +39,25 @@ std::string data_of(const IntrinsicsPlot& plot) {
   return data_block("corners", corners) + data_block("outliers", outliers) + data_block("map", map);
 }
 
+/// For example "12 corners, 3 outliers (crosses)".
+std::string counts(const IntrinsicsPlot& plot, const std::string& outliers) {
+  const auto left_out = std::count_if(plot.corners.begin(), plot.corners.end(),
+                                      [](const auto& corner) { return corner.outlier; });
+  const auto used = static_cast<std::ptrdiff_t>(plot.corners.size()) - left_out;
+  std::string text = std::to_string(used) + " corners";
+  if (left_out > 0) text += ", " + std::to_string(left_out) + " outliers" + outliers;
+  return text;
+}
+
 /// A layer of corners, and one of outliers where there are any.
 std::string layers(const IntrinsicsPlot& plot, const std::string& of_corners,
                    const std::string& of_outliers) {
-  const auto outliers = std::count_if(plot.corners.begin(), plot.corners.end(),
-                                      [](const auto& corner) { return corner.outlier; });
-  const auto used = static_cast<std::ptrdiff_t>(plot.corners.size()) - outliers;
-  std::string layers = "plot $corners " + of_corners + " linecolor rgb '#0072b2' title '" +
-                       std::to_string(used) + " corners'";
-  if (outliers > 0) {
-    layers += ", $outliers " + of_outliers + " linecolor rgb '#d55e00' title '" +
-              std::to_string(outliers) + " outliers'";
+  std::string layers =
+      "plot $corners " + of_corners + " linecolor rgb '" + plot_colors::blue + "' notitle";
+  if (std::any_of(plot.corners.begin(), plot.corners.end(),
+                  [](const auto& corner) { return corner.outlier; })) {
+    layers +=
+        ", $outliers " + of_outliers + " linecolor rgb '" + plot_colors::vermillion + "' notitle";
   }
   return layers + "\n";
 }
@@ -114,7 +122,7 @@ void draw_intrinsics_plot(const std::filesystem::path& picture, const Intrinsics
   const std::string times = significant(residual_magnification(rms_px(plot), width), kDigits);
   const std::string arrows =
       "using 1:2:($3 * " + times + "):($4 * " + times + ") with vectors nohead ";
-  const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.25";
+  const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.18";
   const std::string commands =
       data_of(plot) + plot_settings() +
       "set size ratio -1\n"
@@ -126,16 +134,20 @@ void draw_intrinsics_plot(const std::filesystem::path& picture, const Intrinsics
       ":-0.5]\n"  // as in the image
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
-      "set multiplot layout 2,2 margins 0.08,0.92,0.1,0.9 spacing 0.11,0.16 title " +
+      "set multiplot layout 2,2 margins 0.1,0.9,0.08,0.88 spacing 0.13,0.2 title " +
       gnuplot_quoted(plot.title) +
       " noenhanced\n"
-      "set title 'corners of all views'\n" +
+      "set title " +
+      gnuplot_quoted("corners of all views\n" + counts(plot, " (crosses)")) + "\n" +
       layers(plot, dots, "using 1:2 with points pointtype 2 pointsize 1.2 linewidth 2") +
-      "set title 'residuals, seen minus projected, " + times + " times as long'\n" +
-      layers(plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.7",
+      "set title " +
+      gnuplot_quoted("residuals, seen minus projected, " + times + " times as long\n" +
+                     counts(plot, " (thick)")) +
+      "\n" +
+      layers(plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
              arrows + "linewidth 2") +
       "set title 'uncertainty of the projection'\n" + map_of(plot) + "unset multiplot\n";
-  draw(picture, {"intrinsics", 900, 250 + 720 * height / width, commands});
+  draw(picture, {"intrinsics", 900, 280 + 720 * height / width, commands});
 }
 
 }  // namespace vlp

@@ -43,7 +43,7 @@ void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot
   const std::string marks =
       "$principal using 1:2 with points pointtype 1 pointsize 2 linewidth 2 linecolor rgb "
       "'#0072b2' title 'principal point', "
-      "$axis using 1:2 with points pointtype 2 pointsize 2 linewidth 2 linecolor rgb '#d1495b' "
+      "$axis using 1:2 with points pointtype 2 pointsize 2 linewidth 2 linecolor rgb '#d55e00' "
       "title 'rotation centre'\n";
   const std::string commands =
       data_block("places", places) + data_block("ellipses", ellipses) +

@@ -42,7 +42,7 @@ std::string layers(const std::string& columns) {
          "title 'commanded', $fixes using " + columns + " with points pointtype 7 pointsize 0.35" +
          color(plot_colors::blue) + "title 'fixes', $fitted using " + columns +
          " with lines linewidth 2 dashtype 2" + color(plot_colors::vermillion) +
-         "title 'line fitted to the fixes'\n";
+         "title 'fitted line'\n";
 }
 
 }  // namespace
@@ -94,9 +94,12 @@ Drawing drawing_of(const TrackPlot& plot) {
               "\nset size ratio -1\nset xtics " + tics + "\nset ytics " + tics +
               "\nset xlabel 'x (m)'\nset ylabel 'y (m)'\nunset key\nset xrange " +
               plot_range(low.x(), high.x()) + "\nset yrange " + plot_range(low.y(), high.y()) +
-              "\n" + layers("1:2") + "set bmargin at screen " + from_bottom(110) +
-              "\nset tmargin at screen " + from_bottom(below_px - 70) +
-              "\nset size noratio\nset xtics autofreq\nset ytics autofreq\nset key below\nset "
+              "\n" + layers("1:2") + "set bmargin at screen " + from_bottom(100) +
+              "\nset tmargin at screen " + from_bottom(below_px - 85) +
+              "\nset size noratio\nset xtics autofreq\nset ytics autofreq\nset key horizontal Left "
+              "reverse center at screen 0.54, screen " +
+              from_bottom(22) +
+              " maxrows 1\nset "
               "xlabel 'along the commanded line (m)'\n"
               "set ylabel 'to its left (mm)'\nset xrange " +
               plot_range(along.min().x() - around_m, along.max().x() + around_m) + "\nset yrange " +

@@ -48,7 +48,9 @@ TEST_F(FloorPlotTest, RefusesAnotherEnding) {
 
 TEST_F(FloorPlotTest, KeepsTheOldPictureWhenGnuplotFails) {
   const auto file = folder.file("a.png", "old");
-  EXPECT_THAT(refusal_of([&] { draw(file, {"a", 100, 100, "plot nonsense\n"}); }),
+  EXPECT_THAT(refusal_of([&] {
+                draw(file, {"a", 100, 100, "plot nonsense\n"});
+              }),
               HasSubstr("a.png: cannot be drawn"));
   EXPECT_EQ(TemporaryFolder::content_of(file), "old");
 }

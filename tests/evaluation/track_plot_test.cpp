@@ -19,7 +19,7 @@ TEST(TrackPlot, ShowsDistancesToTheLeftOfTheCommandedLine) {
   // The fitted line is drawn along the whole commanded one.
   EXPECT_THAT(drawing.commands, HasSubstr("1.001 0 0 -1 \n1.001 2 2 -1 \n"));
   const std::string svg = svg_of(drawing);
-  for (const char* part : {"<title>track</title>", "commanded", "line fitted", "north"}) {
+  for (const char* part : {"<title>track</title>", "commanded", "fitted line", "north"}) {
     EXPECT_THAT(svg, HasSubstr(part));
   }
 }

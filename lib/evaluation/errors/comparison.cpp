@@ -3,9 +3,8 @@
 #include "evaluation/errors/comparison.h"
 
 #include <string>
-#include <unordered_map>
-#include <unordered_set>
 
+#include "captures/name_index.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -13,13 +12,12 @@ namespace {
 
 /// That every image of `fixes` is in `others`.
 void check_images_in(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
-  std::unordered_set<std::string_view> images;
-  images.reserve(others.rows.size());
+  NameIndex images(others.rows.size());
   for (const FixRow& row : others.rows) images.insert(row.image);
   std::size_t strangers = 0;
   const FixRow* first = nullptr;
   for (const FixRow& row : fixes.rows) {
-    if (images.contains(row.image)) continue;
+    if (images.find(row.image)) continue;
     ++strangers;
     if (first == nullptr) first = &row;
   }
@@ -41,21 +39,19 @@ std::string_view Comparison::verdict() const {
 Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>& errors,
                    const std::vector<FixRow>& other_fixes,
                    const std::vector<FixError>& other_errors, int threads) {
-  std::unordered_map<std::string_view, const FixError*> other_of_image;
-  other_of_image.reserve(other_errors.size());
-  for (const FixError& other : other_errors) {
-    other_of_image.emplace(other_fixes[other.fix].image, &other);
-  }
+  NameIndex images(other_errors.size());
+  for (const FixError& other : other_errors) images.insert(other_fixes[other.fix].image);
   Comparison comparison;
   std::vector<double> differences_m;
   std::vector<std::size_t> units;
   for (const FixError& error : errors) {
-    const auto other = other_of_image.find(fixes[error.fix].image);
-    if (other == other_of_image.end()) {
+    const auto other = images.find(fixes[error.fix].image);
+    if (!other) {
       ++comparison.only_these;
       continue;
     }
-    const double difference_m = error.horizontal_m.norm() - other->second->horizontal_m.norm();
+    const double difference_m =
+        error.horizontal_m.norm() - other_errors[*other].horizontal_m.norm();
     differences_m.push_back(difference_m);
     units.push_back(error.unit);
     comparison.mean_difference_m += difference_m;

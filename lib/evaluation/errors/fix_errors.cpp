@@ -3,9 +3,8 @@
 #include "evaluation/errors/fix_errors.h"
 
 #include <algorithm>
-#include <string_view>
-#include <unordered_map>
 
+#include "captures/name_index.h"
 #include "evaluation/errors/stations.h"
 #include "geometry/angles.h"
 #include "rig/input_error.h"
@@ -15,23 +14,18 @@ namespace {
 
 /// The truth's row of each fix.
 std::vector<std::size_t> matched(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth) {
-  std::unordered_map<std::string_view, std::size_t> row_of_image;
-  row_of_image.reserve(truth.rows.size());
-  for (std::size_t row = 0; row < truth.rows.size(); ++row) {
-    row_of_image.emplace(truth.rows[row].image, row);
-  }
+  NameIndex images(truth.rows.size());
+  for (const TruthRow& row : truth.rows) images.insert(row.image);
   std::vector<std::size_t> rows;
   rows.reserve(fixes.rows.size());
   std::size_t strangers = 0;
   const FixRow* first = nullptr;
   for (const FixRow& fix : fixes.rows) {
-    const auto found = row_of_image.find(fix.image);
-    if (found == row_of_image.end()) {
-      ++strangers;
-      if (first == nullptr) first = &fix;
-    } else {
-      rows.push_back(found->second);
-    }
+    const auto row = images.find(fix.image);
+    rows.push_back(row.value_or(0));
+    if (row) continue;
+    ++strangers;
+    if (first == nullptr) first = &fix;
   }
   if (first != nullptr) {
     throw InputError(fixes.file, first->line, "image",

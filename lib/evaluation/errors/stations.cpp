@@ -17,20 +17,22 @@ using Cell = Eigen::Array3d;  // whole numbers
 class StationTable {
  public:
   StationTable(std::size_t most, double radius_m)
-      : cell_m_(2 * radius_m), slots_(std::bit_ceil(2 * most + 1), kFree) {}
+      : radius_m_(radius_m), cell_m_(4 * radius_m), slots_(std::bit_ceil(2 * most + 1), kFree) {}
 
-  /// The first station within the radius; firsts_m.size() when there is none. With cells as large
-  /// as the ball around a place, two along each axis hold it.
+  /// The first station within the radius; firsts_m.size() when there is none. The ball around a
+  /// place is in one or two cells along each axis.
   std::size_t find(const Eigen::Vector3d& place_m,
                    const std::vector<Eigen::Vector3d>& firsts_m) const {
-    const double radius_m = cell_m_ / 2;
-    const Cell low = (place_m.array() / cell_m_ - 0.5).floor();
+    const Cell low = ((place_m.array() - radius_m_) / cell_m_).floor();
+    const Cell more = ((place_m.array() + radius_m_) / cell_m_).floor() - low;
     std::size_t found = firsts_m.size();
     for (int corner = 0; corner < 8; ++corner) {
-      const Cell cell = low + Cell(corner & 1, (corner >> 1) & 1, corner >> 2);
+      const Cell step(corner & 1, (corner >> 1) & 1, corner >> 2);
+      if ((step > more).any()) continue;
+      const Cell cell = low + step;
       for (std::size_t slot = slot_of(cell); slots_[slot] != kFree; slot = next(slot)) {
         const std::size_t station = slots_[slot];
-        if (station < found && (firsts_m[station] - place_m).norm() <= radius_m) found = station;
+        if (station < found && (firsts_m[station] - place_m).norm() <= radius_m_) found = station;
       }
     }
     return found;
@@ -39,25 +41,28 @@ class StationTable {
   void insert(const Eigen::Vector3d& place_m, std::size_t station) {
     std::size_t slot = slot_of((place_m.array() / cell_m_).floor());
     while (slots_[slot] != kFree) slot = next(slot);
-    slots_[slot] = station;
+    slots_[slot] = static_cast<std::uint32_t>(station);
   }
 
  private:
-  static constexpr std::size_t kFree = std::numeric_limits<std::size_t>::max();
+  static constexpr std::uint32_t kFree = std::numeric_limits<std::uint32_t>::max();
 
   std::size_t next(std::size_t slot) const { return (slot + 1) & (slots_.size() - 1); }
   std::size_t slot_of(const Cell& cell) const {
     std::uint64_t hash = 0;
     for (const double number : cell) {
       // + 0: there is a zero with a minus sign, whose bits are others.
-      hash = (hash ^ std::bit_cast<std::uint64_t>(number + 0.0)) * 0x9e3779b97f4a7c15;
-      hash ^= hash >> 29;
+      hash ^= std::bit_cast<std::uint64_t>(number + 0.0);
+      // The end of splitmix64: whole numbers differ in their upper bits alone.
+      hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9;
+      hash = (hash ^ (hash >> 27)) * 0x94d049bb133111eb;
+      hash ^= hash >> 31;
     }
     return static_cast<std::size_t>(hash) & (slots_.size() - 1);
   }
 
-  double cell_m_;
-  std::vector<std::size_t> slots_;
+  double radius_m_, cell_m_;
+  std::vector<std::uint32_t> slots_;
 };
 
 }  // namespace

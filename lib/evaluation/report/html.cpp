@@ -88,7 +88,9 @@ std::string html_table(const HtmlTable& table) {
 
 std::string html_figure(const ReportPicture& picture) {
   const bool png = picture.image.rfind("\x89PNG", 0) == 0;
-  return "<figure>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Picture\">"
+  const std::string large = picture.part == ReportPart::camera ? " class=\"large\"" : "";
+  return "<figure" + large +
+         ">\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Picture\">"
          "<img alt=\"" +
          html_text(picture.alt) + "\" src=\"data:image/" + (png ? "png" : "svg+xml") + ";base64," +
          base64(picture.image) + "\"></div>\n" + html_element("figcaption", picture.caption) +

@@ -22,9 +22,13 @@ std::string section(const std::string& heading, const std::string& body) {
   return "<section>\n" + html_element("h2", heading) + body + "</section>\n";
 }
 
+std::string with_unit(const std::string& text, const std::string& unit) {
+  return text.empty() || unit.empty() ? text : text + kSpace + unit;
+}
+
 std::string quantity(double value, const std::string& unit) {
   if (!std::isfinite(value)) return "none";
-  return significant(value, 4) + (unit.empty() ? "" : kSpace + unit);
+  return with_unit(significant(value, 4), unit);
 }
 
 std::string verdict(const std::vector<GateResult>& gates) {
@@ -43,8 +47,8 @@ std::string verdict(const std::vector<GateResult>& gates) {
   for (const auto& gate : gates) {
     if (!gate.passed) table.marked.push_back(table.rows.size());
     table.rows.push_back({gate.name, quantity(gate.value, gate.unit),
-                          "at most" + kSpace + quantity(gate.limit, gate.unit),
-                          gate.passed ? "met" : "NOT" + kSpace + "MET"});
+                          "at most\u00a0" + quantity(gate.limit, gate.unit),
+                          gate.passed ? "met" : "NOT\u00a0MET"});
   }
   return std::string("<div class=\"verdict ") + (missed == 0 ? "pass" : "fail") + "\"><strong>" +
          (missed == 0 ? "PASS" : "FAIL") + "</strong>" + reason + "</div>\n" + html_table(table);
@@ -55,9 +59,7 @@ std::string figures_of(const Report& report) {
   if (!report.figures.empty()) {
     HtmlTable table{"", {"figure", "value", "95 % confidence interval"}, {}};
     for (const auto& [label, value, unit, interval] : report.figures) {
-      table.rows.push_back(
-          {label, unit.empty() ? value : value + kSpace + unit,
-           interval.empty() || unit.empty() ? interval : interval + kSpace + unit});
+      table.rows.push_back({label, with_unit(value, unit), with_unit(interval, unit)});
     }
     html += html_table(table);
   }

@@ -42,9 +42,9 @@ constexpr std::array<Kind, 7> kKinds = {
       "with the smallest circle around them. The circle after should be the smaller.",
       "Errors of fixes about the station with their dispersion circles, before and after."},
      {"errors", ReportPart::floor,
-      "An arrow for each capture, from where it was towards its fix, enlarged as the title says; "
-      "the "
-      "bar below the plan has the scale.",
+      "Arrows from where the captures were towards their fixes, enlarged as the title says; the "
+      "bar "
+      "below the plan has the scale.",
       "Floor plan with the lamps and an enlarged error arrow at each true place."},
      {"cdf", ReportPart::distribution,
       "The share of fixes that are no further off than so much; marks at half and at nine tenths.",

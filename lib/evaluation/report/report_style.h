@@ -42,7 +42,8 @@ footer { margin-top: 2rem; font-size: .85rem; color: #444; }
   body { max-width: none; padding: 0; font-size: 10pt; }
   h2, caption, summary { break-after: avoid; }
   figure, .verdict, tr, table { break-inside: avoid; }
-  img { min-width: 0; max-width: 100%; max-height: 125mm; object-fit: contain; }
+  img { min-width: 0; max-width: 100%; max-height: 108mm; object-fit: contain; }
+  .large img { max-height: 150mm; }
   table, figcaption { font-size: 9pt; }
   .scroll { overflow: visible; }
   .verdict { print-color-adjust: exact; }
