@@ -90,6 +90,9 @@ locate() {  # DETECTIONS CALIBRATION CORRECTION [LAMPS]
   errors_of "$out/fixes.csv"
 }
 
+# Every capture has to have a fix, before all else.
+locate "$out/check.csv" "$out/camera.yaml" none >/dev/null
+
 # Rotation centre and dispersion by some methods, to $out/$1.yaml.
 calibrate() {  # NAME LAMPS ROTATION-METHOD DISPERSION-METHOD DISPERSION-CAPTURES [KIND]
   vlp rotation "$out/rotation${6:-}.csv" --lamps "$out/lamps.yaml" \
@@ -158,7 +161,8 @@ read -r focal _ center_u center_v _ <<<"$(numbers "$out/camera.yaml" intrinsics)
 awk -v height="$(awk -v a="$lamps_height" -v b="$height" 'BEGIN { print a - b }')" \
   -v focal="$focal" -v u="$true_u" -v v="$true_v" -v cu="$center_u" -v cv="$center_v" \
   -v circle_u="$circle_u" -v circle_v="$circle_v" -v arm_x="${arm_x:-0}" -v arm_y="${arm_y:-0}" \
-  -v none="$none_2 and $none_3" -v rotation="$rotation_2 and $rotation_3" -v turned="$turned_2 and $turned_3" \
+  -v none="$none_2 and $none_3" -v rotation="$rotation_2 and $rotation_3" \
+  -v turned="$turned_2 and $turned_3" \
   -v dispersion="$dispersion_2 and $dispersion_3" -v exact="$exact_2, $exact_3 and $exact_all" \
   -v blurred="$blurred_2 and $blurred_3" -v true_map="$true_map" '
   function length_of(x, y) { return sqrt(x * x + y * y) }
@@ -172,8 +176,8 @@ awk -v height="$(awk -v a="$lamps_height" -v b="$height" 'BEGIN { print a - b }'
            none, lean * degrees, 1e3 * height * lean, height, atan2(0.0199, height) * degrees
     printf "rotation    ours %s, theirs 15.4 and 10.8: the centre of our circles is %.2f px off, " \
            "%.1f\n            at that height, since the camera sits %.1f beside its axis of rotation " \
-           "and what it sees\n            of a turn are ellipses. The exact method knows both and " \
-           "leaves\n            %s.\n", rotation, off, 1e3 * height * off / focal,
+           "and what it sees\n            of a turn are ellipses. The exact method knows both: " \
+           "%s.\n", rotation, off, 1e3 * height * off / focal,
            1e3 * length_of(arm_x, arm_y), turned
     printf "dispersion  ours %s, theirs 8.2 and 8.8: we find lamps by their outlines. With centres " \
            "as far\n            off as those of bounding boxes, 1.7 px rms, it is %s. A shift is right " \
