@@ -13,9 +13,9 @@ namespace {
 
 class RotationRefusal : public Rotation {
  protected:
-  /// With another lamp map, by each method.
-  void expect_refusals(const LampMap& map, const std::string& message) {
-    write_lamp_map(folder / "other.yaml", map);
+  /// With `lamps` as the map, by each method.
+  void expect_refusals(const std::string& message) {
+    write_lamp_map(folder / "other.yaml", lamps);
     for (const std::string method : {"axis", "joint", "circle", "lamps"}) {
       SCOPED_TRACE(method);
       expect_refusal(run_program("vlp-rotation " + kExample + "turning.csv --lamps " +
@@ -24,17 +24,17 @@ class RotationRefusal : public Rotation {
                      2, "other.yaml: " + message);
     }
   }
-  LampMap map = read_lamp_map(kExample + "lamps.yaml");
+  LampMap lamps = read_lamp_map(kExample + "lamps.yaml");
 };
 
 TEST_F(RotationRefusal, SaysThatAMapIsMirrored) {
-  for (Lamp& lamp : map.lamps) lamp.position_m.x() *= -1;
-  expect_refusals(map, "the lamp map looks mirrored");
+  for (Lamp& lamp : lamps.lamps) lamp.position_m.x() *= -1;
+  expect_refusals("the lamp map looks mirrored");
 }
 
 TEST_F(RotationRefusal, SaysThatTwoLampsAreSwapped) {
-  std::swap(map.lamps[0].position_m, map.lamps[1].position_m);
-  expect_refusals(map, "lamps 1 and 2 look swapped");
+  std::swap(lamps.lamps[0].position_m, lamps.lamps[1].position_m);
+  expect_refusals("lamps 1 and 2 look swapped");
 }
 
 TEST_F(RotationRefusal, RefusesWhatDoesNotDetermineIt) {
@@ -51,9 +51,9 @@ TEST_F(RotationRefusal, RefusesWhatDoesNotDetermineIt) {
 
 TEST_F(RotationRefusal, RefusesTheMapOfAnotherRoom) {
   const std::string map = "format: vlp-lamps/1\nlamps:\n";
-  const auto other = [&](const std::string& lamps) {
+  const auto other = [&](const std::string& places) {
     return run_program("vlp-rotation " + kExample + "turning.csv --lamps " +
-                       folder.file("other.yaml", map + lamps).string() + " --calibration " +
+                       folder.file("other.yaml", map + places).string() + " --calibration " +
                        kExample + "calibration.yaml -o " + output.string());
   };
   expect_refusal(
