@@ -66,8 +66,8 @@ TEST_F(RotationRefusal, RefusesTheMapOfAnotherRoom) {
 }
 
 TEST_F(RotationRefusal, RefusesToWriteOverAnInput) {
-  const std::string lamps = kExample + "lamps.yaml";
-  EXPECT_EQ(rotation(kExample + "turning.csv", "--plot " + lamps).exit_code, 2);
+  const std::string input = kExample + "lamps.yaml";
+  EXPECT_EQ(rotation(kExample + "turning.csv", "--plot " + input).exit_code, 2);
 }
 
 }  // namespace
