@@ -119,6 +119,14 @@ TEST_F(DispersionProgram, SaysWhatIsWrong) {
   const auto other_map = dispersion(frames, "--station 0.1 -0.05");
   EXPECT_EQ(other_map.exit_code, 2);
   EXPECT_THAT(other_map.errors, HasSubstr("lamps.yaml: has none of the lamps"));
+  frames = turn(6, 6.28);
+  LampMap mirrored = rig.map;
+  for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
+  write_lamp_map(folder / "lamps.yaml", mirrored);
+  const auto from_below = dispersion(frames, "--station 0.1 -0.05");
+  EXPECT_EQ(from_below.exit_code, 2);
+  EXPECT_THAT(from_below.errors, HasSubstr("lamps.yaml: the lamp map looks mirrored"));
+  write_lamp_map(folder / "lamps.yaml", rig.map);
   for (Frame& frame : frames) frame.detections.resize(1), frame.detections[0].lamp = 1;
   EXPECT_EQ(dispersion(frames, "--station 0.1 -0.05").exit_code, 3);
 }

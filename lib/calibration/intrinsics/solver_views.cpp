@@ -8,6 +8,7 @@
 #include "calibration/intrinsics/edge_bias.h"
 #include "calibration/intrinsics/intrinsics_solver.h"
 #include "calibration/intrinsics/view_pose.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 /// What a view's corners may be off, given what those of the others are.
 double limit_for(const std::vector<double>& rms) {
   constexpr double fair_px = 1, fair = 4;
-  return std::max(fair_px, fair * median(rms));
+  return std::max(fair_px, fair * upper_median(rms));
 }
 
 }  // namespace
