@@ -44,8 +44,7 @@ struct Sorted {
 
 Sorted sorted(const Options& options, const Board& board, const std::vector<BoardView>& views) {
   const auto model = lens_model_from_name(options.lens);
-  const IntrinsicsInput none{
-      BoardLattice(board), {}, views.front().imager_px, *model, !board.corner_squares};
+  const IntrinsicsInput none{BoardLattice(board), {}, views.front().imager_px, *model};
   Sorted sorted{none, none, {}};
   int usable = 0;
   for (const BoardView& view : views) {

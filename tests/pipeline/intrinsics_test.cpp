@@ -61,10 +61,10 @@ TEST_P(RenderedRig, GivesItsLensWhateverTheThreads) {
       projection_difference(Lens(truth.lens_model, truth.intrinsics),
                             Lens(found.camera.lens_model, found.camera.intrinsics), truth.imager_px,
                             [](const auto&) { return 1; });
-  EXPECT_LT(difference->mean_px, 0.05);  // measured: 0.013 and 0.031
-  EXPECT_LT(difference->worst_px, 1);    // in corners that few views cover: 0.05 and 0.59
+  EXPECT_LT(difference->mean_px, 0.05);
+  EXPECT_LT(difference->worst_px, 0.2);
   ASSERT_TRUE(found.intrinsics_report);
-  EXPECT_LT(found.intrinsics_report->rms_px, 0.07);
+  EXPECT_LT(found.intrinsics_report->rms_px, 0.03);  // measured: 0.018 and 0.013
   ASSERT_EQ(found.history.size(), 1U);
   EXPECT_EQ(found.history[0].inputs.size(), 37U);
 
