@@ -15,7 +15,7 @@ packages=(
   libmrcal-dev libsuitesparse-dev libcairo2-dev
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks
-  libgtest-dev libgmock-dev libbenchmark-dev python3-mrcal poppler-utils unzip
+  libgtest-dev libgmock-dev libbenchmark-dev mrcal python3-mrcal poppler-utils unzip
 )
 
 missing=()

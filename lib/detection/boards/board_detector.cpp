@@ -67,7 +67,8 @@ BoardDetector::BoardDetector(const Board& board)
 BoardDetector::~BoardDetector() = default;
 
 std::optional<SeenTag> BoardDetector::exact(const SeenTag& tag, const GreyLevels& image) const {
-  return touching_ ? touching_->exact(tag, image) : with_exact_edges(tag, image.sharp, *stripes_);
+  if (touching_) return touching_->exact(tag, image);
+  return with_exact_edges(tag, image.sharp, *stripes_).value_or(tag);
 }
 
 SeenBoard BoardDetector::detect(const cv::Mat& image) const {

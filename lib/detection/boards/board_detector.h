@@ -38,10 +38,10 @@ struct SeenBoard {
 };
 
 /// Finds a board's tags. Boards without corner squares by libapriltag, with corners where the
-/// tag's edges cross (with_exact_edges()); the gap between tags has to be white. Boards with corner
-/// squares, where tags touch, by OpenCV's ArUco module and from one to the next, with corners where
-/// the squares' edges cross (edge_crossing()).
-/// Safe to share between threads.
+/// tag's edges cross (with_exact_edges()), or its own where that fails; the gap between tags has to
+/// be white. Boards with corner squares, where tags touch, by OpenCV's ArUco module and from one to
+/// the next, with corners where the squares' edges cross (edge_crossing()). Safe to share between
+/// threads.
 class BoardDetector {
  public:
   /// Throws std::invalid_argument when the detector that the board needs lacks the family.

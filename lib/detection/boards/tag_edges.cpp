@@ -138,7 +138,7 @@ Eigen::Vector2d crossing(const Parabola& a, const Parabola& b, Eigen::Vector2d p
 std::optional<SeenTag> with_exact_edges(const SeenTag& tag, const cv::Mat1b& image,
                                         const EdgeStripes& stripes) {
   // The stripe's other side is kept away from by 2 px: it is blurred, too.
-  constexpr double least_px = 1.5, most_px = 4.5, away_px = 2, most_moved_px = 1.5;
+  constexpr double least_px = 1.5, most_px = 4.5, away_px = 2, moved_px = 1.5, moved_share = 0.03;
   const auto& corners = tag.corners_px;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   double width_px = INFINITY;
@@ -148,6 +148,7 @@ std::optional<SeenTag> with_exact_edges(const SeenTag& tag, const cv::Mat1b& ima
   }
   const Band band{std::clamp(stripes.inside * width_px - away_px, least_px, most_px),
                   std::clamp(stripes.outside * width_px - away_px, least_px, most_px)};
+  const double most_moved_px = std::max(moved_px, moved_share * width_px);
   std::array<Parabola, 4> edges;
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d from = corners[k], to = corners[(k + 1) % 4];

@@ -20,7 +20,8 @@ struct EdgeStripes {
 /// with w from -1 to 1 along the edge, v across it and a blurred step. On rendered boards corners
 /// are good to 0.03 px and without a bias; libapriltag's straight lines, which take no notice of
 /// light that changes over the image, leave 0.05 px and are drawn outwards by the lens. Nothing
-/// when an edge looks otherwise, or when a corner is more than 1.5 px from where it was.
+/// when an edge looks otherwise, or when a corner is more than 1.5 px, and than 3 % of the tag,
+/// from where it was.
 std::optional<SeenTag> with_exact_edges(const SeenTag& tag, const cv::Mat1b& image,
                                         const EdgeStripes& stripes);
 
