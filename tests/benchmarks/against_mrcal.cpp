@@ -17,7 +17,6 @@
 #include "calibration/intrinsics/mrcal_files.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
-#include "support/program.h"
 
 namespace vlp {
 namespace {
@@ -61,17 +60,18 @@ int compare() {
   names.reserve(count);
   for (int i = 0; i < count; ++i) names.push_back(fmt::format("{:03}.png", i));
   write_corners(corners, solution, names);
-  const ProgramResult result = run_program(
-      fmt::format("mrcal-calibrate-cameras --corners-cache {} --lensmodel LENSMODEL_OPENCV8 "
-                  "--focal 520 --object-spacing {} --object-width-n {} --object-height-n {} "
-                  "--imagersize 800 600 --outdir {} '*.png'",
-                  corners, input.lattice.spacing_m(), input.lattice.cols(), input.lattice.rows(),
-                  folder.string()));
+  const std::string command = fmt::format(
+      "mrcal-calibrate-cameras --corners-cache {} --lensmodel LENSMODEL_OPENCV8 "
+      "--focal 520 --object-spacing {} --object-width-n {} --object-height-n {} "
+      "--imagersize 800 600 --outdir {} '*.png' >{}/log 2>&1",
+      corners, input.lattice.spacing_m(), input.lattice.cols(), input.lattice.rows(),
+      folder.string(), folder.string());
+  const int status = std::system(command.c_str());
   const double mrcal_s = cpu_of_children_s();
   std::ostringstream model;
   model << std::ifstream(folder / "camera-0.cameramodel").rdbuf();
   std::filesystem::remove_all(folder);
-  if (result.exit_code != 0) {
+  if (status != 0) {
     fmt::print("solve {:.3f} s; mrcal-calibrate-cameras is not installed, or failed\n", here_s);
     return 0;
   }
