@@ -18,7 +18,7 @@ struct EdgeStripes {
 /// it, from corner to corner, as a parabola, since the lens bends it, by least squares:
 ///   grey = (middle + contrast step(v - a - b w - c w^2)) (1 + light . (w, v)),
 /// with w from -1 to 1 along the edge, v across it and a blurred step. On rendered boards corners
-/// are good to 0.03 px and without a bias; libapriltag's straight lines, which take no notice of
+/// are good to 0.019 px and without a bias; libapriltag's straight lines, which take no notice of
 /// light that changes over the image, leave 0.05 px and are drawn outwards by the lens. Nothing
 /// when an edge looks otherwise, or when a corner is more than 1.5 px, and than 3 % of the tag,
 /// from where it was.
