@@ -24,7 +24,7 @@
 #
 # Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 the captures do not determine it.
 set -euo pipefail
-bin=${VLP_BIN:-$(cd "$(dirname "$0")/.." && pwd)/build/bin}
+bin=${VLP_PROGRAMS_DIR:-$(cd "$(dirname "$0")/.." && pwd)/build/bin}
 
 usage() {
   echo "calibrate.sh: $1; usage: calibrate.sh STATION_DIR [-o RESULTS_DIR] [--camera-id ID]" \

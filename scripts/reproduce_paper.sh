@@ -20,7 +20,7 @@ cd "$(dirname "$0")/.."
 scene=${1:-datasets/paper-rig-faulty}
 out=${2:-out/reproduce-$(basename "$scene")}
 bin=${VLP_PROGRAMS_DIR:-build/bin}
-folders=(rotation dispersion dispersion-turning check)
+folders=(rotation dispersion dispersion-one-yaw check)
 for program in simulate detect rotation dispersion locate; do
   if [ ! -x "$bin/vlp-$program" ]; then
     echo "reproduce_paper.sh: $bin/vlp-$program is missing: run scripts/test.sh first" >&2
@@ -117,11 +117,11 @@ measured() {  # LABEL NAME CHECK
 }
 
 for lamps in 2 3; do
-  calibrate paper-$lamps -$lamps circle paper dispersion
-  calibrate exact-$lamps -$lamps axis camera dispersion-turning
-  calibrate blurred-$lamps -$lamps circle paper dispersion -blurred
+  calibrate paper-$lamps -$lamps circle paper dispersion-one-yaw
+  calibrate exact-$lamps -$lamps axis camera dispersion
+  calibrate blurred-$lamps -$lamps circle paper dispersion-one-yaw -blurred
 done
-calibrate exact "" axis camera dispersion-turning
+calibrate exact "" axis camera dispersion
 vlp rotation "$out/rotation.csv" --method lamps --lamps "$out/lamps.yaml" \
   --calibration "$out/camera.yaml" --refine-map "$out/refined-lamps.yaml" -o "$out/levelled.yaml"
 

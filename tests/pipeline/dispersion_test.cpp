@@ -155,7 +155,7 @@ TEST(DispersionOfImages, IsTheCamerasTilt) {
   const std::string rendered = (folder / "rendered").string();
   const auto simulated = run_program("vlp-simulate -q " VLP_SOURCE_DIR
                                      "/datasets/paper-rig/scene.yaml --only "
-                                     "dispersion-turning -o " +
+                                     "dispersion -o " +
                                      rendered);
   ASSERT_EQ(simulated.exit_code, 0) << simulated.errors;
   Calibration calibration = read_calibration(rendered + "/true_calibration.yaml");
@@ -166,7 +166,7 @@ TEST(DispersionOfImages, IsTheCamerasTilt) {
   center.zenith_in_camera.normalize();
   write_calibration(folder / "rotated.yaml", calibration);
   const std::string files = " --lamps " + rendered + "/lamps.yaml --calibration ";
-  const auto result = run_program("vlp-dispersion " + rendered + "/dispersion-turning" + files +
+  const auto result = run_program("vlp-dispersion " + rendered + "/dispersion" + files +
                                   (folder / "rotated.yaml").string() + " -o " +
                                   (folder / "calibration.yaml").string());
   ASSERT_EQ(result.exit_code, 0) << result.errors;

@@ -49,7 +49,7 @@ TEST(Readme, ItsCommandsWorkAsTyped) {
   }
   for (const auto& command : commands) {
     const auto result = run_program("cd '" + (folder / "").string() +
-                                    "' && export VLP_BIN=" VLP_PROGRAMS_DIR " && " + command);
+                                    "' && export VLP_PROGRAMS_DIR=" VLP_PROGRAMS_DIR " && " + command);
     EXPECT_EQ(result.exit_code, 0) << command << "\n" << result.errors;
   }
 }

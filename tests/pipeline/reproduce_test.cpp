@@ -18,8 +18,8 @@ using testing::HasSubstr;
 /// 58 captures instead of 536.
 const std::string kFewCaptures = R"(captures:
   - {folder: rotation, exposure_s: 5.0e-5, spots_m: [[0.05, 0.02]], heights_m: [0, 0.3], turn: {count: 8, jitter_deg: 8}, interval_s: 0.5}
-  - {folder: dispersion, exposure_s: 5.0e-5, spots_m: [[0, 0]], heights_m: [0], yaws_deg: [0], repeat: 6, interval_s: 0.5, known: true}
-  - {folder: dispersion-turning, exposure_s: 5.0e-5, spots_m: [[0, 0]], heights_m: [0], turn: {count: 12, jitter_deg: 4}, interval_s: 0.5, known: true}
+  - {folder: dispersion-one-yaw, exposure_s: 5.0e-5, spots_m: [[0, 0]], heights_m: [0], yaws_deg: [0], repeat: 6, interval_s: 0.5, known: true}
+  - {folder: dispersion, exposure_s: 5.0e-5, spots_m: [[0, 0]], heights_m: [0], turn: {count: 12, jitter_deg: 4}, interval_s: 0.5, known: true}
   - {folder: check, exposure_s: 5.0e-5, grid: {x_m: [-0.6, 0.6], y_m: [-0.35, 0.35], columns: 3, rows: 2}, heights_m: [0, 0.3], turn: {count: 2, jitter_deg: 60}, interval_s: 0.5}
 )";
 
