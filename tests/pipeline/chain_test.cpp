@@ -32,7 +32,8 @@ class Chain : public testing::Test {
     ASSERT_EQ(result.exit_code, 0) << result.errors;
   }
   ProgramResult calibrate(const std::string& options = "--row-time-s 3e-5 --readout rows") const {
-    return run_program("VLP_PROGRAMS_DIR=" VLP_PROGRAMS_DIR " " VLP_SOURCE_DIR "/scripts/calibrate.sh " +
+    return run_program("VLP_PROGRAMS_DIR=" VLP_PROGRAMS_DIR " " VLP_SOURCE_DIR
+                       "/scripts/calibrate.sh " +
                        path("station") + " " + options);
   }
   std::string result(const std::string& name) const {
