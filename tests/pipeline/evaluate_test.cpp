@@ -90,7 +90,7 @@ TEST_F(Evaluate, HoldsFixesAgainstAPathAndALine) {
   ASSERT_EQ(path.exit_code, 0) << path.errors;
   // Beyond its end by 3 mm; 2 and 4 mm beside it; twice on it.
   EXPECT_THAT(path.output, AllOf(HasSubstr("mean            1.800 mm"), HasSubstr("height")));
-  const auto line = evaluate("--line 0 0 1 0 --gate fitted_max_mm=3 --json line.json");
+  const auto line = evaluate("--line 0 0 1 0 --gate fitted_max_mm=3.3 --json line.json");
   ASSERT_EQ(line.exit_code, 0) << line.errors;
   EXPECT_THAT(line.output, AllOf(HasSubstr("mean            1.800 mm"),
                                  HasSubstr("line fit    mean"), HasSubstr("hides     jitter of")));

@@ -42,6 +42,19 @@ TEST(Comparison, SeesSmallDifferencesInPairs) {
   EXPECT_EQ(compare(same.fixes, same.errors, same.fixes, same.errors, 1).verdict(), "no evidence");
 }
 
+TEST(Comparison, NeedsTheWholeIntervalOnOneSide) {
+  Comparison comparison;
+  EXPECT_EQ(comparison.verdict(), "no evidence");
+  comparison.interval_m = {-1, 0.1};
+  EXPECT_EQ(comparison.verdict(), "no evidence");
+  comparison.interval_m = {-0.1, 1};
+  EXPECT_EQ(comparison.verdict(), "no evidence");
+  comparison.interval_m = {-1, -0.1};
+  EXPECT_EQ(comparison.verdict(), "better");
+  comparison.interval_m = {0.1, 1};
+  EXPECT_EQ(comparison.verdict(), "worse");
+}
+
 TEST(Comparison, CountsPairsAndWhatIsMissing) {
   Pairs all = pairs(10, 1e-2);
   all.errors.erase(all.errors.begin(), all.errors.begin() + 3);

@@ -40,6 +40,17 @@ TEST(LineFit, SamplesTheLineEvenly) {
   EXPECT_NEAR(fit->jitter_m, 0, 1e-7);  // the root of rounding
 }
 
+TEST(LineFit, RunsAsItWasCommanded) {
+  const std::vector<FixRow> fixes{fix_at("", 0, 0), fix_at("", 1, 0)};
+  const Eigen::Vector2d begin(0, 0), end(1, 0);
+  for (const CommandedLine& line : {CommandedLine{begin, end}, CommandedLine{end, begin}}) {
+    const auto fit = fit_line(fixes, line);
+    ASSERT_TRUE(fit);
+    EXPECT_NEAR((fit->line_m[0] - line[0]).norm(), 0, 1e-12);
+    EXPECT_NEAR(fit->angle_rad, 0, 1e-12);
+  }
+}
+
 TEST(LineFit, NeedsADirection) {
   const CommandedLine line{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0)};
   EXPECT_FALSE(fit_line({fix_at("", 0, 0)}, line));
