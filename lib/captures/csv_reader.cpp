@@ -83,6 +83,11 @@ struct CsvParsing {
 
   /// parse() for plain text, without libcsv.
   void split(std::string_view content) {
+    const auto lines = static_cast<std::size_t>(std::count(content.begin(), content.end(), '\n'));
+    const auto commas = static_cast<std::size_t>(std::count(content.begin(), content.end(), ','));
+    table.fields_.reserve(content.size());
+    table.ends_.reserve(lines + commas);
+    table.lines_.reserve(lines);
     while (!content.empty() && !error) {
       std::string_view text = content.substr(0, content.find('\n'));
       content.remove_prefix(std::min(text.size() + 1, content.size()));

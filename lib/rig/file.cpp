@@ -80,6 +80,8 @@ std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
   std::ifstream stream(path, std::ios::binary);
   if (!stream) throw InputError(path, std::string("cannot be opened: ") + std::strerror(errno));
   std::string content;
+  const auto bytes = fs::file_size(path, error);
+  if (!error) content.reserve(std::min<std::size_t>(bytes, max_bytes) + 1);
   for (char block[65536]; stream.read(block, sizeof block), stream.gcount() > 0;) {
     content.append(block, static_cast<std::size_t>(stream.gcount()));
     if (content.size() > max_bytes) {

@@ -7,18 +7,18 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
-#include <random>
 #include <vector>
 
 #include "captures/in_parallel.h"
+#include "evaluation/errors/split_mix.h"
 
 namespace vlp {
 namespace {
 
 constexpr std::size_t kDraws = 2000, kMostParts = 1000, kRanks = 256;
 
-/// In [0, count); the same with every standard library. Precondition: count < 2^32.
-std::size_t below(std::size_t count, std::mt19937_64& random) {
+/// In [0, count). Precondition: count < 2^32.
+std::size_t below(std::size_t count, SplitMix& random) {
   return static_cast<std::size_t>(((random() >> 32) * count) >> 32);
 }
 
@@ -40,7 +40,7 @@ Parts dealt_out(std::span<const std::size_t> units) {
   std::vector<std::uint32_t> deal(parts.units);
   std::iota(deal.begin(), deal.end(), std::uint32_t{0});
   if (parts.units > kMostParts) {
-    std::mt19937_64 random(1);
+    SplitMix random(1);
     for (std::size_t i = deal.size(); i > 1; --i) std::swap(deal[i - 1], deal[below(i, random)]);
   }
   parts.of_error.reserve(units.size());
@@ -78,7 +78,7 @@ class Resampler {
     double mean, median, p90, rms;
   };
   Figures draw(std::uint64_t seed) const {
-    std::mt19937_64 random(seed);
+    SplitMix random(seed);
     std::vector<std::uint32_t> weights(parts_);
     for (std::size_t i = 0; i < parts_; ++i) ++weights[below(parts_, random)];
     Totals all;

@@ -33,9 +33,10 @@ inline constexpr std::size_t kFewestUnits = 5;
 /// draw's quantiles are exact: a draw sums its weights at 256 ranks of the sorted errors, kept by
 /// part, and walks from the last one below, so that n errors cost n log n once and n / 256 a draw.
 ///
-/// The percentile interval of few units is too narrow: of ten it holds the true mean in about 90 %
-/// of all cases rather than 95. Nothing for fewer than kFewestUnits. Seeded: the same errors give
-/// the same intervals, whatever the threads.
+/// Percentile intervals of few units are too narrow. Of 5 / 10 / 20 / 50 / 100 units with a
+/// horizontal error each, that of the mean held the truth in 85 / 90 / 93 / 94 / 95 % of 2,000
+/// cases, that of p90 in 40 / 64 / 87 / 88 / 94 %. Nothing for fewer than kFewestUnits. Seeded: the
+/// same errors give the same intervals, whatever the threads.
 std::optional<ErrorIntervals> error_intervals(std::span<const double> errors,
                                               std::span<const std::size_t> units, int threads);
 

@@ -12,16 +12,37 @@
 namespace vlp {
 namespace {
 
+/// Finds rows of the truth by image, fastest in the order in which they stand.
+class RowOfImage {
+ public:
+  explicit RowOfImage(const std::vector<TruthRow>& truth) : truth_(truth) {}
+
+  std::optional<std::size_t> operator()(const std::string& image) {
+    if (next_ < truth_.size() && truth_[next_].image == image) return next_++;
+    if (!index_) {
+      index_.emplace(truth_.size());
+      for (const TruthRow& row : truth_) index_->insert(row.image);
+    }
+    const auto found = index_->find(image);
+    if (found) next_ = *found + 1;
+    return found;
+  }
+
+ private:
+  const std::vector<TruthRow>& truth_;
+  std::size_t next_ = 0;
+  std::optional<NameIndex> index_;
+};
+
 /// The truth's row of each fix.
 std::vector<std::size_t> matched(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth) {
-  NameIndex images(truth.rows.size());
-  for (const TruthRow& row : truth.rows) images.insert(row.image);
+  RowOfImage row_of_image(truth.rows);
   std::vector<std::size_t> rows;
   rows.reserve(fixes.rows.size());
   std::size_t strangers = 0;
   const FixRow* first = nullptr;
   for (const FixRow& fix : fixes.rows) {
-    const auto row = images.find(fix.image);
+    const auto row = row_of_image(fix.image);
     rows.push_back(row.value_or(0));
     if (row) continue;
     ++strangers;

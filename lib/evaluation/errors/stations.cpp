@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "evaluation/errors/split_mix.h"
+
 namespace vlp {
 namespace {
 
@@ -52,11 +54,7 @@ class StationTable {
     std::uint64_t hash = 0;
     for (const double number : cell) {
       // + 0: there is a zero with a minus sign, whose bits are others.
-      hash ^= std::bit_cast<std::uint64_t>(number + 0.0);
-      // The end of splitmix64: whole numbers differ in their upper bits alone.
-      hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9;
-      hash = (hash ^ (hash >> 27)) * 0x94d049bb133111eb;
-      hash ^= hash >> 31;
+      hash = mixed(hash ^ std::bit_cast<std::uint64_t>(number + 0.0));
     }
     return static_cast<std::size_t>(hash) & (slots_.size() - 1);
   }
