@@ -7,7 +7,7 @@
 #   scripts/calibrate.sh STATION_DIR [-o RESULTS_DIR] [--camera-id ID] [--row-time-s S]
 #                        [--readout rows|columns]
 #
-# STATION_DIR is only read. In it:
+# What is in STATION_DIR is only read:
 #   lamps.yaml                  the lamps, with their frequencies
 #   boards/, board.yaml         images of the board, and what it is; or camera.yaml, when the camera
 #                               part of the calibration is there already
