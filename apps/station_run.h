@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace vlp {
+
+struct StationRunOptions {
+  std::string station, camera_id;
+  /// A folder whose steps are full; empty: the folder of the station is watched.
+  std::string batch;
+  /// Give the verdict when no image came for so long.
+  std::optional<double> idle_s;
+  int threads = 1;
+};
+
+/// vlp-station run: a unit to its verdict. Throws GateNotMet when it fails.
+void run_unit(const StationRunOptions& options);
+
+/// vlp-station verify: the golden unit. Throws GateNotMet when the station has moved.
+void run_verify(const StationRunOptions& options);
+
+}  // namespace vlp
