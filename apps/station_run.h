@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace vlp {
 
@@ -11,6 +12,8 @@ struct StationRunOptions {
   std::string station, camera_id;
   /// A folder whose steps are full; empty: the folder of the station is watched.
   std::string batch;
+  /// Of a camera or video, by step: "boards=/dev/video0"; without a step for each in turn.
+  std::vector<std::string> sources;
   /// Give the verdict when no image came for so long.
   std::optional<double> idle_s;
   int threads = 1;

@@ -19,6 +19,10 @@ void add_run(CLI::App& app, StationRunOptions& options) {
   run->add_option("--batch", options.batch,
                   "A folder whose folders boards, rotation, dispersion and check are full: no "
                   "questions asked (default: the images that arrive in the station's folder)");
+  run->add_option("--source", options.sources,
+                  "A V4L2 camera or a video file whose frames are taken for the present step, or "
+                  "STEP=SOURCE for one step")
+      ->option_text("[STEP=]SOURCE ...");
   run->add_option("--idle-s", options.idle_s, "Give the verdict when no image came for so long")
       ->check(finite_positive());
   run->add_option("--threads", options.threads, "Images at a time (default: one a core)")

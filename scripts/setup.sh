@@ -16,6 +16,7 @@ packages=(
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev python3-mrcal poppler-utils unzip
+  postgresql postgresql-client tmux util-linux
 )
 
 missing=()

@@ -16,12 +16,14 @@ IntrinsicsReport report_of(const IntrinsicsSolution& solution, const IntrinsicsI
                            const CalibrationReport& report) {
   const Eigen::Vector2d warp_m =
       solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
+  // Infinite where the lens sees no ray.
+  const bool known = std::isfinite(report.uncertainty_worst_px);
   return {static_cast<int>(solution.views.size()),
           solution.corners,
           solution.outliers,
           solution.rms_px,
           std::array{warp_m.x(), warp_m.y()},
-          report.uncertainty_worst_px};
+          known ? std::optional(report.uncertainty_worst_px) : std::nullopt};
 }
 
 /// How far the lens is from the nominal one.

@@ -126,7 +126,7 @@ std::string count_of(const Unit& unit, StationStep step) {
   const StationEnough& enough = unit.config().enough;
   const std::array wanted{enough.board_views, enough.turn_captures * enough.turn_heights,
                           enough.dispersion_captures, enough.check_captures};
-  return fmt::format("{} of {}", unit.step(step).used(), wanted[static_cast<std::size_t>(step)]);
+  return fmt::format("{}/{}", unit.step(step).used(), wanted[static_cast<std::size_t>(step)]);
 }
 
 std::vector<std::string> progress_of(const Unit& unit, StationStep step) {

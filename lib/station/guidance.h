@@ -15,7 +15,7 @@ std::vector<std::string> progress_of(const Unit& unit, StationStep step);
 /// What to do next, in one or two lines of 70 columns at most.
 std::string next_of(const Unit& unit, StationStep step);
 
-/// How many of how many: "12 of 36".
+/// How many of how many: "12/36".
 std::string count_of(const Unit& unit, StationStep step);
 
 }  // namespace vlp

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "calibration/dispersion/dispersion.h"
 #include "calibration/rotation/circle_center.h"
@@ -90,7 +91,8 @@ StageResult solve_dispersion(const StationConfig& config, const Calibration& cal
 StageResult check_fixes(const StationConfig& config, const Calibration& calibration,
                         const std::vector<Frame>& frames, const CapturesTable& places) {
   const Positioner positioner(config.lamps, calibration);
-  int captures = 0;
+  int captures = 0, lamps = 0, fitting = 0;
+  std::set<int> seen;
   std::vector<double> errors_mm, residuals_px;
   Eigen::Vector2d sum_mm = Eigen::Vector2d::Zero();
   for (const Frame& frame : frames) {
@@ -100,7 +102,10 @@ StageResult check_fixes(const StationConfig& config, const Calibration& calibrat
     Sensors sensors;
     sensors.inclination = entry->second.inclination;
     const Fix fix = positioner.locate(frame.detections, sensors);
+    lamps += static_cast<int>(frame.detections.size());
+    for (const Detection& detection : frame.detections) seen.insert(detection.lamp);
     if (!fix.ok()) continue;
+    fitting += fix.lamps;
     const Eigen::Vector2d known_m(*entry->second.x_m, *entry->second.y_m);
     const Eigen::Vector2d error_mm =
         kMillimetres * (fix.estimate.pose.position_m.head<2>() - known_m);
@@ -115,7 +120,10 @@ StageResult check_fixes(const StationConfig& config, const Calibration& calibrat
   }
   StageResult result{"", calibration};
   const auto fixes = static_cast<double>(errors_mm.size());
-  result.values = {{"check_fixes", fixes / captures}};
+  result.values = {{"check_fixes", fixes / captures},
+                   {"check_lamps", lamps > 0 ? static_cast<double>(fitting) / lamps : 0},
+                   {"check_lamps_seen", static_cast<double>(seen.size()) /
+                                            static_cast<double>(config.lamps.lamps.size())}};
   if (errors_mm.empty()) return result;
   double mean_mm = 0;
   for (const double error_mm : errors_mm) mean_mm += error_mm / fixes;

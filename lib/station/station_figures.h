@@ -23,7 +23,7 @@ struct FigureKind {
   const char* meaning;
 };
 
-/// All of them, in the order of the steps.
+/// All of them, in the order of the steps; what explains others comes before them.
 std::span<const FigureKind> station_figures();
 
 /// One of them, measured; no value where the step did not come to it.

@@ -79,7 +79,8 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
 std::string last_image_line(const Unit& unit, StationStep step, const std::string& image) {
   const auto& images = unit.step(step).images;
   const auto found = images.find(image);
-  const std::string outcome = found == images.end() ? "waits" : outcome_of(found->second);
+  const std::string outcome =
+      found == images.end() ? "waits for the step before" : outcome_of(found->second);
   return fmt::format("{} {}: {} ({})", name_of(step), image, outcome, count_of(unit, step));
 }
 
@@ -103,7 +104,9 @@ std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
     lines.push_back(
         {fmt::format("{:<24}{:>12}{:>14}  {}", figure.name, value,
                      fmt::format("{} {:.4g}", figure.at_least ? ">=" : "<=", *figure.limit),
-                     figure.met() ? "met" : "NOT MET"),
+                     figure.met()   ? "met"
+                     : figure.value ? "NOT MET"
+                                    : "not reached"),
          figure.met() ? Tone::plain : Tone::bad});
   }
   return lines;

@@ -67,9 +67,19 @@ void Unit::take(StationStep step, UnitImage image) {
       break;
     }
   }
+  if (image.refused.empty() && step == StationStep::rotation) {
+    const double near_px = config_.refuse.same_pose_share * config_.type.imager_px[0];
+    for (const auto& [other, known] : state.images) {
+      if (!known.refused.empty() || !same_lamps(image.lamps, known.lamps, near_px)) continue;
+      image.refused = "same pose as " + other;
+      break;
+    }
+  }
   if (image.refused.empty() && state.done()) image.refused = "not needed: the step has enough";
   const bool used = image.refused.empty();
-  state.refused_in_a_row = used || state.done() ? 0 : state.refused_in_a_row + 1;
+  // A camera that rests is no fault.
+  const bool fault = !used && !state.done() && !image.refused.starts_with("same pose");
+  if (used || fault) state.refused_in_a_row = fault ? state.refused_in_a_row + 1 : 0;
   state.last = name;
   state.images.emplace(name, std::move(image));
   if (!used) return;

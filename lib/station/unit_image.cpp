@@ -98,4 +98,13 @@ bool same_pose(const SeenBoard& a, const SeenBoard& b, double distance_px) {
   return count > 0 && sum < distance_px * count;
 }
 
+bool same_lamps(const std::vector<Detection>& a, const std::vector<Detection>& b,
+                double distance_px) {
+  return a.size() == b.size() && std::all_of(a.begin(), a.end(), [&](const Detection& lamp) {
+           return std::any_of(b.begin(), b.end(), [&](const Detection& other) {
+             return other.lamp == lamp.lamp && (other.pixel - lamp.pixel).norm() < distance_px;
+           });
+         });
+}
+
 }  // namespace vlp

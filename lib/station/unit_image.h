@@ -41,4 +41,8 @@ UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& 
 /// closer than `distance_px` on average.
 bool same_pose(const SeenBoard& a, const SeenBoard& b, double distance_px);
 
+/// Whether both show the same lamps, each closer than `distance_px` to where it was.
+bool same_lamps(const std::vector<Detection>& a, const std::vector<Detection>& b,
+                double distance_px);
+
 }  // namespace vlp

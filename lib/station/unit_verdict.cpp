@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "station/guidance.h"
 #include "station/lamp_faults.h"
 #include "station/unit.h"
 
@@ -39,6 +40,25 @@ std::string refusals(StationStep step, const UnitStep& state) {
   }
   return fmt::format("{}: {} of {} images refused: {}", name_of(step), refused, state.images.size(),
                      text);
+}
+
+/// What stands in the way of the first step that did not end well; those after it rest on it.
+void add_step_problems(const Unit& unit, std::vector<std::string>& causes) {
+  for (const StationStep each : kStationSteps) {
+    const UnitStep& state = unit.step(each);
+    if (state.done()) continue;
+    const std::string refused = refusals(each, state);
+    if (!refused.empty()) causes.push_back(refused);
+    if (state.result && !state.result->problem.empty() && state.used() > 0) {
+      causes.push_back(fmt::format("{}: {}", name_of(each), state.result->problem));
+      return;
+    }
+    if (!state.enough && refused.empty()) {
+      causes.push_back(fmt::format("{}: not enough images, or too much alike ({})", name_of(each),
+                                   count_of(unit, each)));
+    }
+    if (!state.result || !state.result->problem.empty()) return;
+  }
 }
 
 /// Whether most of the board images show another board.
@@ -103,24 +123,16 @@ std::vector<std::string> Unit::causes() const {
   if (other_board(step(StationStep::boards))) add("wrong board: the tags have other ids");
   const auto figures = this->figures();
   for (const StationFigure& figure : figures) {
-    if (figure.name == "blur_px" && !figure.met()) add(cause_of(figure));
+    if (figure.name == "blur_px" && figure.value && !figure.met()) add(cause_of(figure));
   }
-  for (const StationStep each : kStationSteps) {
-    const UnitStep& state = step(each);
-    add(refusals(each, state));
-    if (state.result && !state.result->problem.empty()) {
-      add(fmt::format("{}: {}", name_of(each), state.result->problem));
-    } else if (!state.result || !state.enough) {
-      add(fmt::format("{}: not enough images ({} used)", name_of(each), state.used()));
+  add_step_problems(*this, causes);
+  // What is known comes first; what is not may be its consequence.
+  for (const bool known : {true, false}) {
+    if (!known && current()) break;
+    for (const StationFigure& figure : figures) {
+      if (figure.name == "blur_px" || figure.value.has_value() != known) continue;
+      if (!figure.met()) add(cause_of(figure));
     }
-  }
-  for (const StationFigure& figure : figures) {
-    if (figure.name != "blur_px" && figure.value && !figure.met()) add(cause_of(figure));
-  }
-  const bool complete =
-      std::all_of(steps_.begin(), steps_.end(), [](const auto& s) { return s.result.has_value(); });
-  for (const StationFigure& figure : figures) {
-    if (complete && !figure.value && !figure.met()) add(cause_of(figure));
   }
   if (causes.empty()) return causes;
   std::vector<Frame> frames;

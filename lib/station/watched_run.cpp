@@ -80,7 +80,7 @@ std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
     for (const std::string& name : changes.gone) {
       std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
       unit_.remove(step, name);
-      arrivals.push_back({step, name});
+      arrivals.push_back({step, name, true});
     }
     waiting.insert(waiting.end(), changes.came.begin(), changes.came.end());
     const auto end = waiting.begin() + static_cast<std::ptrdiff_t>(std::min(most, waiting.size()));
@@ -88,7 +88,7 @@ std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
     waiting.erase(waiting.begin(), end);
     most -= now.size();
     unit_.add(step, now);
-    for (const fs::path& file : now) arrivals.push_back({step, file.filename().string()});
+    for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
   }
   if (!arrivals.empty()) unit_.advance(false);
   return arrivals;

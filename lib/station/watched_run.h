@@ -29,6 +29,7 @@ class WatchedRun {
   struct Arrival {
     StationStep step;
     std::string image;
+    bool gone;
   };
   /// Takes what changed, a few images at a time, and solves what has enough.
   std::vector<Arrival> look(std::size_t most);
