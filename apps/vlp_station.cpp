@@ -71,11 +71,11 @@ int main(int argc, char** argv) {
       "records.\n"
       "vlp-station COMMAND --help tells more.\n\n"
       "Example, from the project's folder:\n"
-      "  cp -r datasets/station out-station\n"
-      "  build/bin/vlp-simulate datasets/station/scene.yaml -o out-station/unit\n"
-      "  build/bin/vlp-station run --station out-station/station.yaml --camera-id 0001 \\\n"
-      "    --batch out-station/unit\n"
-      "  build/bin/vlp-station list --station out-station/station.yaml\n",
+      "  mkdir -p out && cp -rT datasets/station out/station\n"
+      "  build/bin/vlp-simulate datasets/station/scene.yaml -o out/station/unit\n"
+      "  build/bin/vlp-station run --station out/station/station.yaml --camera-id 0001 \\\n"
+      "    --batch out/station/unit\n"
+      "  build/bin/vlp-station list --station out/station/station.yaml\n",
       "vlp-station");
   app.require_subcommand(1);
   app.fallthrough();
