@@ -20,9 +20,9 @@ std::string last_name(const std::string& path) {
 }
 
 bool changes_the_result(const CLI::Option& option) {
-  constexpr std::array<std::string_view, 10> others = {
-      "--output",  "--plot",  "--annotate", "--threads", "--quiet",
-      "--verbose", "--cache", "--ros",      "--kalibr",  "--opencv"};
+  constexpr std::array<std::string_view, 13> others = {
+      "--output", "--plot",   "--annotate", "--threads", "--quiet", "--verbose", "--cache",
+      "--ros",    "--kalibr", "--opencv",   "--report",  "--json",  "--junit"};
   return std::find(others.begin(), others.end(), option.get_name()) == others.end();
 }
 

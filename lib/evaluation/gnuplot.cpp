@@ -44,18 +44,11 @@ std::string shell_quoted(const std::string& text) {
   return quoted + "'";
 }
 
-std::string terminal_of(const fs::path& picture, int width_px, int height_px) {
-  const std::string size =
-      " size " + std::to_string(width_px) + "," + std::to_string(height_px) + "\n";
-  if (picture.extension() == ".png") return "set terminal pngcairo font 'DejaVu Sans,11'" + size;
-  if (picture.extension() == ".svg") return "set terminal svg font 'DejaVu Sans,11'" + size;
-  throw InputError(picture, "a picture's name should end in .png or .svg");
-}
-
-}  // namespace
-
-void draw(const fs::path& picture, int width_px, int height_px, const std::string& commands) {
-  const Script script(terminal_of(picture, width_px, height_px) + commands, picture);
+/// `picture` is for the messages.
+std::string drawn(const std::string& terminal, const Drawing& drawing, const fs::path& picture) {
+  const Script script("set terminal " + terminal + " size " + std::to_string(drawing.width_px) +
+                          "," + std::to_string(drawing.height_px) + "\n" + drawing.commands,
+                      picture);
   FILE* pipe = ::popen(("LC_ALL=C.UTF-8 gnuplot " + shell_quoted(script.path())).c_str(), "r");
   if (pipe == nullptr) throw InputError(picture, "cannot be drawn: gnuplot cannot be started");
   std::string image;
@@ -66,13 +59,29 @@ void draw(const fs::path& picture, int width_px, int height_px, const std::strin
   if (::pclose(pipe) != 0 || image.empty()) {
     throw InputError(picture, "cannot be drawn: gnuplot failed; is it installed?");
   }
-  write_file(picture, image);
+  return image;
 }
 
-std::string gnuplot_quoted(const std::string& text) {
-  std::string quoted = "'";
-  for (const char c : text) quoted += c == '\'' ? std::string("''") : std::string(1, c);
-  return quoted + "'";
+/// The font has two stand-ins, for machines that look at the picture and lack it.
+std::string svg_terminal(const Drawing& drawing) {
+  return "svg background 'white' name '" + drawing.name +
+         "' font 'DejaVu Sans,Verdana,sans-serif,13'";
+}
+
+}  // namespace
+
+void draw(const fs::path& picture, const Drawing& drawing) {
+  if (picture.extension() == ".png") {
+    write_file(picture, drawn("pngcairo font 'DejaVu Sans,13'", drawing, picture));
+  } else if (picture.extension() == ".svg") {
+    write_file(picture, drawn(svg_terminal(drawing), drawing, picture));
+  } else {
+    throw InputError(picture, "a picture's name should end in .png or .svg");
+  }
+}
+
+std::string svg_of(const Drawing& drawing) {
+  return drawn(svg_terminal(drawing), drawing, drawing.name);
 }
 
 }  // namespace vlp

@@ -7,13 +7,21 @@
 
 namespace vlp {
 
-/// Draws `commands` (gnuplot's language, without `set terminal` and `set output`) into `picture`,
-/// .png or .svg by its ending, whole or not at all. Same commands, same bytes. Throws InputError
-/// when the ending is another, gnuplot is missing or fails, or the file cannot be written.
-void draw(const std::filesystem::path& picture, int width_px, int height_px,
-          const std::string& commands);
+/// A picture before it is drawn.
+struct Drawing {
+  /// What it shows: letters, digits and underscores. It becomes the title of an SVG.
+  std::string name;
+  int width_px, height_px;
+  /// In gnuplot's language, without `set terminal` and `set output`.
+  std::string commands;
+};
 
-/// `text` as a gnuplot string literal, with nothing in it interpreted.
-std::string gnuplot_quoted(const std::string& text);
+/// Draws into `picture`, .png or .svg by its ending, whole or not at all. Same commands, same
+/// bytes. Throws InputError when the ending is another, gnuplot is missing or fails, or the file
+/// cannot be written.
+void draw(const std::filesystem::path& picture, const Drawing& drawing);
+
+/// The text of the SVG. Throws InputError when gnuplot is missing or fails.
+std::string svg_of(const Drawing& drawing);
 
 }  // namespace vlp

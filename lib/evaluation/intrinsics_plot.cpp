@@ -8,18 +8,13 @@
 
 #include "captures/csv_writer.h"
 #include "evaluation/gnuplot.h"
+#include "evaluation/plot_parts.h"
 #include "evaluation/round_numbers.h"
 
 namespace vlp {
 namespace {
 
 constexpr int kDigits = 7;
-
-std::string data_row(std::initializer_list<double> values) {
-  std::string row;
-  for (const double value : values) row += significant(value, kDigits) + " ";
-  return row + "\n";
-}
 
 /// The data, in blocks: corners and outliers as u v du dv, and the map as u v sd.
 std::string data_of(const IntrinsicsPlot& plot) {
@@ -41,21 +36,28 @@ std::string data_of(const IntrinsicsPlot& plot) {
     }
     map += "\n";
   }
-  return "$corners << END\n" + corners + "END\n$outliers << END\n" + outliers +
-         "END\n$map << END\n" + map + "END\n";
+  return data_block("corners", corners) + data_block("outliers", outliers) + data_block("map", map);
+}
+
+/// For example "12 corners, 3 outliers (crosses)".
+std::string counts(const IntrinsicsPlot& plot, const std::string& outliers) {
+  const auto left_out = std::count_if(plot.corners.begin(), plot.corners.end(),
+                                      [](const auto& corner) { return corner.outlier; });
+  const auto used = static_cast<std::ptrdiff_t>(plot.corners.size()) - left_out;
+  std::string text = std::to_string(used) + " corners";
+  if (left_out > 0) text += ", " + std::to_string(left_out) + " outliers" + outliers;
+  return text;
 }
 
 /// A layer of corners, and one of outliers where there are any.
 std::string layers(const IntrinsicsPlot& plot, const std::string& of_corners,
                    const std::string& of_outliers) {
-  const auto outliers = std::count_if(plot.corners.begin(), plot.corners.end(),
-                                      [](const auto& corner) { return corner.outlier; });
-  const auto used = static_cast<std::ptrdiff_t>(plot.corners.size()) - outliers;
-  std::string layers = "plot $corners " + of_corners + " linecolor rgb '#3b528b' title '" +
-                       std::to_string(used) + " corners'";
-  if (outliers > 0) {
-    layers += ", $outliers " + of_outliers + " linecolor rgb '#d55e00' title '" +
-              std::to_string(outliers) + " outliers'";
+  std::string layers =
+      "plot $corners " + of_corners + " linecolor rgb '" + plot_colors::blue + "' notitle";
+  if (std::any_of(plot.corners.begin(), plot.corners.end(),
+                  [](const auto& corner) { return corner.outlier; })) {
+    layers +=
+        ", $outliers " + of_outliers + " linecolor rgb '" + plot_colors::vermillion + "' notitle";
   }
   return layers + "\n";
 }
@@ -120,10 +122,9 @@ void draw_intrinsics_plot(const std::filesystem::path& picture, const Intrinsics
   const std::string times = significant(residual_magnification(rms_px(plot), width), kDigits);
   const std::string arrows =
       "using 1:2:($3 * " + times + "):($4 * " + times + ") with vectors nohead ";
-  const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.25";
+  const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.18";
   const std::string commands =
-      data_of(plot) +
-      "set encoding utf8\n"
+      data_of(plot) + plot_settings() +
       "set size ratio -1\n"
       "set xrange [-0.5:" +
       significant(width - 0.5, kDigits) +
@@ -131,24 +132,22 @@ void draw_intrinsics_plot(const std::filesystem::path& picture, const Intrinsics
       "set yrange [" +
       significant(height - 0.5, kDigits) +
       ":-0.5]\n"  // as in the image
-      "set tics out nomirror\n"
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
-      "set key below\n"
-      "set style textbox opaque noborder margins 0.5,0.5\n"
-      // Viridis: even in lightness, legible to the colour-blind and in grey.
-      "set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#fde725')\n"
-      "set multiplot layout 1,3 margins 0.05,0.93,0.16,0.86 spacing 0.06 title " +
+      "set multiplot layout 2,2 margins 0.1,0.9,0.08,0.88 spacing 0.13,0.2 title " +
       gnuplot_quoted(plot.title) +
       " noenhanced\n"
-      "set title 'corners of all views'\n" +
+      "set title " +
+      gnuplot_quoted("corners of all views\n" + counts(plot, " (crosses)")) + "\n" +
       layers(plot, dots, "using 1:2 with points pointtype 2 pointsize 1.2 linewidth 2") +
-      "set title 'residuals, seen minus projected, drawn " + times +
-      " times as long, from a dot'\n" +
-      layers(plot, dots + " linecolor rgb '#3b528b' notitle, $corners " + arrows + "linewidth 0.7",
+      "set title " +
+      gnuplot_quoted("residuals, seen minus projected, " + times + " times as long\n" +
+                     counts(plot, " (thick)")) +
+      "\n" +
+      layers(plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
              arrows + "linewidth 2") +
       "set title 'uncertainty of the projection'\n" + map_of(plot) + "unset multiplot\n";
-  draw(picture, 1950, 150 + 560 * height / width, commands);
+  draw(picture, {"intrinsics", 900, 280 + 720 * height / width, commands});
 }
 
 }  // namespace vlp

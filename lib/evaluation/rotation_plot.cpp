@@ -6,30 +6,19 @@
 #include <algorithm>
 #include <set>
 
-#include "captures/csv_writer.h"
 #include "evaluation/gnuplot.h"
+#include "evaluation/plot_parts.h"
 
 namespace vlp {
 namespace {
-
-std::string data_row(std::initializer_list<double> values) {
-  constexpr int digits = 7;
-  std::string row;
-  for (const double value : values) row += significant(value, digits) + " ";
-  return row + "\n";
-}
 
 /// Ranges of one length that show the whole box, v downwards as in the image.
 std::string square_around(const Eigen::AlignedBox2d& box) {
   constexpr double margin = 0.1, least_px = 1e-3;
   const Eigen::Vector2d center = box.center();
   const double half = (0.5 + margin) * std::max(box.sizes().maxCoeff(), least_px);
-  const auto range = [](double from, double to) {
-    constexpr int digits = 7;
-    return "[" + significant(from, digits) + ":" + significant(to, digits) + "]\n";
-  };
-  return "set xrange " + range(center.x() - half, center.x() + half) + "set yrange " +
-         range(center.y() + half, center.y() - half);
+  return "set xrange " + plot_range(center.x() - half, center.x() + half) + "\nset yrange " +
+         plot_range(center.y() + half, center.y() - half) + "\n";
 }
 
 }  // namespace
@@ -53,20 +42,16 @@ void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot
   const Eigen::Vector2d &axis = plot.rotation_center_px, &principal = plot.principal_point_px;
   const std::string marks =
       "$principal using 1:2 with points pointtype 1 pointsize 2 linewidth 2 linecolor rgb "
-      "'#3b528b' title 'principal point', "
-      "$axis using 1:2 with points pointtype 2 pointsize 2 linewidth 2 linecolor rgb '#d1495b' "
+      "'#0072b2' title 'principal point', "
+      "$axis using 1:2 with points pointtype 2 pointsize 2 linewidth 2 linecolor rgb '#d55e00' "
       "title 'rotation centre'\n";
   const std::string commands =
-      "$places << END\n" + places + "END\n$ellipses << END\n" + ellipses + "END\n$labels << END\n" +
-      labels + "END\n$axis << END\n" + data_row({axis.x(), axis.y()}) + "END\n$principal << END\n" +
-      data_row({principal.x(), principal.y()}) +
-      "END\n"
-      "set encoding utf8\n"
+      data_block("places", places) + data_block("ellipses", ellipses) +
+      data_block("labels", labels) + data_block("axis", data_row({axis.x(), axis.y()})) +
+      data_block("principal", data_row({principal.x(), principal.y()})) + plot_settings() +
       "set size ratio -1\n"
-      "set tics out nomirror\n"
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
-      "set key below\n"
       "unset colorbox\n"
       "set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#e0b000')\n"
       "set multiplot layout 1,2 title " +
@@ -81,7 +66,7 @@ void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot
       "palette notitle, "
       "$labels using 1:2:(sprintf('%d', int($3))) with labels left offset 0.8,0 notitle, " +
       marks + "unset multiplot\n";
-  draw(picture, 1200, 620, commands);
+  draw(picture, {"rotation", 1000, 560, commands});
 }
 
 }  // namespace vlp

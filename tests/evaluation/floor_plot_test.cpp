@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "evaluation/gnuplot.h"
+#include "evaluation/plot_parts.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
 
@@ -47,7 +48,9 @@ TEST_F(FloorPlotTest, RefusesAnotherEnding) {
 
 TEST_F(FloorPlotTest, KeepsTheOldPictureWhenGnuplotFails) {
   const auto file = folder.file("a.png", "old");
-  EXPECT_THAT(refusal_of([&] { draw(file, 100, 100, "plot nonsense\n"); }),
+  EXPECT_THAT(refusal_of([&] {
+                draw(file, {"a", 100, 100, "plot nonsense\n"});
+              }),
               HasSubstr("a.png: cannot be drawn"));
   EXPECT_EQ(TemporaryFolder::content_of(file), "old");
 }

@@ -45,11 +45,14 @@ TEST_P(Help, NamesTheVersion) {
   EXPECT_THAT(result.output, HasSubstr(std::string(GetParam()) + " 0."));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Programs, Help,
-    testing::Values("vlp-board", "vlp-detect", "vlp-dispersion", "vlp-intrinsics", "vlp-limits",
-                    "vlp-locate", "vlp-rotation", "vlp-simulate", "vlp-station", "vlp-train"),
-    [](const auto& instance) { return std::string(instance.param).substr(4); });
+INSTANTIATE_TEST_SUITE_P(Programs, Help,
+                         testing::Values("vlp-board", "vlp-detect", "vlp-dispersion",
+                                         "vlp-evaluate", "vlp-intrinsics", "vlp-limits",
+                                         "vlp-locate", "vlp-rotation", "vlp-simulate",
+                                         "vlp-station", "vlp-train"),
+                         [](const auto& instance) {
+                           return std::string(instance.param).substr(4);
+                         });
 
 }  // namespace
 }  // namespace vlp

@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rig/calibration.h"
+
+namespace vlp {
+
+/// What the calibration says, as tables in HTML.
+std::string camera_table(const Camera& camera);
+std::string intrinsics_table(const IntrinsicsReport& report);
+std::string rotation_table(const RotationCenter& center);
+std::string dispersion_table(const Dispersion& dispersion);
+
+/// Program, version and options of each part, and the digests of its inputs, to be folded away.
+std::string history_list(const std::vector<HistoryEntry>& entries);
+
+}  // namespace vlp

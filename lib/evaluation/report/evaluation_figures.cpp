@@ -1,0 +1,103 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/report/evaluation_figures.h"
+
+#include "captures/csv_writer.h"
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+std::string number(double value) { return significant(value, 3); }
+std::string mm(double value_m) { return number(1e3 * value_m); }
+
+std::string between(double low, double high) { return number(low) + " to " + number(high); }
+
+ReportFigure length(const std::string& label, double value_m,
+                    const Interval* interval_m = nullptr) {
+  return {label, mm(value_m), "mm",
+          interval_m == nullptr ? "" : between(1e3 * interval_m->low, 1e3 * interval_m->high)};
+}
+
+void add_horizontal(std::vector<ReportFigure>& figures, const Evaluation& evaluation) {
+  const ErrorFigures& errors_m = evaluation.horizontal_m;
+  const auto& intervals_m = evaluation.intervals_m;
+  const auto line = [&](const char* name, double value_m, Interval ErrorIntervals::*part) {
+    figures.push_back(length(std::string("horizontal error, ") + name, value_m,
+                             intervals_m ? &(*intervals_m.*part) : nullptr));
+  };
+  line("mean", errors_m.mean, &ErrorIntervals::mean);
+  line("median", errors_m.median, &ErrorIntervals::median);
+  line("90th percentile", errors_m.p90, &ErrorIntervals::p90);
+  line("root mean square", errors_m.rms, &ErrorIntervals::rms);
+  figures.push_back(length("horizontal error, largest", errors_m.max));
+}
+
+}  // namespace
+
+std::vector<ReportFigure> report_figures(const Evaluation& evaluation) {
+  std::vector<ReportFigure> figures = {
+      {"captures", std::to_string(evaluation.captures), "", ""},
+      {"without a fix", std::to_string(evaluation.captures - evaluation.fixes), "", ""}};
+  add_horizontal(figures, evaluation);
+  if (const auto& height_m = evaluation.height_m) {
+    figures.push_back(length("height error, root mean square", height_m->sizes.rms));
+    figures.push_back(length("height error, mean", height_m->bias));
+  }
+  if (const auto& yaw_rad = evaluation.yaw_rad) {
+    figures.push_back(
+        {"yaw error, root mean square", number(deg_from_rad(yaw_rad->sizes.rms)), "degrees", ""});
+  }
+  if (const auto& stations = evaluation.stations) {
+    figures.push_back(length("bias of the stations, root mean square", stations->bias_m));
+    figures.push_back(length("scatter at a station", stations->scatter_m));
+  }
+  if (evaluation.stated) {
+    figures.push_back({"error over its stated deviation (1: right)",
+                       number(evaluation.stated->horizontal), "", ""});
+  }
+  if (evaluation.limit) {
+    figures.push_back(length("theoretical limit", evaluation.limit->limit_m));
+    figures.push_back(
+        {"error over the limit (1: the best)", number(evaluation.limit->horizontal), "", ""});
+  }
+  if (evaluation.fit) {
+    const auto of_fit = report_figures("drive", *evaluation.fit);
+    figures.insert(figures.end(), of_fit.begin(), of_fit.end());
+  }
+  return figures;
+}
+
+std::vector<std::string> report_notes(const Evaluation& evaluation) {
+  std::vector<std::string> notes;
+  const char* against = evaluation.against == "truth"  ? "from the true place, by image"
+                        : evaluation.against == "path" ? "from the path driven"
+                                                       : "from the commanded line";
+  notes.push_back("Horizontal errors are distances " + std::string(against) + ".");
+  std::string missing;
+  for (const auto& [status, count] : evaluation.missing) {
+    missing.append(missing.empty() ? "" : ", ").append(std::to_string(count) + " " + status);
+  }
+  if (!missing.empty()) notes.push_back("Captures without a fix: " + missing + ".");
+  if (const auto& intervals = evaluation.intervals_m) {
+    notes.push_back("The intervals are of a bootstrap over " + std::to_string(intervals->units) +
+                    " " + evaluation.drawn + ".");
+  }
+  if (const auto& comparison = evaluation.comparison) {
+    std::string note = "Compared with the other fixes: " + std::string(comparison->verdict()) +
+                       "; the mean error differs by " + mm(comparison->mean_difference_m) + " mm";
+    if (const auto& interval_m = comparison->interval_m) {
+      note += " (95 %: " + between(1e3 * interval_m->low, 1e3 * interval_m->high) + " mm)";
+    }
+    notes.push_back(note + ".");
+  }
+  return notes;
+}
+
+std::vector<ReportFigure> report_figures(const std::string& drive, const LineFit& fit) {
+  return {length(drive + ": fitted line from the commanded one, mean", fit.distances_m.mean),
+          length(drive + ": the same, 90th percentile", fit.distances_m.p90),
+          length(drive + ": jitter across the fitted line, root mean square", fit.jitter_m)};
+}
+
+}  // namespace vlp

@@ -1,0 +1,163 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/report/report.h"
+
+#include <gmock/gmock.h>
+
+#include "evaluation/cdf_plot.h"
+#include "evaluation/intrinsics_plot.h"
+#include "support/program.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
+const std::string kCheck = VLP_SOURCE_DIR "/tests/support/browser_check.py";
+constexpr int kNoBrowser = 77;
+
+/// vlp-evaluate on the example, with all there can be in a report.
+class ReportTest : public testing::Test {
+ protected:
+  TemporaryFolder folder;
+
+  std::string in(const char* name) const { return " " + (folder / name).string(); }
+  std::string rig(const std::string& calibration) const {
+    return " --lamps " + kExample + "lamps.yaml --calibration " + calibration;
+  }
+  void must(const std::string& command) {
+    const auto [code, output, errors] = run_program(command);
+    ASSERT_EQ(code, 0) << command << "\n" << errors;
+  }
+  void SetUp() override {
+    const std::string levelled = (folder / "rotated.yaml").string();
+    must("vlp-rotation " + kExample + "turning.csv" + rig(kExample + "calibration.yaml") + " -o " +
+         levelled + " --plot" + in("rotation.svg"));
+    must("vlp-dispersion " + kExample + "station.csv" + rig(levelled) + " --station 0.1 0 -o" +
+         in("calibration.yaml") + " --plot" + in("dispersion.svg"));
+    must("vlp-locate " + kExample + "detections.csv" + rig(kExample + "calibration.yaml") + " -o" +
+         in("fixes.csv"));
+    draw_intrinsics_plot(folder / "camera.svg",
+                         {"unit 7",
+                          {800, 600},
+                          {{{10, 20}, {0.1, 0.2}, false}, {{700, 500}, {-0.1, 0.1}, false}},
+                          2,
+                          {0.1, 0.2, 0.3, 0.4}});
+    folder.file("track.csv",
+                "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,"
+                "lamps,residual_px\n0,ok,0,0.001,0,0,,,,,3,0.1\n"
+                "1,ok,0.5,0.0015,0,0,,,,,3,0.1\n2,ok,1,0.001,0,0,,,,,3,0.1\n");
+  }
+
+  ProgramResult evaluate(const std::string& more) {
+    return run_program("vlp-evaluate" + in("fixes.csv") + " --truth " + kExample + "truth.csv" +
+                       rig(folder / "calibration.yaml") + " --gate mean_mm=1 --report" +
+                       in("report.html") + more);
+  }
+  std::string all() const {
+    return " --picture" + in("camera.svg") + " --picture" + in("rotation.svg") + " --picture" +
+           in("dispersion.svg") + " --track" + in("track.csv") + " 0 0 1 0";
+  }
+};
+
+TEST_F(ReportTest, OpensInABrowserPrintsOnA4AndLeavesNothingToComplainOf) {
+  const auto [code, output, errors] = evaluate(all());
+  ASSERT_EQ(code, 0) << errors;
+  const auto check = run_program("python3 " + kCheck + in("report.html"));
+  if (check.exit_code == kNoBrowser) GTEST_SKIP() << check.output;
+  EXPECT_EQ(check.exit_code, 0) << check.output << check.errors;
+  EXPECT_THAT(run_program("pdfinfo" + in("report.pdf")).output, HasSubstr("(A4)"));
+  const std::string paper = run_program("pdftotext -layout" + in("report.pdf") + " -").output;
+  for (const char* part : {"PASS", "mean_mm", "Figures", "Camera", "Rotation centre", "Dispersion",
+                           "Fixes on the floor", "Distribution of the errors", "Moving tracks",
+                           "track.csv", "History", "vlp-evaluate", "SHA-256"}) {
+    EXPECT_THAT(paper, HasSubstr(part));
+  }
+}
+
+TEST_F(ReportTest, IsTheSameTwiceAndWrittenWhenAGateIsNotMet) {
+  ASSERT_EQ(evaluate(all()).exit_code, 0);
+  const std::string first = TemporaryFolder::content_of(folder / "report.html");
+  EXPECT_THAT(first, Not(HasSubstr((folder / "").string()))) << "paths of a machine";
+  ASSERT_EQ(evaluate(all() + " --threads 1").exit_code, 0);
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "report.html"), first);
+  EXPECT_EQ(evaluate(" --gate p90_mm=0.001").exit_code, 1);
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "report.html"),
+              HasSubstr("FAIL</strong>1 of 2"));
+}
+
+TEST_F(ReportTest, RefusesWhatItCannotShow) {
+  const auto refusal = [&](const std::string& more) {
+    const auto [code, output, errors] = evaluate(more);
+    EXPECT_EQ(code, 2) << more;
+    EXPECT_FALSE(std::filesystem::exists(folder / "report.html")) << "nothing half-written";
+    return errors;
+  };
+  EXPECT_THAT(refusal(" --picture" + in("fixes.csv")), HasSubstr("is neither an SVG nor a PNG"));
+  EXPECT_THAT(refusal(" --picture" + in("none.svg")), HasSubstr("none.svg: cannot be read"));
+  EXPECT_THAT(refusal(" --track" + in("track.csv") + " 1 0 1 0"),
+              HasSubstr("begins where it ends"));
+  EXPECT_THAT(refusal(" --json" + in("report.html")), HasSubstr("name one file"));
+}
+
+/// A page that passes, small enough to be broken in many ways.
+std::string good_page() {
+  Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, true}}, {}, {}, {}, {}, {}};
+  report.pictures = {
+      report_picture(drawing_of(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
+  return report_html(report);
+}
+
+TEST(BrowserCheck, SeesWhatIsWrong) {
+  const struct {
+    const char *name, *from, *to, *complaint;
+  } faults[] = {
+      {"good", "", "", ""},
+      {"language", " lang=\"en\"", "", "no language"},
+      {"title", "<title>unit 7</title>", "", "no title"},
+      {"heading", "<h2>", "<h4>", "heading leaves out a level"},
+      {"two", "<main>", "<main><h1>again</h1>", "2 headings of level 1"},
+      {"scope", " scope=\"row\"", "", "a header without scope"},
+      {"alt", "<img alt=\"", "<img alt=\"\" title=\"", "a picture without a text"},
+      {"empty", "svg+xml;base64,", "svg+xml;base64,AAAA", "an empty picture"},
+      {"blank", "src=\"data",
+       "src=\"data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' "
+       "width='9' height='9'/>\" title=\"",
+       "a picture of nothing"},
+      {"pale", "color: #1b1b1b", "color: #999", "contrast 2.8"},
+      {"tiny", "font-size: .95rem", "font-size: .5rem", "text of 8px"},
+      {"keyboard", "<img",
+       "<div style='overflow-x:auto;width:9em'>"
+       "<p style='width:99em'>long</p></div><img",
+       "scrolls, but not by keyboard"},
+      {"wide", "<main>", "<main><p style='width:900px'>wide</p>", "px wide on a screen of 360 px"},
+      {"elsewhere", "<main>", "<main><img alt='a' src='http://127.0.0.1:9/a.png'>",
+       "asks for http://127.0.0.1:9/a.png"},
+      {"script", "</main>", "</main><script>throw new Error('b')</script>", "a script fails"},
+  };
+  const TemporaryFolder folder;
+  const std::string page = good_page();
+  std::string files;
+  for (const auto& [name, from, to, complaint] : faults) {
+    std::string broken = page;
+    const auto at = page.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    broken.replace(at, std::string(from).size(), to);
+    files += " " + folder.file(std::string(name) + ".html", broken).string();
+  }
+  const auto check = run_program("python3 " + kCheck + files);
+  if (check.exit_code == kNoBrowser) GTEST_SKIP() << check.output;
+  EXPECT_EQ(check.exit_code, 1) << check.errors;
+  EXPECT_THAT(check.output, Not(HasSubstr("good.html")));
+  for (const auto& [name, from, to, complaint] : faults) {
+    if (*complaint == '\0') continue;
+    EXPECT_THAT(check.output,
+                testing::ContainsRegex(std::string(name) + "\\.html: [^\n]*" + complaint));
+  }
+}
+
+}  // namespace
+}  // namespace vlp
