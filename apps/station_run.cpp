@@ -88,10 +88,8 @@ class Sources {
       const auto& images = unit.step(last_step_).images;
       const auto image = images.find(last_.filename().string());
       if (image == images.end()) return;
-      const std::string& refused = image->second.refused;
-      if (refused.starts_with("same pose") || refused.starts_with("not needed")) {
-        fs::remove(last_);
-      }
+      // A moving camera blurs; what shows nothing new is of no use to keep.
+      if (!image->second.refused.empty()) fs::remove(last_);
     }
     last_ = by_step_.at(*step)->save_next(folder / name_of(*step));
     last_step_ = *step;

@@ -6,6 +6,7 @@
 
 #include "captures/csv_writer.h"
 #include "evaluation/gnuplot.h"
+#include "evaluation/plot_parts.h"
 
 namespace vlp {
 
@@ -43,28 +44,32 @@ void draw_trend(const std::filesystem::path& picture, const std::string& title,
   for (const std::size_t i : chart.outside) outside[i] = true;
   std::string data, marked;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const std::string row = std::to_string(i + 1) + " " + significant(values[i], 9) + "\n";
+    const std::string row = data_row({double(i + 1), values[i]});
     data += row;
     if (outside[i]) marked += row;
   }
-  const auto level = [](double value, const char* look) {
+  const auto level = [](double value, const std::string& look) {
     return significant(value, 9) + " with lines " + look;
   };
-  std::string commands = "$data << END\n" + data + "END\n";
-  if (!marked.empty()) commands += "$marked << END\n" + marked + "END\n";
+  const std::string limits = std::string("dashtype 2 linecolor rgb '") + plot_colors::vermillion;
+  std::string commands = data_block("data", data) + plot_settings();
+  if (!marked.empty()) commands += data_block("marked", marked);
   commands +=
-      "set encoding utf8\nset tics out nomirror\nset key below\nset grid ytics\n"
-      "set xlabel 'runs, in the order of their end'\nset ylabel " +
-      gnuplot_quoted(title) + " noenhanced\nset xrange [0.5:" + std::to_string(points.size()) +
-      ".5]\nset offsets 0, 0, graph 0.1, graph 0.1\n" + "plot " +
-      level(chart.upper, "dashtype 2 linecolor rgb '#d55e00' title 'limits'") + ", " +
-      level(chart.lower, "dashtype 2 linecolor rgb '#d55e00' notitle") + ", " +
-      level(chart.mean, "linecolor rgb '#009e73' title 'mean'") +
-      ", $data using 1:2 with linespoints pointtype 7 linecolor rgb '#0072b2' title 'units'" +
-      (marked.empty() ? "\n"
-                      : ", $marked using 1:2 with points pointtype 4 pointsize 2 linewidth 2 "
-                        "linecolor rgb '#d55e00' title 'outside the limits'\n");
-  draw(picture, 1000, 480, commands);
+      "set xlabel 'runs, in the order of their end'\nset ylabel " + gnuplot_quoted(title) +
+      " noenhanced\nset xrange " + plot_range(0.5, double(points.size()) + 0.5) +
+      "\nset offsets 0, 0, graph 0.1, graph 0.1\nplot " +
+      level(chart.upper, limits + "' title 'limits'") + ", " +
+      level(chart.lower, limits + "' notitle") + ", " +
+      level(chart.mean, std::string("linecolor rgb '") + plot_colors::green + "' title 'mean'") +
+      ", $data using 1:2 with linespoints pointtype 7 linecolor rgb '" + plot_colors::blue +
+      "' title 'runs'";
+  if (!marked.empty()) {
+    commands += std::string(
+                    ", $marked using 1:2 with points pointtype 4 pointsize 2 linewidth 2 "
+                    "linecolor rgb '") +
+                plot_colors::vermillion + "' title 'outside the limits'";
+  }
+  draw(picture, {"trend", 1000, 480, commands + "\n"});
 }
 
 }  // namespace vlp

@@ -61,7 +61,7 @@ std::vector<std::string> board_map(const Unit& unit) {
   }
   constexpr int many = 20;
   std::vector<std::string> lines;
-  const std::string edge = "  +" + std::string(std::size_t{2 * kCols + 1}, '-') + "+";
+  const std::string edge = "  +-----------------+";
   lines.push_back(edge);
   for (int row = 0; row < kRows; ++row) {
     std::string line = "  |";

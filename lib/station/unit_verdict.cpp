@@ -69,6 +69,11 @@ bool other_board(const UnitStep& boards) {
   return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
 }
 
+std::size_t part_of(double pixel, int size_px, std::size_t parts) {
+  const double share = std::clamp(pixel / size_px, 0.0, 0.999);
+  return static_cast<std::size_t>(share * static_cast<double>(parts));
+}
+
 }  // namespace
 
 std::vector<Frame> frames_of(const UnitStep& step) {
@@ -80,19 +85,19 @@ std::vector<Frame> frames_of(const UnitStep& step) {
 }
 
 double board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px) {
-  constexpr int cols = 8, rows = 6;
-  std::array<bool, std::size_t{cols * rows}> covered{};
+  constexpr std::size_t cols = 8, rows = 6;
+  std::array<bool, cols * rows> covered{};
   for (const auto& [name, image] : step.images) {
     if (!image.refused.empty() || !image.view) continue;
     for (const SeenTag& tag : image.view->seen.tags) {
       for (const auto& corner : tag.corners_px) {
-        const int col = std::clamp(static_cast<int>(corner.x() * cols / imager_px[0]), 0, cols - 1);
-        const int row = std::clamp(static_cast<int>(corner.y() * rows / imager_px[1]), 0, rows - 1);
-        covered[static_cast<std::size_t>(row * cols + col)] = true;
+        const std::size_t col = part_of(corner.x(), imager_px[0], cols);
+        covered[part_of(corner.y(), imager_px[1], rows) * cols + col] = true;
       }
     }
   }
-  return static_cast<double>(std::count(covered.begin(), covered.end(), true)) / (cols * rows);
+  const auto there = static_cast<double>(std::count(covered.begin(), covered.end(), true));
+  return there / static_cast<double>(covered.size());
 }
 
 std::optional<Calibration> Unit::calibration() const {

@@ -11,6 +11,7 @@
 
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "station/unit_report.h"
 
 namespace vlp {
 namespace {
@@ -105,10 +106,12 @@ void WatchedRun::put_away() {
 fs::path publish_run(const RunRecord& record, const fs::path& results) {
   const fs::path folder = results / record.camera / record.run;
   make_folder(folder);
+  fs::path calibration;
   if (!record.calibration.empty()) {
-    const char* name = record.passed() ? "calibration.yaml" : "failed-calibration.yaml";
-    write_file(folder / name, record.calibration);
+    calibration = folder / (record.passed() ? "calibration.yaml" : "failed-calibration.yaml");
+    write_file(calibration, record.calibration);
   }
+  write_file(folder / "report.html", unit_report(record, calibration));
   return folder;
 }
 

@@ -52,8 +52,8 @@ class WatchedRun {
 };
 
 /// Keeps the record, then writes RESULTS/CAMERA/RUN/: calibration.yaml when the unit passed,
-/// failed-calibration.yaml when it failed and came so far. Done again it changes nothing; a run
-/// that has its record can be published at any time. Throws InputError.
+/// failed-calibration.yaml when it failed and came so far; report.html. Done again it changes
+/// nothing; a run that has its record can be published at any time. Throws InputError.
 void finish_run(const RunRecord& record, Records& records, const std::filesystem::path& results);
 /// The second half of it. The folder that it went to.
 std::filesystem::path publish_run(const RunRecord& record, const std::filesystem::path& results);

@@ -19,6 +19,8 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   EXPECT_THAT(result.output, AllOf(HasSubstr("PASS   camera 0001"), Not(HasSubstr("NOT MET"))));
   const std::string calibration = this->result("0001", "calibration.yaml");
   EXPECT_THAT(calibration, AllOf(HasSubstr("rotation_center"), HasSubstr("dispersion")));
+  EXPECT_THAT(this->result("0001", "report.html"),
+              AllOf(HasSubstr("<strong>PASS"), HasSubstr("check_mean_mm"), HasSubstr("LENSMODEL")));
   // A unit calibrated again keeps its history, and gives the same calibration.
   EXPECT_EQ(run_program(batch("0002") + " --threads 1").exit_code, 0);
   std::string again = this->result("0002", "calibration.yaml");
@@ -60,6 +62,8 @@ TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {
   EXPECT_THAT(loose.errors, HasSubstr("lamp 5 is loose"));
   EXPECT_EQ(result("loose", "calibration.yaml"), "");
   EXPECT_NE(result("loose", "failed-calibration.yaml"), "");
+  EXPECT_THAT(result("loose", "report.html"),
+              AllOf(HasSubstr("<strong>FAIL"), HasSubstr("lamp 5 is loose")));
 
   folder.file("station/lamps.yaml", lamps);
   change("lamps.yaml", "frequency_hz: 2000", "frequency_hz: 9999");
