@@ -37,6 +37,16 @@ CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
       "");
 }
 
+/// Of what was typed, separated by commas.
+std::string unknown_options(const CLI::App& app) {
+  std::string names;
+  for (const std::string& word : app.remaining()) {
+    if (!word.starts_with("--")) continue;
+    names.append(names.empty() ? "" : ", ").append(word);
+  }
+  return names;
+}
+
 }  // namespace
 
 int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
@@ -85,7 +95,12 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   } catch (const CLI::Success& success) {  // --help, --version
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    spdlog::error("{}; see {} --help", error.what(), app.get_name());
+    const auto unknown = unknown_options(app);  // a misspelt option says more than what it lacks
+    if (!unknown.empty()) {
+      spdlog::error("unknown: {}; see {} --help", unknown, app.get_name());
+    } else {
+      spdlog::error("{}; see {} --help", error.what(), app.get_name());
+    }
     return kBadInput;
   } catch (const GateNotMet& error) {
     if (std::fflush(stdout) != 0) return kBadInput;

@@ -32,6 +32,16 @@ void check_sizes(const std::vector<BoardView>& views) {
   }
 }
 
+/// By its tags; their ids and corners are read all the same.
+bool upside_down(const BoardView& view) {
+  double down_px = 0;
+  for (const SeenTag& tag : view.seen.tags) {
+    down_px +=
+        (tag.corners_px[0] - tag.corners_px[3]).y() + (tag.corners_px[1] - tag.corners_px[2]).y();
+  }
+  return down_px < 0;
+}
+
 /// Says why no tag of the board is seen, if a few of the images show why.
 [[noreturn]] void explain_no_tags(const std::vector<BoardView>& views,
                                   const std::vector<fs::path>& images, const Board& board,
@@ -94,6 +104,8 @@ std::vector<BoardView> board_views(const std::vector<fs::path>& images, const Bo
   if (!any) explain_no_tags(found.views, images, board, board_file);
   const BoardCheck check = check_board(board, found.views, {});
   if (!check.problem.empty()) throw InputError(board_file, check.problem);
+  const auto turned = std::count_if(found.views.begin(), found.views.end(), upside_down);
+  if (turned > 0) spdlog::debug("{} views show the board upside down; that does no harm", turned);
   return found.views;
 }
 

@@ -17,16 +17,12 @@
 #include "detection/image_file.h"
 #include "progress.h"
 #include "readout_option.h"
+#include "rig/find_lamp.h"
 #include "rig/input_error.h"
 #include "warn_of_lamps.h"
 
 namespace vlp {
 namespace {
-
-bool has(const LampMap& lamps, int id) {
-  return std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
-                     [&](const Lamp& lamp) { return lamp.id == id; });
-}
 
 void check_row_time(const DetectOptions& options, const DetectorCamera& camera) {
   if (!camera.row_time_s) {
@@ -41,7 +37,7 @@ LampClassifier classifier_for(const DetectOptions& options, const LampMap& lamps
                               const DetectorCamera& camera) {
   LampClassifier classifier = read_lamp_classifier(options.classifier);
   for (const auto& lamp : classifier.lamps) {
-    if (has(lamps, lamp.lamp)) continue;
+    if (find_lamp(lamps.lamps, lamp.lamp) != nullptr) continue;
     throw InputError(options.classifier,
                      fmt::format("lamp {} is not in {}", lamp.lamp, options.lamps));
   }
@@ -106,7 +102,7 @@ void check_lamps(const std::vector<Frame>& frames, const LampMap& lamps,
                  const std::string& lamps_file) {
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
-      if (has(lamps, detection.lamp)) return;
+      if (find_lamp(lamps.lamps, detection.lamp) != nullptr) return;
     }
   }
   throw InputError(lamps_file, "has none of the lamps that the captures show");

@@ -16,11 +16,16 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("views         {} used, {} dropped\n", solution.views.size(), solution.dropped.size());
   fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
   fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
-  fmt::print("focal length  {:.2f}, {:.2f} px, sd {:.2f}\ncentre        {:.2f}, {:.2f} px\n",
-             parameters[0], parameters[1], report.focal_sd_px, parameters[2], parameters[3]);
+  fmt::print(
+      "focal length  {:.2f}, {:.2f} px, sd {:.2f} by noise, {:.2f} by views\n"
+      "centre        {:.2f}, {:.2f} px\n",
+      parameters[0], parameters[1], report.focal_sd_px, report.focal_sd_by_views_px, parameters[2],
+      parameters[3]);
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst, at ({:.0f}, {:.0f})\n",
              report.uncertainty_mean_px, report.uncertainty_worst_px,
              report.uncertainty_worst_at.x(), report.uncertainty_worst_at.y());
+  fmt::print("true lens     {:.3f} px rms apart per axis, expected by noise, {:.3f} by views\n",
+             report.expected_rms_px, report.expected_by_views_rms_px);
   if (report.halves) {
     fmt::print("halves        {:.3f} px rms apart per axis, {:.3f} px worst\n",
                report.halves->rms_px, report.halves->worst_px);

@@ -3,17 +3,61 @@
 #include "print_rotation.h"
 
 #include <fmt/core.h>
+#include <spdlog/spdlog.h>
 
-#include "calibration/rotation/rotation_fit.h"
+#include <optional>
+#include <string>
+
 #include "geometry/angles.h"
 
 namespace vlp {
+namespace {
 
+/// ", sd X Y UNIT" of a covariance, times a factor.
 std::string sd_of(const std::optional<Matrix2>& covariance, double factor, const char* unit) {
   if (!covariance) return ", sd not known";
   const Eigen::Vector2d sd = factor * covariance->diagonal().cwiseSqrt();
   return fmt::format(", sd {:.4f} {:.4f} {}", sd.x(), sd.y(), unit);
 }
+
+/// A height in metres, without a sign where it rounds to zero.
+std::string metres(double z_m) {
+  const std::string text = fmt::format("{:.3f}", z_m);
+  return text == "-0.000" ? "0.000" : text;
+}
+
+void print_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
+  if (const auto& arm_m = center.lever_arm_m) {
+    fmt::print("lever arm   {:.3f} {:.3f} mm{}\n", 1e3 * arm_m->x(), 1e3 * arm_m->y(),
+               sd_of(center.lever_arm_covariance, 1e3, "mm"));
+  } else if (spot.heights.size() == 1) {
+    fmt::print("lever arm   taken as zero\n");
+    spdlog::warn(
+        "at one height, under lamps that hang much alike, a lever arm cannot be told from a tilt; "
+        "it is taken as zero, and fixes at z = {} m will be of the axis of rotation: add captures "
+        "at a second height",
+        metres(spot.heights.front().z_m));
+  } else {
+    fmt::print("lever arm   taken as zero\n");
+    spdlog::warn(
+        "this method takes the lever arm as zero, and the centre is a mean over {} heights: axis "
+        "estimates both",
+        spot.heights.size());
+  }
+}
+
+void print_residuals(const RotationFit& fit, const SpotCaptures& spot) {
+  fmt::print("residual    {:.4f} px per axis, of {} detections\n", fit.residual_px,
+             spot.sightings.size() - fit.outliers.size());
+  fmt::print("outliers    {}\n", fit.outliers.size());
+  for (const auto& [index, distance_px] : fit.outliers) {
+    const SpotSighting& sighting = spot.sightings[index];
+    fmt::print("  outlier   {} lamp {}: {:.2f} px off\n", spot.captures[sighting.capture].image,
+               spot.lamps[sighting.lamp].id, distance_px);
+  }
+}
+
+}  // namespace
 
 void print_center(const RotationCenter& center, const Camera& camera) {
   fmt::print("centre      {:.3f} {:.3f} px in the undistorted image{}\n", center.center_px.x(),
@@ -25,6 +69,28 @@ void print_center(const RotationCenter& center, const Camera& camera) {
   fmt::print("tilt        {:.4f} deg towards {:.1f} deg in the image{}\n", deg_from_rad(angle_rad),
              deg_from_rad(azimuth_rad),
              sd_rad ? fmt::format(", sd {:.4f} deg", deg_from_rad(*sd_rad)) : "");
+}
+
+void print_summary(const RotationFit& fit, const SpotCaptures& spot, const CircleCenters& circles,
+                   const Camera& camera) {
+  fmt::print("captures    {} of {}\n", spot.captures.size(),
+             spot.captures.size() + spot.left_out.size());
+  for (const SpotHeight& height : spot.heights) {
+    fmt::print("  height    {} m: {} captures over {:.0f} deg\n", metres(height.z_m),
+               height.captures, deg_from_rad(height.arc_rad));
+  }
+  fmt::print("lamps       {}\n", spot.lamps.size());
+  print_center(fit.center, camera);
+  print_lever_arm(fit.center, spot);
+  fmt::print("circles     {}, their centres spread by {:.3f} px\n", circles.circles.size(),
+             circles.spread_px);
+  print_residuals(fit, spot);
+  fmt::print("\n{:>10} {:>10}  image\n", "z (m)", "yaw (deg)");
+  for (std::size_t i = 0; i < spot.captures.size(); ++i) {
+    const SpotCapture& capture = spot.captures[i];
+    fmt::print("{:>10} {:10.3f}  {}\n", metres(spot.heights[capture.height].z_m),
+               deg_from_rad(wrapped_rad(fit.yaws_rad[i])), capture.image);
+  }
 }
 
 }  // namespace vlp

@@ -2,17 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
-#include <string>
-
+#include "calibration/rotation/circle_center.h"
 #include "rig/calibration.h"
 
 namespace vlp {
 
-/// ", sd X Y UNIT" of a covariance, times a factor.
-std::string sd_of(const std::optional<Matrix2>& covariance, double factor, const char* unit);
-
 /// Centre, zenith and tilt on stdout, with what they are worth.
 void print_center(const RotationCenter& center, const Camera& camera);
+
+/// What a turn on the spot shows, on stdout, and a warning of a lever arm that it does not show.
+void print_summary(const RotationFit& fit, const SpotCaptures& spot, const CircleCenters& circles,
+                   const Camera& camera);
 
 }  // namespace vlp

@@ -7,6 +7,8 @@
 
 #include "app.h"
 #include "calibration/levelling/levelling.h"
+#include "capture_options.h"
+#include "check_map.h"
 #include "history.h"
 #include "print_rotation.h"
 #include "rig/stage.h"
@@ -28,7 +30,7 @@ void report(const Levelling& result, const Camera& camera) {
              result.captures_of_few_lamps, result.captures_rejected);
   fmt::print("detections  {} used, {} left out\n", result.detections, result.detections_rejected);
   print_center(result.center, camera);
-  fmt::print("residual    {:.4f} px, {:.4f} px for a level camera{}\n", result.residual_px,
+  fmt::print("residual    {:.4f} px per axis, {:.4f} px for a level camera{}\n", result.residual_px,
              result.residual_before_px, result.corrections.empty() ? "" : " and the map as it was");
   if (!result.corrections.empty()) print_corrections(result);
   constexpr double much = 3;
@@ -50,14 +52,17 @@ void rotate_by_lamps(const CLI::App& app, const DetectOptions& detect,
   if (refined_map == detect.output) {
     throw std::invalid_argument("--output and --refine-map name one file");
   }
-  const LampMap lamps = read_lamp_map(detect.lamps);
-  const Calibration calibration = read_calibration(detect.calibration);
-  const auto frames = frames_of(detect, lamps, calibration);
+  const CaptureInput input = read_captures_of(detect);
+  const auto& [lamps, calibration, frames] = input;
   check_lamps(frames, lamps, detect.lamps);
+  check_map(input, camera_alone(calibration), detect);
   LevellingOptions options;
   options.refine_map = !refined_map.empty();
   const Levelling result = level_by_lamps(frames, lamps, calibration.camera, options);
-  if (!result.undetermined.empty()) throw Undetermined(result.undetermined);
+  if (!result.undetermined.empty()) {
+    check_map_of_failure(input, camera_alone(calibration), detect);
+    throw Undetermined(result.undetermined);
+  }
   HistoryEntry entry = history_entry(app, inputs);
   if (options.refine_map) write_lamp_map(refined_map, result.map);
   write_calibration(detect.output,

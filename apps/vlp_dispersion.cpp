@@ -1,21 +1,21 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+/// vlp-dispersion: captures at a known station -> what their fixes still lack.
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
-#include <array>
 #include <cmath>
-#include <filesystem>
 #include <map>
+#include <string>
 
 #include "app.h"
 #include "calibration/dispersion/dispersion.h"
-#include "captures/captures_table.h"
-#include "detect_folder.h"
+#include "capture_options.h"
+#include "check_map.h"
 #include "evaluation/dispersion_plot.h"
 #include "history.h"
-#include "rig/input_error.h"
 #include "rig/stage.h"
+#include "station_captures.h"
 
 namespace vlp {
 namespace {
@@ -27,46 +27,10 @@ const std::map<std::string, DispersionCircle> kCircles{{"mean", DispersionCircle
 
 struct Options {
   DetectOptions detect;
-  std::string captures, plot;
+  StationOptions station;
+  std::string plot;
   std::string method = "camera", circle = "mean";
-  std::optional<std::array<double, 2>> station_m;
 };
-
-/// captures.csv: the one named, or that in the folder of the images; empty when there is none.
-std::string captures_file(const Options& options) {
-  if (!options.captures.empty()) return options.captures;
-  const auto beside = std::filesystem::path(options.detect.folder) / "captures.csv";
-  return std::filesystem::exists(beside) ? beside.string() : "";
-}
-
-/// The captures whose place is known.
-std::vector<StationCapture> at_station(const std::vector<Frame>& frames, const Options& options,
-                                       const std::string& file) {
-  const CapturesTable table = file.empty() ? CapturesTable{} : read_captures(file);
-  std::vector<StationCapture> captures;
-  for (const Frame& frame : frames) {
-    const auto entry = table.find(frame.image);
-    const Capture known = entry == table.end() ? Capture{} : entry->second;
-    if (const auto& station_m = options.station_m) {
-      captures.push_back({frame.detections, {(*station_m)[0], (*station_m)[1]}, known.inclination});
-    } else if (known.x_m && known.y_m) {
-      captures.push_back({frame.detections, {*known.x_m, *known.y_m}, known.inclination});
-    }
-  }
-  if (captures.empty()) {
-    const char* problem =
-        "tells no place of these captures: it needs x_m and y_m, and the names of the images; "
-        "or give --station";
-    if (file.empty())
-      throw std::invalid_argument("where is the station? Give --station or --captures");
-    throw InputError(file, problem);
-  }
-  if (captures.size() < frames.size()) {
-    spdlog::warn("{} of {} captures left out: {} does not tell their place",
-                 frames.size() - captures.size(), frames.size(), file);
-  }
-  return captures;
-}
 
 void check(const DispersionFit& fit) {
   switch (fit.status) {
@@ -125,18 +89,21 @@ void draw(const std::string& picture, const DispersionFit& fit) {
 }
 
 void run(const CLI::App& app, const Options& options) {
-  const std::string table = captures_file(options);
+  const std::string table = captures_file(options.station, options.detect.folder);
   std::vector<std::string> inputs = inputs_of(options.detect);
   inputs.push_back(table);
   check_output(options.detect.output, inputs);
   check_plot(options.plot, options.detect.output, inputs);
-  const LampMap lamps = read_lamp_map(options.detect.lamps);
-  const Calibration calibration = read_calibration(options.detect.calibration);
-  const auto frames = frames_of(options.detect, lamps, calibration);
+  const CaptureInput input = read_captures_of(options.detect);
+  const auto& [lamps, calibration, frames] = input;
   check_lamps(frames, lamps, options.detect.lamps);
-  const auto captures = at_station(frames, options, table);
+  Calibration levelled = calibration;
+  levelled.dispersion.reset();
+  check_map(input, levelled, options.detect);
+  const auto captures = at_station(frames, options.station, table);
   const DispersionFit fit = fit_dispersion(
       captures, lamps, calibration, kMethods.at(options.method), kCircles.at(options.circle));
+  if (fit.status == DispersionStatus::no_fix) check_map_of_failure(input, levelled, options.detect);
   check(fit);
   HistoryEntry entry = history_entry(app, inputs);
   if (!options.plot.empty()) draw(options.plot, fit);
@@ -161,23 +128,11 @@ int main(int argc, char** argv) {
       "    --station 0.1 0 -o calibration.yaml\n",
       "vlp-dispersion");
   vlp::Options options;
-  app.add_option("captures", options.detect.folder,
-                 "A folder of images taken at the station, or their detections.csv")
-      ->required();
-  app.add_option("--lamps", options.detect.lamps, "Lamp map, lamps.yaml")->required();
-  app.add_option("--calibration", options.detect.calibration,
-                 "Calibration of the camera; its rotation_center is applied")
-      ->required();
-  app.add_option("-o,--output", options.detect.output,
-                 "Where to write the calibration with its dispersion")
-      ->required();
-  auto* station = app.add_option("--station", options.station_m, "Where the camera is in the world")
-                      ->check(vlp::finite())
-                      ->option_text("X_M Y_M");
-  app.add_option("--captures", options.captures,
-                 "captures.csv: image, x_m, y_m (where the camera is) [, roll_rad, pitch_rad]; "
-                 "default: captures.csv in the folder")
-      ->excludes(station);
+  vlp::add_capture_options(app, options.detect,
+                           {"A folder of images taken at the station, or their detections.csv",
+                            "Calibration of the camera; its rotation_center is applied",
+                            "Where to write the calibration with its dispersion"});
+  vlp::add_station_options(app, options.station);
   app.add_option(
          "--method", options.method,
          "camera (default): captures at different yaws; paper: the circle's centre, captures "
@@ -189,6 +144,5 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"mean", "enclosing"}))
       ->option_text("mean|enclosing");
   app.add_option("--plot", options.plot, "Draw the fixes and their circles, .png or .svg");
-  vlp::add_detect_options(app, options.detect);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

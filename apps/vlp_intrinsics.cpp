@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
-#include <map>
 #include <string>
 
 #include "app.h"
@@ -14,10 +13,9 @@
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/mrcal_files.h"
-#include "detect_folder.h"
 #include "history.h"
+#include "intrinsics_options.h"
 #include "print_intrinsics.h"
-#include "readout_option.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/stage.h"
@@ -25,27 +23,16 @@
 namespace vlp {
 namespace {
 
-struct Options {
-  std::vector<std::string> images;
-  std::string board, output, cache, ros, kalibr, opencv, plot, camera_id = "camera",
-                                                               lens = "LENSMODEL_OPENCV8";
-  std::optional<Readout> readout;
-  std::optional<double> row_time_s, pixel_pitch_m;
-  int threads = all_cores();
-  int held_out = 0;
-  std::map<std::string, double> gates;
-};
-
 /// The views that can be used, apart from those that are held out.
 struct Sorted {
   IntrinsicsInput solved, held_out;
   std::vector<std::string> names;  // of the solved
 };
 
-Sorted sorted(const Options& options, const Board& board, const std::vector<BoardView>& views) {
+Sorted sorted(const IntrinsicsOptions& options, const Board& board,
+              const std::vector<BoardView>& views) {
   const auto model = lens_model_from_name(options.lens);
-  const IntrinsicsInput none{
-      BoardLattice(board), {}, views.front().imager_px, *model, !board.corner_squares};
+  const IntrinsicsInput none{BoardLattice(board), {}, views.front().imager_px, *model};
   Sorted sorted{none, none, {}};
   int usable = 0;
   for (const BoardView& view : views) {
@@ -88,20 +75,10 @@ IntrinsicsReport report_of(const IntrinsicsSolution& solution, const IntrinsicsI
           report.uncertainty_worst_px};
 }
 
-Camera camera_of(const Options& options, const BoardProblem& problem) {
+Camera camera_of(const IntrinsicsOptions& options, const BoardProblem& problem) {
   Camera camera{options.camera_id,     problem.imager_px,  problem.lens_model, problem.intrinsics,
                 options.pixel_pitch_m, options.row_time_s, options.readout};
   return camera;
-}
-
-IntrinsicsGates gates_of(const Options& options) {
-  IntrinsicsGates gates;
-  for (const auto& [name, value] : options.gates) {
-    if (name == "rms_px") gates.rms_px = value;
-    if (name == "uncertainty_px") gates.uncertainty_px = value;
-    if (name == "halves_px") gates.halves_px = value;
-  }
-  return gates;
 }
 
 /// camera.yaml and ".cameramodel" to camera.cameramodel.
@@ -109,13 +86,13 @@ std::string beside(const std::string& output, const char* ending) {
   return std::filesystem::path(output).replace_extension(ending).string();
 }
 
-void write_exports(const Options& options, const Camera& camera) {
+void write_exports(const IntrinsicsOptions& options, const Camera& camera) {
   if (!options.ros.empty()) write_file(options.ros, ros_camera_info(camera));
   if (!options.kalibr.empty()) write_file(options.kalibr, kalibr_camchain(camera));
   if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
 }
 
-void run(const CLI::App& app, const Options& options) {
+void run(const CLI::App& app, const IntrinsicsOptions& options) {
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
@@ -143,24 +120,12 @@ void run(const CLI::App& app, const Options& options) {
     draw_solution(options.plot, fmt::format("{}, {}", options.camera_id, options.lens), solution);
   }
   print_summary(solution, report, coverage, held_out_fit(solution, input.held_out));
-  const auto failed = gates_not_met(gates_of(options), solution, report);
+  const auto failed = gates_not_met(options.gates, solution, report);
   std::string all;
   for (const std::string& gate : failed) all += (all.empty() ? "" : "; ") + gate;
   if (!failed.empty()) {
     throw GateNotMet(fmt::format("{}; add views, next {}", all, next_view(coverage)));
   }
-}
-
-/// NAME=VALUE of a gate.
-std::string gate_problem(const std::string& text) {
-  const std::size_t sign = text.find('=');
-  const std::string name = text.substr(0, sign);
-  if (name != "rms_px" && name != "uncertainty_px" && name != "halves_px") {
-    return "the gates are rms_px, uncertainty_px and halves_px, not '" + name + "'";
-  }
-  if (sign == std::string::npos) return "a gate is NAME=VALUE";
-  std::string value = text.substr(sign + 1);
-  return finite_positive()(value);
 }
 
 }  // namespace
@@ -176,55 +141,7 @@ int main(int argc, char** argv) {
       "  build/bin/vlp-intrinsics out/rig/boards/*.png --board out/rig/board.yaml \\\n"
       "    --row-time-s 3e-5 --readout rows -o camera.yaml\n",
       "vlp-intrinsics");
-  vlp::Options options;
-  app.add_option("images", options.images, "Images of the board, or folders of them")->required();
-  app.add_option("--board", options.board, "The board, board.yaml")->required();
-  app.add_option("-o,--output", options.output,
-                 "Where to write the calibration with its camera part; mrcal's .cameramodel and "
-                 ".corners.vnl go beside it")
-      ->required();
-  app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
-  app.add_option("--lens", options.lens, "Lens model (default: LENSMODEL_OPENCV8)")
-      ->check([](const std::string& name) {
-        return vlp::lens_model_from_name(name) ? std::string()
-                                               : "the models are: " + vlp::lens_model_names();
-      });
-  app.add_option("--row-time-s", options.row_time_s,
-                 "Time from one row of the read-out to the next, which every program that finds "
-                 "lamps needs; vlp-train --row-time finds it, too")
-      ->check(CLI::Range(1e-8, 1e-3));
-  vlp::add_readout_option(app, options.readout);
-  app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Width of a pixel")
-      ->check(CLI::Range(1e-7, 1e-4));
-  app.add_option("--held-out", options.held_out,
-                 "Keep every Nth view out of the solve, and say how well the lens fits it")
-      ->check(CLI::Range(2, 1000))
-      ->option_text("N");
-  std::vector<std::string> gates;
-  app.add_option(
-         "--gate", gates,
-         "Change a gate: rms_px=1, uncertainty_px=2 (worst over the image), halves_px=1 (rms, "
-         "between the lenses of two halves of the views)")
-      ->check([](const std::string& text) { return vlp::gate_problem(text); })
-      ->option_text("NAME=VALUE ...");
-  app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
-  app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");
-  app.add_option("--opencv", options.opencv, "Write the camera for OpenCV, too (FileStorage)");
-  app.add_option("--plot", options.plot,
-                 "Draw the corners, their residuals and the uncertainty over the image, .png or "
-                 ".svg")
-      ->check([](const std::string& name) {
-        const bool known = name.ends_with(".png") || name.ends_with(".svg");
-        return known ? std::string() : "a picture's name should end in .png or .svg";
-      });
-  app.add_option("--cache", options.cache,
-                 "Folder to keep the corners of each image in, for the next time");
-  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
-  return vlp::run_app(app, argc, argv, [&] {
-    for (const std::string& gate : gates) {
-      options.gates[gate.substr(0, gate.find('='))] = std::stod(gate.substr(gate.find('=') + 1));
-    }
-    vlp::run(app, options);
-  });
+  vlp::IntrinsicsOptions options;
+  vlp::add_intrinsics_options(app, options);
+  return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

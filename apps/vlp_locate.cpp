@@ -5,18 +5,19 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <array>
 #include <map>
-#include <optional>
-#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "app.h"
+#include "capture_options.h"
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "captures/fixes_table.h"
-#include "detect_folder.h"
 #include "evaluation/fix_summary.h"
 #include "geometry/angles.h"
+#include "locate_options.h"
+#include "locate_warnings.h"
 #include "positioning/positioner.h"
 #include "positioning/residual_noise.h"
 
@@ -28,18 +29,8 @@ const std::map<std::string, Correction> kCorrections{{"none", Correction::none},
                                                      {"dispersion", Correction::dispersion},
                                                      {"all", Correction::all}};
 
-struct Options {
-  DetectOptions detect;
-  std::string captures;
-  std::string correction = "all";
-  std::optional<double> sigma_px;
-  std::optional<double> inclination_sigma_deg;
-  std::optional<std::array<double, 4>> camera_on_robot;
-  bool one_lamp = false;
-};
-
 Sensors sensors_of(const std::string& image, const CapturesTable& captures,
-                   const Options& options) {
+                   const LocateOptions& options) {
   Sensors sensors;
   const auto entry = captures.find(image);
   if (entry == captures.end()) return sensors;
@@ -53,7 +44,7 @@ Sensors sensors_of(const std::string& image, const CapturesTable& captures,
 }
 
 std::vector<Fix> locate_all(const Positioner& positioner, const std::vector<Frame>& frames,
-                            const CapturesTable& captures, const Options& options) {
+                            const CapturesTable& captures, const LocateOptions& options) {
   std::vector<Fix> fixes;
   fixes.reserve(frames.size());
   for (const Frame& frame : frames) {
@@ -82,32 +73,6 @@ FixRow row_of(const Frame& frame, const Fix& fix, bool noise_known) {
   return row;
 }
 
-void report_captures(const std::vector<Frame>& frames, const CapturesTable& captures) {
-  const auto without = std::count_if(frames.begin(), frames.end(), [&](const Frame& frame) {
-    return captures.find(frame.image) == captures.end();
-  });
-  if (captures.empty() || without == 0) return;
-  spdlog::warn(
-      "{} of {} images are not in captures.csv: image names have to be equal (here '{}', "
-      "there '{}')",
-      without, frames.size(), frames.front().image, captures.begin()->first);
-}
-
-void report_lamps(const std::vector<Frame>& frames, const std::vector<Fix>& fixes) {
-  int unknown = 0, rejected = 0;
-  for (std::size_t i = 0; i < fixes.size(); ++i) {
-    unknown += fixes[i].unknown_lamps;
-    rejected += fixes[i].rejected_lamps;
-    if (fixes[i].rejected_lamps > 0) {
-      spdlog::debug("{}: lamp {} contradicts the others and is left out", frames[i].image,
-                    fixes[i].rejected_lamp_id);
-    }
-  }
-  if (unknown > 0)
-    spdlog::warn("{} detections of lamps that are not in the map, left out", unknown);
-  if (rejected > 0) spdlog::warn("{} detections that contradict the others, left out", rejected);
-}
-
 void print_summary(const FixSummary& summary) {
   fmt::print("frames      {}\nfixes       {}\n", summary.frames, summary.fixes);
   for (const auto& [status, count] : summary.refused) {
@@ -126,50 +91,13 @@ void print_summary(const FixSummary& summary) {
   }
 }
 
-void report_noise(const std::vector<Frame>& frames, const std::vector<Fix>& fixes) {
-  double stated_px = 0;
-  for (const Frame& frame : frames) {
-    for (const Detection& detection : frame.detections) {
-      stated_px = std::max(stated_px, detection.sigma_px.value_or(0));
-    }
-  }
-  constexpr double too_noisy = 3;
-  const auto shown_px = residual_noise_px(fixes);
-  if (shown_px && *shown_px > too_noisy * stated_px) {
-    spdlog::warn(
-        "the residuals show {:.2g} px of noise, {:.2g} px are stated: sd is too small; are "
-        "calibration and lamp map right and complete?",
-        *shown_px, stated_px);
-  }
-}
-
-/// A lamp that the image's edge cuts may have its centre a little outside.
-void report_image(const std::vector<Frame>& frames, const Camera& camera) {
-  const Eigen::Array2d size(camera.imager_px[0], camera.imager_px[1]);
-  std::size_t outside = 0;
-  for (const Frame& frame : frames) {
-    for (const Detection& detection : frame.detections) {
-      const Eigen::Array2d pixel = detection.pixel.array();
-      const bool near = (pixel >= -0.1 * size).all() && (pixel <= 1.1 * size).all();
-      outside += near ? 0 : 1;
-    }
-  }
-  if (outside > 0) {
-    spdlog::warn(
-        "{} detections far outside the camera's {} x {} px: is the calibration this camera's?",
-        outside, camera.imager_px[0], camera.imager_px[1]);
-  }
-}
-
-void run(const Options& options) {
+void run(const LocateOptions& options) {
   check_output(options.detect.output,
                {options.detect.folder, options.detect.lamps, options.detect.calibration,
                 options.detect.classifier, options.captures});
-  const LampMap lamps = read_lamp_map(options.detect.lamps);
-  const Calibration calibration = read_calibration(options.detect.calibration);
   const CapturesTable captures =
       options.captures.empty() ? CapturesTable{} : read_captures(options.captures);
-  std::vector<Frame> frames = frames_of(options.detect, lamps, calibration);
+  auto [lamps, calibration, frames] = read_captures_of(options.detect);
   if (options.sigma_px) set_sigma(frames, *options.sigma_px);
   PositionerOptions how;
   how.correction = kCorrections.at(options.correction);
@@ -190,16 +118,16 @@ void run(const Options& options) {
       spdlog::warn("sigma_px is not stated and no residuals show it: sd columns are empty");
     }
   }
-  if (stated) report_noise(frames, fixes);
+  if (stated) warn_of_noise(frames, fixes);
   std::vector<FixRow> rows;
   rows.reserve(fixes.size());
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     rows.push_back(row_of(frames[i], fixes[i], noise_known));
   }
   write_fixes(options.detect.output, rows);
-  report_image(frames, calibration.camera);
-  report_captures(frames, captures);
-  report_lamps(frames, fixes);
+  warn_of_image(frames, calibration.camera);
+  warn_of_captures(frames, captures);
+  warn_of_lamps_left_out(frames, fixes);
   const FixSummary summary = summarize(rows);
   print_summary(summary);
   if (summary.fixes == 0) {
@@ -221,39 +149,7 @@ int main(int argc, char** argv) {
       "\\\n"
       "    --calibration datasets/example/calibration.yaml -o fixes.csv\n",
       "vlp-locate");
-  vlp::Options options;
-  app.add_option("detections", options.detect.folder,
-                 "detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images")
-      ->required();
-  app.add_option("--lamps", options.detect.lamps, "Lamp map, lamps.yaml")->required();
-  app.add_option("--calibration", options.detect.calibration, "Calibration of the camera")
-      ->required();
-  app.add_option("-o,--output", options.detect.output, "Where to write fixes.csv")->required();
-  vlp::add_detect_options(app, options.detect);
-  app.add_option("--correction", options.correction,
-                 "Parts of the calibration to apply (default: all that it has)")
-      ->check(CLI::IsMember({"none", "rotation", "dispersion", "all"}))
-      ->option_text("none|rotation|dispersion|all");
-  app.add_option(
-         "--sigma-px", options.sigma_px,
-         "Standard deviation of the lamps' pixels; taken from the residuals when neither it "
-         "nor a column says it")
-      ->check(CLI::Range(vlp::kMinSigma_px, vlp::kMaxSigma_px));
-  auto* captures_option =
-      app.add_option("--captures", options.captures,
-                     "captures.csv: image, roll_rad, pitch_rad (inclination of the robot, or of "
-                     "the camera when there is no --camera-on-robot), z_m, yaw_rad");
-  app.add_option("--inclination-sigma-deg", options.inclination_sigma_deg,
-                 "Standard deviation of the inclination sensor's angles (default: left out of sd)")
-      ->check(vlp::finite_not_negative())
-      ->needs(captures_option);
-  app.add_option(
-         "--camera-on-robot", options.camera_on_robot,
-         "The camera's place and yaw on the robot: the fixes are then of the robot's centre")
-      ->check(vlp::finite())
-      ->option_text("X_M Y_M Z_M YAW_DEG");
-  app.add_flag("--one-lamp", options.one_lamp,
-               "Where one lamp is seen, take z_m and yaw_rad from captures.csv")
-      ->needs(captures_option);
+  vlp::LocateOptions options;
+  vlp::add_locate_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

@@ -16,7 +16,7 @@ packages=(
   libmrcal-dev libsuitesparse-dev libcairo2-dev libsoci-dev libsqlite3-dev libpq-dev
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks
-  libgtest-dev libgmock-dev libbenchmark-dev python3-mrcal poppler-utils unzip
+  libgtest-dev libgmock-dev libbenchmark-dev mrcal python3-mrcal poppler-utils unzip
   postgresql postgresql-client tmux util-linux  # of the station
   chromium-headless-shell python3  # the report is opened in a browser
 )

@@ -6,17 +6,9 @@
 #include <cmath>
 #include <vector>
 
+#include "geometry/median.h"
+
 namespace vlp {
-namespace {
-
-/// The lower median. Precondition: not empty.
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
 
 FixSummary summarize(std::span<const FixRow> rows) {
   FixSummary summary;
@@ -42,9 +34,9 @@ FixSummary summarize(std::span<const FixRow> rows) {
   double sum = 0;
   for (const int count : lamps) sum += count;
   summary.typical = {*fewest, *most, sum / static_cast<double>(lamps.size()), {}};
-  if (!residual_px.empty()) summary.typical->median_residual_px = median(residual_px);
+  if (!residual_px.empty()) summary.typical->median_residual_px = lower_median(residual_px);
   if (!yaw_rad.empty()) {
-    summary.median_sd = {median(horizontal_m), median(height_m), median(yaw_rad)};
+    summary.median_sd = {lower_median(horizontal_m), lower_median(height_m), lower_median(yaw_rad)};
   }
   return summary;
 }

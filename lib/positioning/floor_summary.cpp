@@ -7,6 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "geometry/median.h"
+
 namespace vlp {
 namespace {
 
@@ -14,10 +16,9 @@ struct MedianAndWorst {
   double median, worst;
 };
 
-/// The lower median. Precondition: not empty.
-MedianAndWorst summary_of(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return {values[(values.size() - 1) / 2], values.back()};
+/// Precondition: not empty.
+MedianAndWorst summary_of(const std::vector<double>& values) {
+  return {lower_median(values), *std::max_element(values.begin(), values.end())};
 }
 
 FloorSummary::Row row_of(std::string_view source, std::span<const FloorLimit> limits,

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rig/lamp_map.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "rig/file.h"
+#include "rig/find_lamp.h"
 #include "rig/yaml_parts.h"
 #include "rig/yaml_writer.h"
 
@@ -36,15 +38,21 @@ Lamp read_lamp(YamlMap& map) {
 }
 
 void check_lamp(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item) {
+  if (find_lamp(earlier, lamp.id) != nullptr) {
+    throw item.error("id " + std::to_string(lamp.id) + " stands twice");
+  }
   for (const Lamp& other : earlier) {
-    if (other.id == lamp.id) {
-      throw item.error("id " + std::to_string(lamp.id) + " stands twice");
-    }
     if ((other.position_m - lamp.position_m).norm() < kCoincident_m) {
       throw item.error("lamp " + std::to_string(lamp.id) + " is where lamp " +
                        std::to_string(other.id) + " is");
     }
   }
+}
+
+const Lamp* find_lamp(std::span<const Lamp> lamps, int id) {
+  const auto lamp =
+      std::find_if(lamps.begin(), lamps.end(), [&](const Lamp& one) { return one.id == id; });
+  return lamp == lamps.end() ? nullptr : &*lamp;
 }
 
 LampMap read_lamp_map(const std::filesystem::path& file) {

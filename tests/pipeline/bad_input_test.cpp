@@ -96,6 +96,7 @@ TEST(BadUsage, IsToldInOneLine) {
     EXPECT_EQ(result.exit_code, 2) << options;
     EXPECT_THAT(result.errors, HasSubstr("see vlp-locate --help"));
   }
+  EXPECT_THAT(run_program("vlp-locate --nonsense").errors, HasSubstr("unknown: --nonsense; see"));
 }
 
 }  // namespace

@@ -119,6 +119,14 @@ TEST_F(DispersionProgram, SaysWhatIsWrong) {
   const auto other_map = dispersion(frames, "--station 0.1 -0.05");
   EXPECT_EQ(other_map.exit_code, 2);
   EXPECT_THAT(other_map.errors, HasSubstr("lamps.yaml: has none of the lamps"));
+  frames = turn(6, 6.28);
+  LampMap mirrored = rig.map;
+  for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
+  write_lamp_map(folder / "lamps.yaml", mirrored);
+  const auto from_below = dispersion(frames, "--station 0.1 -0.05");
+  EXPECT_EQ(from_below.exit_code, 2);
+  EXPECT_THAT(from_below.errors, HasSubstr("lamps.yaml: the lamp map looks mirrored"));
+  write_lamp_map(folder / "lamps.yaml", rig.map);
   for (Frame& frame : frames) frame.detections.resize(1), frame.detections[0].lamp = 1;
   EXPECT_EQ(dispersion(frames, "--station 0.1 -0.05").exit_code, 3);
 }
@@ -147,7 +155,7 @@ TEST(DispersionOfImages, IsTheCamerasTilt) {
   const std::string rendered = (folder / "rendered").string();
   const auto simulated = run_program("vlp-simulate -q " VLP_SOURCE_DIR
                                      "/datasets/paper-rig/scene.yaml --only "
-                                     "dispersion-turning -o " +
+                                     "dispersion -o " +
                                      rendered);
   ASSERT_EQ(simulated.exit_code, 0) << simulated.errors;
   Calibration calibration = read_calibration(rendered + "/true_calibration.yaml");
@@ -158,7 +166,7 @@ TEST(DispersionOfImages, IsTheCamerasTilt) {
   center.zenith_in_camera.normalize();
   write_calibration(folder / "rotated.yaml", calibration);
   const std::string files = " --lamps " + rendered + "/lamps.yaml --calibration ";
-  const auto result = run_program("vlp-dispersion " + rendered + "/dispersion-turning" + files +
+  const auto result = run_program("vlp-dispersion " + rendered + "/dispersion" + files +
                                   (folder / "rotated.yaml").string() + " -o " +
                                   (folder / "calibration.yaml").string());
   ASSERT_EQ(result.exit_code, 0) << result.errors;

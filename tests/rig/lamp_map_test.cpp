@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "rig/find_lamp.h"
 #include "rig/samples.h"
 
 namespace vlp {
@@ -24,6 +25,15 @@ TEST(LampMap, IsWrittenByteForByteInTheFormat) {
   const TemporaryFolder folder;
   write_lamp_map(folder / "lamps.yaml", sample_lamps());
   EXPECT_EQ(folder.content_of(folder / "lamps.yaml"), kLampsYaml);
+}
+
+TEST(LampMap, FindsALampByItsId) {
+  LampMap map;
+  for (const int id : {7, 2, 40}) map.lamps.push_back({id, {0, 0.1 * id, 2}, {}, {}, {}});
+  EXPECT_EQ(find_lamp(map.lamps, 2), &map.lamps[1]);
+  EXPECT_EQ(find_lamp(map.lamps, 40), &map.lamps[2]);
+  EXPECT_EQ(find_lamp(map.lamps, 3), nullptr);
+  EXPECT_EQ(find_lamp({}, 7), nullptr);
 }
 
 TEST(LampMap, KeepsEveryDoubleExactly) {

@@ -43,7 +43,7 @@ enum class DispersionStatus {
   station_far,       // every fix is far from it
   one_yaw,           // `camera`: camera and world cannot be told apart
   many_yaws,         // `paper`
-  diverged           // the fixes follow no offset
+  diverged           // no offset explains the fixes
 };
 
 /// What it means and what to add, for people.
@@ -82,11 +82,12 @@ struct DispersionFit {
 /// station or map that is wrong by m, put
 ///   fix_k - station = -H_k e^{j g_k} delta + m.
 /// Method `paper` (eq. 10 to 13 with the scale f / H and the turn by the yaw that they lack) takes
-/// the circle's centre D for the whole of it: offset_px = -f e^{-jg} D / H at the mean yaw and
-/// height. Method `camera` estimates offset_px = f delta and m so that the fixes, made anew with
-/// the offset as level_from_camera() applies it, agree with -H e^{jg} delta and m exactly; each
-/// weighs by its covariance. Fixes farther off than five standard deviations, of the residuals'
-/// median, are left out. A dispersion that `calibration` has already is not used.
+/// the circle's centre D for the whole of it: offset_px = -f e^{-jg} D / H, corrected until the
+/// circle of the fixes made anew has its centre at the station (find_paper_offset). Method `camera`
+/// estimates offset_px = f delta and m so that the fixes, made anew with the offset as
+/// level_from_camera() applies it, agree with -H e^{jg} delta and m exactly; each weighs by its
+/// covariance. Fixes farther off than five standard deviations, of the residuals' median, are left
+/// out. A dispersion that `calibration` has already is not used.
 DispersionFit fit_dispersion(std::span<const StationCapture> captures, const LampMap& map,
                              const Calibration& calibration, DispersionMethod method,
                              DispersionCircle circle = DispersionCircle::mean);

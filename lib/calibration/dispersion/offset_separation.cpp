@@ -6,6 +6,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -117,10 +120,8 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
 
 double robust_variance(std::vector<double> squares) {
   constexpr double rounding = 1e-24;
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
   const double median_of_unit_variance = 2 * std::log(2.0);
-  return std::max(*middle / median_of_unit_variance, rounding);
+  return std::max(upper_median(std::move(squares)) / median_of_unit_variance, rounding);
 }
 
 std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes) {

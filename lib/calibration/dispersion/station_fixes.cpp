@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/dispersion/station_fixes.h"
 
-#include <algorithm>
-
 #include "positioning/positioner.h"
+#include "rig/find_lamp.h"
 
 namespace vlp {
 namespace {
@@ -14,9 +13,8 @@ double lamps_height(const StationCapture& capture, const LampMap& map) {
   double sum_m = 0;
   int count = 0;
   for (const Detection& detection : capture.detections) {
-    const auto lamp = std::find_if(map.lamps.begin(), map.lamps.end(),
-                                   [&](const Lamp& one) { return one.id == detection.lamp; });
-    if (lamp == map.lamps.end()) continue;
+    const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
+    if (lamp == nullptr) continue;
     sum_m += lamp->position_m.z();
     ++count;
   }

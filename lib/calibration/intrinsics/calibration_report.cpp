@@ -4,8 +4,9 @@
 
 #include <cmath>
 
-#include "calibration/intrinsics/edge_bias.h"
+#include "calibration/intrinsics/expected_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
+#include "calibration/intrinsics/view_jackknife.h"
 #include "calibration/intrinsics/view_pose.h"
 #include "captures/csv_writer.h"
 
@@ -26,7 +27,18 @@ IntrinsicsInput every_other(const IntrinsicsSolution& solution, const Intrinsics
 
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
   const ProjectionUncertainty uncertainty(solution);
-  CalibrationReport report{0, 0, {0, 0}, uncertainty.focal_sd_px(), {}};
+  const Lens lens = solution.lens();
+  const Eigen::MatrixXd by_views = covariance_by_views(solution);
+  const auto expected =
+      expected_difference(lens, input.imager_px, uncertainty.intrinsics_covariance());
+  CalibrationReport report{0,
+                           0,
+                           {0, 0},
+                           uncertainty.focal_sd_px(),
+                           std::sqrt(by_views(0, 0)),
+                           expected.rms_px,
+                           expected_difference(lens, input.imager_px, by_views).rms_px,
+                           {}};
   const auto pixels = pixel_grid(input.imager_px);
   for (const Eigen::Vector2d& pixel : pixels) {
     const double sigma_px = uncertainty.worst_px(pixel);
@@ -69,15 +81,9 @@ HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& 
   HeldOut fit;
   double squares = 0;
   for (const auto& view : held_out.views) {
-    auto corners = held_out.lattice.bent(view, solution.problem.warp_m);
-    auto pose = view_pose(corners, lens);
+    const auto corners = held_out.lattice.bent(view, solution.problem.warp_m);
+    const auto pose = view_pose(corners, lens);
     if (!pose) continue;
-    if (held_out.from_edges) {
-      const auto bias_px = edge_bias_px(corners, pose->camera_from_board, lens);
-      for (std::size_t i = 0; i < corners.size(); ++i) corners[i].pixel -= bias_px[i];
-      pose = view_pose(corners, lens);
-      if (!pose) continue;
-    }
     ++fit.views;
     fit.corners += static_cast<int>(corners.size());
     squares += pose->rms_px * pose->rms_px * 2 * static_cast<double>(corners.size());

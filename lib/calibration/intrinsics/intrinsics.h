@@ -18,8 +18,6 @@ struct IntrinsicsInput {
   std::vector<std::vector<BoardLattice::Corner>> views;
   std::array<int, 2> imager_px;
   LensModel lens_model;
-  /// The corners are crossings of lines fitted to the tags' edges: see edge_bias_px().
-  bool from_edges;
 };
 
 enum class IntrinsicsStatus {
@@ -60,7 +58,7 @@ struct IntrinsicsSolution {
 ///  2. STEREOGRAPHIC with every pose, and the poses again with that lens, until they stay;
 ///  3. the model wanted, regularized as mrcal does it, and the poses again; views that fit no pose
 ///     are dropped;
-///  4. all of it with the board's warp, without outliers; again without the bias of the corners.
+///  4. all of it with the board's warp, without outliers.
 /// Planar flips cannot live: both poses of every view are tried with each lens (view_pose()).
 /// Depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);

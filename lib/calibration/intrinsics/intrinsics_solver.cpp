@@ -56,12 +56,7 @@ bool IntrinsicsSolver::refine() {
 }
 
 bool IntrinsicsSolver::finish() {
-  constexpr int corrections = 2;
   if (!solve(IntrinsicsSolution::solved_for)) return false;
-  for (int i = 0; input_.from_edges && i < corrections; ++i) {
-    remove_edge_bias();
-    if (!solve(IntrinsicsSolution::solved_for)) return false;
-  }
   // Without noise what is left is the regularization's, and would be taken for outliers.
   constexpr double exact_px = 0.005;
   if (solution().rms_px < exact_px) return true;

@@ -35,7 +35,6 @@ class IntrinsicsSolver {
   void seed(const Lens& lens);
   /// The problem of the views used, at their seeds.
   void assemble(const Lens& lens);
-  void remove_edge_bias();
   /// Of the views used, in their order.
   std::vector<double> rms_of_views() const;
   /// Tries both poses of each view that fits badly, and drops the worst of those that stay bad.

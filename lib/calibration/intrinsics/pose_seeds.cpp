@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "calibration/intrinsics/view_pose.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -36,12 +37,6 @@ PoseSeeds poses_through(const IntrinsicsInput& input, const Lens& lens) {
   return seeds;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 Lens stereographic(const IntrinsicsInput& input, double focal_px) {
   const auto [width, height] = input.imager_px;
   const std::array parameters{focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0};
@@ -54,7 +49,7 @@ std::vector<double> focal_lengths(const IntrinsicsInput& input) {
   constexpr int least = -5, most = 6;  // of the image's width: 0.18 to 8
   for (int half_octaves = least; half_octaves <= most; ++half_octaves) {
     const double focal_px = input.imager_px[0] * std::exp2(half_octaves / 2.0);
-    tried.emplace_back(median(poses_through(some, stereographic(input, focal_px)).rms_px),
+    tried.emplace_back(upper_median(poses_through(some, stereographic(input, focal_px)).rms_px),
                        focal_px);
   }
   std::sort(tried.begin(), tried.end());

@@ -16,8 +16,6 @@ struct PoseSeeds {
 };
 PoseSeeds poses_through(const IntrinsicsInput& input, const Lens& lens);
 
-double median(std::vector<double> values);
-
 /// LENSMODEL_STEREOGRAPHIC with its centre in the middle of the image.
 Lens stereographic(const IntrinsicsInput& input, double focal_px);
 

@@ -84,6 +84,12 @@ double ProjectionUncertainty::worst_px(const Eigen::Vector2d& pixel) const {
   return std::sqrt(mean + std::hypot(half, c(0, 1)));
 }
 
+Eigen::MatrixXd ProjectionUncertainty::intrinsics_covariance() const {
+  const auto count = static_cast<Eigen::Index>(parameter_count(lens_.model()));
+  if (determined_) return covariance_.topLeftCorner(count, count);
+  return Eigen::MatrixXd::Constant(count, count, std::numeric_limits<double>::infinity());
+}
+
 double ProjectionUncertainty::focal_sd_px() const {
   return determined_ ? std::sqrt(covariance_(0, 0)) : std::numeric_limits<double>::infinity();
 }

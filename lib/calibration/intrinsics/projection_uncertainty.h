@@ -31,6 +31,9 @@ class ProjectionUncertainty {
   /// Standard deviation in the direction in which it is largest.
   double worst_px(const Eigen::Vector2d& pixel) const;
 
+  /// Of the intrinsics alone.
+  Eigen::MatrixXd intrinsics_covariance() const;
+
   /// Of the focal length along x. Infinite when nothing is determined.
   double focal_sd_px() const;
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include "calibration/intrinsics/edge_bias.h"
 #include "calibration/intrinsics/intrinsics_solver.h"
 #include "calibration/intrinsics/view_pose.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 /// What a view's corners may be off, given what those of the others are.
 double limit_for(const std::vector<double>& rms) {
   constexpr double fair_px = 1, fair = 4;
-  return std::max(fair_px, fair * median(rms));
+  return std::max(fair_px, fair * upper_median(rms));
 }
 
 }  // namespace
@@ -49,21 +49,6 @@ void IntrinsicsSolver::assemble(const Lens& lens) {
     for (const auto& corner : input_.views[used_[i]]) {
       const std::size_t board = i * lattice.parts() + corner.part;
       problem_.points[board * lattice.points() + corner.point] << corner.pixel, 1;
-    }
-  }
-}
-
-void IntrinsicsSolver::remove_edge_bias() {
-  const BoardLattice& lattice = input_.lattice;
-  const Lens lens = this->lens();
-  for (std::size_t i = 0; i < used_.size(); ++i) {
-    const auto& corners = input_.views[used_[i]];
-    const BoardPose pose = lattice.pose_of_board(problem_.poses[i * lattice.parts()]);
-    const auto bias_px = edge_bias_px(corners, pose, lens);
-    for (std::size_t k = 0; k < corners.size(); ++k) {
-      const std::size_t board = i * lattice.parts() + corners[k].part;
-      problem_.points[board * lattice.points() + corners[k].point].head<2>() =
-          corners[k].pixel - bias_px[k];
     }
   }
 }

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "calibration/levelling/levelling_checks.h"
 #include "calibration/levelling/map_gauge.h"
 #include "calibration/levelling/measured_lamps.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -52,12 +54,10 @@ bool take_out_worst(LampBundle& bundle, const BundleFit& fit) {
       squares.push_back(whitened_residual(bundle, capture, seen).squaredNorm());
     }
   }
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
   const double median_of_unit_noise = 2 * std::log(2.0);
   const double share_left = fit.degrees_of_freedom / (2.0 * static_cast<double>(squares.size()));
-  const double limit = limit_sigmas * limit_sigmas *
-                       std::max(*middle / (median_of_unit_noise * share_left), rounding * rounding);
+  const double variance = upper_median(std::move(squares)) / (median_of_unit_noise * share_left);
+  const double limit = limit_sigmas * limit_sigmas * std::max(variance, rounding * rounding);
   bool any = false;
   for (Capture& capture : bundle.captures) {
     const auto square = [&](const Seen& seen) {

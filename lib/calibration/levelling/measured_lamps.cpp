@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "positioning/frame_fix.h"
+#include "rig/find_lamp.h"
 
 namespace vlp {
 namespace {
@@ -32,11 +33,9 @@ std::optional<std::vector<LampBundle::Seen>> measured_lamps(std::span<const Dete
   std::vector<LampBundle::Seen> measured;
   measured.reserve(detections.size());
   for (const Detection& detection : detections) {
-    const auto lamp = std::find_if(map.lamps.begin(), map.lamps.end(), [&](const Lamp& candidate) {
-      return candidate.id == detection.lamp;
-    });
-    if (lamp == map.lamps.end()) continue;
-    const auto index = static_cast<std::size_t>(lamp - map.lamps.begin());
+    const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
+    if (lamp == nullptr) continue;
+    const auto index = static_cast<std::size_t>(lamp - map.lamps.data());
     for (const auto& other : measured) {
       if (other.lamp == index) return std::nullopt;
     }

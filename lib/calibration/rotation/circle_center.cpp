@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "calibration/rotation/fit_parts.h"
-#include "calibration/rotation/turning.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -57,7 +57,7 @@ std::optional<Circle> typical_circle(const std::vector<Eigen::Vector2d>& points)
     const std::array<Eigen::Vector2d, 3> triple{next(), next(), next()};
     const auto fit = fit_circle(triple);
     if (!fit) continue;
-    const double median = median_of(distances(fit->circle, points));
+    const double median = upper_median(distances(fit->circle, points));
     if (!best || median < least) best = fit->circle, least = median;
   }
   return best;
@@ -69,7 +69,8 @@ std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
                                         std::vector<SpotOutlier>& outliers) {
   constexpr double rounding = 1e-9, far = 4.5, sigma_over_median = 1.4826;
   auto fit = fit_circle(trace.points);
-  constexpr std::size_t least_to_judge = 5;
+  // Of fewer the median distance from a circle through three of them says too little.
+  constexpr std::size_t least_to_judge = 8;
   if (!fit || trace.points.size() < least_to_judge) return fit;
   auto circle = typical_circle(trace.points);
   const double count = static_cast<double>(trace.points.size());
@@ -78,7 +79,7 @@ std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
   for (int round = 0; circle && round < 4; ++round) {
     off = distances(*circle, trace.points);
     // Rousseeuw's factor for few points.
-    limit = far * std::max(sigma_over_median * (1 + 5 / (count - 3)) * median_of(off), rounding);
+    limit = far * std::max(sigma_over_median * (1 + 5 / (count - 3)) * upper_median(off), rounding);
     std::vector<Eigen::Vector2d> near;
     near.reserve(off.size());
     for (std::size_t i = 0; i < off.size(); ++i) {
@@ -105,7 +106,7 @@ CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera)
   const double focal_px = camera.intrinsics[0];
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  double squares = 0, points = 0;
+  double squares = 0, freedom = 0;
   for (std::size_t height = 0; height < spot.heights.size(); ++height) {
     for (std::size_t lamp = 0; lamp < spot.lamps.size(); ++lamp) {
       Trace trace = trace_of(spot, lamp, height);
@@ -115,7 +116,7 @@ CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera)
       sum += fit->circle.center;
       covariance += fit->center_covariance;
       squares += fit->rms * fit->rms * static_cast<double>(trace.points.size());
-      points += static_cast<double>(trace.points.size());
+      freedom += static_cast<double>(trace.points.size()) - 3;
     }
   }
   if (result.circles.empty()) return result;
@@ -131,7 +132,7 @@ CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera)
   result.spread_px = focal_px * std::sqrt(spread / count);
   result.mean.converged = true;
   result.mean.center = rotation_center_at(mean, RotationModel::shift, camera, measured);
-  result.mean.residual_px = focal_px * std::sqrt(squares / points);
+  result.mean.residual_px = freedom > 0 ? focal_px * std::sqrt(squares / freedom) : 0;
   result.mean.yaws_rad = yaws_of(spot);
   return result;
 }

@@ -22,7 +22,8 @@ struct LampCircle {
 };
 
 struct CircleCenters {
-  /// The mean of the centres. `yaws_rad` are those of the captures' fixes.
+  /// The mean of the centres. `yaws_rad` are those of the captures' fixes. The residual is across
+  /// the circles, each of which has three unknowns.
   RotationFit mean;
   std::vector<LampCircle> circles;
   /// Root of the mean squared distance of the centres from their mean: a symptom of tilt.
@@ -34,8 +35,8 @@ struct CircleCenters {
 /// of what a lamp at angle phi from the axis traces is not at f tan t but at
 ///   f sin t cos t / (cos^2 t - sin^2 phi),
 /// so that the circles disagree, and their mean is too far out. Points that are farther from their
-/// circle than 4.5 standard deviations are left out. Needs three sightings of a lamp
-/// at a height; not converged when no lamp has them. The model is RotationModel::shift.
+/// circle than 4.5 standard deviations are left out, of eight or more. Needs three sightings of a
+/// lamp at a height; not converged when no lamp has them. The model is RotationModel::shift.
 CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera);
 
 }  // namespace vlp

@@ -39,13 +39,13 @@ void describe(RotationFit& result, const RobustFit& fit, const SpotCaptures& spo
     out[i] = true;
     result.outliers.push_back({i, fit.lengths()[i] * spot.sightings[i].sigma_px});
   }
-  double squares = 0, count = 0;
+  double squares = 0;
   for (std::size_t i = 0; i < out.size(); ++i) {
     if (out[i]) continue;
     squares += std::pow(fit.lengths()[i] * spot.sightings[i].sigma_px, 2);
-    ++count;
   }
-  result.residual_px = count > 0 ? std::sqrt(squares / count) : 0;
+  const int freedom = fit.degrees_of_freedom();
+  result.residual_px = freedom > 0 ? std::sqrt(squares / freedom) : 0;
 }
 
 }  // namespace vlp

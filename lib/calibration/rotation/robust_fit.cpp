@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "calibration/rotation/turning.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -85,7 +85,7 @@ double RobustFit::scatter() const {
   const double rows = std::max(all->NumResiduals(), 1);
   const double share = std::max(rows - free_parameters(*all), 1.0) / rows;
   constexpr double median_of_rayleigh = 1.17741;  // sqrt(2 ln 2)
-  return std::max(median_of(used) / (median_of_rayleigh * std::sqrt(share)), kRounding);
+  return std::max(upper_median(used) / (median_of_rayleigh * std::sqrt(share)), kRounding);
 }
 
 bool RobustFit::solve() {
@@ -118,6 +118,11 @@ std::vector<std::size_t> RobustFit::outliers() const {
     if (!used_[i]) left_out.push_back(i);
   }
   return left_out;
+}
+
+int RobustFit::degrees_of_freedom() const {
+  const auto all = problem(0);
+  return all->NumResiduals() - free_parameters(*all);
 }
 
 std::optional<Matrix2> RobustFit::covariance(const double* parameter) const {

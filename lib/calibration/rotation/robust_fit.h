@@ -39,6 +39,8 @@ class RobustFit {
   std::vector<std::size_t> outliers() const;
   /// Length of each residual, the outliers among them.
   const std::vector<double>& lengths() const { return lengths_; }
+  /// Rows of the residuals that are used, less the parameters that are free.
+  int degrees_of_freedom() const;
   /// Of a parameter block of two, for the scatter found: s^2 (J^T J)^-1. Nothing when there are no
   /// more residuals than parameters, or the residuals do not determine it.
   std::optional<Matrix2> covariance(const double* parameter) const;

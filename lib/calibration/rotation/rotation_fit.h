@@ -28,7 +28,9 @@ struct RotationFit {
   RotationCenter center = {};
   /// Of each capture in SpotCaptures::captures.
   std::vector<double> yaws_rad = {};
-  /// Root of the mean squared distance in the image, without the outliers.
+  /// Of the image per axis, without the outliers, degrees of freedom taken off: the noise of a
+  /// pixel that the fit leaves over, sqrt(sum of squares / (measurements - unknowns)). Zero when as
+  /// many are measured as are unknown.
   double residual_px = 0;
   std::vector<SpotOutlier> outliers = {};
 };

@@ -6,8 +6,9 @@
 #include <set>
 
 #include "calibration/rotation/spot_search.h"
-#include "calibration/rotation/turning.h"
 #include "camera/lens.h"
+#include "geometry/median.h"
+#include "rig/find_lamp.h"
 
 namespace vlp {
 namespace {
@@ -29,14 +30,13 @@ SpotStatus status_of(const std::vector<Frame>& frames, const LampMap& map) {
 
 void add_sightings(SpotCaptures& spot, const Frame& frame, std::size_t capture, const Lens& lens) {
   for (const Detection& detection : frame.detections) {
-    const auto lamp = std::find_if(spot.lamps.begin(), spot.lamps.end(),
-                                   [&](const Lamp& one) { return one.id == detection.lamp; });
+    const Lamp* lamp = find_lamp(spot.lamps, detection.lamp);
     const auto ray = lens.unproject(detection.pixel);
-    if (lamp == spot.lamps.end() || !ray) continue;
+    if (lamp == nullptr || !ray) continue;
     const Eigen::Vector3d unit = ray->direction.normalized();
     const auto projection = lens.project_with_jacobians(unit);
     if (!projection) continue;
-    spot.sightings.push_back({capture, static_cast<std::size_t>(lamp - spot.lamps.begin()),
+    spot.sightings.push_back({capture, static_cast<std::size_t>(lamp - spot.lamps.data()),
                               detection.pixel, detection.sigma_px.value_or(1), unit,
                               projection->d_pixel_d_point});
   }
@@ -50,7 +50,7 @@ std::optional<double> stated_px(const std::vector<Frame>& frames) {
       stated.push_back(*detection.sigma_px);
     }
   }
-  return median_of(stated);
+  return upper_median(stated);
 }
 
 }  // namespace
@@ -62,7 +62,10 @@ SpotCaptures spot_captures(const std::vector<Frame>& frames, const LampMap& map,
   if (spot.status != SpotStatus::ok) return spot;
   // A long lever arm that is taken for a tilt can hide that there are two heights; looked for at
   // one height, it can hide the tilt.
-  SpotSearch plain(frames, map, camera, false), with_arm(frames, map, camera, true);
+  const auto stated = stated_px(frames);
+  const double noise_px = stated.value_or(1);
+  SpotSearch plain(frames, map, camera, noise_px, false),
+      with_arm(frames, map, camera, noise_px, true);
   spot.status = plain.run();
   const bool both = with_arm.run() == SpotStatus::ok;
   const bool better = both && (spot.status != SpotStatus::ok ||
@@ -71,7 +74,7 @@ SpotCaptures spot_captures(const std::vector<Frame>& frames, const LampMap& map,
   if (spot.status != SpotStatus::ok) return spot;
   const SpotSearch& search = better ? with_arm : plain;
   spot = search.result();
-  spot.stated_px = stated_px(frames);
+  spot.stated_px = stated;
   std::set<int> seen;
   for (const std::size_t i : search.frames()) {
     for (const Detection& detection : frames[i].detections) seen.insert(detection.lamp);

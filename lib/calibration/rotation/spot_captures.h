@@ -69,6 +69,8 @@ std::string_view explanation_of(SpotStatus status);
 /// form, without a guess, in a few rounds of
 ///   fix_k = A + e^{jg_k} (e + H_k delta),
 /// which is linear in A, e and in delta, what is left of the tilt. Weighted against outliers.
+/// Heights are told apart where there is a gap between the fixes' distances from the lamps, of
+/// three of their standard deviations or more, and of kLeastGap of the distance or more.
 struct SpotCaptures {
   SpotStatus status = SpotStatus::ok;
   /// Those of the map that are seen, in its order.
@@ -80,7 +82,7 @@ struct SpotCaptures {
   /// The middle one of the detections' sigma_px; nothing unless all state it.
   std::optional<double> stated_px = {};
   Eigen::Vector3d zenith_in_camera = Eigen::Vector3d::UnitZ();
-  /// Zero at one height, where it cannot be told from the tilt.
+  /// Zero at one height.
   Eigen::Vector2d lever_arm_m = Eigen::Vector2d::Zero();
   struct LeftOut {
     std::string image;
@@ -90,8 +92,9 @@ struct SpotCaptures {
   std::vector<LeftOut> left_out;
 };
 
-/// Captures are of one height when their distances to the lamps differ by less than this share.
-inline constexpr double kSameHeight = 0.04;
+/// Noise apart, captures at one height differ by less than this share of their distance from the
+/// lamps: floors are uneven, lamp maps a little wrong.
+inline constexpr double kLeastGap = 0.01;
 /// The least arc that determines a centre of rotation.
 inline constexpr double kLeastArc_rad = 1.5707963267948966;
 

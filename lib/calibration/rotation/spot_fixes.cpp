@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "geometry/median.h"
+
 namespace vlp {
 namespace {
 
@@ -15,7 +17,8 @@ bool determines(const SpotArc& spot) {
 
 }  // namespace
 
-void tell_heights_apart(SpotFixes& fixes) {
+void tell_heights_apart(SpotFixes& fixes, double noise_m) {
+  constexpr double clear_sigmas = 3;
   std::vector<std::size_t> order(fixes.fixes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -25,7 +28,8 @@ void tell_heights_apart(SpotFixes& fixes) {
   double last_m = 0;
   for (const std::size_t i : order) {
     const double height_m = fixes.fixes[i].height_m;
-    if (fixes.spots == 0 || height_m < (1 - kSameHeight) * last_m) ++fixes.spots;
+    const double gap_m = std::max(clear_sigmas * noise_m, kLeastGap * last_m);
+    if (fixes.spots == 0 || last_m - height_m > gap_m) ++fixes.spots;
     fixes.fixes[i].spot = fixes.spots - 1;
     last_m = height_m;
   }
@@ -76,7 +80,7 @@ double height_of(const SpotFixes& fixes, std::size_t spot) {
   for (const TurningFix& fix : fixes.fixes) {
     if (fix.spot == spot) heights_m.push_back(fix.height_m);
   }
-  return median_of(heights_m);
+  return upper_median(heights_m);
 }
 
 }  // namespace vlp

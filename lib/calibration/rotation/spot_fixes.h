@@ -26,8 +26,9 @@ struct SpotArc {
 
 inline constexpr std::size_t kLeastCaptures = 3;
 
-/// Gives the captures of each height a spot of their own, from low to high.
-void tell_heights_apart(SpotFixes& fixes);
+/// Gives the captures of each height a spot of their own, from low to high. `noise_m` is the
+/// standard deviation of a fix's height; see SpotCaptures.
+void tell_heights_apart(SpotFixes& fixes, double noise_m);
 
 std::vector<SpotArc> arcs_of(const SpotFixes& fixes);
 

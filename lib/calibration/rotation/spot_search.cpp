@@ -3,6 +3,8 @@
 #include "calibration/rotation/spot_search.h"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "positioning/positioner.h"
 
@@ -30,10 +32,11 @@ double mean_height(const LampMap& map) {
 }  // namespace
 
 SpotSearch::SpotSearch(const std::vector<Frame>& frames, const LampMap& map, const Camera& camera,
-                       bool lever_arm)
+                       double noise_px, bool lever_arm)
     : frames_(frames),
       map_(map),
       lamps_z_m_(mean_height(map)),
+      noise_px_(noise_px),
       lever_arm_(lever_arm),
       left_out_(frames.size()) {
   calibration_.camera = camera;
@@ -50,14 +53,14 @@ SpotStatus SpotSearch::run() {
     // Lamps contradict each other a little while the tilt is in them.
     locate(round < rough_rounds ? 0.3 : PositionerOptions().max_residual_share);
     if (fixes_.fixes.size() < kLeastCaptures) return status_of(statuses_);
-    if (round >= rough_rounds) tell_heights_apart(fixes_);
+    if (round >= rough_rounds) tell_heights_apart(fixes_, height_noise_m_);
     const bool rough_arm = round < rough_rounds && lever_arm_;
     if (const SpotStatus status = turn(rough_arm); status != SpotStatus::ok) return status;
   }
   if (misfit_m() > 0.05 * height_of(fixes_, 0)) return SpotStatus::moved;
   leave_out_strays();
   locate(PositionerOptions().max_residual_share);
-  tell_heights_apart(fixes_);
+  tell_heights_apart(fixes_, height_noise_m_);
   return turn(false);
 }
 
@@ -86,6 +89,7 @@ void SpotSearch::locate(double max_residual_share) {
   const Positioner positioner(map_, calibration_, options);
   fixes_ = {};
   statuses_.clear();
+  std::vector<Fix> found;
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     if (strays_.contains(i)) continue;
     const Fix fix = positioner.locate(frames_[i].detections);
@@ -95,7 +99,25 @@ void SpotSearch::locate(double max_residual_share) {
     const Pose& pose = fix.estimate.pose;
     fixes_.frames.push_back(i);
     fixes_.fixes.push_back({pose, lamps_z_m_ - pose.position_m.z(), 0});
+    found.push_back(fix);
   }
+  height_noise_m_ = height_noise_m(found);
+}
+
+/// What the residuals let expect, a tilt that is not corrected yet among them.
+double SpotSearch::height_noise_m(const std::vector<Fix>& fixes) const {
+  std::vector<double> of_two, of_more;
+  for (const Fix& fix : fixes) {
+    const double of_1px_m = std::sqrt(fix.estimate.covariance(2, 2));
+    const double n = fix.lamps;
+    if (fix.lamps > 2) {
+      of_more.push_back(of_1px_m * fix.residual_px * std::sqrt(n / (2 * n - 4)));
+    } else {
+      of_two.push_back(of_1px_m * noise_px_);
+    }
+  }
+  if (!of_more.empty()) return upper_median(std::move(of_more));
+  return of_two.empty() ? 0 : upper_median(std::move(of_two));
 }
 
 SpotStatus SpotSearch::turn(bool lever_arm) {

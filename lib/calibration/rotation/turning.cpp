@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "geometry/median.h"
 #include "geometry/plane.h"
 
 namespace vlp {
@@ -37,7 +38,7 @@ Turning fit_turning(std::span<const TurningFix> fixes, std::size_t spots, bool l
     for (std::size_t k = 0; k < fixes.size(); ++k) {
       turning.residuals_m[k] = errors.segment<2>(static_cast<Eigen::Index>(2 * k)).norm();
     }
-    const double scale_m = std::max(2 * median_of(turning.residuals_m), 1e-9);
+    const double scale_m = std::max(2 * upper_median(turning.residuals_m), 1e-9);
     for (std::size_t k = 0; k < fixes.size(); ++k) {
       roots_of_weights.segment<2>(static_cast<Eigen::Index>(2 * k))
           .setConstant(1 / std::hypot(1, turning.residuals_m[k] / scale_m));
@@ -62,13 +63,6 @@ double arc_of(std::vector<double> angles_rad) {
     widest = std::max(widest, angles_rad[i] - angles_rad[i - 1]);
   }
   return turn - widest;
-}
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace vlp

@@ -38,7 +38,4 @@ Turning fit_turning(std::span<const TurningFix> fixes, std::size_t spots, bool l
 /// The full turn less the widest gap between neighbouring angles; zero for fewer than two.
 double arc_of(std::vector<double> angles_rad);
 
-/// The middle one, of an even number the upper; zero of none.
-double median_of(std::vector<double> values);
-
 }  // namespace vlp

@@ -33,7 +33,7 @@ State start_from(const SpotCaptures& spot) {
   return state;
 }
 
-void add_residuals(RobustFit& fit, const SpotCaptures& spot, State& state) {
+void add_residuals(RobustFit& fit, const SpotCaptures& spot, bool lever_arm, State& state) {
   for (const SpotSighting& sighting : spot.sightings) {
     const std::size_t height = spot.captures[sighting.capture].height;
     fit.add(AxisResidual::create(sighting, spot.lamps[sighting.lamp].position_m.z()),
@@ -43,7 +43,7 @@ void add_residuals(RobustFit& fit, const SpotCaptures& spot, State& state) {
   // Nothing shows where the world is, how it is turned, and, of lamps at one height, how large.
   fit.hold(state.axes_m.front().data());
   fit.hold_one_of(pointers_to(state.yaws_rad));
-  if (state.axes_m.size() == 1) fit.hold(state.lever_arm_m.data());
+  if (!lever_arm) fit.hold(state.lever_arm_m.data());
 }
 
 /// Gives the world the size that the map has. True when it had that already.
@@ -66,14 +66,26 @@ bool scale_to_map(const SpotCaptures& spot, State& state) {
   return std::abs(scale - 1) < same;
 }
 
-}  // namespace
+bool lamps_at_several_heights(const SpotCaptures& spot) {
+  const auto [lowest, highest] = std::minmax_element(
+      spot.lamps.begin(), spot.lamps.end(),
+      [](const Lamp& a, const Lamp& b) { return a.position_m.z() < b.position_m.z(); });
+  const double height_m = highest->position_m.z() - spot.heights.front().z_m;
+  return highest->position_m.z() - lowest->position_m.z() > kLeastGap * height_m;
+}
 
-RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera) {
-  assert(spot.status == SpotStatus::ok);
-  const bool lever_arm = spot.heights.size() > 1;
+bool tells_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
+  if (!center.covariance || !center.lever_arm_covariance) return false;
+  const double height_m = spot.lamps.front().position_m.z() - spot.heights.front().z_m;
+  return std::sqrt(center.lever_arm_covariance->diagonal().maxCoeff()) <= kLooseLeverArm * height_m;
+}
+
+/// With the lever arm estimated, or held at zero.
+RotationFit fit_axis(const SpotCaptures& spot, const Camera& camera, bool lever_arm) {
   State state = start_from(spot);
+  if (!lever_arm) state.lever_arm_m.setZero();
   RobustFit fit;
-  add_residuals(fit, spot, state);
+  add_residuals(fit, spot, lever_arm, state);
   RotationFit result;
   constexpr int rounds = 10;
   for (int round = 0; round < rounds; ++round) {
@@ -88,13 +100,27 @@ RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera) {
     result.center.lever_arm_covariance = fit.covariance(state.lever_arm_m.data());
   }
   describe(result, fit, spot);
-  // The method is exact: what is left is noise, or the captures are of no turn about one axis.
-  constexpr double most_share = 0.01, most_times = 5;
-  const double most_px =
-      std::max(most_share * camera.intrinsics[0], most_times * spot.stated_px.value_or(0));
-  if (result.residual_px > most_px) return {};
   result.yaws_rad = std::move(state.yaws_rad);
   return result;
+}
+
+}  // namespace
+
+RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera) {
+  assert(spot.status == SpotStatus::ok);
+  RotationFit result;
+  if (spot.heights.size() > 1) {
+    result = fit_axis(spot, camera, true);
+  } else {
+    if (lamps_at_several_heights(spot)) result = fit_axis(spot, camera, true);
+    if (!tells_lever_arm(result.center, spot)) result = fit_axis(spot, camera, false);
+  }
+  if (!result.converged) return result;
+  // The method is exact: what is left is noise, or the captures are of no turn about one axis.
+  constexpr double most_share = 0.007, most_times = 4;
+  const double most_px =
+      std::max(most_share * camera.intrinsics[0], most_times * spot.stated_px.value_or(0));
+  return result.residual_px > most_px ? RotationFit() : result;
 }
 
 }  // namespace vlp

@@ -6,6 +6,8 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
+#include "detection/boards/tag_edges.h"
+#include "detection/boards/tag_families.h"
 #include "detection/boards/tag_finder.h"
 #include "detection/boards/touching_tags.h"
 #include "rig/board_layout.h"
@@ -34,6 +36,15 @@ cv::Mat1f smooth(const cv::Mat1b& levels) {
   return smoothed;
 }
 
+/// A tag's border is as wide as a bit; outside is the gap, but for families with bits around the
+/// border.
+EdgeStripes stripes_of(const Board& board) {
+  const TagFamily family = tag_family(board.family);
+  const double width = family->width_at_border + 2 * (board.border_bits - 1);
+  const double bit = 1 / width;
+  return {board.border_bits * bit, family->reversed_border ? bit : board.tag_spacing};
+}
+
 bool inside(const SeenTag& tag, const cv::Mat& image) {
   return std::all_of(tag.corners_px.begin(), tag.corners_px.end(), [&](const auto& corner) {
     return corner.x() >= kMargin && corner.y() >= kMargin && corner.x() < image.cols - kMargin &&
@@ -46,10 +57,19 @@ bool inside(const SeenTag& tag, const cv::Mat& image) {
 BoardDetector::BoardDetector(const Board& board)
     : finder_(board.corner_squares ? aruco_finder(board) : apriltag_finder(board)) {
   for (const BoardTag& tag : board_layout(board)) ids_.insert(tag.id);
-  if (board.corner_squares) touching_ = std::make_unique<TouchingTags>(board);
+  if (board.corner_squares) {
+    touching_ = std::make_unique<TouchingTags>(board);
+  } else {
+    stripes_ = std::make_unique<EdgeStripes>(stripes_of(board));
+  }
 }
 
 BoardDetector::~BoardDetector() = default;
+
+std::optional<SeenTag> BoardDetector::exact(const SeenTag& tag, const GreyLevels& image) const {
+  if (touching_) return touching_->exact(tag, image);
+  return with_exact_edges(tag, image.sharp, *stripes_).value_or(tag);
+}
 
 SeenBoard BoardDetector::detect(const cv::Mat& image) const {
   const cv::Mat1b levels = eight_bits(image);
@@ -62,14 +82,14 @@ SeenBoard BoardDetector::detect(const cv::Mat& image) const {
       ++seen.foreign;
     }
   }
-  const cv::Mat1f smoothed = touching_ ? smooth(levels) : cv::Mat1f();
+  const GreyLevels grey{levels, touching_ ? smooth(levels) : cv::Mat1f()};
   for (const auto& [id, same] : found) {
     if (same.size() > 1) continue;
-    const auto tag = touching_ ? touching_->exact(same.front(), smoothed) : same.front();
+    const auto tag = exact(same.front(), grey);
     if (tag) seen.tags.push_back(*tag);
   }
   if (touching_) {
-    for (const SeenTag& tag : touching_->others(seen.tags, smoothed)) {
+    for (const SeenTag& tag : touching_->others(seen.tags, grey)) {
       if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
     }
   }

@@ -6,6 +6,7 @@
 #include <array>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -14,7 +15,9 @@
 namespace vlp {
 
 class TagFinder;
+struct EdgeStripes;
 class TouchingTags;
+struct GreyLevels;
 
 /// A tag as an image shows it.
 struct SeenTag {
@@ -34,11 +37,11 @@ struct SeenBoard {
   int unusable = 0;
 };
 
-/// Finds a board's tags. Boards without corner squares by libapriltag, whose fit of lines to the
-/// tag's edges gives the corners; the gap between tags has to be white. Boards with corner squares,
-/// where tags touch, by OpenCV's ArUco module and from one to the
-/// next; their corners are saddle points (saddle_point()).
-/// Safe to share between threads.
+/// Finds a board's tags. Boards without corner squares by libapriltag, with corners where the
+/// tag's edges cross (with_exact_edges()), or its own where that fails; the gap between tags has to
+/// be white. Boards with corner squares, where tags touch, by OpenCV's ArUco module and from one to
+/// the next, with corners where the squares' edges cross (edge_crossing()). Safe to share between
+/// threads.
 class BoardDetector {
  public:
   /// Throws std::invalid_argument when the detector that the board needs lacks the family.
@@ -51,8 +54,13 @@ class BoardDetector {
   SeenBoard detect(const cv::Mat& image) const;
 
  private:
+  /// With exact corners; nothing when they cannot be found.
+  std::optional<SeenTag> exact(const SeenTag& tag, const GreyLevels& image) const;
+
   std::unique_ptr<TagFinder> finder_;
   std::set<int> ids_;
+  /// Of boards without corner squares.
+  std::unique_ptr<EdgeStripes> stripes_;
   /// Of boards with corner squares.
   std::unique_ptr<TouchingTags> touching_;
 };

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "detection/boards/edge_crossing.h"
 #include "detection/boards/saddle_point.h"
 #include "detection/boards/tag_bits.h"
 #include "geometry/homography.h"
@@ -33,17 +34,26 @@ TouchingTags::TouchingTags(const Board& board)
   free_share_ = std::min(board.tag_spacing, border_bits_ / width);
 }
 
-std::optional<SeenTag> TouchingTags::exact(SeenTag tag, const cv::Mat1f& smoothed) const {
+std::optional<SeenTag> TouchingTags::exact(SeenTag tag, const GreyLevels& image) const {
   constexpr int least_px = 2, most_px = 5;
+  constexpr double least_fit_px = 2.5, most_fit_px = 8, fit_share = 0.75;
   const double free_px = shortest_edge_px(tag) * free_share_;
   const int radius_px = std::clamp(static_cast<int>(free_px / 2), least_px, most_px);
   const int reach_px = std::max(least_px, static_cast<int>(free_px * 0.8));
   for (auto& corner : tag.corners_px) {
-    const auto found = saddle_point(smoothed, corner, reach_px, radius_px);
+    const auto found = saddle_point(image.smoothed, corner, reach_px, radius_px);
     if (!found) return {};
     corner = *found;
   }
-  if (!shows_its_bits(tag, smoothed, *family_, border_bits_)) return {};
+  const double fit_px = std::clamp(free_px * fit_share, least_fit_px, most_fit_px);
+  const auto saddles = tag.corners_px;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto found = edge_crossing(
+        image.sharp, saddles[k],
+        {saddles[(k + 1) % 4] - saddles[k], saddles[(k + 3) % 4] - saddles[k]}, fit_px);
+    if (found) tag.corners_px[k] = *found;
+  }
+  if (!shows_its_bits(tag, image.smoothed, *family_, border_bits_)) return {};
   return tag;
 }
 
@@ -80,7 +90,7 @@ std::optional<SeenTag> TouchingTags::expected(const BoardTag& missing,
 }
 
 std::vector<SeenTag> TouchingTags::others(const std::vector<SeenTag>& tags,
-                                          const cv::Mat1f& smoothed) const {
+                                          const GreyLevels& image) const {
   std::vector<SeenTag> all = tags;
   for (bool more = true; more;) {
     more = false;
@@ -89,7 +99,7 @@ std::vector<SeenTag> TouchingTags::others(const std::vector<SeenTag>& tags,
                                      [&](const SeenTag& tag) { return tag.id == place.id; });
       if (known) continue;
       const auto guess = expected(place, all);
-      const auto tag = guess ? exact(*guess, smoothed) : std::nullopt;
+      const auto tag = guess ? exact(*guess, image) : std::nullopt;
       if (!tag) continue;
       all.push_back(*tag);
       more = true;

@@ -12,18 +12,24 @@
 
 namespace vlp {
 
+/// An image, and smoothed: see saddle_point().
+struct GreyLevels {
+  cv::Mat1b sharp;
+  cv::Mat1f smoothed;
+};
+
 /// The exact corners of tags that black squares touch, and the tags that were not found at first.
 class TouchingTags {
  public:
   explicit TouchingTags(const Board& board);
 
-  /// The tag with its corners at the saddle points near them; nothing when one is not found, or
-  /// when the bits between them are not the tag's. smoothed: see saddle_point().
-  std::optional<SeenTag> exact(SeenTag tag, const cv::Mat1f& smoothed) const;
+  /// The tag with its corners where edges cross near the saddle points near them; nothing when one
+  /// is not found, or when the bits between them are not the tag's.
+  std::optional<SeenTag> exact(SeenTag tag, const GreyLevels& image) const;
 
   /// The tags of the board that are not among `tags`, which are exact, but lie where a homography
   /// of the nearest of these takes them, as far as they can be made exact.
-  std::vector<SeenTag> others(const std::vector<SeenTag>& tags, const cv::Mat1f& smoothed) const;
+  std::vector<SeenTag> others(const std::vector<SeenTag>& tags, const GreyLevels& image) const;
 
  private:
   std::optional<SeenTag> expected(const BoardTag& missing, const std::vector<SeenTag>& tags) const;

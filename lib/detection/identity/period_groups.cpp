@@ -5,24 +5,21 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
+
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 PeriodGroup group_of(const std::vector<double>& log_periods, std::optional<int> lamp) {
-  PeriodGroup group{median_of(log_periods), 0, static_cast<int>(log_periods.size()), lamp};
+  PeriodGroup group{upper_median(log_periods), 0, static_cast<int>(log_periods.size()), lamp};
   std::vector<double> offs;
   offs.reserve(log_periods.size());
   for (const double value : log_periods) offs.push_back(std::abs(value - group.log_period));
   // A median scatters 1.25 times as much as a mean. Three lights or less do not show their scatter.
   constexpr double single = 0.003, least = 1e-5, sd_of_mad = 1.4826, sd_of_median = 1.2533;
-  const double scatter = group.lights > 3 ? sd_of_mad * median_of(std::move(offs)) : single;
+  const double scatter = group.lights > 3 ? sd_of_mad * upper_median(std::move(offs)) : single;
   group.sd = std::max(least, sd_of_median * scatter / std::sqrt(double(group.lights)));
   return group;
 }

@@ -10,6 +10,7 @@
 
 #include "detection/lights/robust_circle.h"
 #include "detection/lights/robust_ellipse.h"
+#include "geometry/median.h"
 #include "rig/detection.h"
 
 namespace vlp {
@@ -22,17 +23,11 @@ double extent(const std::vector<Eigen::Vector2d>& points) {
   return box.diagonal().norm();
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double median_rise_px(const std::vector<EdgePoint>& outline) {
   std::vector<double> rises;
   rises.reserve(outline.size());
   for (const EdgePoint& edge : outline) rises.push_back(edge.rise_px);
-  return median(std::move(rises));
+  return upper_median(std::move(rises));
 }
 
 /// The points of the circle, but those next to a point that is not: where the edge of what hides a

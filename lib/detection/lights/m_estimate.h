@@ -8,7 +8,10 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
+
+#include "geometry/median.h"
 
 namespace vlp {
 
@@ -50,11 +53,10 @@ std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights,
     if (size < 4 * tolerance) sizes.push_back(size);
   }
   if (sizes.size() < least) return std::nullopt;
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
   constexpr double sigma_from_median = 1.4826, tukey = 4.685;
+  const double median = upper_median(std::move(sizes));
   const double cut =
-      std::min(4 * tolerance, tukey * std::max(sigma_from_median * *middle, tolerance / 10));
+      std::min(4 * tolerance, tukey * std::max(sigma_from_median * median, tolerance / 10));
 
   MEstimateStep<N> result{{}, {}, std::vector<bool>(weights.size()), 0, 0};
   Eigen::Matrix<double, N, N> normal = Eigen::Matrix<double, N, N>::Zero();

@@ -11,29 +11,6 @@
 namespace vlp {
 namespace {
 
-// The rotation that lines two lenses up takes some of their difference away, the rest should be
-// what is reported.
-TEST(ProjectionUncertainty, IsTheScatterOfTheSolutions) {
-  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
-  constexpr int seeds = 20;
-  double found = 0, reported = 0;
-  for (int seed = 0; seed < seeds; ++seed) {
-    Random random(100 + static_cast<std::uint64_t>(seed));
-    const IntrinsicsSolution solution = solve_intrinsics(views.input(25, random, 0.1));
-    ASSERT_TRUE(solution.ok());
-    const ProjectionUncertainty uncertainty(solution);
-    ASSERT_TRUE(uncertainty.determined());
-    const auto sigma = [&](const Eigen::Vector2d& pixel) { return uncertainty.worst_px(pixel); };
-    found += projection_difference(views.lens, solution.lens(), views.imager_px, sigma)->mean_px;
-    double sum = 0;
-    const auto pixels = pixel_grid(views.imager_px);
-    for (const auto& pixel : pixels) sum += std::sqrt(uncertainty.covariance(pixel).trace());
-    reported += sum / static_cast<double>(pixels.size());
-  }
-  EXPECT_GT(found / reported, 0.4);
-  EXPECT_LT(found / reported, 0.9);
-}
-
 TEST(ProjectionUncertainty, IsLargeForViewsFromTheFront) {
   SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(3);
@@ -55,8 +32,9 @@ TEST(CalibrationReport, HalvesAgreeAsTheUncertaintySays) {
   ASSERT_TRUE(solution.ok());
   const CalibrationReport report = report_on(solution, input);
   ASSERT_TRUE(report.halves);
-  EXPECT_LT(report.halves->mean_px, 6 * report.uncertainty_mean_px);
-  EXPECT_GT(report.halves->mean_px, 0.3 * report.uncertainty_mean_px);
+  // Twice as far apart as a lens from the truth, by a factor that a few freedoms leave open.
+  EXPECT_LT(report.halves->rms_px, 2.5 * 2 * report.expected_rms_px);
+  EXPECT_GT(report.halves->rms_px, 0.3 * 2 * report.expected_rms_px);
   EXPECT_TRUE(gates_not_met({}, solution, report).empty());
   EXPECT_EQ(gates_not_met({0.01, 0.001, 0.001}, solution, report).size(), 3U);
 }

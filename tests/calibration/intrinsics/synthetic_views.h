@@ -81,7 +81,7 @@ struct SyntheticViews {
   }
 
   IntrinsicsInput input(int views, Random& random, double noise_px) const {
-    IntrinsicsInput input{BoardLattice(board), {}, imager_px, lens.model(), false};
+    IntrinsicsInput input{BoardLattice(board), {}, imager_px, lens.model()};
     while (static_cast<int>(input.views.size()) < views) {
       const SeenBoard seen = random_view(random, noise_px);
       if (input.lattice.enough(seen)) input.views.push_back(input.lattice.corners(seen));

@@ -9,16 +9,10 @@
 #include "calibration/rotation/spot.h"
 #include "calibration/rotation/turning_axis.h"
 #include "geometry/angles.h"
-#include "positioning/positioner.h"
 #include "support/near.h"
 
 namespace vlp {
 namespace {
-
-SpotStatus status_of(const SpotScene& scene, const std::vector<Frame>& frames) {
-  return spot_captures(frames, scene.map, scene.camera).status;
-}
-SpotStatus status_of(const SpotScene& scene) { return status_of(scene, scene.frames()); }
 
 SpotScene tilted_scene() {
   SpotScene scene;
@@ -82,73 +76,6 @@ TEST(SpotCaptures, TakesAQuarterTurn) {
   expect_axis(fit(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(SpotCaptures, RefusesTooSmallAnArc) {
-  SpotScene scene;
-  scene.arc_rad = rad_from_deg(80);
-  EXPECT_EQ(status_of(scene), SpotStatus::short_arc);
-}
-
-TEST(SpotCaptures, RefusesCapturesThatAreAlike) {
-  SpotScene scene;
-  scene.arc_rad = 1e-3;
-  EXPECT_EQ(status_of(scene), SpotStatus::alike);
-  Random random(3);
-  EXPECT_EQ(status_of(scene, with_noise(scene.frames(0.3), random)), SpotStatus::alike);
-}
-
-TEST(SpotCaptures, RefusesTooFewCaptures) {
-  SpotScene scene;
-  for (const int captures : {1, 2}) {
-    scene.captures = captures;
-    EXPECT_EQ(status_of(scene), SpotStatus::too_few_captures) << captures;
-  }
-  EXPECT_EQ(status_of(scene, {}), SpotStatus::other_map);
-}
-
-TEST(SpotCaptures, RefusesOneLamp) {
-  SpotScene scene;
-  auto frames = scene.frames();
-  for (Frame& frame : frames) {
-    std::erase_if(frame.detections, [](const Detection& one) { return one.lamp != 7; });
-  }
-  EXPECT_EQ(status_of(scene, frames), SpotStatus::too_few_lamps);
-  scene.map.lamps.resize(1);
-  EXPECT_EQ(status_of(scene), SpotStatus::too_few_lamps);
-  // Two in all, but never two at a time.
-  SpotScene in_turn;
-  frames = in_turn.frames();
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    std::erase_if(frames[i].detections,
-                  [&](const Detection& one) { return one.lamp != (i % 2 == 0 ? 7 : 8); });
-  }
-  EXPECT_EQ(status_of(in_turn, frames), SpotStatus::too_few_lamps);
-}
-
-TEST(SpotCaptures, RefusesTheLampsOfAnotherMap) {
-  SpotScene scene;
-  const auto frames = scene.frames();
-  for (Lamp& lamp : scene.map.lamps) lamp.id += 100;
-  EXPECT_EQ(status_of(scene, frames), SpotStatus::other_map);
-  scene = {};
-  for (Lamp& lamp : scene.map.lamps) lamp.position_m.x() *= -1;  // as seen from below
-  EXPECT_EQ(status_of(scene, frames), SpotStatus::other_map);
-  scene = {};
-  std::swap(scene.map.lamps[1].position_m, scene.map.lamps[6].position_m);
-  std::swap(scene.map.lamps[0].position_m, scene.map.lamps[5].position_m);
-  std::swap(scene.map.lamps[2].position_m, scene.map.lamps[4].position_m);
-  EXPECT_EQ(status_of(scene, frames), SpotStatus::other_map);
-}
-
-TEST(SpotCaptures, RefusesADrive) {
-  SpotScene scene;
-  std::vector<Frame> frames;
-  for (int k = 0; k < 12; ++k) {
-    scene.axis_m = {-0.3 + 0.05 * k, 0.1 * (k % 3)};
-    frames.push_back(scene.frames()[static_cast<std::size_t>(k)]);
-  }
-  EXPECT_EQ(status_of(scene, frames), SpotStatus::moved);
-}
-
 TEST(SpotCaptures, LeavesOutAHeightWithTooFewCapturesAndSaysSo) {
   const SpotScene scene = tilted_scene();
   auto frames = scene.frames();
@@ -210,24 +137,6 @@ TEST(SpotCaptures, ErrorsOfTheMapAlongTheCeilingDoNotMatter) {
         Eigen::Vector2d(random.uniform(-5e-3, 5e-3), random.uniform(-5e-3, 5e-3));
   }
   expect_axis(fit(scene, frames), scene, 0.01);
-}
-
-/// What the axis at one height is good for, with a lever arm: fixes of the axis at that height.
-TEST(SpotCaptures, AtOneHeightFixesAreOfTheAxis) {
-  SpotScene scene = tilted_scene();
-  scene.heights_m = {0};
-  const RotationFit found = fit(scene, scene.frames());
-  ASSERT_TRUE(found.converged);
-  Calibration calibration;
-  calibration.camera = scene.camera;
-  calibration.rotation_center = found.center;
-  const Positioner positioner(scene.map, calibration);
-  for (const Frame& frame : scene.frames()) {
-    const Fix fix = positioner.locate(frame.detections);
-    ASSERT_TRUE(fix.ok());
-    const Eigen::Vector2d place_m = fix.estimate.pose.position_m.head<2>();
-    EXPECT_THAT(place_m, IsNear(scene.axis_m, 0.1 * scene.lever_arm_m.norm()));
-  }
 }
 
 }  // namespace

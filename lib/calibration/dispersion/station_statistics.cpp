@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/dispersion/station_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/dispersion/offset_separation.h"
+#include "geometry/angles.h"
+#include "geometry/median.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kFar = 0.2;  // of the lamps' height
+
+}  // namespace
+
+double TypicalFix::yaw_variety() const {
+  return std::sqrt(std::max(0.0, 1 - heading.squaredNorm()));
+}
+
+bool TypicalFix::at_one_yaw() const {
+  constexpr double one_yaw_rad = rad_from_deg(10);
+  return yaw_variety() < std::sin(one_yaw_rad);
+}
+
+TypicalFix typical_of(const OptionalFixes& fixes, const std::vector<bool>& used) {
+  TypicalFix typical;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (!fixes[i] || !used[i]) continue;
+    typical.heading += Eigen::Vector2d(std::cos(fixes[i]->yaw_rad), std::sin(fixes[i]->yaw_rad));
+    typical.height_m += fixes[i]->height_m;
+    ++typical.count;
+  }
+  typical.heading /= typical.count;
+  typical.height_m /= typical.count;
+  return typical;
+}
+
+bool at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used) {
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!fixes[i] || !used[i]) continue;
+    used[i] = false;
+    if (typical_of(fixes, used).at_one_yaw()) return true;
+    used[i] = true;
+  }
+  return false;
+}
+
+bool far_from_all(const OptionalFixes& fixes) {
+  return std::all_of(fixes.begin(), fixes.end(), [](const auto& fix) {
+    return !fix || fix->error_m.norm() > kFar * fix->height_m;
+  });
+}
+
+std::vector<bool> near_median(const OptionalFixes& fixes) {
+  std::vector<double> x, y, squares;
+  for (const auto& fix : fixes) {
+    if (!fix) continue;
+    x.push_back(fix->error_m.x());
+    y.push_back(fix->error_m.y());
+  }
+  const Eigen::Vector2d middle_m(upper_median(x), upper_median(y));
+  for (const auto& fix : fixes) {
+    if (fix) squares.push_back((fix->error_m - middle_m).squaredNorm());
+  }
+  const double limit = kOutlierVariances * robust_variance(squares);
+  std::vector<bool> near;
+  near.reserve(fixes.size());
+  for (const auto& fix : fixes) {
+    near.push_back(fix && (fix->error_m - middle_m).squaredNorm() <= limit);
+  }
+  return near;
+}
+
+}  // namespace vlp

@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "camera/lens.h"
+
+namespace vlp {
+
+/// What projection_difference() between a lens and the true one should be.
+struct ExpectedDifference {
+  /// Root of the expected mean square over the image, per axis.
+  double rms_px;
+  /// How many independent terms of like size the mean square has: it scatters by sqrt(2 / freedoms)
+  /// of itself.
+  double freedoms;
+};
+
+/// From the covariance of the intrinsics, to first order, for even weights over the image. It is
+/// less than the projection uncertainty: that counts, too, how far the camera as a whole turns
+/// against the boards, which lining two lenses up takes away.
+ExpectedDifference expected_difference(const Lens& lens, const std::array<int, 2>& imager_px,
+                                       const Eigen::MatrixXd& covariance);
+
+}  // namespace vlp

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/edge_crossing.h"
+
+#include <ceres/tiny_solver.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "detection/boards/blurred_step.h"
+
+namespace vlp {
+namespace {
+
+struct Pixel {
+  Eigen::Vector2d from_guess;
+  double grey;
+};
+
+/// Parameters: corner (from the guess), the angles of the edges, blur, middle, contrast, light, and
+/// how much the edges bend.
+struct Crossing {
+  using Scalar = double;
+  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 11 };
+  using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
+
+  const std::vector<Pixel>& pixels;
+
+  int NumResiduals() const { return static_cast<int>(pixels.size()); }
+
+  bool operator()(const double* p, double* residuals, double* jacobian) const {
+    const Eigen::Vector2d corner(p[0], p[1]), light(p[7], p[8]);
+    const Eigen::Vector2d along1(std::cos(p[2]), std::sin(p[2]));
+    const Eigen::Vector2d along2(std::cos(p[3]), std::sin(p[3]));
+    const Eigen::Vector2d normal1(-along1.y(), along1.x()), normal2(-along2.y(), along2.x());
+    const auto rows = static_cast<Eigen::Index>(pixels.size());
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const auto& [from_guess, grey] = pixels[static_cast<std::size_t>(i)];
+      const Eigen::Vector2d at = from_guess - corner;
+      const double u1 = along1.dot(at), u2 = along2.dot(at);
+      const double v1 = normal1.dot(at), v2 = normal2.dot(at);
+      const BlurredStep one(v1 - p[9] * u1 * u1, p[4]), two(v2 - p[10] * u2 * u2, p[4]);
+      const double lit = 1 + light.dot(at), pattern = one.value * two.value;
+      const double unlit = p[5] + p[6] * pattern;
+      residuals[i] = unlit * lit - grey;
+      if (jacobian == nullptr) continue;
+      const double by_one = lit * p[6] * one.slope * two.value;
+      const double by_two = lit * p[6] * one.value * two.slope;
+      const Eigen::Vector2d by_corner = by_one * (2 * p[9] * u1 * along1 - normal1) +
+                                        by_two * (2 * p[10] * u2 * along2 - normal2) -
+                                        unlit * light;
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>> all(jacobian, rows,
+                                                                            NUM_PARAMETERS);
+      all.row(i) << by_corner.transpose(), -by_one * u1 * (1 + 2 * p[9] * v1),
+          -by_two * u2 * (1 + 2 * p[10] * v2),
+          lit * p[6] * (one.by_blur * two.value + one.value * two.by_blur), lit, lit * pattern,
+          unlit * at.transpose(), -by_one * u1 * u1, -by_two * u2 * u2;
+    }
+    return true;
+  }
+};
+
+std::vector<Pixel> pixels_around(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
+                                 double radius_px) {
+  const Eigen::Vector2i low = (guess_px.array() - radius_px).ceil().cast<int>().max(0);
+  const Eigen::Vector2i high = (guess_px.array() + radius_px)
+                                   .floor()
+                                   .cast<int>()
+                                   .min(Eigen::Array2i(image.cols - 1, image.rows - 1));
+  std::vector<Pixel> pixels;
+  for (int row = low.y(); row <= high.y(); ++row) {
+    for (int column = low.x(); column <= high.x(); ++column) {
+      const Eigen::Vector2d from_guess = Eigen::Vector2d(column, row) - guess_px;
+      if (from_guess.norm() > radius_px) continue;
+      pixels.push_back({from_guess, static_cast<double>(image(row, column))});
+    }
+  }
+  return pixels;
+}
+
+/// Middle and contrast that go with the other parameters.
+void start_levels(const std::vector<Pixel>& pixels, Crossing::Parameters& p) {
+  p[5] = 0;
+  p[6] = 1;
+  const Crossing crossing{pixels};
+  Eigen::VectorXd pattern(crossing.NumResiduals()), grey(crossing.NumResiduals());
+  crossing(p.data(), pattern.data(), nullptr);
+  for (Eigen::Index i = 0; i < grey.size(); ++i) grey[i] = pixels[static_cast<std::size_t>(i)].grey;
+  pattern += grey;  // from the residuals
+  const Eigen::VectorXd swing = pattern.array() - pattern.mean();
+  p[6] = swing.dot(grey) / std::max(swing.squaredNorm(), 1e-9);
+  p[5] = grey.mean() - p[6] * pattern.mean();
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector2d> edge_crossing(const cv::Mat1b& image,
+                                             const Eigen::Vector2d& guess_px,
+                                             const std::array<Eigen::Vector2d, 2>& along,
+                                             double radius_px) {
+  constexpr std::size_t least_pixels = 16;
+  constexpr int most_steps = 15;
+  constexpr double usual_blur_px = 0.8, least_blur_px = 0.05, most_moved_px = 1.5;
+  constexpr double enough = 1e-3;  // grey levels squared
+  constexpr double least_contrast = 3, unlike = 0.35;
+  const auto pixels = pixels_around(image, guess_px, radius_px);
+  if (pixels.size() < least_pixels) return {};
+  Crossing::Parameters p = Crossing::Parameters::Zero();
+  p[2] = std::atan2(along[0].y(), along[0].x());
+  p[3] = std::atan2(along[1].y(), along[1].x());
+  p[4] = usual_blur_px;
+  start_levels(pixels, p);
+
+  const Crossing crossing{pixels};
+  ceres::TinySolver<Crossing> solver;
+  solver.options.max_num_iterations = most_steps;
+  solver.options.function_tolerance = enough;
+  solver.Solve(crossing, &p);
+  const double rms = std::sqrt(2 * solver.summary.final_cost / static_cast<double>(pixels.size()));
+  const bool good = p.allFinite() && p.head<2>().norm() < most_moved_px && p[4] > least_blur_px &&
+                    p[4] < radius_px && std::abs(p[6]) > least_contrast &&
+                    rms < unlike * std::abs(p[6]);
+  if (!good) return {};
+  return guess_px + p.head<2>();
+}
+
+}  // namespace vlp

@@ -1,0 +1,14 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "lamp_map.h"
+
+namespace vlp {
+
+/// The lamp with this id; null when there is none.
+const Lamp* find_lamp(std::span<const Lamp> lamps, int id);
+
+}  // namespace vlp

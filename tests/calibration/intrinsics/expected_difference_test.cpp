@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/expected_difference.h"
+
+#include <gtest/gtest.h>
+
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
+#include "calibration/intrinsics/synthetic_views.h"
+#include "calibration/intrinsics/view_jackknife.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kSeeds = 20;
+constexpr double kNoise = 0.1;
+
+/// Mean squares, over the seeds, of what lenses are apart from the truth and of what is expected.
+struct Scatter {
+  double found = 0, by_noise = 0, by_views = 0, freedoms = 0;
+};
+
+/// Each view's board may be bent otherwise, which no model of the solver knows.
+Scatter scatter(double bent_m) {
+  Scatter sum;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    Random random(100 + static_cast<std::uint64_t>(seed));
+    SyntheticViews views{synthetic_board(seed % 2 == 1), synthetic_lens()};
+    IntrinsicsInput input = views.input(0, random, 0);
+    while (input.views.size() < 25) {
+      views.warp_m = bent_m * Eigen::Vector2d(random.normal(), random.normal());
+      input.views.push_back(views.input(1, random, kNoise).views[0]);
+    }
+    const IntrinsicsSolution solution = solve_intrinsics(input);
+    EXPECT_TRUE(solution.ok());
+    const Lens lens = solution.lens();
+    const auto difference =
+        projection_difference(views.lens, lens, views.imager_px, [](const auto&) { return 1; });
+    const auto noise = expected_difference(lens, views.imager_px,
+                                           ProjectionUncertainty(solution).intrinsics_covariance());
+    const auto by_views = expected_difference(lens, views.imager_px, covariance_by_views(solution));
+    sum.found += difference->rms_px * difference->rms_px / kSeeds;
+    sum.by_noise += noise.rms_px * noise.rms_px / kSeeds;
+    sum.by_views += by_views.rms_px * by_views.rms_px / kSeeds;
+    sum.freedoms += noise.freedoms;
+  }
+  return sum;
+}
+
+// The mean square of so many terms scatters by sqrt(2 / freedoms); three times that.
+TEST(ExpectedDifference, IsWhatLensesAreApartFromTheTruth) {
+  const Scatter of = scatter(0);
+  const double sd = std::sqrt(2 / of.freedoms);
+  EXPECT_LT(sd, 0.3);
+  EXPECT_NEAR(of.found / of.by_noise, 1, 3 * sd);
+  // Views carry independent noise here, so that leaving them out tells the same; the jackknife is
+  // somewhat too large.
+  EXPECT_GT(of.by_views / of.by_noise, 0.7);
+  EXPECT_LT(of.by_views / of.by_noise, 2.5);
+}
+
+TEST(ExpectedDifference, ByViewsCountsWhatAViewsCornersHaveInCommon) {
+  const Scatter of = scatter(0.0005);
+  const double sd = std::sqrt(2 / of.freedoms);
+  EXPECT_GT(of.found / of.by_noise, 1 + 3 * sd);  // noise alone does not explain it
+  EXPECT_LT(of.found / of.by_views, 1 + 3 * sd);
+  EXPECT_GT(of.found / of.by_views, 0.3);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Captures at several heights, or at one: which are told apart, and what that is good for.
+#include <gmock/gmock.h>
+
+#include "calibration/rotation/spot.h"
+#include "calibration/rotation/turning_axis.h"
+#include "geometry/angles.h"
+#include "positioning/positioner.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kSeeds = 20;
+
+SpotScene tilted_scene() {
+  SpotScene scene;
+  scene.tilt_rad = rad_from_deg(1.5);
+  scene.lever_arm_m = {0.012, -0.009};
+  return scene;
+}
+
+/// A ceiling of 2.6 m, where 10 cm are less than 4 % of the distance from the lamps.
+SpotScene high_scene() {
+  SpotScene scene = tilted_scene();
+  for (Lamp& lamp : scene.map.lamps) lamp.position_m *= 2.6 / 1.6;
+  return scene;
+}
+
+SpotCaptures captures_of(const SpotScene& scene, const std::vector<Frame>& frames) {
+  SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
+  EXPECT_EQ(spot.status, SpotStatus::ok) << explanation_of(spot.status);
+  return spot;
+}
+
+TEST(SpotHeights, TenCentimetresAreToldApartUnderAHighCeiling) {
+  SpotScene scene = high_scene();
+  scene.heights_m = {0, 0.1};
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(static_cast<unsigned>(seed));
+    const SpotCaptures spot = captures_of(scene, with_noise(scene.frames(0.1), random));
+    ASSERT_EQ(spot.heights.size(), 2U);
+    EXPECT_EQ(spot.captures.size(), 24U);
+    const RotationFit found = fit_turning_axis(spot, scene.camera);
+    ASSERT_TRUE(found.converged && found.center.covariance);
+    const auto sd_rad = axis_sd_rad(found.center, scene.camera);
+    EXPECT_LT(*sd_rad, rad_from_deg(0.1));
+    // Of 20 draws none is beyond five standard deviations of a plane normal distribution.
+    EXPECT_LT(angle_between(found.center.zenith_in_camera, scene.truth().zenith_in_camera),
+              5 * *sd_rad);
+  }
+}
+
+TEST(SpotHeights, FourHeightsAreFour) {
+  SpotScene scene = high_scene();
+  scene.heights_m = {0, 0.05, 0.15, 0.2};
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(static_cast<unsigned>(seed));
+    const SpotCaptures spot = captures_of(scene, with_noise(scene.frames(0.1), random));
+    EXPECT_EQ(spot.heights.size(), 4U);
+    EXPECT_TRUE(spot.left_out.empty());
+  }
+}
+
+/// Noise of 1 px puts the heights of two lamps' fixes off by 1 % of the distance.
+TEST(SpotHeights, NoiseDoesNotMakeTwoOfOne) {
+  for (const std::size_t lamps : {std::size_t{2}, std::size_t{8}}) {
+    SpotScene scene = tilted_scene();
+    scene.map.lamps.resize(lamps);
+    if (lamps == 2) scene.map = lamp_map_of({{-0.3, -0.25, 1.6}, {0.2, 0.2, 1.6}});
+    scene.captures = 24;
+    for (int seed = 0; seed < kSeeds; ++seed) {
+      SCOPED_TRACE(testing::Message() << lamps << " lamps, seed " << seed);
+      Random random(static_cast<unsigned>(seed));
+      const SpotCaptures spot = captures_of(scene, with_noise(scene.frames(1), random));
+      EXPECT_EQ(spot.heights.size(), 1U);
+      EXPECT_GE(spot.captures.size(), 23U);
+    }
+  }
+}
+
+TEST(SpotHeights, AtOneLampsAtSeveralTellTheLeverArm) {
+  SpotScene scene = tilted_scene();
+  scene.map =
+      lamp_map_of({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
+  const RotationFit exact = fit_turning_axis(captures_of(scene, scene.frames()), scene.camera);
+  ASSERT_TRUE(exact.converged && exact.center.lever_arm_m);
+  EXPECT_LT(angle_between(exact.center.zenith_in_camera, scene.truth().zenith_in_camera),
+            rad_from_deg(1e-6));
+  EXPECT_THAT(*exact.center.lever_arm_m, IsNear(scene.lever_arm_m, 1e-7));
+}
+
+/// Lamps that differ by 2 mm would tell a lever arm of 15 mm to several centimetres.
+TEST(SpotHeights, AtOneLampsAtNearlyOneDoNot) {
+  SpotScene scene = tilted_scene();
+  for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
+    scene.map.lamps[i].position_m.z() += 0.002;
+  }
+  Random random(1);
+  const SpotCaptures spot = captures_of(scene, with_noise(scene.frames(0.3), random));
+  const RotationFit found = fit_turning_axis(spot, scene.camera);
+  ASSERT_TRUE(found.converged);
+  EXPECT_FALSE(found.center.lever_arm_m);
+}
+
+/// What the axis at one height is good for, with a lever arm: fixes of the axis at that height.
+TEST(SpotHeights, AtOneFixesAreOfTheAxis) {
+  const SpotScene scene = tilted_scene();
+  const RotationFit found = fit_turning_axis(captures_of(scene, scene.frames()), scene.camera);
+  ASSERT_TRUE(found.converged);
+  EXPECT_FALSE(found.center.lever_arm_m);
+  Calibration calibration;
+  calibration.camera = scene.camera;
+  calibration.rotation_center = found.center;
+  const Positioner positioner(scene.map, calibration);
+  for (const Frame& frame : scene.frames()) {
+    const Fix fix = positioner.locate(frame.detections);
+    ASSERT_TRUE(fix.ok());
+    const Eigen::Vector2d place_m = fix.estimate.pose.position_m.head<2>();
+    EXPECT_THAT(place_m, IsNear(scene.axis_m, 0.1 * scene.lever_arm_m.norm()));
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,86 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Captures that are of no turn on the spot, or of too little of one.
+#include <gtest/gtest.h>
+
+#include "calibration/rotation/spot.h"
+#include "calibration/rotation/spot_captures.h"
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+SpotStatus status_of(const SpotScene& scene, const std::vector<Frame>& frames) {
+  return spot_captures(frames, scene.map, scene.camera).status;
+}
+SpotStatus status_of(const SpotScene& scene) { return status_of(scene, scene.frames()); }
+
+TEST(SpotRefusal, OfTooSmallAnArc) {
+  SpotScene scene;
+  scene.arc_rad = rad_from_deg(80);
+  EXPECT_EQ(status_of(scene), SpotStatus::short_arc);
+}
+
+TEST(SpotRefusal, OfCapturesThatAreAlike) {
+  SpotScene scene;
+  scene.arc_rad = 1e-3;
+  EXPECT_EQ(status_of(scene), SpotStatus::alike);
+  Random random(3);
+  EXPECT_EQ(status_of(scene, with_noise(scene.frames(0.3), random)), SpotStatus::alike);
+}
+
+TEST(SpotRefusal, OfTooFewCaptures) {
+  SpotScene scene;
+  for (const int captures : {1, 2}) {
+    scene.captures = captures;
+    EXPECT_EQ(status_of(scene), SpotStatus::too_few_captures) << captures;
+  }
+  EXPECT_EQ(status_of(scene, {}), SpotStatus::other_map);
+}
+
+TEST(SpotRefusal, OfOneLamp) {
+  SpotScene scene;
+  auto frames = scene.frames();
+  for (Frame& frame : frames) {
+    std::erase_if(frame.detections, [](const Detection& one) { return one.lamp != 7; });
+  }
+  EXPECT_EQ(status_of(scene, frames), SpotStatus::too_few_lamps);
+  scene.map.lamps.resize(1);
+  EXPECT_EQ(status_of(scene), SpotStatus::too_few_lamps);
+  // Two in all, but never two at a time.
+  SpotScene in_turn;
+  frames = in_turn.frames();
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    std::erase_if(frames[i].detections,
+                  [&](const Detection& one) { return one.lamp != (i % 2 == 0 ? 7 : 8); });
+  }
+  EXPECT_EQ(status_of(in_turn, frames), SpotStatus::too_few_lamps);
+}
+
+TEST(SpotRefusal, OfTheLampsOfAnotherMap) {
+  SpotScene scene;
+  const auto frames = scene.frames();
+  for (Lamp& lamp : scene.map.lamps) lamp.id += 100;
+  EXPECT_EQ(status_of(scene, frames), SpotStatus::other_map);
+  scene = {};
+  for (Lamp& lamp : scene.map.lamps) lamp.position_m.x() *= -1;  // as seen from below
+  EXPECT_EQ(status_of(scene, frames), SpotStatus::other_map);
+  scene = {};
+  std::swap(scene.map.lamps[1].position_m, scene.map.lamps[6].position_m);
+  std::swap(scene.map.lamps[0].position_m, scene.map.lamps[5].position_m);
+  std::swap(scene.map.lamps[2].position_m, scene.map.lamps[4].position_m);
+  EXPECT_EQ(status_of(scene, frames), SpotStatus::other_map);
+}
+
+TEST(SpotRefusal, OfADrive) {
+  SpotScene scene;
+  std::vector<Frame> frames;
+  for (int k = 0; k < 12; ++k) {
+    scene.axis_m = {-0.3 + 0.05 * k, 0.1 * (k % 3)};
+    frames.push_back(scene.frames()[static_cast<std::size_t>(k)]);
+  }
+  EXPECT_EQ(status_of(scene, frames), SpotStatus::moved);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,115 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-intrinsics on images and boards that it cannot use.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "pipeline/intrinsics_program.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
+const std::string kFaulty = VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered";
+
+class IntrinsicsRefusals : public IntrinsicsProgram {
+ protected:
+  /// The view of the sample, as many times as there are names.
+  std::string copies(const std::vector<std::string>& names) const {
+    fs::create_directory(folder / "images");
+    for (const auto& name : names) {
+      fs::copy(kRig + "/sample-boards/0000.png", folder / ("images/" + name));
+    }
+    return (folder / "images").string();
+  }
+};
+
+TEST_F(IntrinsicsRefusals, RefusesOneViewAndViewsAllAlike) {
+  const std::string board = kRig + "/board.yaml";
+  const auto one = calibrate(copies({"0.png"}), board);
+  EXPECT_EQ(one.exit_code, 3);
+  EXPECT_THAT(one.errors, HasSubstr("1 views with the board: fewer than three"));
+  for (const char* name : {"images/1.png", "images/2.png", "images/3.png", "images/4.png"}) {
+    fs::copy(kRig + "/sample-boards/0000.png", folder / name);
+  }
+  const auto alike = calibrate((folder / "images").string(), board);
+  EXPECT_EQ(alike.exit_code, 3);
+  EXPECT_THAT(alike.errors, HasSubstr("all views show the board at the same angle"));
+  EXPECT_FALSE(fs::exists(folder / "camera.yaml"));
+}
+
+TEST_F(IntrinsicsRefusals, SaysWhyThereAreNoTags) {
+  const std::string board = kRig + "/board.yaml";
+  const auto lamps = calibrate(kRig + "/sample", board);
+  EXPECT_EQ(lamps.exit_code, 3);
+  EXPECT_THAT(lamps.errors, HasSubstr("no tag of tag36h11 is seen in 2 images"));
+
+  const auto other = calibrate(kFaulty + "/sample-boards", board);
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.errors, HasSubstr("border_bits 2, corner_squares true"));
+
+  const cv::Mat image = cv::imread(kRig + "/sample-boards/0000.png", cv::IMREAD_GRAYSCALE);
+  cv::Mat mirrored;
+  cv::flip(image, mirrored, 1);
+  fs::create_directory(folder / "mirrored");
+  cv::imwrite((folder / "mirrored/0.png").string(), mirrored);
+  const auto mirror = calibrate((folder / "mirrored").string(), board);
+  EXPECT_EQ(mirror.exit_code, 2);
+  EXPECT_THAT(mirror.errors, HasSubstr("the image is mirrored"));
+}
+
+TEST_F(IntrinsicsRefusals, NamesWhatIsWrongWithTheBoard) {
+  std::string text = TemporaryFolder::content_of(kRig + "/board.yaml");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    return folder.file("board.yaml", changed).string();
+  };
+  const std::string images = kRig + "/sample-boards";
+  const auto order =
+      calibrate(images, with("row-major-from-top-left", "row-major-from-bottom-left"));
+  EXPECT_EQ(order.exit_code, 2);
+  EXPECT_THAT(order.errors, HasSubstr("board.yaml: the images show cols 6, rows 5, id_order "
+                                      "row-major-from-top-left"));
+  const auto ids = calibrate(images, with("first_id: 0", "first_id: 100"));
+  EXPECT_EQ(ids.exit_code, 2);
+  EXPECT_THAT(ids.errors, HasSubstr("with other ids than the board has, 100 to 129"));
+  const auto spacing = calibrate(images, with("tag_spacing: 1", "tag_spacing: 0.5"));
+  EXPECT_EQ(spacing.exit_code, 2);
+  EXPECT_THAT(spacing.errors, HasSubstr("tag_spacing is 0.5, but the images show gaps of "));
+}
+
+TEST_F(IntrinsicsRefusals, RefusesMixedSizesAndSkipsWhatIsNoImage) {
+  const std::string images = copies({"0.png", "1.png"});
+  folder.file("images/2.png", "no image\n");
+  const auto bad = calibrate(images, kRig + "/board.yaml");
+  EXPECT_EQ(bad.exit_code, 3) << bad.errors;
+  EXPECT_THAT(bad.errors, HasSubstr("2.png: cannot be read as an image; skipped"));
+  const auto only = calibrate((folder / "images/2.png").string(), kRig + "/board.yaml");
+  EXPECT_EQ(only.exit_code, 2);
+  EXPECT_THAT(only.errors, HasSubstr("none of 1 images can be used"));
+  const cv::Mat image = cv::imread(kRig + "/sample-boards/0000.png", cv::IMREAD_GRAYSCALE);
+  cv::imwrite((folder / "images/2.png").string(), image(cv::Rect(0, 0, 640, 480)));
+  const auto mixed = calibrate(images, kRig + "/board.yaml");
+  EXPECT_EQ(mixed.exit_code, 2);
+  EXPECT_THAT(mixed.errors, HasSubstr("2.png: is 640 x 480, but 0.png is 800 x 600 px"));
+}
+
+TEST_F(IntrinsicsRefusals, RefusesBadOptions) {
+  const std::string images = kRig + "/sample-boards", board = kRig + "/board.yaml";
+  EXPECT_EQ(calibrate(images, board, "--gate mean=3").exit_code, 2);
+  EXPECT_EQ(calibrate(images, board, "--gate rms_px=no").exit_code, 2);
+  EXPECT_EQ(calibrate(images, board, "--lens FISHEYE").exit_code, 2);
+  EXPECT_EQ(calibrate(images, board, "--plot plot.gif").exit_code, 2);
+  EXPECT_EQ(calibrate(images, board, "--held-out 1").exit_code, 2);
+  EXPECT_EQ(calibrate(images + "/missing.png", board).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// What vlp-rotation refuses, by whatever method.
+#include <gmock/gmock.h>
+
+#include <utility>
+
+#include "rig/lamp_map.h"
+#include "rotation_program.h"
+
+namespace vlp {
+namespace {
+
+class RotationRefusal : public Rotation {
+ protected:
+  /// With `lamps` as the map, by each method.
+  void expect_refusals(const std::string& message) {
+    write_lamp_map(folder / "other.yaml", lamps);
+    for (const std::string method : {"axis", "joint", "circle", "lamps"}) {
+      SCOPED_TRACE(method);
+      expect_refusal(run_program("vlp-rotation " + kExample + "turning.csv --lamps " +
+                                 (folder / "other.yaml").string() + " --calibration " + kExample +
+                                 "calibration.yaml -o " + output.string() + " --method " + method),
+                     2, "other.yaml: " + message);
+    }
+  }
+  LampMap lamps = read_lamp_map(kExample + "lamps.yaml");
+};
+
+TEST_F(RotationRefusal, SaysThatAMapIsMirrored) {
+  for (Lamp& lamp : lamps.lamps) lamp.position_m.x() *= -1;
+  expect_refusals("the lamp map looks mirrored");
+}
+
+TEST_F(RotationRefusal, SaysThatTwoLampsAreSwapped) {
+  std::swap(lamps.lamps[0].position_m, lamps.lamps[1].position_m);
+  expect_refusals("lamps 1 and 2 look swapped");
+}
+
+TEST_F(RotationRefusal, RefusesWhatDoesNotDetermineIt) {
+  expect_refusal(rotation(captures([](std::size_t i) { return i < 1; })), 3, "add captures");
+  expect_refusal(rotation(captures([](std::size_t i) { return i < 3; })), 3,
+                 "less than 90 degrees: add captures");
+  auto frames = read_detections(kExample + "turning.csv");
+  auto alike = frames;
+  for (Frame& frame : alike) frame.detections = frames[0].detections;
+  expect_refusal(rotation(written(alike)), 3, "all alike: turn the camera");
+  for (Frame& frame : frames) frame.detections.resize(1);
+  expect_refusal(rotation(written(frames)), 3, "add lamps");
+}
+
+TEST_F(RotationRefusal, RefusesTheMapOfAnotherRoom) {
+  const std::string map = "format: vlp-lamps/1\nlamps:\n";
+  const auto other = [&](const std::string& places) {
+    return run_program("vlp-rotation " + kExample + "turning.csv --lamps " +
+                       folder.file("other.yaml", map + places).string() + " --calibration " +
+                       kExample + "calibration.yaml -o " + output.string());
+  };
+  expect_refusal(
+      other("  - {id: 11, position_m: [0, 0, 2]}\n  - {id: 12, position_m: [1, 0, 2]}\n"), 2,
+      "other.yaml");
+  expect_refusal(other("  - {id: 1, position_m: [0.3, 0, 2]}\n  - {id: 2, position_m: [1, 0, 2]}\n"
+                       "  - {id: 3, position_m: [1, 0.9, 2]}\n"
+                       "  - {id: 4, position_m: [-2, 0.9, 2]}\n"),
+                 2, "is it the map of this room?");
+}
+
+TEST_F(RotationRefusal, RefusesToWriteOverAnInput) {
+  const std::string input = kExample + "lamps.yaml";
+  EXPECT_EQ(rotation(kExample + "turning.csv", "--plot " + input).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace vlp
