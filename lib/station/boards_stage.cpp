@@ -48,11 +48,8 @@ StageResult solve_boards(const StationConfig& config, const std::string& camera_
                          const std::vector<BoardView>& views) {
   const BoardCheck layout = check_board(config.board, views, {});
   if (!layout.problem.empty()) return {"wrong board: " + layout.problem};
-  IntrinsicsInput input{BoardLattice(config.board),
-                        {},
-                        config.type.imager_px,
-                        config.type.lens_model,
-                        !config.board.corner_squares};
+  IntrinsicsInput input{
+      BoardLattice(config.board), {}, config.type.imager_px, config.type.lens_model};
   for (const BoardView& view : views) {
     if (input.lattice.enough(view.seen)) input.views.push_back(input.lattice.corners(view.seen));
   }

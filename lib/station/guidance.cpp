@@ -30,11 +30,8 @@ std::vector<const UnitImage*> used_images(const UnitStep& step) {
 ViewCoverage coverage_so_far(const Unit& unit) {
   const StationConfig& config = unit.config();
   const Lens nominal(config.type.lens_model, config.type.intrinsics);
-  IntrinsicsInput input{BoardLattice(config.board),
-                        {},
-                        config.type.imager_px,
-                        config.type.lens_model,
-                        !config.board.corner_squares};
+  IntrinsicsInput input{
+      BoardLattice(config.board), {}, config.type.imager_px, config.type.lens_model};
   IntrinsicsSolution poses{};
   for (const UnitImage* image : used_images(unit.step(StationStep::boards))) {
     if (!input.lattice.enough(image->view->seen)) continue;
