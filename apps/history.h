@@ -5,18 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "captures/digest.h"
 #include "rig/calibration.h"
 
 namespace vlp {
-
-/// SHA-256 of a text, in hexadecimal digits.
-std::string sha256_of_text(std::string_view text);
-
-/// SHA-256 of a file's content, in hexadecimal digits. Throws InputError.
-std::string sha256_of_file(const std::filesystem::path& file);
 
 /// Of a folder of images: what `sha256sum *.png | sha256sum` says there, the images being those
 /// that images_in() finds, in its order. Throws InputError.

@@ -13,10 +13,11 @@ packages=(
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
   libopencv-dev libapriltag-dev libceres-dev libssl-dev
   nlohmann-json3-dev libpugixml-dev
-  libmrcal-dev libsuitesparse-dev libcairo2-dev
+  libmrcal-dev libsuitesparse-dev libcairo2-dev libsoci-dev libsqlite3-dev libpq-dev
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev mrcal python3-mrcal poppler-utils unzip
+  postgresql postgresql-client tmux util-linux  # of the station
   chromium-headless-shell python3  # the report is opened in a browser
 )
 

@@ -25,6 +25,15 @@ std::string quoted(std::string_view field) {
 }  // namespace
 
 void CsvWriter::row(std::initializer_list<std::string_view> fields) {
+  write_row({fields.begin(), fields.size()});
+}
+
+void CsvWriter::row(const std::vector<std::string>& fields) {
+  const std::vector<std::string_view> views(fields.begin(), fields.end());
+  write_row(views);
+}
+
+void CsvWriter::write_row(std::span<const std::string_view> fields) {
   const char* separator = "";
   for (const std::string_view field : fields) {
     waiting_ += separator;

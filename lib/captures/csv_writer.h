@@ -4,8 +4,10 @@
 
 #include <filesystem>
 #include <initializer_list>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "rig/file.h"
 
@@ -20,11 +22,19 @@ class CsvWriter {
       : file_(file) {
     row(header);
   }
+  /// With as many columns as the header has.
+  CsvWriter(const std::filesystem::path& file, const std::vector<std::string>& header)
+      : file_(file) {
+    row(header);
+  }
 
   void row(std::initializer_list<std::string_view> fields);
+  void row(const std::vector<std::string>& fields);
   void save();
 
  private:
+  void write_row(std::span<const std::string_view> fields);
+
   WholeFile file_;
   std::string waiting_;
 };

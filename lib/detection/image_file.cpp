@@ -15,16 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_image(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}) {
-    if (extension == known) return true;
-  }
-  return false;
-}
-
 /// A JPEG that is cut short is decoded all the same, grey from there on: its scan has to end with
 /// the marker of the end (FF D9).
 bool is_cut_jpeg(const std::string& bytes) {
@@ -36,6 +26,16 @@ bool is_cut_jpeg(const std::string& bytes) {
 
 }  // namespace
 
+bool is_image_name(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}) {
+    if (extension == known) return true;
+  }
+  return false;
+}
+
 std::vector<fs::path> images_in(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) throw InputError(folder, "is not a folder of images");
@@ -43,7 +43,8 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
     std::error_code no_file;  // a folder, a pipe, a link that leads nowhere
-    if (entry->is_regular_file(no_file) && is_image(entry->path())) images.push_back(entry->path());
+    if (entry->is_regular_file(no_file) && is_image_name(entry->path()))
+      images.push_back(entry->path());
   }
   if (error) throw InputError(folder, "cannot be read: " + error.message());
   if (images.empty()) {

@@ -9,6 +9,9 @@
 
 namespace vlp {
 
+/// Whether the name is that of an image, by its ending: PNG, JPEG, BMP, TIFF and PGM.
+bool is_image_name(const std::filesystem::path& file);
+
 /// The images in a folder by name: PNG, JPEG, BMP, TIFF and PGM. Throws InputError when it is no
 /// folder or holds none.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vlp {
+
+struct StationRunOptions {
+  std::string station, camera_id;
+  /// A folder whose steps are full; empty: the folder of the station is watched.
+  std::string batch;
+  /// Of a camera or video, by step: "boards=/dev/video0"; without a step for each in turn.
+  std::vector<std::string> sources;
+  /// Give the verdict when no image came for so long.
+  std::optional<double> idle_s;
+  int threads = 1;
+};
+
+/// vlp-station run: a unit to its verdict. Throws GateNotMet when it fails.
+void run_unit(const StationRunOptions& options);
+
+/// vlp-station verify: the golden unit. Throws GateNotMet when the station has moved.
+void run_verify(const StationRunOptions& options);
+
+}  // namespace vlp

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "station/station_screen.h"
+
+namespace vlp {
+
+/// What the operator sees: at a terminal one screen that is redrawn in place, in colour unless
+/// NO_COLOR is set; elsewhere nothing but the end.
+class Terminal {
+ public:
+  /// Keys are read one by one while it lives, when stdin is a terminal, too.
+  Terminal();
+  ~Terminal();
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+
+  bool interactive() const { return interactive_; }
+  /// Redraws in place; only at a terminal, and only when something changed.
+  void draw(const std::vector<ScreenLine>& lines);
+  /// Prints in place of what was drawn, to stay.
+  void print(const std::vector<ScreenLine>& lines);
+  /// The key that was pressed, if one was, waiting so long at most.
+  std::optional<char> key(int wait_ms) const;
+
+ private:
+  struct Saved;
+  bool interactive_, colour_;
+  std::size_t drawn_ = 0;
+  std::string last_;
+  std::unique_ptr<Saved> saved_;
+};
+
+/// Whether SIGINT or SIGTERM came while a Terminal was there: work is on the disk, end it.
+bool interrupted();
+
+}  // namespace vlp

@@ -1,0 +1,105 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-station: a factory's calibration station: units to a verdict, and their records.
+#include "app.h"
+#include "detect_folder.h"
+#include "station/watched_run.h"
+#include "station_records.h"
+#include "station_run.h"
+
+namespace vlp {
+namespace {
+
+void add_run(CLI::App& app, StationRunOptions& options) {
+  CLI::App* run = app.add_subcommand("run", "Take a unit to its verdict");
+  run->add_option("--station", options.station, "The station, station.yaml")->required();
+  run->add_option("--camera-id", options.camera_id, "The unit's camera")
+      ->required()
+      ->check([](const std::string& id) { return camera_id_problem(id); });
+  run->add_option("--batch", options.batch,
+                  "A folder whose folders boards, rotation, dispersion and check are full: no "
+                  "questions asked (default: the images that arrive in the station's folder)");
+  run->add_option("--source", options.sources,
+                  "A V4L2 camera or a video file whose frames are taken for the present step, or "
+                  "STEP=SOURCE for one step")
+      ->option_text("[STEP=]SOURCE ...");
+  run->add_option("--idle-s", options.idle_s, "Give the verdict when no image came for so long")
+      ->check(finite_positive());
+  run->add_option("--threads", options.threads, "Images at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
+}
+
+void add_verify(CLI::App& app, StationRunOptions& options) {
+  CLI::App* verify =
+      app.add_subcommand("verify", "Measure the golden unit: has the station itself moved?");
+  verify->add_option("--station", options.station, "The station, station.yaml")->required();
+  verify
+      ->add_option("--batch", options.batch,
+                   "Its images: a folder with check and, maybe, dispersion and boards")
+      ->required();
+  verify->add_option("--threads", options.threads, "Images at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
+}
+
+/// What the commands on records share.
+CLI::App* add_records(CLI::App& app, const char* name, const char* what,
+                      StationRecordsOptions& options) {
+  CLI::App* command = app.add_subcommand(name, what);
+  command->add_option("--station", options.station, "The station, station.yaml");
+  command->add_option("--records", options.records,
+                      "Or its records: a file of SQLite, or postgresql://USER@HOST/NAME");
+  command->add_option("--camera-id", options.filter.camera, "Only of this camera");
+  command->add_option("--of-station", options.filter.station, "Only of the station of this name");
+  command->add_option("--verdict", options.filter.verdict, "Only with this verdict")
+      ->check(CLI::IsMember({"PASS", "FAIL"}));
+  command->add_option("--kind", options.filter.kind, "Only units, or only golden units")
+      ->check(CLI::IsMember({"unit", "golden"}));
+  command->add_option("--last", options.filter.last, "Only the last so many")
+      ->check(CLI::Range(1, 1'000'000));
+  return command;
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "A factory's calibration station. 'run' takes a camera through boards, rotation, dispersion "
+      "and\n"
+      "check to PASS or FAIL (exit code 1), as its images arrive or from full folders (--batch);\n"
+      "'verify' measures a reference camera; 'list', 'show', 'export' and 'trend' tell of the "
+      "records.\n"
+      "vlp-station COMMAND --help tells more.\n\n"
+      "Example, from the project's folder:\n"
+      "  mkdir -p out && cp -rT datasets/station out/station\n"
+      "  build/bin/vlp-simulate datasets/station/scene.yaml -o out/station/unit\n"
+      "  build/bin/vlp-station run --station out/station/station.yaml --camera-id 0001 \\\n"
+      "    --batch out/station/unit\n"
+      "  build/bin/vlp-station list --station out/station/station.yaml\n",
+      "vlp-station");
+  app.require_subcommand(1);
+  app.fallthrough();
+  vlp::StationRunOptions run;
+  vlp::StationRecordsOptions records;
+  run.threads = vlp::all_cores();
+  vlp::add_run(app, run);
+  vlp::add_verify(app, run);
+  vlp::add_records(app, "list", "A line for each run", records);
+  auto* show =
+      vlp::add_records(app, "show", "All of one run, the last unless it is named", records);
+  show->add_option("run", records.run, "Name of the run");
+  auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
+  exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
+  auto* trend = vlp::add_records(
+      app, "trend", "A figure over the runs, with the limits of a control chart", records);
+  trend->add_option("figure", records.figure, "Which: rms_px, check_mean_mm, ...")->required();
+  trend->add_option("-o,--output", records.output, "Draw it, .png or .svg");
+  return vlp::run_app(app, argc, argv, [&] {
+    if (app.got_subcommand("run")) vlp::run_unit(run);
+    if (app.got_subcommand("verify")) vlp::run_verify(run);
+    if (app.got_subcommand("list")) vlp::list_runs(records);
+    if (app.got_subcommand("show")) vlp::show_run(records);
+    if (app.got_subcommand("export")) vlp::export_runs(records);
+    if (app.got_subcommand("trend")) vlp::show_trend(records);
+  });
+}

@@ -1,0 +1,17 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace vlp {
+
+/// SHA-256 of a text, in hexadecimal digits.
+std::string sha256_of_text(std::string_view text);
+
+/// SHA-256 of a file's content, in hexadecimal digits. Throws InputError.
+std::string sha256_of_file(const std::filesystem::path& file);
+
+}  // namespace vlp

@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/export_runs.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "captures/csv_writer.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kDigits = 9;
+
+std::string one_line(std::string text) {
+  while (text.ends_with('\n')) text.pop_back();
+  std::string joined;
+  for (const char c : text) joined += c == '\n' ? std::string("; ") : std::string(1, c);
+  return joined;
+}
+
+void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
+  std::vector<std::string> header{"run",       "kind",    "station", "camera",  "begun_utc",
+                                  "ended_utc", "verdict", "causes",  "program", "config_sha256"};
+  for (const FigureKind& kind : station_figures()) header.emplace_back(kind.name);
+  CsvWriter csv(file, header);
+  for (const RunRecord& run : runs) {
+    std::vector<std::string> row{
+        run.run,       run.kind,    run.station,          run.camera,  begun_utc(run.run),
+        run.ended_utc, run.verdict, one_line(run.causes), run.program, run.config_sha256};
+    for (const FigureKind& kind : station_figures()) {
+      const auto figure = std::find_if(run.figures.begin(), run.figures.end(),
+                                       [&](const auto& f) { return f.name == kind.name; });
+      const bool there = figure != run.figures.end() && figure->value;
+      row.push_back(there ? significant(*figure->value, kDigits) : "");
+    }
+    csv.row(row);
+  }
+  csv.save();
+}
+
+nlohmann::json optional_number(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
+
+nlohmann::ordered_json json_of(const RunRecord& run) {
+  nlohmann::ordered_json figures = nlohmann::ordered_json::object();
+  for (const StationFigure& figure : run.figures) {
+    figures[figure.name] = {{"value", optional_number(figure.value)},
+                            {"gate", optional_number(figure.limit)},
+                            {"at_least", figure.at_least},
+                            {"met", figure.met()}};
+  }
+  nlohmann::ordered_json images = nlohmann::ordered_json::array();
+  for (const auto& [step, name, sha256, refused] : run.images) {
+    images.push_back({{"step", step}, {"image", name}, {"sha256", sha256}, {"refused", refused}});
+  }
+  return {{"run", run.run},
+          {"kind", run.kind},
+          {"station", run.station},
+          {"camera", run.camera},
+          {"begun_utc", begun_utc(run.run)},
+          {"ended_utc", run.ended_utc},
+          {"verdict", run.verdict},
+          {"causes", one_line(run.causes)},
+          {"program", run.program},
+          {"libraries", run.libraries},
+          {"config_sha256", run.config_sha256},
+          {"figures", figures},
+          {"calibration", run.calibration},
+          {"images", images}};
+}
+
+}  // namespace
+
+void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
+  if (file.extension() == ".csv") return write_csv(file, runs);
+  if (file.extension() != ".json") throw InputError(file, "should end in .csv or .json");
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const RunRecord& run : runs) all.push_back(json_of(run));
+  constexpr int indent = 1;
+  write_file(file, all.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace vlp

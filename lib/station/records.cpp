@@ -1,0 +1,256 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records.h"
+
+#include <soci/postgresql/soci-postgresql.h>
+#include <soci/sqlite3/soci-sqlite3.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "rig/input_error.h"
+#include "station/record_tables.h"
+
+namespace vlp {
+namespace {
+
+/// In seconds. Others that write a run need some milliseconds each.
+constexpr int kPatience_s = 30;
+
+void open(soci::session& sql, const std::string& where) {
+  if (where.starts_with("postgresql://")) {
+    sql.open(soci::postgresql, where);
+    sql << "SET client_min_messages TO warning";
+    return;
+  }
+  sql.open(soci::sqlite3, "dbname=\"" + where + "\" timeout=" + std::to_string(kPatience_s));
+  // What is committed is on the disk; a second connection sees runs whole.
+  sql << "PRAGMA synchronous = FULL";
+  sql << "PRAGMA foreign_keys = ON";
+}
+
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+/// Password and user are nobody's business in a message.
+std::string shown(const std::string& where) {
+  const auto at = where.find('@');
+  return where.starts_with("postgresql://") && at != std::string::npos
+             ? "postgresql://" + where.substr(at + 1)
+             : where;
+}
+
+void put_figures(soci::session& sql, const RunRecord& record) {
+  int place = 0;
+  for (const StationFigure& figure : record.figures) {
+    const double value = figure.value.value_or(0), gate = figure.limit.value_or(0);
+    soci::indicator has_value = figure.value ? soci::i_ok : soci::i_null;
+    soci::indicator has_gate = figure.limit ? soci::i_ok : soci::i_null;
+    const int at_least = figure.at_least ? 1 : 0, met = figure.met() ? 1 : 0;
+    ++place;
+    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met) VALUES (:run, "
+           ":place, :name, :value, :gate, :at_least, :met)",
+        soci::use(record.run), soci::use(place), soci::use(figure.name),
+        soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least), soci::use(met);
+  }
+}
+
+void put_images(soci::session& sql, const RunRecord& record) {
+  for (const auto& [step, name, sha256, refused] : record.images) {
+    sql << "INSERT INTO images (run, step, image, sha256, refused) VALUES (:run, :step, :image, "
+           ":sha256, :refused)",
+        soci::use(record.run), soci::use(step), soci::use(name), soci::use(sha256),
+        soci::use(refused);
+  }
+}
+
+std::string condition(const RunFilter& filter) {
+  std::string text = "WHERE 1 = 1";
+  if (!filter.camera.empty()) text += " AND runs.camera = :camera";
+  if (!filter.station.empty()) text += " AND runs.station = :station";
+  if (!filter.verdict.empty()) text += " AND runs.verdict = :verdict";
+  if (!filter.kind.empty()) text += " AND runs.kind = :kind";
+  return text;
+}
+
+void bind(soci::statement& statement, const RunFilter& filter) {
+  for (const std::string* value :
+       {&filter.camera, &filter.station, &filter.verdict, &filter.kind}) {
+    if (!value->empty()) statement.exchange(soci::use(*value));
+  }
+}
+
+template <typename Row>
+std::vector<Row> last_of(std::vector<Row> rows, int last) {
+  const auto kept = static_cast<std::size_t>(last);
+  if (last > 0 && rows.size() > kept) {
+    rows.erase(rows.begin(), rows.end() - static_cast<std::ptrdiff_t>(kept));
+  }
+  return rows;
+}
+
+}  // namespace
+
+struct Records::Database {
+  std::string where;
+  soci::session sql;
+
+  /// Errors name the database.
+  template <typename Action>
+  auto run(const Action& action) {
+    try {
+      return action();
+    } catch (const InputError&) {
+      throw;
+    } catch (const std::exception& error) {
+      throw InputError(shown(where), "the records: " + one_line(error.what()));
+    }
+  }
+};
+
+Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
+  database_->where = where;
+  database_->run([&] {
+    open(database_->sql, where);
+    // Two that make the tables at once get in each other's way once.
+    constexpr int tries = 20;
+    for (int i = 1;; ++i) {
+      try {
+        return make_record_tables(database_->sql);
+      } catch (const soci::soci_error&) {
+        if (i == tries) throw;
+        std::this_thread::sleep_for(std::chrono::milliseconds(50 * i));
+      }
+    }
+  });
+}
+
+Records::~Records() = default;
+
+void Records::keep(const RunRecord& record) {
+  database_->run([&] {
+    soci::session& sql = database_->sql;
+    const std::string begun = begun_utc(record.run);
+    soci::transaction transaction(sql);
+    // Writes first, so that it waits for others before it has read anything.
+    soci::statement insert =
+        (sql.prepare << "INSERT INTO runs (run, kind, station, camera, begun_utc, ended_utc, "
+                        "verdict, causes, program, libraries, config_sha256, calibration) "
+                        "VALUES (:run, :kind, :station, :camera, :begun, :ended, :verdict, "
+                        ":causes, :program, :libraries, :config, :calibration) "
+                        "ON CONFLICT (run) DO NOTHING",
+         soci::use(record.run), soci::use(record.kind), soci::use(record.station),
+         soci::use(record.camera), soci::use(begun), soci::use(record.ended_utc),
+         soci::use(record.verdict), soci::use(record.causes), soci::use(record.program),
+         soci::use(record.libraries), soci::use(record.config_sha256),
+         soci::use(record.calibration));
+    insert.execute(true);
+    if (insert.get_affected_rows() > 0) {
+      put_figures(sql, record);
+      put_images(sql, record);
+    }
+    transaction.commit();
+  });
+}
+
+bool Records::has(const std::string& run) {
+  return database_->run([&] {
+    int count = 0;
+    database_->sql << "SELECT COUNT(*) FROM runs WHERE run = :run", soci::into(count),
+        soci::use(run);
+    return count > 0;
+  });
+}
+
+std::vector<RunSummary> Records::list(const RunFilter& filter) {
+  return database_->run([&] {
+    RunSummary row;
+    std::vector<RunSummary> rows;
+    soci::statement statement(database_->sql);
+    statement.exchange(soci::into(row.run));
+    statement.exchange(soci::into(row.kind));
+    statement.exchange(soci::into(row.station));
+    statement.exchange(soci::into(row.camera));
+    statement.exchange(soci::into(row.ended_utc));
+    statement.exchange(soci::into(row.verdict));
+    statement.exchange(soci::into(row.causes));
+    bind(statement, filter);
+    statement.alloc();
+    statement.prepare("SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
+                      condition(filter) + " ORDER BY ended_utc, run");
+    statement.define_and_bind();
+    statement.execute();
+    while (statement.fetch()) rows.push_back(row);
+    return last_of(std::move(rows), filter.last);
+  });
+}
+
+std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilter& filter) {
+  return database_->run([&] {
+    TrendPoint row;
+    std::vector<TrendPoint> rows;
+    soci::statement statement(database_->sql);
+    statement.exchange(soci::into(row.run));
+    statement.exchange(soci::into(row.camera));
+    statement.exchange(soci::into(row.verdict));
+    statement.exchange(soci::into(row.value));
+    bind(statement, filter);
+    statement.exchange(soci::use(figure));
+    statement.alloc();
+    statement.prepare(
+        "SELECT runs.run, runs.camera, runs.verdict, figures.value FROM runs JOIN figures ON "
+        "figures.run = runs.run " +
+        condition(filter) +
+        " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, "
+        "runs.run");
+    statement.define_and_bind();
+    statement.execute();
+    while (statement.fetch()) rows.push_back(row);
+    return last_of(std::move(rows), filter.last);
+  });
+}
+
+std::optional<RunRecord> Records::find(const std::string& run) {
+  return database_->run([&]() -> std::optional<RunRecord> {
+    soci::session& sql = database_->sql;
+    RunRecord record;
+    record.run = run;
+    sql << "SELECT kind, station, camera, ended_utc, verdict, causes, program, libraries, "
+           "config_sha256, calibration FROM runs WHERE run = :run",
+        soci::into(record.kind), soci::into(record.station), soci::into(record.camera),
+        soci::into(record.ended_utc), soci::into(record.verdict), soci::into(record.causes),
+        soci::into(record.program), soci::into(record.libraries), soci::into(record.config_sha256),
+        soci::into(record.calibration), soci::use(run);
+    if (!sql.got_data()) return std::nullopt;
+    StationFigure figure;
+    double value = 0, gate = 0;
+    int at_least = 0;
+    soci::indicator has_value = soci::i_null, has_gate = soci::i_null;
+    soci::statement figures =
+        (sql.prepare << "SELECT name, value, gate, at_least FROM figures WHERE run = :run ORDER "
+                        "BY place",
+         soci::into(figure.name), soci::into(value, has_value), soci::into(gate, has_gate),
+         soci::into(at_least), soci::use(run));
+    figures.execute();
+    while (figures.fetch()) {
+      figure.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
+      figure.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
+      figure.at_least = at_least != 0;
+      record.figures.push_back(figure);
+    }
+    RunRecord::Image image;
+    soci::statement images =
+        (sql.prepare << "SELECT step, image, sha256, refused FROM images WHERE run = :run ORDER "
+                        "BY step, image",
+         soci::into(image.step), soci::into(image.name), soci::into(image.sha256),
+         soci::into(image.refused), soci::use(run));
+    images.execute();
+    while (images.fetch()) record.images.push_back(image);
+    return record;
+  });
+}
+
+}  // namespace vlp

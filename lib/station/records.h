@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "station/run_record.h"
+
+namespace vlp {
+
+/// Which runs; what is empty is not asked for.
+struct RunFilter {
+  std::string camera, station, verdict, kind;
+  /// The last ones; 0 for all.
+  int last = 0;
+};
+
+/// A run as it is listed.
+struct RunSummary {
+  std::string run, kind, station, camera, ended_utc, verdict, causes;
+};
+
+/// A figure of one run.
+struct TrendPoint {
+  std::string run, camera, verdict;
+  double value;
+};
+
+/// The records of one or more stations in a database: a file of SQLite, or PostgreSQL by a
+/// connection string postgresql://... Tables are made when they are not there. Any number of
+/// programs may use it at once: each run is written in one transaction, and waits up to half a
+/// minute for others. What is kept is on the disk. Each throws InputError that names the database.
+class Records {
+ public:
+  explicit Records(const std::string& where);
+  ~Records();
+  Records(const Records&) = delete;
+  Records& operator=(const Records&) = delete;
+
+  /// Keeps a run, whole or not at all. One that is kept already stays as it is.
+  void keep(const RunRecord& record);
+  bool has(const std::string& run);
+  /// All of one run.
+  std::optional<RunRecord> find(const std::string& run);
+  /// From the first to the last.
+  std::vector<RunSummary> list(const RunFilter& filter);
+  std::vector<TrendPoint> trend(const std::string& figure, const RunFilter& filter);
+
+ private:
+  struct Database;
+  std::unique_ptr<Database> database_;
+};
+
+}  // namespace vlp

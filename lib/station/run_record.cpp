@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/run_record.h"
+
+#include <ceres/version.h>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <Eigen/Core>
+#include <chrono>
+#include <ctime>
+#include <filesystem>
+#include <opencv2/core/version.hpp>
+#include <random>
+
+#include "rig/file.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+std::string utc(const char* format) {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  ::gmtime_r(&now, &parts);
+  char text[32];
+  return {text, std::strftime(text, sizeof text, format, &parts)};
+}
+
+}  // namespace
+
+std::string new_run() {
+  std::random_device random;
+  return utc("%Y%m%dT%H%M%SZ-") + fmt::format("{:08x}{:08x}", random(), random());
+}
+
+std::string begun_utc(const std::string& run) {
+  constexpr std::size_t length = 16;  // 20261121T134501Z
+  if (run.size() < length || run[8] != 'T' || run[15] != 'Z') return "";
+  return run.substr(0, 4) + "-" + run.substr(4, 2) + "-" + run.substr(6, 5) + ":" +
+         run.substr(11, 2) + ":" + run.substr(13, 3);
+}
+
+std::string now_utc() { return utc("%Y-%m-%dT%H:%M:%SZ"); }
+
+std::string library_versions() {
+  return fmt::format("OpenCV {}, Ceres {}, Eigen {}.{}.{}", CV_VERSION, CERES_VERSION_STRING,
+                     EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
+}
+
+std::string calibration_text(const Calibration& calibration) {
+  namespace fs = std::filesystem;
+  std::string folder = (fs::temp_directory_path() / "vlp-station-XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr) {
+    throw InputError(folder, "cannot be made: no room for temporary files");
+  }
+  const fs::path file = fs::path(folder) / "calibration.yaml";
+  constexpr std::size_t most_bytes = 1 << 20;
+  std::string text;
+  std::error_code ignored;
+  try {
+    write_calibration(file, calibration);
+    text = read_text_file(file, most_bytes);
+  } catch (...) {
+    fs::remove_all(folder, ignored);
+    throw;
+  }
+  fs::remove_all(folder, ignored);
+  return text;
+}
+
+RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program) {
+  const auto causes = unit.causes();
+  const auto calibration = unit.calibration();
+  RunRecord record{run,
+                   "unit",
+                   unit.config().station,
+                   unit.camera_id(),
+                   now_utc(),
+                   causes.empty() ? "PASS" : "FAIL",
+                   "",
+                   program.program + " " + program.version,
+                   library_versions(),
+                   unit.config().sha256,
+                   calibration ? calibration_text(*calibration) : "",
+                   unit.figures(),
+                   {}};
+  for (const std::string& cause : causes) record.causes += cause + "\n";
+  for (const StationStep step : kStationSteps) {
+    for (const auto& [name, image] : unit.step(step).images) {
+      record.images.push_back({name_of(step), name, image.sha256, image.refused});
+    }
+  }
+  return record;
+}
+
+}  // namespace vlp

@@ -1,0 +1,152 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/station_config.h"
+
+#include <algorithm>
+
+#include "captures/digest.h"
+#include "geometry/angles.h"
+#include "rig/yaml_reader.h"
+#include "station/station_figures.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMany = 10'000;
+
+/// A file or folder that a value names.
+fs::path path_of(const YamlValue& value, const fs::path& file) {
+  const fs::path path = value.text();
+  if (path.empty()) throw value.error("names nothing");
+  return path.is_absolute() ? path : file.parent_path() / path;
+}
+
+void read_into(YamlMap& map, const char* key, int& figure) {
+  if (const auto value = map.optional(key)) figure = value->integer_within(1, kMany);
+}
+void read_into(YamlMap& map, const char* key, double& figure, double max, const char* unit) {
+  if (const auto value = map.optional(key)) figure = value->number_within(0, max, unit);
+}
+
+StationEnough read_enough(YamlMap map) {
+  StationEnough enough;
+  read_into(map, "board_views", enough.board_views);
+  read_into(map, "board_coverage", enough.board_coverage, 1, "(share)");
+  read_into(map, "turn_captures", enough.turn_captures);
+  read_into(map, "turn_heights", enough.turn_heights);
+  double arc_deg = deg_from_rad(enough.turn_arc_rad);
+  read_into(map, "turn_arc_deg", arc_deg, 360, "degrees");
+  enough.turn_arc_rad = rad_from_deg(arc_deg);
+  read_into(map, "dispersion_captures", enough.dispersion_captures);
+  read_into(map, "check_captures", enough.check_captures);
+  map.finish();
+  return enough;
+}
+
+StationRefusal read_refusal(YamlMap map) {
+  StationRefusal refuse;
+  constexpr double most_px = 100;
+  read_into(map, "blur_px", refuse.blur_px, most_px, "px");
+  read_into(map, "dark_share", refuse.dark_share, 1, "(share)");
+  read_into(map, "same_pose_share", refuse.same_pose_share, 1, "(share)");
+  read_into(map, "in_a_row", refuse.in_a_row);
+  map.finish();
+  return refuse;
+}
+
+std::vector<StationGate> read_gates(YamlMap map) {
+  std::vector<StationGate> gates;
+  for (const FigureKind& kind : station_figures()) {
+    if (const auto value = map.optional(kind.name)) {
+      gates.push_back({kind.name, value->number_within(0, 1e6, kind.unit)});
+    }
+  }
+  map.finish();
+  if (gates.empty()) throw map.error("there should be a gate at least");
+  return gates;
+}
+
+/// Reads the files that a station names, and keeps their digests.
+class Files {
+ public:
+  explicit Files(const fs::path& station) : station_(station) { add(station); }
+
+  fs::path operator()(const YamlValue& value) {
+    fs::path file = path_of(value, station_);
+    add(file);
+    return file;
+  }
+  std::string sha256() const { return sha256_of_text(digests_); }
+
+ private:
+  void add(const fs::path& file) { digests_ += sha256_of_file(file) + "\n"; }
+
+  const fs::path& station_;
+  std::string digests_;
+};
+
+Camera read_type(const YamlValue& value, Files& files) {
+  const Camera type = read_calibration(files(value)).camera;
+  if (!type.row_time_s || !type.readout) {
+    throw value.error("its camera should have row_time_s and readout: lamps are told by them");
+  }
+  return type;
+}
+
+GoldenUnit read_golden(YamlMap map, Files& files) {
+  GoldenUnit golden{map.required("camera_id").text(), {}, {}};
+  const YamlValue calibration = map.required("calibration");
+  golden.calibration = read_calibration(files(calibration));
+  if (!golden.calibration.rotation_center) {
+    throw calibration.error("should be of a whole calibration: it has no rotation_center");
+  }
+  golden.gates = read_gates(map.required("gates").map());
+  map.finish();
+  return golden;
+}
+
+/// A database: a file beside the station, or a server.
+std::string records_of(const YamlValue& value, const fs::path& file) {
+  const std::string where = value.text();
+  if (where.starts_with("postgresql://")) return where;
+  if (where.find("://") != std::string::npos) {
+    throw value.error("should name a file, or be postgresql://...");
+  }
+  return path_of(value, file).string();
+}
+
+}  // namespace
+
+StationConfig read_station(const fs::path& file) {
+  YamlMap document = read_yaml(file, "vlp-station/1");
+  Files files(file);
+  StationConfig config;
+  config.station = document.required("station").text();
+  config.type = read_type(document.required("camera_type"), files);
+  config.board = read_board(files(document.required("board")));
+  config.lamps = read_lamp_map(files(document.required("lamps")));
+  if (const auto place = document.optional("dispersion_station_m")) {
+    config.dispersion_station_m = Eigen::Vector2d(place->numbers(2).data());
+  }
+  if (const auto enough = document.optional("enough")) config.enough = read_enough(enough->map());
+  if (const auto refuse = document.optional("refuse")) config.refuse = read_refusal(refuse->map());
+  config.gates = read_gates(document.required("gates").map());
+  if (const auto golden = document.optional("golden")) {
+    config.golden = read_golden(golden->map(), files);
+  }
+  config.captures = path_of(document.required("captures"), file);
+  config.results = path_of(document.required("results"), file);
+  config.records = records_of(document.required("records"), file);
+  document.finish();
+  const auto& lamps = config.lamps.lamps;
+  if (std::none_of(lamps.begin(), lamps.end(), [](const Lamp& l) { return l.frequency_hz; })) {
+    throw InputError(file,
+                     "no lamp of the map has a frequency_hz: none could be told from another");
+  }
+  config.sha256 = files.sha256();
+  return config;
+}
+
+}  // namespace vlp

@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rig/board.h"
+#include "rig/calibration.h"
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// What counts as enough for each step.
+struct StationEnough {
+  int board_views = 36;
+  /// Share of 8 x 6 parts of the image in which the views have corners.
+  double board_coverage = 0.6;
+  /// Captures at each height of the turn, the heights, and the arc over which they go.
+  int turn_captures = 12;
+  int turn_heights = 2;
+  double turn_arc_rad = 5.2;
+  int dispersion_captures = 40;
+  int check_captures = 36;
+};
+
+/// When an image is refused, and after how many of them in a row a step is given up.
+struct StationRefusal {
+  /// Sigma of the blur of a board's edges.
+  double blur_px = 2;
+  /// Grey level, as a share of the full scale, that 1 % of the pixels reach.
+  double dark_share = 0.1;
+  /// Views of a board whose corners are all closer together, as a share of the image's width.
+  double same_pose_share = 0.01;
+  int in_a_row = 12;
+};
+
+/// A figure that a unit has to reach: no more than the limit, or no less (`at_least`).
+struct StationGate {
+  std::string figure;
+  double limit;
+};
+
+/// The reference camera of `verify`.
+struct GoldenUnit {
+  std::string camera_id;
+  Calibration calibration;
+  std::vector<StationGate> gates;
+};
+
+/// A station for one type of camera: `vlp-station/1`. Files that it names are beside it, unless
+/// their names begin with a slash.
+struct StationConfig {
+  std::string station;
+  /// The camera's type: imager, lens model, row time, read-out, and as lens the nominal one.
+  Camera type;
+  Board board;
+  LampMap lamps;
+  /// Where the camera is in the step `dispersion` unless its captures.csv says it.
+  std::optional<Eigen::Vector2d> dispersion_station_m;
+  StationEnough enough;
+  StationRefusal refuse;
+  std::vector<StationGate> gates;
+  std::optional<GoldenUnit> golden;
+  /// Folders: where the images of a unit arrive, as CAPTURES/CAMERA/STEP/, and where results go.
+  std::filesystem::path captures, results;
+  /// A file of SQLite, or postgresql://...
+  std::string records;
+  /// SHA-256 of the digests of station.yaml and of the files that it names.
+  std::string sha256;
+};
+
+/// Throws InputError with file, line and key: unknown or missing keys, figures that no station can
+/// mean, a gate of a figure that there is not, a type without row time or read-out.
+StationConfig read_station(const std::filesystem::path& file);
+
+}  // namespace vlp

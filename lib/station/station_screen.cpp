@@ -1,0 +1,115 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/station_screen.h"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <sstream>
+
+#include "station/guidance.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kColumns = 80;
+
+/// The text in lines of the screen's width, the first with this label.
+void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const std::string& text,
+                 Tone tone) {
+  std::istringstream words(text);
+  std::string line = fmt::format("{:<9}", label), word;
+  const std::size_t indent = line.size();
+  while (words >> word) {
+    if (line.size() > indent && line.size() + 1 + word.size() > kColumns) {
+      lines.push_back({line, tone});
+      line = std::string(indent, ' ');
+    }
+    line += (line.size() > indent ? " " : "") + word;
+  }
+  lines.push_back({line.substr(0, kColumns), tone});
+}
+
+std::string outcome_of(const UnitImage& image) {
+  return image.refused.empty() ? "taken" : "refused: " + image.refused;
+}
+
+const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",
+                       "  ####   #####   ###     ###  ", "  #      #   #      #       # ",
+                       "  #      #   #  ####    ####  "};
+const std::array kFail{"  #####    #     #####   #    ", "  #       # #      #     #    ",
+                       "  ####   #####     #     #    ", "  #      #   #     #     #    ",
+                       "  #      #   #   #####   #####"};
+
+}  // namespace
+
+std::vector<ScreenLine> station_screen(const Unit& unit) {
+  std::vector<ScreenLine> lines;
+  lines.push_back(
+      {fmt::format("{}   camera {}", unit.config().station, unit.camera_id()).substr(0, kColumns),
+       Tone::heading});
+  const auto current = unit.current();
+  std::string steps;
+  for (const StationStep step : kStationSteps) {
+    const char* mark = unit.step(step).done() ? "x" : step == current ? ">" : " ";
+    steps += fmt::format("[{}] {} {}   ", mark, name_of(step), count_of(unit, step));
+  }
+  lines.push_back({steps.substr(0, kColumns)});
+  lines.push_back({""});
+  if (!current) return lines;
+  const UnitStep& state = unit.step(*current);
+  lines.push_back({name_of(*current), Tone::heading});
+  for (std::string& line : progress_of(unit, *current)) {
+    lines.push_back({line.substr(0, kColumns)});
+  }
+  add_wrapped(lines, "Next", next_of(unit, *current), Tone::plain);
+  if (const auto image = state.images.find(state.last); image != state.images.end()) {
+    add_wrapped(lines, "Last", image->first + ": " + outcome_of(image->second),
+                image->second.refused.empty() ? Tone::good : Tone::bad);
+  }
+  if (state.refused_in_a_row > 1) {
+    add_wrapped(lines, "Refused",
+                fmt::format("{} in a row; after {} the unit fails", state.refused_in_a_row,
+                            unit.config().refuse.in_a_row),
+                Tone::bad);
+  }
+  return lines;
+}
+
+std::string last_image_line(const Unit& unit, StationStep step, const std::string& image) {
+  const auto& images = unit.step(step).images;
+  const auto found = images.find(image);
+  const std::string outcome =
+      found == images.end() ? "waits for the step before" : outcome_of(found->second);
+  return fmt::format("{} {}: {} ({})", name_of(step), image, outcome, count_of(unit, step));
+}
+
+std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
+  std::vector<ScreenLine> lines{{""}};
+  const Tone tone = record.passed() ? Tone::good : Tone::bad;
+  for (const char* row : record.passed() ? kPass : kFail) lines.push_back({row, tone});
+  lines.push_back({""});
+  lines.push_back({fmt::format("{}   camera {}   {}", record.verdict, record.camera, record.station)
+                       .substr(0, kColumns),
+                   Tone::heading});
+  std::istringstream causes(record.causes);
+  for (std::string cause; std::getline(causes, cause);) {
+    add_wrapped(lines, "Cause", cause, Tone::bad);
+  }
+  lines.push_back({""});
+  lines.push_back({fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading});
+  for (const StationFigure& figure : record.figures) {
+    if (!figure.limit) continue;
+    const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
+    lines.push_back(
+        {fmt::format("{:<24}{:>12}{:>14}  {}", figure.name, value,
+                     fmt::format("{} {:.4g}", figure.at_least ? ">=" : "<=", *figure.limit),
+                     figure.met()   ? "met"
+                     : figure.value ? "NOT MET"
+                                    : "not reached"),
+         figure.met() ? Tone::plain : Tone::bad});
+  }
+  return lines;
+}
+
+}  // namespace vlp

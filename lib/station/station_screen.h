@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "station/run_record.h"
+#include "station/unit.h"
+
+namespace vlp {
+
+/// How a line is to be shown, where there is colour.
+enum class Tone { plain, heading, good, bad };
+
+/// A line of at most 80 columns of ASCII.
+struct ScreenLine {
+  std::string text;
+  Tone tone = Tone::plain;
+};
+
+/// What the operator of a station sees while a unit is worked on: the steps, what there is of the
+/// present one, what to do next, and what became of the last image.
+std::vector<ScreenLine> station_screen(const Unit& unit);
+
+/// The same in one line, of the image that came last.
+std::string last_image_line(const Unit& unit, StationStep step, const std::string& image);
+
+/// PASS or FAIL, large; the causes; the gates with figure and limit.
+std::vector<ScreenLine> verdict_screen(const RunRecord& record);
+
+}  // namespace vlp

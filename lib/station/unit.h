@@ -1,0 +1,105 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "station/station_step.h"
+#include "station/unit_image.h"
+#include "station/unit_stages.h"
+
+namespace vlp {
+
+/// Who makes a calibration, for its history.
+struct ProgramVersion {
+  std::string program, version;
+};
+
+/// One step of a unit.
+struct UnitStep {
+  /// Where captures.csv and truth.csv are looked for.
+  std::filesystem::path folder = {};
+  /// By name.
+  std::map<std::string, UnitImage> images = {};
+  /// Images that wait for the step before.
+  std::vector<std::filesystem::path> waiting = {};
+  /// There are as many as the station wants.
+  bool enough = false;
+  /// What the images come to, once there are enough of them.
+  std::optional<StageResult> result = {};
+  /// Of the images refused one after another, the last ones.
+  int refused_in_a_row = 0;
+  /// The image that came last.
+  std::string last = {};
+
+  bool done() const { return enough && result && result->problem.empty(); }
+  int used() const;
+};
+
+/// A unit on its way through the station. Images are looked at as they come; a step is solved as
+/// soon as it has enough, and again when its images change, and with it those that rest on it. The
+/// result depends on the images and their names only, not on threads, nor on when they came, unless
+/// more came than enough.
+class Unit {
+ public:
+  /// `config` outlives it.
+  Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads);
+  ~Unit();
+  Unit(const Unit&) = delete;
+  Unit& operator=(const Unit&) = delete;
+
+  /// Images of a step that came, or changed. One that comes when the step is done is not used.
+  void add(StationStep step, const std::vector<std::filesystem::path>& files);
+  /// An image that is there no more.
+  void remove(StationStep step, const std::string& name);
+  /// Solves what has enough; with `all_in`, nothing more comes, and what there is has to do.
+  void advance(bool all_in);
+
+  const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
+  /// The first step that is not done; nothing when all are.
+  std::optional<StationStep> current() const;
+  /// It is of no use to go on: a step has so many refused images in a row, or enough images that
+  /// lead to nothing because of the lamps.
+  bool hopeless() const;
+
+  /// As far as it came; nothing before the lens is known.
+  std::optional<Calibration> calibration() const;
+  /// All figures, gates among them.
+  std::vector<StationFigure> figures() const;
+  /// Why the unit fails, the root first; empty when it passes.
+  std::vector<std::string> causes() const;
+  const StationConfig& config() const { return config_; }
+  const std::string& camera_id() const { return camera_id_; }
+
+ private:
+  static std::size_t index(StationStep step) { return static_cast<std::size_t>(step); }
+  UnitStep& at(StationStep step) { return steps_[index(step)]; }
+  void look(StationStep step, const std::vector<std::filesystem::path>& files);
+  void take(StationStep step, UnitImage image);
+  void forget_after(StationStep step);
+  bool has_enough(StationStep step) const;
+  StageResult solve(StationStep step) const;
+  std::optional<Calibration> calibration_before(StationStep step) const;
+  HistoryEntry history_of(StationStep step) const;
+
+  const StationConfig& config_;
+  std::string camera_id_;
+  ProgramVersion program_;
+  int threads_;
+  std::unique_ptr<BoardDetector> boards_;
+  std::array<UnitStep, 4> steps_;
+};
+
+/// The frames of the images that are used, by name.
+std::vector<Frame> frames_of(const UnitStep& step);
+
+/// Share of 8 x 6 parts of the image in which the views have corners.
+double board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px);
+
+}  // namespace vlp

@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "detection/boards/detect_boards.h"
+#include "detection/lamp_detector.h"
+#include "rig/detection.h"
+#include "station/station_config.h"
+
+namespace vlp {
+
+/// An image of a unit, and what the station makes of it.
+struct UnitImage {
+  std::filesystem::path file;
+  std::string sha256;
+  /// Why it is not used, for people; empty when it is.
+  std::string refused = {};
+  /// Of the step `boards`; there also when the image is refused, but for one that shows no board.
+  std::optional<BoardView> view = {};
+  std::optional<double> blur_px = {};
+  /// Of the other steps.
+  std::vector<Detection> lamps = {};
+  int lights_cut = 0, lights_unknown = 0;
+};
+
+/// What a board image shows, refused when it cannot be read, is too dark or blurred, or shows too
+/// little of the board. One bad image ends nothing: it is refused with the reason.
+UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& config,
+                        const BoardDetector& detector);
+
+/// The same of lamps: refused when it cannot be read or shows fewer than two of them.
+UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& config,
+                        const LampDetector& detector);
+
+/// Whether two views show the board at the same place: the corners of the tags that both have are
+/// closer than `distance_px` on average.
+bool same_pose(const SeenBoard& a, const SeenBoard& b, double distance_px);
+
+/// Whether both show the same lamps, each closer than `distance_px` to where it was.
+bool same_lamps(const std::vector<Detection>& a, const std::vector<Detection>& b,
+                double distance_px);
+
+}  // namespace vlp

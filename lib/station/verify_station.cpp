@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/verify_station.h"
+
+#include <fmt/core.h>
+
+#include "captures/in_parallel.h"
+#include "detection/image_file.h"
+#include "rig/input_error.h"
+#include "station/lamp_faults.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <typename Look>
+UnitStep step_of(const fs::path& folder, int threads, const Look& look) {
+  const auto files = images_in(folder);
+  std::vector<UnitImage> images(files.size());
+  in_parallel(files.size(), threads, [&](std::size_t i) { images[i] = look(files[i]); });
+  UnitStep step;
+  step.folder = folder;
+  for (UnitImage& image : images) {
+    std::string name = image.file.filename().string();
+    step.images.emplace(std::move(name), std::move(image));
+  }
+  return step;
+}
+
+CapturesTable places_of(const fs::path& folder) {
+  return fs::exists(folder / "captures.csv") ? read_captures(folder / "captures.csv")
+                                             : CapturesTable{};
+}
+
+class Verification {
+ public:
+  Verification(const StationConfig& config, const fs::path& folder, int threads)
+      : config_(config), golden_(*config.golden), folder_(folder), threads_(threads) {
+    config_.type = golden_.calibration.camera;
+  }
+
+  void boards() {
+    const BoardDetector detector(config_.board);
+    UnitStep step = step_of(folder_ / "boards", threads_, [&](const fs::path& file) {
+      return look_at_board(file, config_, detector);
+    });
+    std::vector<BoardView> views;
+    for (const auto& [name, image] : step.images) {
+      if (image.refused.empty()) views.push_back(*image.view);
+    }
+    if (!views.empty()) add("boards", solve_boards(config_, golden_.camera_id, views));
+    note(StationStep::boards, step);
+  }
+
+  void lamps(StationStep each) {
+    const LampDetector detector(config_.lamps, detector_camera(golden_.calibration));
+    UnitStep step = step_of(folder_ / name_of(each), threads_, [&](const fs::path& file) {
+      return look_at_lamps(file, config_, detector);
+    });
+    const auto frames = frames_of(step);
+    frames_.insert(frames_.end(), frames.begin(), frames.end());
+    const auto places = places_of(step.folder);
+    add(name_of(each), each == StationStep::check
+                           ? check_fixes(config_, golden_.calibration, frames, places)
+                           : solve_dispersion(config_, golden_.calibration, frames, places));
+    note(each, step);
+  }
+
+  RunRecord record(const ProgramVersion& program) {
+    const auto figures = with_gates(values_, golden_.gates);
+    for (const StationFigure& figure : figures) {
+      if (!figure.met()) causes_.push_back(cause_of(figure));
+    }
+    if (!causes_.empty()) {
+      const auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration);
+      causes_.insert(causes_.begin(), faults.begin(), faults.end());
+    }
+    RunRecord record{new_run(),
+                     "golden",
+                     config_.station,
+                     golden_.camera_id,
+                     now_utc(),
+                     causes_.empty() ? "PASS" : "FAIL",
+                     "",
+                     program.program + " " + program.version,
+                     library_versions(),
+                     config_.sha256,
+                     "",
+                     figures,
+                     images_};
+    for (const std::string& cause : causes_) record.causes += cause + "\n";
+    return record;
+  }
+
+ private:
+  void add(const char* step, const StageResult& result) {
+    if (!result.problem.empty()) causes_.push_back(fmt::format("{}: {}", step, result.problem));
+    values_.insert(values_.end(), result.values.begin(), result.values.end());
+  }
+  void note(StationStep each, const UnitStep& step) {
+    for (const auto& [name, image] : step.images) {
+      images_.push_back({name_of(each), name, image.sha256, image.refused});
+    }
+  }
+
+  StationConfig config_;
+  const GoldenUnit& golden_;
+  fs::path folder_;
+  int threads_;
+  std::vector<Frame> frames_ = {};
+  std::vector<NamedValue> values_ = {};
+  std::vector<std::string> causes_ = {};
+  std::vector<RunRecord::Image> images_ = {};
+};
+
+}  // namespace
+
+RunRecord verify_station(const StationConfig& config, const fs::path& folder,
+                         const ProgramVersion& program, int threads) {
+  Verification verification(config, folder, threads);
+  if (fs::is_directory(folder / "boards")) verification.boards();
+  if (fs::is_directory(folder / "dispersion")) verification.lamps(StationStep::dispersion);
+  verification.lamps(StationStep::check);
+  return verification.record(program);
+}
+
+}  // namespace vlp

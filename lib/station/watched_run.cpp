@@ -1,0 +1,123 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/watched_run.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "station/unit_report.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw InputError(folder, "cannot be made: " + error.message());
+}
+
+}  // namespace
+
+std::string camera_id_problem(const std::string& camera_id) {
+  const bool plain = std::all_of(camera_id.begin(), camera_id.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.';
+  });
+  constexpr std::size_t longest = 64;
+  if (plain && !camera_id.empty() && camera_id.size() <= longest && camera_id[0] != '.') return "";
+  return "a camera's id has letters, digits, '-', '_' and '.', up to 64, no '.' first";
+}
+
+WatchedRun::WatchedRun(Unit& unit, Records& records)
+    : unit_(unit), folder_(unit.config().captures / unit.camera_id()) {
+  begin(records);
+  for (const StationStep step : kStationSteps) {
+    make_folder(folder_ / name_of(step));
+    steps_.emplace_back(folder_ / name_of(step));
+  }
+  waiting_.resize(steps_.size());
+}
+
+WatchedRun::~WatchedRun() {
+  if (lock_ >= 0) ::close(lock_);
+}
+
+void WatchedRun::begin(Records& records) {
+  make_folder(folder_);
+  const fs::path lock = folder_ / ".lock", state = folder_ / ".run";
+  lock_ = ::open(lock.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+  if (lock_ < 0) throw InputError(lock, "cannot be written");
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    throw InputError(folder_, "another vlp-station works on this camera");
+  }
+  constexpr std::size_t longest = 100;
+  if (fs::exists(state)) {
+    run_ = read_text_file(state, longest);
+    run_.erase(std::find(run_.begin(), run_.end(), '\n'), run_.end());
+    const auto record = records.find(run_);
+    if (!record) return;  // goes on
+    publish_run(*record, unit_.config().results);
+    put_away();
+    ::close(std::exchange(lock_, -1));
+    return begin(records);
+  }
+  run_ = new_run();
+  write_file(state, run_ + "\n");
+}
+
+std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
+  std::vector<Arrival> arrivals;
+  for (const StationStep step : kStationSteps) {
+    const auto index = static_cast<std::size_t>(step);
+    auto& waiting = waiting_[index];
+    const auto changes = steps_[index].look();
+    for (const std::string& name : changes.gone) {
+      std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
+      unit_.remove(step, name);
+      arrivals.push_back({step, name, true});
+    }
+    waiting.insert(waiting.end(), changes.came.begin(), changes.came.end());
+    const auto end = waiting.begin() + static_cast<std::ptrdiff_t>(std::min(most, waiting.size()));
+    const std::vector<fs::path> now(waiting.begin(), end);
+    waiting.erase(waiting.begin(), end);
+    most -= now.size();
+    unit_.add(step, now);
+    for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
+  }
+  if (!arrivals.empty()) unit_.advance(false);
+  return arrivals;
+}
+
+void WatchedRun::put_away() {
+  const fs::path kept = folder_.string() + "." + run_;
+  std::error_code error;
+  fs::rename(folder_, kept, error);
+  if (error)
+    throw InputError(folder_, "cannot be put away as " + kept.string() + ": " + error.message());
+}
+
+fs::path publish_run(const RunRecord& record, const fs::path& results) {
+  const fs::path folder = results / record.camera / record.run;
+  make_folder(folder);
+  fs::path calibration;
+  if (!record.calibration.empty()) {
+    calibration = folder / (record.passed() ? "calibration.yaml" : "failed-calibration.yaml");
+    write_file(calibration, record.calibration);
+  }
+  write_file(folder / "report.html", unit_report(record, calibration));
+  return folder;
+}
+
+void finish_run(const RunRecord& record, Records& records, const fs::path& results) {
+  records.keep(record);
+  publish_run(record, results);
+}
+
+}  // namespace vlp

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "station/records.h"
+#include "station/unit.h"
+#include "station/watched_folder.h"
+
+namespace vlp {
+
+/// A run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. The folders are the truth: an
+/// image that is taken away is no longer of the unit, one that is overwritten counts anew, and a
+/// program that starts again after it was killed goes on where it was, with the same name of the
+/// run (file
+/// `.run` there). One program at a time.
+class WatchedRun {
+ public:
+  /// Makes the folders. A run there that has its record already is put away first. Throws
+  /// InputError: another program works on this camera, a folder cannot be made.
+  WatchedRun(Unit& unit, Records& records);
+  ~WatchedRun();
+  WatchedRun(const WatchedRun&) = delete;
+  WatchedRun& operator=(const WatchedRun&) = delete;
+
+  struct Arrival {
+    StationStep step;
+    std::string image;
+    bool gone;
+  };
+  /// Takes what changed, a few images at a time, and solves what has enough.
+  std::vector<Arrival> look(std::size_t most);
+
+  const std::string& run() const { return run_; }
+  const std::filesystem::path& folder() const { return folder_; }
+
+  /// After the record is kept: CAPTURES/CAMERA becomes CAPTURES/CAMERA.RUN, images and all.
+  void put_away();
+
+ private:
+  void begin(Records& records);
+
+  Unit& unit_;
+  std::filesystem::path folder_;
+  std::string run_;
+  int lock_ = -1;
+  std::vector<WatchedFolder> steps_;
+  std::vector<std::vector<std::filesystem::path>> waiting_;
+};
+
+/// Keeps the record, then writes RESULTS/CAMERA/RUN/: calibration.yaml when the unit passed,
+/// failed-calibration.yaml when it failed and came so far; report.html. Done again it changes
+/// nothing; a run that has its record can be published at any time. Throws InputError.
+void finish_run(const RunRecord& record, Records& records, const std::filesystem::path& results);
+/// The second half of it. The folder that it went to.
+std::filesystem::path publish_run(const RunRecord& record, const std::filesystem::path& results);
+
+/// Why a text cannot be a camera's id, which names folders; empty when it can.
+std::string camera_id_problem(const std::string& camera_id);
+
+}  // namespace vlp

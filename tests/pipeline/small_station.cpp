@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "small_station.h"
+
+#include <algorithm>
+
+namespace vlp {
+
+namespace fs = std::filesystem;
+
+SmallStation::SmallStation() {
+  const fs::path data = fs::path(VLP_SOURCE_DIR) / "datasets/station";
+  fs::create_directory(folder / "station");
+  for (const char* name : {"station.yaml", "camera_type.yaml", "board.yaml", "lamps.yaml"}) {
+    fs::copy_file(data / name, folder / "station" / name);
+  }
+  fs::copy_file(data / "scene.yaml", folder / "station/scene.yaml");
+  change("station.yaml", "board_views: 36", "board_views: 16");
+  change("station.yaml", "turn_captures: 12", "turn_captures: 6");
+  change("station.yaml", "turn_arc_deg: 300", "turn_arc_deg: 240");
+  change("station.yaml", "dispersion_captures: 40, check_captures: 36",
+         "dispersion_captures: 12, check_captures: 8");
+  change("scene.yaml", "count: 36", "count: 16");
+  change("scene.yaml", "count: 12", "count: 6");
+  change("scene.yaml", "count: 40", "count: 12");
+  change("scene.yaml", "columns: 3, rows: 3}\n    heights_m: [0, 0.3]",
+         "columns: 2, rows: 2}\n    heights_m: [0]");
+}
+
+void SmallStation::change(const std::string& file, const std::string& from,
+                          const std::string& to) const {
+  const std::string name = "station/" + file;
+  std::string text = TemporaryFolder::content_of(folder / name);
+  const auto at = text.find(from);
+  ASSERT_NE(at, std::string::npos) << from;
+  folder.file(name, text.replace(at, from.size(), to));
+}
+
+void SmallStation::render(const std::string& only) const {
+  const auto result = run_program("vlp-simulate " + (folder / "station/scene.yaml").string() +
+                                  " --only " + only + " -o " + (folder / "unit").string());
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+}
+
+std::vector<fs::path> SmallStation::images(const std::string& step) const {
+  std::vector<fs::path> images;
+  for (const auto& entry : fs::directory_iterator(folder / "unit" / step)) {
+    if (entry.path().extension() == ".png") images.push_back(entry.path());
+  }
+  std::sort(images.begin(), images.end());
+  return images;
+}
+
+void SmallStation::drop(const fs::path& image, const fs::path& step) const {
+  const fs::path making = step / ("." + image.filename().string());
+  fs::copy_file(image, making, fs::copy_options::overwrite_existing);
+  fs::rename(making, step / image.filename());
+}
+
+std::string SmallStation::result(const std::string& camera, const std::string& name) const {
+  std::string content;
+  const fs::path results = folder / "station/results" / camera;
+  if (!fs::exists(results)) return content;
+  for (const auto& run : fs::directory_iterator(results)) {
+    if (!fs::exists(run.path() / name)) continue;
+    EXPECT_EQ(content, "") << "more than one " << name;
+    content = TemporaryFolder::content_of(run.path() / name);
+  }
+  return content;
+}
+
+}  // namespace vlp

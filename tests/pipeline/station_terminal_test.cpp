@@ -1,0 +1,130 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-station at a real terminal (tmux), images dropped one by one; the screens are kept in
+/// station_screens/ as text.
+#include <chrono>
+#include <regex>
+#include <thread>
+
+#include "small_station.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+
+/// A terminal of 80 x 40 that a program runs in.
+class Tmux {
+ public:
+  Tmux(const fs::path& folder, const std::string& command) : socket_((folder / "tmux").string()) {
+    run_program(tmux() + "new-session -d -x 80 -y 40 \"" + command + "; sleep 100\"");
+  }
+  ~Tmux() { run_program(tmux() + "kill-server"); }
+  Tmux(const Tmux&) = delete;
+  Tmux& operator=(const Tmux&) = delete;
+
+  void type(const std::string& keys) const { run_program(tmux() + "send-keys " + keys); }
+
+  /// What it shows, without empty lines at the end; `escapes`: with colours.
+  std::string screen(const char* escapes = "") const {
+    std::string text = run_program(tmux() + "capture-pane -p " + escapes).output;
+    while (text.ends_with("\n\n")) text.pop_back();
+    return text;
+  }
+  /// The same once it holds a text; what it is after half a minute otherwise.
+  std::string screen_with(const std::string& text) const {
+    std::string shown;
+    for (int i = 0; i < 600; ++i) {
+      shown = screen();
+      if (shown.find(text) != std::string::npos) return shown;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    return shown;
+  }
+
+ private:
+  std::string tmux() const { return "tmux -f /dev/null -S '" + socket_ + "' "; }
+  std::string socket_;
+};
+
+/// The screen as it is kept. A new one is written where VLP_WRITE_SCREENS is set.
+void expect_screen(const std::string& shown, const std::string& name) {
+  const fs::path kept = fs::path(VLP_SOURCE_DIR) / "tests/pipeline/station_screens" / name;
+  if (std::getenv("VLP_WRITE_SCREENS") != nullptr) std::ofstream(kept) << shown;
+  EXPECT_EQ(shown, TemporaryFolder::content_of(kept)) << name;
+}
+
+/// Measured figures differ in the last digits from one system to another.
+std::string without_figures(const std::string& screen) {
+  return std::regex_replace(screen, std::regex(" +[0-9.e-]+ +([<>]=)"), "  N $1");
+}
+
+class StationTerminal : public SmallStation {
+ protected:
+  void drop(const std::string& step, std::size_t first, std::size_t end) const {
+    const auto all = images(step);
+    for (std::size_t i = first; i < std::min(end, all.size()); ++i) {
+      SmallStation::drop(all[i], captures("0001") / step);
+      // One by one: each has come before the next.
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
+};
+
+TEST_F(StationTerminal, GuidesThroughAUnit) {
+  if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
+  change("station.yaml", "same_pose_share: 0.01", "same_pose_share: 0.02");
+  render();
+  for (const char* step : {"dispersion", "check"}) {
+    fs::create_directories(captures("0001") / step);
+    fs::copy_file(folder / "unit" / step / "captures.csv",
+                  captures("0001") / step / "captures.csv");
+  }
+  const Tmux tmux(folder / "", "PATH='" VLP_PROGRAMS_DIR "':$PATH NO_COLOR=1 " +
+                                   run("0001", "--threads 1") + " 2>" + (folder / "log").string());
+  expect_screen(tmux.screen_with("Ctrl-C"), "begin.txt");
+  drop("boards", 0, 1);
+  tmux.screen_with("0000.png: taken");
+  fs::copy_file(images("boards")[0], captures("0001") / "boards/again.png");
+  expect_screen(tmux.screen_with("again.png: refused"), "same-pose.txt");
+  drop("boards", 1, 12);
+  expect_screen(tmux.screen_with("boards 12/16"), "boards.txt");
+  drop("boards", 12, 16);
+  tmux.screen_with("[x] boards");
+  drop("rotation", 0, 8);
+  expect_screen(tmux.screen_with("rotation 8/12"), "rotation.txt");
+  // A step done again replaces that step: an image is taken away, the step is open again.
+  fs::remove(captures("0001") / "boards/0003.png");
+  expect_screen(tmux.screen_with("boards 15/16"), "redone.txt");
+  drop("boards", 3, 4);
+  tmux.screen_with("[x] boards");
+  drop("rotation", 8, 12);
+  tmux.screen_with("[x] rotation");
+  drop("dispersion", 0, 12);
+  expect_screen(tmux.screen_with("[x] dispersion"), "check.txt");
+  drop("check", 0, 7);
+  tmux.screen_with("check 7/8");
+  const auto begin = std::chrono::steady_clock::now();
+  drop("check", 7, 8);
+  const std::string verdict = tmux.screen_with("check_residual_px");
+  const std::chrono::duration<double> wait = std::chrono::steady_clock::now() - begin;
+  RecordProperty("verdict_s", std::to_string(wait.count()));
+  expect_screen(without_figures(verdict), "verdict.txt");
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "log"), Not(HasSubstr("error")));
+}
+
+TEST_F(StationTerminal, ShowsColourAndStopsOnAKey) {
+  if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
+  const Tmux tmux(folder / "",
+                  "PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
+  tmux.screen_with("Ctrl-C");
+  EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[1m"));
+  tmux.type("q");
+  EXPECT_THAT(tmux.screen_with("FAIL"), HasSubstr("boards: not enough images"));
+  EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[31m"));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/image_blur.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+/// A checkerboard of squares of 40 px, its edges blurred by a Gaussian.
+cv::Mat checkerboard(double sigma_px, double dark, double bright) {
+  cv::Mat1b image(300, 400);
+  const auto wave = [&](double at) {
+    constexpr double period = 40;
+    const double from_edge = at - period * std::round(at / period);
+    const bool rising = static_cast<long>(std::lround(at / period)) % 2 == 0;
+    return (rising ? 1 : -1) * std::erf(from_edge / (sigma_px * std::sqrt(2.0)));
+  };
+  for (int v = 0; v < image.rows; ++v) {
+    for (int u = 0; u < image.cols; ++u) {
+      const double level = 0.5 + 0.5 * wave(u + 0.3) * wave(v + 0.6);
+      image(v, u) = static_cast<unsigned char>(std::lround(dark + (bright - dark) * level));
+    }
+  }
+  return image;
+}
+
+TEST(ImageBlur, MeasuresTheSigmaOfEdges) {
+  // Of edges along rows and columns, sampled once a pixel: a tenth, and half a pixel where the blur
+  // is no wider than a pixel.
+  for (const double sigma_px : {1.0, 2.0, 3.0, 5.0}) {
+    EXPECT_NEAR(image_blur(checkerboard(sigma_px, 20, 220)).sigma_px, sigma_px,
+                0.1 * sigma_px + 0.1);
+  }
+}
+
+TEST(ImageBlur, DoesNotDependOnContrast) {
+  EXPECT_NEAR(image_blur(checkerboard(2, 20, 60)).sigma_px,
+              image_blur(checkerboard(2, 20, 220)).sigma_px, 0.1);
+}
+
+TEST(ImageBlur, IsInfiniteWithoutContrast) {
+  const ImageBlur blur = image_blur(cv::Mat1b(300, 400, static_cast<unsigned char>(3)));
+  EXPECT_TRUE(std::isinf(blur.sigma_px));
+  EXPECT_NEAR(blur.bright_share, 3.0 / 255, 1e-6);
+}
+
+}  // namespace
+}  // namespace vlp

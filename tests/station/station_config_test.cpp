@@ -1,0 +1,76 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/station_config.h"
+
+#include <gmock/gmock.h>
+
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+class StationYaml : public testing::Test {
+ protected:
+  StationYaml() {
+    for (const char* name : {"station.yaml", "camera_type.yaml", "board.yaml", "lamps.yaml"}) {
+      folder.file(name, TemporaryFolder::content_of(std::filesystem::path(VLP_SOURCE_DIR) /
+                                                    "datasets/station" / name));
+    }
+  }
+  void change(const std::string& name, const std::string& from, const std::string& to) const {
+    std::string text = TemporaryFolder::content_of(folder / name);
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    folder.file(name, text.replace(at, from.size(), to));
+  }
+  std::string refusal() const {
+    return refusal_of([&] { read_station(folder / "station.yaml"); });
+  }
+  TemporaryFolder folder;
+};
+
+TEST_F(StationYaml, IsReadWithTheFilesThatItNames) {
+  const StationConfig config = read_station(folder / "station.yaml");
+  EXPECT_EQ(config.station, "station-1");
+  EXPECT_EQ(config.type.imager_px[0], 800);
+  EXPECT_THAT(config.lamps.lamps, SizeIs(6));
+  EXPECT_EQ(config.board.cols, 6);
+  EXPECT_EQ(config.enough.dispersion_captures, 40);
+  EXPECT_EQ(config.records, (folder / "records.db").string());
+  EXPECT_FALSE(config.golden);
+}
+
+TEST_F(StationYaml, RefusesAnUnknownGateWithItsLine) {
+  change("station.yaml", "  rms_px: 0.3", "  rms_mm: 0.3");
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("station.yaml:"), HasSubstr("rms_mm")));
+}
+
+TEST_F(StationYaml, RefusesWhatNoStationCanMean) {
+  change("station.yaml", "board_coverage: 0.7", "board_coverage: 70");
+  EXPECT_THAT(refusal(), HasSubstr("enough.board_coverage"));
+}
+
+TEST_F(StationYaml, RefusesATypeWithoutRowTime) {
+  change("camera_type.yaml", "  row_time_s: 3.0e-05\n", "");
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("camera_type"), HasSubstr("row_time_s")));
+}
+
+TEST_F(StationYaml, RefusesAnUnknownDatabase) {
+  change("station.yaml", "records: records.db", "records: mysql://server/records");
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("records"), HasSubstr("postgresql://")));
+}
+
+TEST_F(StationYaml, HasAnotherDigestWhenAFileThatItNamesChanges) {
+  const std::string before = read_station(folder / "station.yaml").sha256;
+  EXPECT_EQ(read_station(folder / "station.yaml").sha256, before);
+  change("lamps.yaml", "-0.32", "-0.33");
+  EXPECT_NE(read_station(folder / "station.yaml").sha256, before);
+}
+
+}  // namespace
+}  // namespace vlp

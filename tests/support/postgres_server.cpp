@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "support/postgres_server.h"
+
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <vector>
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The folder of initdb and pg_ctl; empty when there is none.
+fs::path programs() {
+  std::vector<fs::path> versions;
+  std::error_code none;
+  for (const auto& version : fs::directory_iterator("/usr/lib/postgresql", none)) {
+    if (fs::exists(version.path() / "bin/initdb")) versions.push_back(version.path() / "bin");
+  }
+  return versions.empty() ? fs::path() : *std::max_element(versions.begin(), versions.end());
+}
+
+}  // namespace
+
+bool PostgresServer::installed() { return !programs().empty(); }
+
+int PostgresServer::as_owner(const std::string& command) const {
+  const std::string user = ::geteuid() == 0 ? "setpriv --reuid=postgres --regid=postgres "
+                                              "--clear-groups "
+                                            : "";
+  return std::system(("cd / && " + user + programs().string() + "/" + command + " >>'" +
+                      folder_.string() + "/log' 2>&1")
+                         .c_str());
+}
+
+PostgresServer::PostgresServer() {
+  std::string folder = (fs::temp_directory_path() / "vlp-postgres-XXXXXX").string();
+  if (::mkdtemp(folder.data()) == nullptr) return;
+  folder_ = folder;
+  if (::geteuid() == 0 && std::system(("chown postgres '" + folder + "'").c_str()) != 0) return;
+  const std::string data = "-D '" + folder + "/data' ";
+  if (as_owner("initdb " + data + "--auth=trust --username=vlp --no-sync --encoding=UTF8") != 0) {
+    return;
+  }
+  const std::string start = "-c listen_addresses= -c fsync=off -k " + folder;
+  if (as_owner("pg_ctl " + data + "-w -o \"" + start + "\" start") != 0) return;
+  uri_ = "postgresql://vlp@/postgres?host=" + folder;
+}
+
+PostgresServer::~PostgresServer() {
+  if (!uri_.empty()) as_owner("pg_ctl -D '" + folder_.string() + "/data' -m immediate stop");
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+}
+
+}  // namespace vlp

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace vlp {
+
+/// A PostgreSQL server of a test's own, of the newest version that Debian's packages have
+/// installed, as user postgres when the test runs as root; it listens to a socket in its own folder
+/// only.
+class PostgresServer {
+ public:
+  PostgresServer();
+  ~PostgresServer();
+  PostgresServer(const PostgresServer&) = delete;
+  PostgresServer& operator=(const PostgresServer&) = delete;
+
+  static bool installed();
+  /// postgresql://...; empty when it did not start.
+  const std::string& uri() const { return uri_; }
+
+ private:
+  int as_owner(const std::string& command) const;
+
+  std::filesystem::path folder_;
+  std::string uri_;
+};
+
+}  // namespace vlp
