@@ -5,11 +5,13 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <thread>
 
 namespace vlp {
 namespace {
@@ -36,6 +38,8 @@ CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
 }
 
 }  // namespace
+
+int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
 
 CLI::Validator finite() {
   return number_check("finite", [](double) { return true; });

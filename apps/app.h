@@ -23,6 +23,9 @@ class GateNotMet : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// How many threads there are when nobody says so.
+int all_cores();
+
 /// Checks for options: a number that is finite, and positive, or not negative.
 CLI::Validator finite();
 CLI::Validator finite_positive();

@@ -11,7 +11,6 @@
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
 #include "app.h"
@@ -112,8 +111,6 @@ void check_lamps(const std::vector<Frame>& frames, const LampMap& lamps,
   }
   throw InputError(lamps_file, "has none of the lamps that the captures show");
 }
-
-int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
 
 void add_detect_options(CLI::App& app, DetectOptions& options) {
   app.add_option("--classifier", options.classifier,

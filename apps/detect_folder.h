@@ -7,14 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "app.h"
 #include "detection/detect_captures.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 
 namespace vlp {
-
-/// How many threads there are when nobody says so.
-int all_cores();
 
 /// How to find the lamps in a folder of images. Names of files are for messages, too.
 struct DetectOptions {

@@ -12,6 +12,7 @@ packages=(
   # libraries
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
   libopencv-dev libapriltag-dev libceres-dev libssl-dev
+  nlohmann-json3-dev libpugixml-dev
   libmrcal-dev libsuitesparse-dev libcairo2-dev
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks

@@ -37,6 +37,9 @@ class CsvTable {
   /// Nothing for an empty field.
   std::optional<double> optional_number(std::size_t row, Column column) const;
 
+  /// Where a row begins in the file, from 1.
+  std::size_t line(std::size_t row) const { return lines_[row]; }
+
   InputError error(std::size_t row, Column column, const std::string& problem) const;
 
  private:

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -28,10 +29,18 @@ struct FixRow {
   std::optional<Fix> fix;
   /// Lamps that the fix rests on.
   int lamps;
+  /// Where the row stands in the file that it was read from.
+  std::size_t line = 0;
 };
 
 /// Writes image, status, x_m, y_m, z_m, yaw_rad, sd_x_m, sd_y_m, sd_z_m, sd_yaw_rad, lamps,
 /// residual_px, whole or not at all; what there is not is left empty. Throws InputError.
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows);
+
+/// Reads what write_fixes() writes. Only image, status, x_m, y_m, z_m and yaw_rad are needed; an sd
+/// that is not there for all four is none; where the status is not "ok", the figures are not
+/// looked at. Throws InputError: see CsvTable; an image or a status that is empty; an image twice;
+/// a fix whose figures are not finite, or an sd that is negative; no rows.
+std::vector<FixRow> read_fixes(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -58,6 +59,18 @@ bool is_special(const fs::path& path) {
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
 
+bool is_control_character(char character) {
+  const auto byte = static_cast<unsigned char>(character);
+  return byte < 0x20 && byte != '\n' && byte != '\r' && byte != '\t';
+}
+
+/// Looks at all of it: without a way out of the loop the compiler takes many characters at a time.
+bool has_control_characters(const std::string& text) {
+  bool found = false;
+  for (const char character : text) found |= is_control_character(character);
+  return found;
+}
+
 }  // namespace
 
 std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
@@ -67,6 +80,8 @@ std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
   std::ifstream stream(path, std::ios::binary);
   if (!stream) throw InputError(path, std::string("cannot be opened: ") + std::strerror(errno));
   std::string content;
+  const auto bytes = fs::file_size(path, error);
+  if (!error) content.reserve(std::min<std::size_t>(bytes, max_bytes) + 1);
   for (char block[65536]; stream.read(block, sizeof block), stream.gcount() > 0;) {
     content.append(block, static_cast<std::size_t>(stream.gcount()));
     if (content.size() > max_bytes) {
@@ -76,16 +91,15 @@ std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
   }
   if (stream.bad()) throw InputError(path, "cannot be read");
   if (content.empty()) throw InputError(path, "is empty");
-  std::size_t line = 1;
-  for (const char character : content) {
-    const auto byte = static_cast<unsigned char>(character);
-    if (byte == '\n') ++line;
-    if (byte < 0x20 && byte != '\n' && byte != '\r' && byte != '\t') {
-      throw InputError(path, line, "", "is not a text file");
-    }
+  const auto line_at = [&](std::string::const_iterator end) {
+    return static_cast<std::size_t>(std::count(content.cbegin(), end, '\n')) + 1;
+  };
+  if (has_control_characters(content)) {
+    const auto first = std::find_if(content.cbegin(), content.cend(), is_control_character);
+    throw InputError(path, line_at(first), "", "is not a text file");
   }
   if (content.back() != '\n') {
-    throw InputError(path, line, "",
+    throw InputError(path, line_at(content.cend()), "",
                      "the last line has no end: is the file cut short? "
                      "If it is whole, end it with a newline");
   }

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "captures/fixes_table.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
+#include "support/refused.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -21,6 +22,44 @@ TEST(FixesTable, HasTheColumnsOfTheContract) {
             "a.png,ok,1.500000000,-0.250000000,0.123456789,3.000000000,0.1,0.2,0.3,0.4,4,0.05\n"
             "b.png,ok,1.500000000,-0.250000000,0.123456789,3.000000000,,,,,2,0\n"
             "\"c,d.png\",too_few_lamps,,,,,,,,,0,\n");
+}
+
+TEST(FixesTable, ReadsWhatItWrites) {
+  const TemporaryFolder folder;
+  const Pose pose{{1.5, -0.25, 0.125}, 3};
+  write_fixes(folder / "fixes.csv",
+              {{"a.png", "ok", FixRow::Fix{pose, Eigen::Vector4d(0.1, 0.2, 0.3, 0.4), 0.05}, 4},
+               {"b.png", "ok", FixRow::Fix{pose, {}, 0}, 2},
+               {"c,d.png", "too_few_lamps", {}, 1}});
+  const auto rows = read_fixes(folder / "fixes.csv");
+  ASSERT_EQ(rows.size(), 3);
+  EXPECT_EQ(rows[0].fix->pose.position_m, pose.position_m);
+  EXPECT_EQ(rows[0].fix->pose.yaw_rad, 3);
+  EXPECT_EQ(*rows[0].fix->sd, Eigen::Vector4d(0.1, 0.2, 0.3, 0.4));
+  EXPECT_EQ(rows[0].fix->residual_px, 0.05);
+  EXPECT_EQ(rows[0].lamps, 4);
+  EXPECT_FALSE(rows[1].fix->sd);
+  EXPECT_EQ(rows[2].image, "c,d.png");
+  EXPECT_EQ(rows[2].status, "too_few_lamps");
+  EXPECT_FALSE(rows[2].fix);
+  EXPECT_EQ(rows[2].line, 4);
+}
+
+TEST(FixesTable, NamesTheLineOfBadRows) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& rows) {
+    const std::string header = "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad\n";
+    return refusal_of([&] { read_fixes(folder.file("fixes.csv", header + rows)); });
+  };
+  using testing::HasSubstr;
+  EXPECT_EQ(refusal("a,ok,0,0,0,0,,,,\nb,bad,x,,,,,,,\n"), "");
+  EXPECT_THAT(refusal("a,ok,0,0,0,0,,,,\na,bad,,,,,,,,\n"),
+              HasSubstr("fixes.csv:3: image: 'a' stands twice"));
+  EXPECT_THAT(refusal("a,ok,0,NaN,0,0,,,,\n"), HasSubstr("fixes.csv:2: y_m"));
+  EXPECT_THAT(refusal("a,ok,0,0,0,0,1,1,1,-1\n"), HasSubstr("fixes.csv:2: sd_yaw_rad"));
+  EXPECT_THAT(refusal("a,,0,0,0,0,,,,\n"), HasSubstr("fixes.csv:2: status: is empty"));
+  EXPECT_THAT(refusal("a,ok,0,0\n"), HasSubstr("fixes.csv:2: has 4 fields"));
+  EXPECT_THAT(refusal(""), HasSubstr("fixes.csv: holds no fix"));
 }
 
 }  // namespace

@@ -47,8 +47,8 @@ TEST_P(Help, NamesTheVersion) {
 
 INSTANTIATE_TEST_SUITE_P(Programs, Help,
                          testing::Values("vlp-board", "vlp-detect", "vlp-dispersion",
-                                         "vlp-intrinsics", "vlp-limits", "vlp-locate",
-                                         "vlp-rotation", "vlp-simulate", "vlp-train"),
+                                         "vlp-evaluate", "vlp-intrinsics", "vlp-limits",
+                                         "vlp-locate", "vlp-rotation", "vlp-simulate", "vlp-train"),
                          [](const auto& instance) {
                            return std::string(instance.param).substr(4);
                          });

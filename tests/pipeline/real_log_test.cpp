@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// A robot's run under eight real ceiling lamps, when the real captures are there.
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -86,6 +86,19 @@ class RealLog : public testing::Test {
                        path("levelled.yaml") + options);
   }
 };
+
+/// The same two figures from vlp-evaluate, as a user would have them.
+TEST_F(RealLog, IsEvaluatedAgainstItsPath) {
+  const auto evaluate = [&](const char* gate) {
+    return run_program("vlp-evaluate " + path("fixes.csv") + "--path " + in_log("path.csv") + gate);
+  };
+  figures(in_log("lamps.yaml"), calibration);
+  EXPECT_THAT(evaluate("").output, testing::HasSubstr("mean           65.831 mm"));
+  ASSERT_EQ(level().exit_code, 0);
+  figures(in_log("lamps.yaml"), path("levelled.yaml"));
+  EXPECT_EQ(evaluate("--gate mean_mm=32.9 --gate missing=0").exit_code, 0);
+  EXPECT_EQ(evaluate("--gate mean_mm=32.5").exit_code, 1);
+}
 
 TEST_F(RealLog, IsSixtySixMillimetresFromThePathWithoutCentreCorrection) {
   const auto [distance_m, residual_px] = figures(in_log("lamps.yaml"), calibration);

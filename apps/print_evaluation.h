@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "evaluation/evaluation.h"
+#include "evaluation/gates.h"
+
+namespace vlp {
+
+/// To stdout, for people: millimetres and degrees.
+void print_evaluation(const Evaluation& evaluation, const std::vector<GateResult>& gates);
+
+}  // namespace vlp

@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/name_index.h"
+
+#include <bit>
+#include <functional>
+
+namespace vlp {
+namespace {
+
+std::uint64_t hash_of(std::string_view name) { return std::hash<std::string_view>()(name); }
+
+/// Of the hash's bits those that the choice of the slot leaves over.
+std::uint32_t upper(std::uint64_t hash) { return static_cast<std::uint32_t>(hash >> 32); }
+
+}  // namespace
+
+NameIndex::NameIndex(std::size_t most) : slots_(std::bit_ceil(2 * most + 1)) {
+  names_.reserve(most);
+}
+
+std::size_t NameIndex::slot_of(std::string_view name, std::uint64_t hash) const {
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t slot = hash & mask;
+  for (; slots_[slot].next_place != 0; slot = (slot + 1) & mask) {
+    const Slot& taken = slots_[slot];
+    if (taken.hash == upper(hash) && names_[taken.next_place - 1] == name) break;
+  }
+  return slot;
+}
+
+bool NameIndex::insert(std::string_view name) {
+  const std::uint64_t hash = hash_of(name);
+  Slot& slot = slots_[slot_of(name, hash)];
+  if (slot.next_place != 0) return false;
+  names_.push_back(name);
+  slot = {upper(hash), static_cast<std::uint32_t>(names_.size())};
+  return true;
+}
+
+std::optional<std::size_t> NameIndex::find(std::string_view name) const {
+  const Slot& slot = slots_[slot_of(name, hash_of(name))];
+  if (slot.next_place == 0) return std::nullopt;
+  return slot.next_place - 1;
+}
+
+}  // namespace vlp

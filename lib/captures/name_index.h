@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace vlp {
+
+/// Where names stand: a hash table with open addressing, for tables of millions of rows. It holds
+/// views: the names outlive it.
+class NameIndex {
+ public:
+  /// For so many names, fewer than 2^32.
+  explicit NameIndex(std::size_t most);
+
+  /// Puts a name at the next place, from 0; false, and nothing is done, when it is there.
+  bool insert(std::string_view name);
+  /// The place of a name.
+  std::optional<std::size_t> find(std::string_view name) const;
+
+ private:
+  struct Slot {
+    std::uint32_t hash = 0;
+    std::uint32_t next_place = 0;  // 0: free
+  };
+  /// The slot of the name, or the one that it would be in.
+  std::size_t slot_of(std::string_view name, std::uint64_t hash) const;
+
+  std::vector<Slot> slots_;
+  std::vector<std::string_view> names_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/path_table.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "captures/csv_reader.h"
+
+namespace vlp {
+
+NearestOnPath nearest_on(const Path& path, const Eigen::Vector2d& place_m) {
+  NearestOnPath nearest{path.waypoints_m.front(), {}};
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t leg = 0;
+  double share_of_leg = 0;
+  for (std::size_t i = 0; i + 1 < path.waypoints_m.size(); ++i) {
+    const Eigen::Vector2d& begin = path.waypoints_m[i];
+    const Eigen::Vector2d along = path.waypoints_m[i + 1] - begin, to_place = place_m - begin;
+    const double squared_length = along.squaredNorm();
+    const double share =
+        squared_length > 0 ? std::clamp(to_place.dot(along) / squared_length, 0.0, 1.0) : 0;
+    const double squared_distance = (share * along - to_place).squaredNorm();
+    if (squared_distance >= least) continue;
+    least = squared_distance;
+    leg = i;
+    share_of_leg = share;
+    nearest.xy_m = begin + share * along;
+  }
+  if (!path.z_m.empty()) {
+    nearest.z_m = path.z_m[leg] + share_of_leg * (path.z_m[leg + 1] - path.z_m[leg]);
+  }
+  return nearest;
+}
+
+Path read_path(const std::filesystem::path& file) {
+  const CsvTable csv(file);
+  const auto x_m = csv.required("x_m"), y_m = csv.required("y_m");
+  const auto z_m = csv.optional("z_m");
+  Path path;
+  for (std::size_t row = 0; row < csv.rows(); ++row) {
+    path.waypoints_m.emplace_back(csv.number(row, x_m), csv.number(row, y_m));
+    if (z_m) path.z_m.push_back(csv.number(row, *z_m));
+  }
+  const bool leads_somewhere =
+      std::any_of(path.waypoints_m.begin(), path.waypoints_m.end(),
+                  [&](const auto& waypoint) { return waypoint != path.waypoints_m.front(); });
+  if (!leads_somewhere) throw InputError(file, "needs two waypoints or more at different places");
+  return path;
+}
+
+}  // namespace vlp

@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "evaluation/errors/bootstrap.h"
+#include "evaluation/errors/fix_errors.h"
+
+namespace vlp {
+
+/// These fixes and others of the same captures, by their horizontal errors.
+struct Comparison {
+  /// Captures with a fix in both, in the first alone, in the second alone.
+  std::size_t pairs = 0, only_these = 0, only_others = 0;
+  /// Pairs in which the first error is smaller, or larger.
+  std::size_t smaller = 0, larger = 0;
+  /// Mean of (first error - second error), and its interval (error_intervals() of the differences,
+  /// drawn by the units of the first).
+  double mean_difference_m = 0;
+  std::optional<Interval> interval_m;
+
+  /// The word: "better" when the whole interval is below zero, "worse" when it is above, otherwise
+  /// "no evidence". It is of the pairs alone: look at what is missing, too.
+  std::string_view verdict() const;
+};
+
+/// Pairs by image. `others` are against the same truth or path. No figures when there is no pair.
+Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>& errors,
+                   const std::vector<FixRow>& other_fixes,
+                   const std::vector<FixError>& other_errors, int threads);
+
+/// Throws InputError when the two files do not have rows of the same images: how many they are, and
+/// where the first stands.
+void check_same_images(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others);
+
+}  // namespace vlp

@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/errors/error_ratios.h"
+
+#include <cmath>
+
+#include "camera/lens.h"
+#include "captures/in_parallel.h"
+#include "positioning/error_budget.h"
+#include "positioning/floor_limits.h"
+
+namespace vlp {
+namespace {
+
+/// Root of the mean of squares.
+class Rms {
+ public:
+  void add(double value) {
+    squares_ += value * value;
+    ++count_;
+  }
+  std::optional<double> value() const {
+    return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_)))
+                      : std::nullopt;
+  }
+
+ private:
+  double squares_ = 0;
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
+                                        const std::vector<FixError>& errors) {
+  Rms horizontal, height, yaw;
+  std::size_t stated = 0;
+  for (const FixError& error : errors) {
+    const auto& sd = fixes[error.fix].fix->sd;
+    if (!sd || !(sd->minCoeff() > 0)) continue;
+    ++stated;
+    horizontal.add(error.horizontal_m.x() / (*sd)[0]);
+    horizontal.add(error.horizontal_m.y() / (*sd)[1]);
+    if (error.height_m) height.add(*error.height_m / (*sd)[2]);
+    if (error.yaw_rad) yaw.add(*error.yaw_rad / (*sd)[3]);
+  }
+  if (stated == 0) return std::nullopt;
+  return StatedRatio{*horizontal.value(), stated, height.value(), yaw.value()};
+}
+
+std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,
+                                      const std::vector<TruthRow>& truth, const LampMap& lamps,
+                                      const Camera& camera, double noise_px, int threads) {
+  const Lens lens(camera.lens_model, camera.intrinsics);
+  std::vector<double> limits_m2(errors.size());  // 0: none
+  in_parallel(errors.size(), threads, [&](std::size_t i) {
+    const TruthRow& place = truth[errors[i].truth];
+    if (!place.z_m || !place.yaw_rad) return;
+    const Pose pose{{place.xy_m.x(), place.xy_m.y(), *place.z_m}, *place.yaw_rad};
+    const auto budget =
+        error_budget(visible_lamps(lamps, camera, pose), lens, pose, {noise_px, 0, 0, 0});
+    if (budget) limits_m2[i] = budget->noise(0, 0) + budget->noise(1, 1);
+  });
+  double errors_m2 = 0, limit_m2 = 0;
+  std::size_t fixes = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (!(limits_m2[i] > 0)) continue;
+    errors_m2 += errors[i].horizontal_m.squaredNorm();
+    limit_m2 += limits_m2[i];
+    ++fixes;
+  }
+  if (fixes == 0) return std::nullopt;
+  return LimitRatio{std::sqrt(errors_m2 / limit_m2),
+                    std::sqrt(limit_m2 / static_cast<double>(fixes)), fixes};
+}
+
+}  // namespace vlp

@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "evaluation/errors/fix_errors.h"
+#include "rig/calibration.h"
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// Errors in units of the standard deviations that the fixes state: root of the mean of (error /
+/// sd) squared. 1 when they are honest, whatever their correlations; more when errors are larger
+/// than stated.
+struct StatedRatio {
+  /// Over the fixes with a positive sd, and their number.
+  double horizontal;  // of x and y
+  std::size_t fixes;
+  std::optional<double> height, yaw;
+};
+/// Nothing when no fix states a sd. Not for errors against a path, which lack the part along it.
+std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
+                                        const std::vector<FixError>& errors);
+
+/// Errors in units of the theoretical limit.
+struct LimitRatio {
+  /// sqrt(mean |error|^2 / mean (limit)^2), horizontal: 1 is the best that any unbiased method
+  /// reaches with this noise.
+  double horizontal;
+  /// Root of the mean squared limit of those fixes, x and y together.
+  double limit_m;
+  /// Fixes at whose true pose there is a limit.
+  std::size_t fixes;
+};
+/// The limit at the true pose of each fix: ErrorBudget::noise, Cramer-Rao, for a level camera that
+/// sees every lamp of the map that is wholly in its image. Nothing when the truth has no height and
+/// yaw, or no place sees two lamps. Preconditions: noise_px > 0, intrinsics that are the lens
+/// model's, threads > 0.
+std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,
+                                      const std::vector<TruthRow>& truth, const LampMap& lamps,
+                                      const Camera& camera, double noise_px, int threads);
+
+}  // namespace vlp

@@ -1,0 +1,167 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/evaluation_files.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <pugixml.hpp>
+#include <sstream>
+
+#include "evaluation/check_gates.h"
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Figures in the unit that their keys end in.
+struct Unit {
+  const char* ending;
+  double of_one;
+};
+const Unit kMm{"_mm", 1e3};
+const Unit kDeg{"_deg", deg_from_rad(1)};
+
+Json json_of(const ErrorFigures& figures, const Unit& unit) {
+  const auto key = [&](const char* name) { return name + std::string(unit.ending); };
+  return {{key("mean"), unit.of_one * figures.mean},
+          {key("median"), unit.of_one * figures.median},
+          {key("p90"), unit.of_one * figures.p90},
+          {key("max"), unit.of_one * figures.max},
+          {key("rms"), unit.of_one * figures.rms}};
+}
+
+Json json_of(const SignedFigures& figures, const Unit& unit) {
+  Json json = json_of(figures.sizes, unit);
+  json["bias" + std::string(unit.ending)] = unit.of_one * figures.bias;
+  json["fixes"] = figures.sizes.count;
+  return json;
+}
+
+Json json_of(const Interval& interval_m) {
+  return {kMm.of_one * interval_m.low, kMm.of_one * interval_m.high};
+}
+
+Json json_of(const std::vector<std::pair<double, double>>& distribution_m) {
+  Json points = Json::array();
+  for (const auto& [share, error_m] : distribution_m) {
+    points.push_back({{"share", share}, {"error_mm", kMm.of_one * error_m}});
+  }
+  return points;
+}
+
+Json json_of(const StationFigures& figures) {
+  Json list = Json::array();
+  for (const auto& station : figures.stations) {
+    list.push_back({{"x_m", station.xy_m.x()},
+                    {"y_m", station.xy_m.y()},
+                    {"fixes", station.fixes},
+                    {"bias_x_mm", kMm.of_one * station.bias_m.x()},
+                    {"bias_y_mm", kMm.of_one * station.bias_m.y()},
+                    {"sd_mm", kMm.of_one * station.sd_m}});
+  }
+  return {{"stations", figures.stations.size()},
+          {"fixes", figures.fixes},
+          {"bias_mm", kMm.of_one * figures.bias_m},
+          {"scatter_mm", kMm.of_one * figures.scatter_m},
+          {"list", list}};
+}
+
+Json json_of(const LineFit& fit) {
+  Json json = json_of(fit.distances_m, kMm);
+  json["jitter_mm"] = kMm.of_one * fit.jitter_m;
+  json["angle_deg"] = deg_from_rad(fit.angle_rad);
+  for (const auto& [key, end] : {std::pair("begin", fit.line_m[0]), {"end", fit.line_m[1]}}) {
+    json[key] = {{"x_m", end.x()}, {"y_m", end.y()}};
+  }
+  json["cdf"] = json_of(fit.distribution_m);
+  return json;
+}
+
+Json json_of(const StatedRatio& stated) {
+  Json json{{"horizontal", stated.horizontal}, {"fixes", stated.fixes}};
+  if (stated.height) json["height"] = *stated.height;
+  if (stated.yaw) json["yaw"] = *stated.yaw;
+  return json;
+}
+
+Json json_of(const Comparison& comparison) {
+  Json json{{"verdict", comparison.verdict()},
+            {"pairs", comparison.pairs},
+            {"only_these", comparison.only_these},
+            {"only_others", comparison.only_others},
+            {"smaller_errors", comparison.smaller},
+            {"larger_errors", comparison.larger},
+            {"mean_difference_mm", kMm.of_one * comparison.mean_difference_m}};
+  if (comparison.interval_m) json["interval_95_mm"] = json_of(*comparison.interval_m);
+  return json;
+}
+
+Json json_of(const std::vector<GateResult>& gates) {
+  Json list = Json::array();
+  for (const GateResult& gate : gates) {
+    list.push_back({{"name", gate.name},
+                    {"unit", gate.unit},
+                    {"value", gate.value},
+                    {"limit", gate.limit},
+                    {"passed", gate.passed}});
+  }
+  return list;
+}
+
+bool failed(const GateResult& gate) { return !gate.passed; }
+
+}  // namespace
+
+std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>& gates) {
+  Json json{{"format", "vlp-evaluation/1"},
+            {"against", evaluation.against},
+            {"captures", evaluation.captures},
+            {"fixes", evaluation.fixes},
+            {"missing_share", evaluation.missing_share()},
+            {"missing", evaluation.missing},
+            {"horizontal", json_of(evaluation.horizontal_m, kMm)}};
+  if (const auto& intervals = evaluation.intervals_m) {
+    json["horizontal"]["intervals_95"] = {
+        {"drawn", evaluation.drawn},           {"units", intervals->units},
+        {"mean_mm", json_of(intervals->mean)}, {"median_mm", json_of(intervals->median)},
+        {"p90_mm", json_of(intervals->p90)},   {"rms_mm", json_of(intervals->rms)}};
+  }
+  json["horizontal"]["cdf"] = json_of(evaluation.distribution_m);
+  if (evaluation.height_m) json["height"] = json_of(*evaluation.height_m, kMm);
+  if (evaluation.yaw_rad) json["yaw"] = json_of(*evaluation.yaw_rad, kDeg);
+  if (evaluation.stations) json["repeated"] = json_of(*evaluation.stations);
+  if (evaluation.fit) json["fitted_line"] = json_of(*evaluation.fit);
+  if (evaluation.stated) json["stated_ratio"] = json_of(*evaluation.stated);
+  if (evaluation.limit) {
+    json["limit"] = {{"ratio", evaluation.limit->horizontal},
+                     {"limit_rms_mm", kMm.of_one * evaluation.limit->limit_m},
+                     {"fixes", evaluation.limit->fixes}};
+  }
+  if (evaluation.comparison) json["comparison"] = json_of(*evaluation.comparison);
+  json["gates"] = json_of(gates);
+  json["passed"] = std::none_of(gates.begin(), gates.end(), failed);
+  return json.dump(2) + "\n";
+}
+
+std::string junit_of(const std::vector<GateResult>& gates) {
+  const auto failures = std::count_if(gates.begin(), gates.end(), failed);
+  pugi::xml_document document;
+  pugi::xml_node suite = document.append_child("testsuites").append_child("testsuite");
+  suite.append_attribute("name") = "vlp-evaluate";
+  suite.append_attribute("tests") = static_cast<unsigned long>(gates.size());
+  suite.append_attribute("failures") = static_cast<long>(failures);
+  for (const GateResult& gate : gates) {
+    pugi::xml_node test = suite.append_child("testcase");
+    test.append_attribute("classname") = "vlp-evaluate";
+    test.append_attribute("name") = gate.name.c_str();
+    if (gate.passed) continue;
+    test.append_child("failure").append_attribute("message") = words_of(gate).c_str();
+  }
+  std::ostringstream text;
+  document.save(text, "  ");
+  return text.str();
+}
+
+}  // namespace vlp

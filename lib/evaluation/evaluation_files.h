@@ -1,0 +1,22 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "evaluation/evaluation.h"
+#include "evaluation/gates.h"
+
+namespace vlp {
+
+/// `evaluation.json`, for programs: format "vlp-evaluation/1". Every key ends in the unit of its
+/// figure (_mm, _deg, _m); shares and ratios have none, counts are called after what they count.
+/// What there is not is left out. Errors have mean, median, p90, max and rms; intervals are of 95
+/// %.
+std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>& gates);
+
+/// JUnit XML, for CI systems: a test case for each gate, failed with words_of() it.
+std::string junit_of(const std::vector<GateResult>& gates);
+
+}  // namespace vlp

@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/name_index.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace vlp {
+namespace {
+
+TEST(NameIndex, FindsEachNameAmongMany) {
+  std::vector<std::string> names;
+  for (int i = 0; i < 10000; ++i) names.push_back(std::to_string(i) + ".png");
+  NameIndex index(names.size());
+  for (const std::string& name : names) EXPECT_TRUE(index.insert(name));
+  for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(index.find(names[i]), i);
+  EXPECT_FALSE(index.insert("77.png"));
+  EXPECT_EQ(index.find("77.png"), 77);
+  EXPECT_EQ(index.find("10000.png"), std::nullopt);
+  EXPECT_EQ(index.find(""), std::nullopt);
+}
+
+TEST(NameIndex, OfNoNamesIsEmpty) { EXPECT_EQ(NameIndex(0).find("a"), std::nullopt); }
+
+}  // namespace
+}  // namespace vlp

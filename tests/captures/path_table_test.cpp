@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/path_table.h"
+
+#include <gmock/gmock.h>
+
+#include "support/random.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(PathTable, HasHeightsOrNot) {
+  const TemporaryFolder folder;
+  const Path flat = read_path(folder.file("p.csv", "y_m,x_m\n1,2\n3,4\n"));
+  EXPECT_EQ(flat.waypoints_m[1], Eigen::Vector2d(4, 3));
+  EXPECT_TRUE(flat.z_m.empty());
+  EXPECT_EQ(read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n4,5,6\n")).z_m,
+            (std::vector<double>{3, 6}));
+}
+
+TEST(PathTable, RefusesWhatLeadsNowhere) {
+  const TemporaryFolder folder;
+  for (const char* text : {"x_m,y_m\n", "x_m,y_m\n1,2\n", "x_m,y_m\n1,2\n1,2\n"}) {
+    EXPECT_THAT(refusal_of([&] { read_path(folder.file("p.csv", text)); }),
+                HasSubstr("two waypoints or more at different places"));
+  }
+  EXPECT_THAT(refusal_of([&] { read_path(folder.file("p.csv", "x_m,y_m\n1,nan\n1,2\n")); }),
+              HasSubstr("p.csv:2: y_m"));
+}
+
+TEST(PathTable, HasItsNearestPointWhereItIsNearest) {
+  Random random(1);
+  Path path;
+  for (int i = 0; i < 30; ++i) {
+    path.waypoints_m.emplace_back(random.uniform(-1, 1), random.uniform(-1, 1));
+    if (i % 10 == 0) path.waypoints_m.push_back(path.waypoints_m.back());  // a stop
+  }
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector2d place(random.uniform(-2, 2), random.uniform(-2, 2));
+    double least = 1e9;  // by brute force: a thousand points a leg
+    for (std::size_t leg = 1; leg < path.waypoints_m.size(); ++leg) {
+      for (int step = 0; step <= 1000; ++step) {
+        const Eigen::Vector2d point =
+            path.waypoints_m[leg - 1] +
+            step / 1000.0 * (path.waypoints_m[leg] - path.waypoints_m[leg - 1]);
+        least = std::min(least, (point - place).norm());
+      }
+    }
+    EXPECT_NEAR((nearest_on(path, place).xy_m - place).norm(), least, 2e-3);
+  }
+}
+
+TEST(PathTable, HasHeightsInBetween) {
+  const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
+  EXPECT_DOUBLE_EQ(*nearest_on(path, {1, 1e-3}).z_m, 0.5);
+  EXPECT_DOUBLE_EQ(*nearest_on(path, {3, 1.5}).z_m, 4);
+  EXPECT_DOUBLE_EQ(*nearest_on(path, {9, 9}).z_m, 5);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/check_gates.h"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+#include <pugixml.hpp>
+
+#include "evaluation/evaluation_files.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+/// Three fixes of four captures, off by 1, 2 and 6 mm; only the first's height is known, 3 mm off.
+Evaluation evaluation() {
+  EvaluationInput input;
+  input.fixes.rows = {{"a", "ok", FixRow::Fix{{{1e-3, 0, 3e-3}, 0}, {}, 0}, 3},
+                      {"b", "ok", FixRow::Fix{{{0, -2e-3, 0}, 0}, {}, 0}, 3},
+                      {"c", "ok", FixRow::Fix{{{0, 6e-3, 0}, 0}, {}, 0}, 3},
+                      {"d", "degenerate", {}, 0}};
+  input.truth = FromFile<TruthRow>{
+      "truth.csv",
+      {{"a", {0, 0}, 0, {}}, {"b", {0, 0}, {}, {}}, {"c", {0, 0}, {}, {}}, {"d", {0, 0}, {}, {}}}};
+  return evaluate(input);
+}
+
+TEST(Gates, HoldWhenTheFigureIsNoLarger) {
+  const auto results = check_gates({{"mean_mm", 3.001},
+                                    {"mean_mm", 2.999},
+                                    {"p90_mm", 6.001},
+                                    {"missing", 0.25},
+                                    {"missing", 0.249},
+                                    {"height_rms_mm", 2.9}},
+                                   evaluation());
+  std::vector<bool> passed;
+  for (const GateResult& result : results) passed.push_back(result.passed);
+  EXPECT_EQ(passed, (std::vector<bool>{true, false, true, true, false, false}));
+  EXPECT_NEAR(results[5].value, 3, 1e-9);
+  EXPECT_EQ(results[5].unit, "mm");
+  EXPECT_EQ(words_of(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is asked for");
+}
+
+TEST(Gates, AreRefusedWhereThereIsNoSuchFigure) {
+  for (const char* name : {"yaw_rms_deg", "limit_ratio", "fitted_mean_mm", "worse_mm"}) {
+    EXPECT_THROW(check_gates({{name, 1}}, evaluation()), std::invalid_argument) << name;
+  }
+}
+
+TEST(Gates, AreReadFromWords) {
+  const Gate gate = gate_of("p90_mm=2.5");
+  EXPECT_EQ(gate.name, "p90_mm");
+  EXPECT_EQ(gate.limit, 2.5);
+  for (const char* bad : {"mean=1", "mean_mm", "mean_mm=", "mean_mm=x", "mean_mm=1mm",
+                          "mean_mm=nan", "mean_mm=inf", "=1", ""}) {
+    EXPECT_THROW(gate_of(bad), std::invalid_argument) << bad;
+  }
+}
+
+TEST(Gates, AreReadFromAFile) {
+  const TemporaryFolder folder;
+  const auto gates =
+      read_gates(folder.file("g.yaml", "format: vlp-gates/1\ngates: {missing: 0, mean_mm: 1.5}\n"));
+  ASSERT_EQ(gates.size(), 2);
+  EXPECT_EQ(gates[0].name, "mean_mm");
+  EXPECT_EQ(gates[0].limit, 1.5);
+  const auto refusal = [&](const std::string& text) {
+    return refusal_of([&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\n" + text)); });
+  };
+  EXPECT_THAT(refusal("gates:\n  mean_mm: 1\n  mean_cm: 1\n"),
+              HasSubstr("g.yaml:4: gates: key 'mean_cm'"));
+  EXPECT_THAT(refusal("gates:\n  mean_cm: 1\n"), HasSubstr("p90_mm"));
+  EXPECT_THAT(refusal("gates: {mean_mm: much}\n"), HasSubstr("g.yaml:2: gates.mean_mm"));
+  EXPECT_THAT(refusal("gates: {}\n"), HasSubstr("holds no gate"));
+}
+
+TEST(EvaluationFiles, AreJsonWithUnitsInTheKeys) {
+  const auto json = nlohmann::json::parse(
+      json_of(evaluation(), check_gates({{"max_mm", 5}, {"missing", 1}}, evaluation())));
+  EXPECT_EQ(json["format"], "vlp-evaluation/1");
+  EXPECT_EQ(json["captures"], 4);
+  EXPECT_EQ(json["missing"]["degenerate"], 1);
+  EXPECT_NEAR(json["horizontal"]["mean_mm"].get<double>(), 3, 1e-9);
+  EXPECT_NEAR(json["height"]["bias_mm"].get<double>(), 3, 1e-9);
+  EXPECT_EQ(json["repeated"]["stations"], 1);
+  EXPECT_FALSE(json.contains("yaw"));
+  EXPECT_EQ(json["gates"][0]["passed"], false);
+  EXPECT_EQ(json["passed"], false);
+}
+
+TEST(EvaluationFiles, AreJUnitWithATestForEachGate) {
+  pugi::xml_document document;
+  const std::string text =
+      junit_of({{"mean_mm", "mm", 1.25, 1, false}, {"missing", "", 0, 0, true}});
+  ASSERT_TRUE(document.load_string(text.c_str()));
+  const pugi::xml_node suite = document.child("testsuites").child("testsuite");
+  EXPECT_EQ(suite.attribute("tests").as_int(), 2);
+  EXPECT_EQ(suite.attribute("failures").as_int(), 1);
+  const pugi::xml_node first = suite.child("testcase"), second = first.next_sibling("testcase");
+  EXPECT_STREQ(first.attribute("name").value(), "mean_mm");
+  EXPECT_STREQ(first.child("failure").attribute("message").value(),
+               "mean_mm is 1.25 mm, at most 1 mm is asked for");
+  EXPECT_FALSE(second.child("failure"));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/errors/comparison.h"
+
+#include <gmock/gmock.h>
+
+#include "fix_at.h"
+#include "support/random.h"
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+struct Pairs {
+  std::vector<FixRow> fixes, others;
+  std::vector<FixError> errors, other_errors;
+};
+/// So many captures, the first run's errors larger by `difference_m` on average, with chance.
+Pairs pairs(std::size_t count, double difference_m) {
+  Random random(1);
+  Pairs all;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double shared_m = random.uniform(0.01, 0.02);
+    all.fixes.push_back(fix_at(std::to_string(i), 0, 0));
+    all.others.push_back(fix_at(std::to_string(count - 1 - i), 0, 0));  // in another order
+    all.errors.push_back({i, {shared_m + difference_m + 1e-4 * random.normal(), 0}, {}, {}, i});
+    all.other_errors.push_back({count - 1 - i, {0, shared_m}, {}, {}, 0});
+  }
+  return all;
+}
+std::string_view verdict_of(const Pairs& all) {
+  return compare(all.fixes, all.errors, all.others, all.other_errors, 1).verdict();
+}
+
+TEST(Comparison, SeesSmallDifferencesInPairs) {
+  EXPECT_EQ(verdict_of(pairs(100, 1e-4)), "worse");
+  EXPECT_EQ(verdict_of(pairs(100, -1e-4)), "better");
+  EXPECT_EQ(verdict_of(pairs(4, 1)), "no evidence");  // too few
+  const Pairs same = pairs(100, 0);
+  EXPECT_EQ(compare(same.fixes, same.errors, same.fixes, same.errors, 1).verdict(), "no evidence");
+}
+
+TEST(Comparison, CountsPairsAndWhatIsMissing) {
+  Pairs all = pairs(10, 1e-2);
+  all.errors.erase(all.errors.begin(), all.errors.begin() + 3);
+  all.other_errors.erase(all.other_errors.begin() + 9);
+  const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
+  EXPECT_EQ(comparison.pairs, 6);
+  EXPECT_EQ(comparison.larger, 6);
+  EXPECT_EQ(comparison.only_these, 1);
+  EXPECT_EQ(comparison.only_others, 3);
+  EXPECT_NEAR(comparison.mean_difference_m, 1e-2, 2e-4);
+}
+
+TEST(Comparison, RefusesFixesOfOtherCaptures) {
+  const FromFile<FixRow> fixes{"a.csv", {fix_at("a", 0, 0)}};
+  const FromFile<FixRow> others{"b.csv", {fix_at("a", 0, 0), fix_at("b", 0, 0)}};
+  EXPECT_THAT(refusal_of([&] { check_same_images(fixes, others); }),
+              HasSubstr("b.csv:1: image: 'b' is not in a.csv; 1 of 2"));
+  EXPECT_EQ(refusal_of([&] { check_same_images(fixes, fixes); }), "");
+}
+
+}  // namespace
+}  // namespace vlp

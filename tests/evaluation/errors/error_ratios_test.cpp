@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/errors/error_ratios.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fix_at.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+TEST(StatedRatio, IsOneWhenErrorsAreAsStated) {
+  Random random(1);
+  std::vector<FixRow> fixes;
+  std::vector<FixError> errors;
+  for (std::size_t i = 0; i < 10000; ++i) {
+    fixes.push_back(fix_at("", 0, 0));
+    fixes.back().fix->sd = Eigen::Vector4d(1e-3, 2e-3, 3e-3, 0.1);
+    errors.push_back({i,
+                      {1e-3 * random.normal(), 2e-3 * random.normal()},
+                      2 * 3e-3 * random.normal(),
+                      {},
+                      i,
+                      0});
+  }
+  const auto ratio = stated_ratio(fixes, errors);
+  ASSERT_TRUE(ratio);
+  EXPECT_NEAR(ratio->horizontal, 1, 0.015);  // three standard errors
+  EXPECT_NEAR(*ratio->height, 2, 0.05);      // stated too small by a factor of two
+  EXPECT_FALSE(ratio->yaw);
+  fixes.resize(1);
+  fixes[0].fix->sd.reset();
+  EXPECT_FALSE(stated_ratio(fixes, {errors[0]}));
+}
+
+/// Four lamps round the camera, 2 m above it, and a focal length of 500 px: sd(X) = sd(Y) =
+/// (H / f) noise / sqrt(4), see ErrorBudget::noise.
+TEST(LimitRatio, IsErrorsOverTheFormulasLimit) {
+  LampMap lamps;
+  for (const auto& [x, y] : {std::pair(1.0, 1.0), {-1.0, 1.0}, {-1.0, -1.0}, {1.0, -1.0}}) {
+    lamps.lamps.push_back({static_cast<int>(lamps.lamps.size()), {x, y, 2}, {}, {}, {}});
+  }
+  const Camera camera{
+      "c", {1000, 1000}, *lens_model_from_name("LENSMODEL_PINHOLE"), {500, 500, 500, 500}, {}, {},
+      {}};
+  const double sd_m = 2.0 / 500 * 0.1 / 2, limit_m = sd_m * std::sqrt(2);
+  const std::vector<TruthRow> truth{
+      {"a", {0, 0}, 0, 0.3}, {"b", {90, 0}, 0, 0}, {"c", {0, 0}, {}, 0}};
+  const auto ratio = limit_ratio({{0, {0, 3 * limit_m}, {}, {}, 0, 0},
+                                  {1, {5, 5}, {}, {}, 1, 1},   // sees no lamp
+                                  {2, {5, 5}, {}, {}, 2, 2}},  // at an unknown height
+                                 truth, lamps, camera, 0.1, 2);
+  ASSERT_TRUE(ratio);
+  EXPECT_EQ(ratio->fixes, 1);
+  EXPECT_NEAR(ratio->limit_m, limit_m, 1e-9);
+  EXPECT_NEAR(ratio->horizontal, 3, 1e-6);
+}
+
+}  // namespace
+}  // namespace vlp

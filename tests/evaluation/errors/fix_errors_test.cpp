@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/errors/fix_errors.h"
+
+#include <gmock/gmock.h>
+
+#include "fix_at.h"
+#include "support/near.h"
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(FixErrors, AgainstTheTruthAreByImage) {
+  const FromFile<FixRow> fixes{
+      "fixes.csv",
+      {fix_at("b", 1.003, 2.004, 0.5, 3.1), no_fix("c", "degenerate"), fix_at("a", 0, 0, 0.1)}};
+  const FromFile<TruthRow> truth{
+      "truth.csv",
+      {{"a", {0, 0}, 0, 0}, {"b", {1, 2}, 0.4, -3.1}, {"c", {0, 0}, 0, 0}, {"d", {0, 0}, 0, 0}}};
+  const FixErrors errors = errors_against_truth(fixes, truth, 1e-3);
+  EXPECT_EQ(errors.captures, 4);
+  EXPECT_EQ(errors.missing, (std::map<std::string, std::size_t>{{"degenerate", 1}, {"no row", 1}}));
+  ASSERT_EQ(errors.errors.size(), 2);
+  EXPECT_THAT(errors.errors[0].horizontal_m, IsNear(Eigen::Vector2d(0.003, 0.004), 1e-12));
+  EXPECT_NEAR(*errors.errors[0].height_m, 0.1, 1e-12);
+  EXPECT_NEAR(*errors.errors[0].yaw_rad, 6.2 - 2 * 3.14159265358979, 1e-12);
+  EXPECT_EQ(errors.errors[0].unit, 1);
+  EXPECT_EQ(errors.errors[1].unit, 0);
+}
+
+TEST(FixErrors, RefuseImagesThatTheTruthDoesNotHave) {
+  FromFile<FixRow> fixes{"fixes.csv", {fix_at("a", 0, 0), fix_at("x", 0, 0), fix_at("y", 0, 0)}};
+  fixes.rows[1].line = 17;
+  const FromFile<TruthRow> truth{"truth.csv", {{"a", {0, 0}, {}, {}}}};
+  const std::string refusal = refusal_of([&] { errors_against_truth(fixes, truth, 1e-3); });
+  EXPECT_THAT(refusal, HasSubstr("fixes.csv:17: image: 'x' is not in truth.csv"));
+  EXPECT_THAT(refusal, HasSubstr("2 of 3"));
+}
+
+TEST(FixErrors, AgainstAPathAreFromItsNearestPoint) {
+  const Path path{{{0, 0}, {1, 0}, {1, 1}}, {0, 1, 1}};
+  const FixErrors errors = errors_against_path(
+      {fix_at("a", 0.5, 0.1, 0.7), fix_at("b", -3, -4), fix_at("c", 1.2, 0.5), no_fix("d", "x")},
+      path);
+  EXPECT_EQ(errors.captures, 4);
+  ASSERT_EQ(errors.errors.size(), 3);
+  EXPECT_THAT(errors.errors[0].horizontal_m, IsNear(Eigen::Vector2d(0, 0.1), 1e-12));
+  EXPECT_NEAR(*errors.errors[0].height_m, 0.2, 1e-12);
+  EXPECT_DOUBLE_EQ(errors.errors[1].horizontal_m.norm(), 5);
+  EXPECT_THAT(errors.errors[2].horizontal_m, IsNear(Eigen::Vector2d(0.2, 0), 1e-12));
+  EXPECT_FALSE(errors.errors[2].yaw_rad);
+}
+
+TEST(FixErrors, AgainstAPathGoTogetherInThirtyRuns) {
+  const std::vector<FixRow> fixes(3000, fix_at("a", 0, 0));
+  const FixErrors errors = errors_against_path(fixes, {{{0, 0}, {1, 0}}, {}});
+  EXPECT_EQ(errors.errors.front().unit, 0);
+  EXPECT_EQ(errors.errors[99].unit, 0);
+  EXPECT_EQ(errors.errors[100].unit, 1);
+  EXPECT_EQ(errors.errors.back().unit, 29);
+}
+
+}  // namespace
+}  // namespace vlp

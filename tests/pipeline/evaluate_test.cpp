@@ -1,0 +1,191 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-evaluate as its users call it.
+#include <gmock/gmock.h>
+
+#include "support/program.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::string kFixes =
+    "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,lamps,residual_px\n";
+
+/// Six captures at two places, off by 1 to 4 mm along x and y; one has no fix.
+class Evaluate : public testing::Test {
+ protected:
+  const TemporaryFolder folder;
+
+  void SetUp() override {
+    folder.file("fixes.csv", kFixes +
+                                 "a.png,ok,0.001,0,0.002,0,,,,,3,0\n"
+                                 "b.png,ok,0,0.002,0,0,,,,,3,0\n"
+                                 "c.png,ok,1.003,0,0,0,,,,,3,0\n"
+                                 "d.png,ok,1,0.004,0,0,,,,,3,0\n"
+                                 "e.png,ok,1,0,0,0.01,,,,,3,0\n"
+                                 "f.png,too_few_lamps,,,,,,,,,1,\n");
+    folder.file("truth.csv",
+                "image,x_m,y_m,z_m,yaw_rad\n"
+                "a.png,0,0,0,0\nb.png,0,0,0,0\nc.png,1,0,0,0\nd.png,1,0,0,0\ne.png,1,0,0,0\n"
+                "f.png,1,0,0,0\n");
+  }
+  std::string path(const std::string& name) const { return (folder / name).string(); }
+  ProgramResult evaluate(const std::string& options) const {
+    return run_program("cd '" + path("") + "' && vlp-evaluate fixes.csv " + options);
+  }
+  ProgramResult with_truth(const std::string& options = "") const {
+    return evaluate("--truth truth.csv " + options);
+  }
+  std::string content(const std::string& name) const {
+    return TemporaryFolder::content_of(folder / name);
+  }
+};
+
+TEST_F(Evaluate, PrintsWhatAHandComputes) {
+  const auto result = with_truth();
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(
+      result.output,
+      AllOf(StartsWith("captures    6\nfixes       5\nmissing     16.7 %\n"),
+            HasSubstr("no fix    1 too_few_lamps"), HasSubstr("mean            2.000 mm"),
+            HasSubstr("median          2.000 mm"), HasSubstr("p90             4.000 mm"),
+            HasSubstr("rms             2.449 mm"), HasSubstr("too few stations for an interval"),
+            HasSubstr("stations    2 with 5 fixes"), HasSubstr("height      rms 0.894 mm"),
+            HasSubstr("yaw         rms 0.2562 deg")));
+}
+
+TEST_F(Evaluate, EndsWithOneAndAllIsWrittenWhenAGateIsNotMet) {
+  const auto result = with_truth(
+      "--gate mean_mm=2.5,p90_mm=3 --gate missing=0 --json evaluation.json --junit junit.xml");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("p90_mm is 4 mm, at most 3 mm"),
+                                   HasSubstr("missing is 0.1667, at most 0 is"),
+                                   testing::Not(HasSubstr("mean_mm"))));
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("NOT MET gate p90_mm"), HasSubstr("met    gate mean_mm")));
+  EXPECT_THAT(content("evaluation.json"), HasSubstr("\"passed\": false"));
+  EXPECT_THAT(content("junit.xml"), HasSubstr("tests=\"3\" failures=\"2\""));
+  EXPECT_EQ(with_truth("--gate mean_mm=2.5 --gate p90_mm=4.5").exit_code, 0);
+}
+
+TEST_F(Evaluate, TakesGatesFromAFileAndMoreFromTheCommandLine) {
+  folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1, max_mm: 5}\n");
+  EXPECT_EQ(with_truth("--gates gates.yaml").exit_code, 1);
+  EXPECT_EQ(with_truth("--gates gates.yaml --gate mean_mm=3").exit_code, 0);
+  EXPECT_EQ(with_truth("--gates gates.yaml --gate mean_mm=3,rms_mm=1").exit_code, 1);
+  folder.file("gates.yaml", "format: vlp-gates/1\ngates:\n  mean_mm: 1\n  mean: 1\n");
+  const auto unknown = with_truth("--gates gates.yaml");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.errors, HasSubstr("gates.yaml:4: gates: key 'mean' is unknown"));
+}
+
+TEST_F(Evaluate, HoldsFixesAgainstAPathAndALine) {
+  folder.file("path.csv", "x_m,y_m,z_m\n0,0,0\n1,0,0\n");
+  const auto path = evaluate("--path path.csv");
+  ASSERT_EQ(path.exit_code, 0) << path.errors;
+  // Beyond its end by 3 mm; 2 and 4 mm beside it; twice on it.
+  EXPECT_THAT(path.output, AllOf(HasSubstr("mean            1.800 mm"), HasSubstr("height")));
+  const auto line = evaluate("--line 0 0 1 0 --gate fitted_max_mm=3 --json line.json");
+  ASSERT_EQ(line.exit_code, 0) << line.errors;
+  EXPECT_THAT(line.output, AllOf(HasSubstr("mean            1.800 mm"),
+                                 HasSubstr("line fit    mean"), HasSubstr("hides     jitter of")));
+  EXPECT_THAT(content("line.json"), HasSubstr("\"jitter_mm\""));
+}
+
+TEST_F(Evaluate, SaysWhichOfTwoRunsIsBetter) {
+  std::string good = kFixes, bad = kFixes, truth = "image,x_m,y_m\n";
+  for (int i = 0; i < 20; ++i) {
+    const std::string name = std::to_string(i);
+    good += name + ",ok," + name + ".0001,0,0,0,,,,,3,0\n";
+    bad += name + ",ok," + name + (i % 2 == 0 ? ".0003" : ".0002") + ",0,0,0,,,,,3,0\n";
+    truth += name + "," + name + ",0\n";
+  }
+  folder.file("fixes.csv", good);
+  folder.file("other.csv", bad);
+  folder.file("truth.csv", truth);
+  EXPECT_THAT(with_truth("--compare other.csv --gate worse_mm=0").output,
+              AllOf(HasSubstr("compared    better: mean error differs by -0.150 mm"),
+                    HasSubstr("20 in both: 20 with a smaller error")));
+  EXPECT_THAT(with_truth("--compare fixes.csv").output, HasSubstr("no evidence"));
+  folder.file("fixes.csv", bad);
+  folder.file("other.csv", good);
+  EXPECT_EQ(with_truth("--compare other.csv --gate worse_mm=0").exit_code, 1);
+  folder.file("other.csv", kFixes + "x,ok,0,0,0,0,,,,,3,0\n");
+  EXPECT_EQ(with_truth("--compare other.csv").exit_code, 2);
+  EXPECT_EQ(evaluate("--line 0 0 9 0 --compare other.csv").exit_code, 2);
+}
+
+TEST_F(Evaluate, ComparesWithTheLimitOfTheExample) {
+  const std::string example = VLP_SOURCE_DIR "/datasets/example/";
+  const std::string rig =
+      " --lamps " + example + "lamps.yaml --calibration " + example + "calibration.yaml ";
+  ASSERT_EQ(run_program("vlp-locate " + example + "detections.csv" + rig + "-o '" +
+                        path("example.csv") + "'")
+                .exit_code,
+            0);
+  // Errors of 36 fixes are within 30 % of the limit of their noise: three standard errors.
+  const auto result =
+      run_program("vlp-evaluate '" + path("example.csv") + "' --truth " + example + "truth.csv" +
+                  rig + "--noise-px 0.05 --gate limit_ratio=1.3,stated_ratio=1.3");
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("limit       0.1"), HasSubstr("error / sd  horizontal")));
+}
+
+TEST_F(Evaluate, EndsWithThreeWithoutAFix) {
+  folder.file("fixes.csv", kFixes + "a.png,degenerate,,,,,,,,,1,\n");
+  const auto result = with_truth("--json none.json");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.errors, HasSubstr("not one of 6 captures has a fix"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "none.json"));
+}
+
+TEST_F(Evaluate, NamesFileAndLineOfBadInput) {
+  const auto refused = [&](const std::string& rows) {
+    folder.file("fixes.csv", rows);
+    const auto result = with_truth();
+    EXPECT_EQ(result.exit_code, 2) << rows;
+    return result.errors;
+  };
+  const std::string good = "a.png,ok,0,0,0,0,,,,,3,0\n";
+  EXPECT_THAT(refused(kFixes + good + "z.png,ok,0,0,0,0,,,,,3,0\n"),
+              HasSubstr("fixes.csv:3: image: 'z.png' is not in truth.csv"));
+  EXPECT_THAT(refused(kFixes + good + good), HasSubstr("fixes.csv:3: image: 'a.png' stands twice"));
+  EXPECT_THAT(refused(kFixes + "a.png,ok,nan,0,0,0,,,,,3,0\n"),
+              HasSubstr("fixes.csv:2: x_m: should be a finite number, not 'nan'"));
+  EXPECT_THAT(refused(kFixes + "a.png,ok,,0,0,0,,,,,3,0\n"), HasSubstr("fixes.csv:2: x_m"));
+  EXPECT_THAT(refused(kFixes + "a.png,ok,0,0,0,0,-1,1,1,1,3,0\n"),
+              HasSubstr("fixes.csv:2: sd_x_m: should not be negative"));
+  EXPECT_THAT(refused(kFixes), HasSubstr("fixes.csv: holds no fix"));
+  EXPECT_THAT(refused(""), HasSubstr("fixes.csv: is empty"));
+  folder.file("truth.csv", "image,x_m,y_m\na.png,0,0\na.png,0,0\n");
+  EXPECT_THAT(refused(kFixes + good), HasSubstr("truth.csv:3: image: 'a.png' stands twice"));
+}
+
+TEST_F(Evaluate, EndsWithTwoOnBadUsage) {
+  for (const char* options :
+       {"", "--truth truth.csv --line 0 0 1 0", "--line 0 0 0 0", "--line 0 0 1",
+        "--truth truth.csv --gate mean=1", "--truth truth.csv --gate mean_mm=x",
+        "--truth truth.csv --gate mean_mm=1,mean_mm=2", "--truth truth.csv --gate fitted_mean_mm=1",
+        "--truth truth.csv --junit a.xml", "--truth truth.csv --json truth.csv",
+        "--truth truth.csv --noise-px 1", "--truth truth.csv --station-mm 0",
+        "--truth truth.csv --json a --junit a --gate mean_mm=1"}) {
+    EXPECT_EQ(evaluate(options).exit_code, 2) << options;
+  }
+  EXPECT_THAT(with_truth("--gate mean=1").errors, HasSubstr("the gates are: mean_mm, median_mm"));
+}
+
+TEST_F(Evaluate, GivesTheSameBytesWhateverTheThreads) {
+  with_truth("--threads 1 --json one.json");
+  with_truth("--threads 4 --json four.json");
+  EXPECT_EQ(content("one.json"), content("four.json"));
+  EXPECT_THAT(content("one.json"), StartsWith("{\n  \"format\": \"vlp-evaluation/1\""));
+}
+
+}  // namespace
+}  // namespace vlp
