@@ -22,7 +22,8 @@ def ends_of(folder):
     ends = {}
     for stage in STAGES:
         try:
-            times, code = (folder / "logs" / f"{stage}.txt.end").read_text().split("\n")[:2]
+            # The shell may have words of its own before them: "Killed".
+            times, code = (folder / "logs" / f"{stage}.txt.end").read_text().splitlines()[-2:]
             ends[stage] = int(code), sum(float(time) for time in times.split())
         except (FileNotFoundError, ValueError):
             continue

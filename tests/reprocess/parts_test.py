@@ -124,7 +124,10 @@ class Outcome(unittest.TestCase):
 
     def test_calls_a_crash_a_crash(self):
         self.ends("rotation", 139)
-        self.assertEqual(self.outcome()["verdict"], "crashed")
+        end = self.work / "logs/rotation.txt.end"
+        end.write_text("stage.sh: line 12: 345 Killed\n" + end.read_text())
+        found = self.outcome()
+        self.assertEqual((found["verdict"], found["reason"]), ("crashed", "rotation ended with exit code 139"))
 
     def test_a_stage_without_an_end_is_a_crash(self):
         self.ends("lens", 0)

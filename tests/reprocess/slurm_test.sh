@@ -66,10 +66,10 @@ patiently() {  # SECONDS COMMAND...: until it succeeds
   done
 }
 patiently 30 test -S "$cluster/munge"
-slurmctld -D &
+slurmctld -D >/dev/null 2>&1 &
 controller=$!
 for node in n1 n2; do
-  unshare --pid --fork --kill-child --mount-proc slurmd -D -N $node &
+  unshare --pid --fork --kill-child --mount-proc slurmd -D -N $node >/dev/null 2>&1 &
   nodes+=($!)
 done
 both_idle() { [ "$(sinfo --noheader --states=idle --format=%D)" = 2 ]; }
