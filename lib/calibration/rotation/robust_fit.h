@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -41,14 +42,27 @@ class RobustFit {
   const std::vector<double>& lengths() const { return lengths_; }
   /// Of a parameter block of two, for the scatter found: s^2 (J^T J)^-1. Nothing when there are no
   /// more residuals than parameters, or the residuals do not determine it.
-  std::optional<Matrix2> covariance(const double* parameter) const;
+  std::optional<Matrix2> covariance(const double* of_parameter) const;
 
  private:
   struct Block {
     std::unique_ptr<ceres::CostFunction> cost;
     std::vector<double*> parameters;
   };
-  std::unique_ptr<ceres::Problem> problem(double loss_width) const;
+  /// Where parameters are for Ceres: copies of some, the others themselves.
+  struct Places {
+    mutable std::vector<double> values;
+    std::map<const double*, std::size_t> begins;
+
+    template <typename Number>
+    Number* of(Number* parameter) const {
+      const auto begin = begins.find(parameter);
+      return begin == begins.end() ? parameter : &values[begin->second];
+    }
+  };
+  /// Copies of the parameters that are used, in the order in which residuals name them.
+  Places places_in_order() const;
+  std::unique_ptr<ceres::Problem> problem(double loss_width, const Places& places = {}) const;
   bool minimize(double loss_width);
   void measure();
   double scatter() const;
