@@ -26,7 +26,7 @@
 # Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 some shards could not be done.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
-bin=${VLP_BIN:-$(cd "$scripts/../.." && pwd)/build/bin}
+bin=${VLP_PROGRAMS_DIR:-$(cd "$scripts/../.." && pwd)/build/bin}
 python=${VLP_PYTHON:-/usr/bin/python3}  # the one that Debian's snakemake is for
 
 usage() {

@@ -8,6 +8,7 @@ from files import read_table
 
 BEFORE, NOW = "#E69F00", "#0072B2"  # of the palette of Okabe and Ito
 MOST_POINTS = 4000
+BETWEEN = "(0.02, 0.05, 0.2, 0.5, 2, 5, 20, 50, 200, 500)"  # marks on logarithmic axes
 
 
 def drawn(script, size="640,420"):
@@ -31,6 +32,7 @@ def shares(values):
 def distribution(now, before):
     script = block("now", shares(now)) + "set xlabel 'mean horizontal error of a session (mm)'\n"
     script += "set ylabel 'share of the sessions'\nset yrange [0:1]\nset key bottom right\nset logscale x\n"
+    script += f"set xtics add {BETWEEN}\n"
     plots = [f"$now using 1:2 with lines lw 2 lc rgb '{NOW}' title 'now'"]
     if before:
         script += block("before", shares(before))
@@ -41,7 +43,7 @@ def distribution(now, before):
 def scatter(pairs):
     """pairs: (before, now)."""
     script = block("pairs", pairs) + "set xlabel 'before (mm)'\nset ylabel 'now (mm)'\nset logscale xy\n"
-    script += "set size square\nset key top left\n"
+    script += f"set size square\nset key top left\nset xtics add {BETWEEN}\nset ytics add {BETWEEN}\n"
     script += f"plot x with lines lc rgb '#888888' title 'the same', $pairs with points pt 7 ps 0.4 lc rgb '{NOW}' title 'a session'\n"
     return drawn(script, "520,520")
 

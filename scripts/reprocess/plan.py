@@ -9,6 +9,7 @@ number, size and latest change of its files: a glance that tells which shards to
 import argparse
 import re
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from changes import read_gates
@@ -46,11 +47,14 @@ def write_shards(archive, state, shard_size):
     for name in sessions:
         if not re.fullmatch(r"[\w.-]+/[\w.-]+", name, re.ASCII):
             fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_' and '-'")
+    with ThreadPoolExecutor(16) as threads:  # most of it is waiting for the file system
+        glances = list(threads.map(lambda name: glance(archive / name), sessions))
     wanted = set()
     for first in range(0, len(sessions), shard_size):
         file = state / "shards" / f"{first // shard_size:06d}.list"
         wanted.add(file)
-        lines = [f"{name}\t{glance(archive / name)}\n" for name in sessions[first : first + shard_size]]
+        names = sessions[first : first + shard_size]
+        lines = [f"{name}\t{seen}\n" for name, seen in zip(names, glances[first : first + shard_size])]
         write_if_other(file, "".join(lines))
     for file in set((state / "shards").glob("*.list")) - wanted:
         file.unlink()

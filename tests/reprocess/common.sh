@@ -4,7 +4,7 @@
 # What the tests of scripts/reprocess.sh have in common: SOURCE BIN SCRATCH are their arguments.
 set -euo pipefail
 source_dir=$1 bin=$2 scratch=$3
-export VLP_BIN=$bin
+export VLP_PROGRAMS_DIR=$bin
 archive=$scratch/archive baseline=$scratch/baseline
 
 /usr/bin/python3 -c 'import snakemake' 2>/dev/null ||
