@@ -69,6 +69,8 @@ exec 9>"$results/.state/lock"
 flock --nonblock 9 || usage "$results: another run is at work there"
 "$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}"
 log=$results/.state/reprocess.log
+mapfile -t again <"$results/.state/again.txt"
+[ ${#again[@]} = 0 ] || how+=(--forcerun "${again[@]}")
 # A run that was killed leaves Snakemake's own lock, which the one above stands for.
 if ! "$python" -m snakemake --snakefile "$scripts/Snakefile" --directory "$results" --nolock \
   --rerun-incomplete --rerun-triggers mtime --keep-going --scheduler greedy "${how[@]}" \

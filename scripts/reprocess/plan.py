@@ -4,7 +4,7 @@
 
 Writes into RESULTS/.state: run.json (toolbox and options), shards/N.list (a session a line, with the
 number, size and latest change of its files: a glance that tells which shards to look into), shards.txt
-(how many), and compare.json. What has not changed is not touched, so that Snakemake runs the rest.
+(how many), again.txt (rows to make again), and compare.json. What has not changed is not touched, so that Snakemake runs the rest.
 """
 import argparse
 import re
@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from changes import read_gates
-from files import digest, input_files, json_text, write_if_other
+from files import digest, input_files, json_text, write_if_other, write_whole
 from toolbox import toolbox
 
 
@@ -62,11 +62,12 @@ def write_shards(archive, state, shard_size):
     return len(sessions)
 
 
-def try_crashes_again(state):
-    """What crashed may have done so for want of memory or disk."""
-    for rows in (state / "rows").glob("*.csv"):
-        if ",crashed," in rows.read_text():
-            rows.unlink()
+def again(state):
+    """The rows to make whatever Snakemake thinks: those that are missing beside a summary, and those
+    with crashes, which may have been for want of memory or disk."""
+    rows = [state / "rows" / f"{file.stem}.csv" for file in sorted((state / "shards").glob("*.list"))]
+    wanted = [file for file in rows if not file.exists() or ",crashed," in file.read_text()]
+    return [f".state/rows/{file.name}\n" for file in wanted]
 
 
 def main():
@@ -105,7 +106,7 @@ def main():
         **toolbox(options.bin),
     }
     count = write_shards(archive, state, options.shard_size)
-    try_crashes_again(state)
+    write_whole(state / "again.txt", "".join(again(state)))
     write_if_other(state / "run.json", json_text(run))
     previous = options.previous.resolve() if options.previous else None
     compare = {
