@@ -136,10 +136,10 @@ std::vector<std::size_t> RobustFit::outliers() const {
   return left_out;
 }
 
-std::optional<Matrix2> RobustFit::covariance(const double* of_parameter) const {
+std::optional<Matrix2> RobustFit::covariance(const double* parameter) const {
   // Ceres goes through the parameters by their addresses, and with them goes the rounding.
   const Places places = places_in_order();
-  const double* parameter = places.of(of_parameter);
+  parameter = places.of(parameter);
   const auto all = problem(0, places);
   if (!all->HasParameterBlock(parameter) || all->IsParameterBlockConstant(parameter)) {
     return std::nullopt;

@@ -42,7 +42,7 @@ class RobustFit {
   const std::vector<double>& lengths() const { return lengths_; }
   /// Of a parameter block of two, for the scatter found: s^2 (J^T J)^-1. Nothing when there are no
   /// more residuals than parameters, or the residuals do not determine it.
-  std::optional<Matrix2> covariance(const double* of_parameter) const;
+  std::optional<Matrix2> covariance(const double* parameter) const;
 
  private:
   struct Block {
