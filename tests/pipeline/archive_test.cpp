@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-simulate --archive as its users call it.
+#include <set>
+
 #include "captures/csv_reader.h"
 #include "small_simulation.h"
 
@@ -10,7 +12,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-/// Four sessions render in about 0.2 s: two captures of a board, two of lamps.
+/// Four sessions render in about 0.2 s: two captures of a board, four of lamps.
 class SimulateArchive : public SmallSimulation {
  protected:
   SimulateArchive() {
@@ -20,8 +22,7 @@ class SimulateArchive : public SmallSimulation {
                  "fault_share: 0.5, damage_share: 0.25}\ncaptures:");
     change_scene("folder: lamps", "folder: rotation");
     change_scene("count: 8", "count: 2");
-    change_scene("columns: 2, rows: 2}, heights_m: [0, 0.3]",
-                 "columns: 1, rows: 1}, heights_m: [0]");
+    change_scene("heights_m: [0, 0.3], turn: {count: 2", "heights_m: [0], turn: {count: 1");
   }
   Files archive(int sessions, const std::string& options = "") {
     const auto result = simulate("--archive " + std::to_string(sessions) + " " + options);
@@ -91,7 +92,7 @@ TEST_F(SimulateArchive, DamagesWhatTheTableSays) {
 
 TEST_F(SimulateArchive, RefusesASceneWithoutSpreadsAndFoldersAsked) {
   EXPECT_THAT(simulate("--archive 2 --only boards").errors, HasSubstr("--only"));
-  change_scene("archive:", "# archive:");
+  change_scene("archive: {", "# {");
   const auto result = simulate("--archive 2");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("the scene has no key 'archive'"));
