@@ -15,6 +15,7 @@
 #include "progress.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "simulation/archive.h"
 #include "simulation/simulate.h"
 
 namespace vlp {
@@ -23,7 +24,7 @@ namespace {
 struct Options {
   std::string scene, output;
   std::vector<std::string> folders;
-  std::optional<int> seed;
+  std::optional<int> seed, archive;
   int threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 };
 
@@ -49,17 +50,20 @@ void run(const Options& options) {
   Scene scene = read_scene(options.scene);
   if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
   cv::setNumThreads(1);  // the captures themselves go in parallel
+  const std::string what = options.archive ? "sessions" : "captures";
+  const SimulationOptions how{options.folders, options.threads, origin_of(options, scene.seed)};
   SimulationSummary summary;
   {
-    Progress progress("captures");
-    summary = simulate(scene, options.output,
-                       {options.folders, options.threads, origin_of(options, scene.seed)},
-                       [&](const SimulationSummary& so_far, std::size_t total) {
-                         progress.update(so_far.rendered + so_far.found, total, so_far.found);
-                       });
+    Progress progress(what);
+    const auto show = [&](const SimulationSummary& so_far, std::size_t total) {
+      progress.update(so_far.rendered + so_far.found, total, so_far.found);
+    };
+    summary = options.archive ? simulate_archive(scene, static_cast<std::size_t>(*options.archive),
+                                                 options.output, how, show)
+                              : simulate(scene, options.output, how, show);
   }
   for (const std::string& doubt : summary.doubts) spdlog::warn("{}", doubt);
-  fmt::print("rendered {} captures, {} were there; in {}\n", summary.rendered, summary.found,
+  fmt::print("rendered {} {}, {} were there; in {}\n", summary.rendered, what, summary.found,
              options.output);
 }
 
@@ -77,11 +81,17 @@ int main(int argc, char** argv) {
   vlp::Options options;
   app.add_option("scene", options.scene, "Scene file, .yaml")->required();
   app.add_option("-o,--output", options.output, "Folder for the captures")->required();
-  app.add_option("--only", options.folders,
-                 "Render these folders of the scene alone (commas between, no spaces)")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->option_text("FOLDER[,FOLDER...]");
+  auto* only = app.add_option("--only", options.folders,
+                              "Render these folders of the scene alone (commas between, no spaces)")
+                   ->delimiter(',')
+                   ->allow_extra_args(false)
+                   ->option_text("FOLDER[,FOLDER...]");
+  app.add_option(
+         "--archive", options.archive,
+         "Render so many sessions of different cameras into OUTPUT/CAMERA/SESSION, some with\n"
+         "faults or damaged; archive.csv tells which")
+      ->check(CLI::Range(1, 10'000'000))
+      ->excludes(only);
   app.add_option("--seed", options.seed, "Another seed than the scene's")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   app.add_option("--threads", options.threads, "Captures at a time (default: one a core)")

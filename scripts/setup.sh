@@ -4,6 +4,8 @@
 #
 # Installs the Debian packages that the toolbox is built and tested with. As root or through sudo;
 # again and again; silent when nothing is missing.
+#
+#   scripts/setup.sh [--batch]    --batch: also what scripts/reprocess.sh and its tests need
 set -euo pipefail
 
 packages=(
@@ -20,6 +22,12 @@ packages=(
   postgresql postgresql-client tmux util-linux  # of the station
   chromium-headless-shell python3  # the report is opened in a browser
 )
+case ${1:-} in
+  '') ;;
+  # Snakemake, and a Slurm on one machine for the tests of its profile.
+  --batch) packages+=(snakemake slurmctld slurmd slurm-client munge) ;;
+  *) echo "setup.sh: unknown option $1; there is --batch" >&2; exit 2 ;;
+esac
 
 missing=()
 for package in "${packages[@]}"; do

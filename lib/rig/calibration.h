@@ -39,7 +39,8 @@ struct IntrinsicsReport {
   double rms_px;
   /// Deflection of the board's centre from flat, along x and y (mrcal's calobject_warp).
   std::optional<std::array<double, 2>> board_warp_m;
-  /// Worst standard deviation of a projection over the image.
+  /// Worst standard deviation of a projection over the image. Infinite where the lens has no ray;
+  /// that is not written.
   std::optional<double> uncertainty_px;
 };
 

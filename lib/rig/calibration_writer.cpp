@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <cmath>
 
 #include "rig/calibration.h"
 #include "rig/file.h"
@@ -35,7 +36,10 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
   emit_integer(out, "outliers", report.outliers);
   emit_number(out, "rms_px", report.rms_px);
   if (report.board_warp_m) emit_numbers(out, "board_warp_m", *report.board_warp_m);
-  if (report.uncertainty_px) emit_number(out, "uncertainty_px", *report.uncertainty_px);
+  // Infinite where the lens has no ray; a gate tells of it, YAML has no number for it.
+  if (report.uncertainty_px && std::isfinite(*report.uncertainty_px)) {
+    emit_number(out, "uncertainty_px", *report.uncertainty_px);
+  }
   out << YAML::EndMap;
 }
 

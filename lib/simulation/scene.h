@@ -108,6 +108,21 @@ struct SceneBoard {
   double white_e_per_s, black_e_per_s, surround_e_per_s;
 };
 
+/// How the units of an archive differ from the scene; see archive.h. Each value is drawn evenly
+/// from within so much of the scene's, up and down.
+struct ArchiveSpreads {
+  int sessions_per_camera;
+  /// Of a camera: both focal lengths alike, each coordinate of the centre, each coefficient of
+  /// distortion.
+  double focal_share, center_px, distortion_share;
+  /// Of a camera: how far it leans besides, in any direction, and each part of its lever arm.
+  double tilt_rad, lever_arm_m;
+  /// Of a session: each coordinate of each lamp in the map.
+  double map_error_m;
+  /// So many of the sessions have a fault, and so many are damaged.
+  double fault_share, damage_share;
+};
+
 struct Scene {
   std::uint64_t seed;
   /// Row time and read-out are given.
@@ -121,6 +136,7 @@ struct Scene {
   Clutter clutter;
   std::optional<SceneBoard> board;
   std::vector<CaptureSet> sets;
+  std::optional<ArchiveSpreads> archive;
 };
 
 /// Reads `vlp-scene/1`; datasets/README.md lists the keys, the scenes there explain them. Angles

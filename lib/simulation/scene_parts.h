@@ -34,6 +34,7 @@ Clutter read_clutter(YamlMap map, const std::vector<SceneLamp>& lamps, const Roo
 Glow read_glow(YamlMap& map, const Room& room);
 double read_edge_share(YamlMap& map);
 SceneBoard read_scene_board(YamlMap map);
+ArchiveSpreads read_archive_spreads(YamlMap map);
 /// Where the axis stands at each capture: spots, a grid or a drive, all in the room.
 void read_places(YamlMap& map, const Scene& scene, const Room& room, LampCaptures& captures);
 /// Heights are checked against the lamps, too.

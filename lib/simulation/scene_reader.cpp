@@ -117,6 +117,9 @@ Scene read_scene(const std::filesystem::path& file) {
   if (const auto board = document.optional("board")) {
     scene.board = read_scene_board(board->map());
   }
+  if (const auto archive = document.optional("archive")) {
+    scene.archive = read_archive_spreads(archive->map());
+  }
   const YamlValue captures = document.required("captures");
   document.finish();
   std::set<std::string> folders;

@@ -3,32 +3,15 @@
 #include "simulation/shot.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
-#include <opencv2/core.hpp>
-#include <random>
 
 #include "camera/lens.h"
 #include "rig/board_layout.h"
+#include "simulation/seeded_random.h"
 
 namespace vlp {
 namespace {
-
-cv::RNG random_of(std::uint64_t seed, const std::string& folder, std::size_t index) {
-  std::vector<std::uint32_t> words{std::uint32_t(seed), std::uint32_t(seed >> 32),
-                                   std::uint32_t(index), std::uint32_t(index >> 32)};
-  words.insert(words.end(), folder.begin(), folder.end());
-  std::seed_seq sequence(words.begin(), words.end());
-  std::array<std::uint32_t, 2> state{};
-  sequence.generate(state.begin(), state.end());
-  return cv::RNG(state[0] | std::uint64_t(state[1]) << 32);
-}
-
-std::uint64_t next_seed(cv::RNG& random) {
-  const std::uint64_t high = random.next();
-  return high << 32 | random.next();
-}
 
 std::string image_name(std::size_t index, std::size_t count) {
   const std::string number = std::to_string(index);

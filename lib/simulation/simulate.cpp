@@ -46,28 +46,6 @@ void make_folder(const fs::path& folder) {
   if (error) throw InputError(folder, "cannot be made: " + error.message());
 }
 
-/// Claims a folder for a scene, or finds that it is.
-void claim(const fs::path& output, const std::string& origin) {
-  const fs::path mark = output / "scene.yaml";
-  if (fs::exists(mark)) {
-    constexpr std::size_t most_bytes = 2 << 20;
-    if (read_text_file(mark, most_bytes) == origin) return;
-    throw InputError(output,
-                     "holds captures of another scene, seed or version: choose another folder or "
-                     "remove it");
-  }
-  make_folder(output);
-  // A run that was killed here may have left its unfinished scene.yaml.
-  const auto foreign = [](const fs::directory_entry& entry) {
-    return !entry.path().filename().string().starts_with(".scene.yaml.tmp-");
-  };
-  if (std::any_of(fs::directory_iterator(output), fs::directory_iterator(), foreign)) {
-    throw InputError(output,
-                     "is not empty and holds no captures of this scene: choose another folder");
-  }
-  write_file(mark, origin);
-}
-
 void write_common_files(const Scene& scene, const fs::path& output) {
   if (!scene.lamps.empty()) {
     write_lamp_map(output / "lamps.yaml", lamp_map_of(scene, true));
@@ -104,11 +82,32 @@ bool render(const Scene& scene, const FrameRenderer& renderer, const CaptureSet&
 
 }  // namespace
 
+void claim_for_simulation(const fs::path& output, const std::string& origin) {
+  const fs::path mark = output / "scene.yaml";
+  if (fs::exists(mark)) {
+    constexpr std::size_t most_bytes = 2 << 20;
+    if (read_text_file(mark, most_bytes) == origin) return;
+    throw InputError(output,
+                     "holds captures of another scene, seed or version: choose another folder or "
+                     "remove it");
+  }
+  make_folder(output);
+  // A run that was killed here may have left its unfinished scene.yaml.
+  const auto foreign = [](const fs::directory_entry& entry) {
+    return !entry.path().filename().string().starts_with(".scene.yaml.tmp-");
+  };
+  if (std::any_of(fs::directory_iterator(output), fs::directory_iterator(), foreign)) {
+    throw InputError(output,
+                     "is not empty and holds no captures of this scene: choose another folder");
+  }
+  write_file(mark, origin);
+}
+
 SimulationSummary simulate(const Scene& scene, const fs::path& output,
                            const SimulationOptions& options, const SimulationProgress& progress) {
   const std::vector<CaptureSet> sets = wanted_sets(scene, options.folders);
   const FrameRenderer renderer(scene);
-  claim(output, options.origin);
+  claim_for_simulation(output, options.origin);
   write_common_files(scene, output);
 
   std::size_t total = 0;

@@ -42,4 +42,8 @@ using SimulationProgress = std::function<void(const SimulationSummary& so_far, s
 SimulationSummary simulate(const Scene& scene, const std::filesystem::path& output,
                            const SimulationOptions& options, const SimulationProgress& progress);
 
+/// Claims a folder for captures by writing `origin` as its scene.yaml, or finds that it is claimed.
+/// Throws InputError: it holds something else.
+void claim_for_simulation(const std::filesystem::path& output, const std::string& origin);
+
 }  // namespace vlp

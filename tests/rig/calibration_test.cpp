@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
 
 #include "rig/samples.h"
@@ -42,6 +43,15 @@ TEST(Calibration, MayHaveItsPartsInAnyOrder) {
   const std::string reordered = "format: vlp-calibration/1\n" + kCalibrationYaml.substr(camera) +
                                 kCalibrationYaml.substr(26, camera - 26);
   expect_same(read_calibration(folder.file("calibration.yaml", reordered)), sample_calibration());
+}
+
+TEST(Calibration, IsWrittenWithoutAnInfiniteUncertainty) {
+  Calibration calibration = sample_calibration();
+  calibration.intrinsics_report->uncertainty_px = std::numeric_limits<double>::infinity();
+  const TemporaryFolder folder;
+  write_calibration(folder / "calibration.yaml", calibration);
+  calibration.intrinsics_report->uncertainty_px.reset();
+  expect_same(read_calibration(folder / "calibration.yaml"), calibration);
 }
 
 TEST(Calibration, KeepsEachPartWithoutEachOptionalKey) {

@@ -19,7 +19,7 @@ TEST(SceneRefusals, NoneIsOfTheSample) { EXPECT_EQ(scene_refusal(kSceneYaml), ""
 TEST(SceneRefusals, NameAnUnknownKeyWhereverItStands) {
   EXPECT_EQ(refusal_with("seed: 7", "seed: 7\nlight: 1"),
             "scene.yaml:3: key 'light' is unknown here; the keys are: format, seed, room, camera, "
-            "optics, sensor, mount, ambient_e_per_s, lamps, clutter, board, captures");
+            "optics, sensor, mount, ambient_e_per_s, lamps, clutter, board, archive, captures");
   EXPECT_EQ(refusal_with("z_m: [0, 1.7]", "z_m: [0, 1.7], w_m: 0"),
             "scene.yaml:3: room: key 'w_m' is unknown here; the keys are: x_m, y_m, z_m");
   const auto unknown = [](const std::string& before, const std::string& place) {

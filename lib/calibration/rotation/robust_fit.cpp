@@ -33,22 +33,38 @@ void RobustFit::add(std::unique_ptr<ceres::CostFunction> cost, std::vector<doubl
   used_.push_back(true);
 }
 
-std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width) const {
+std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width, const Places& places) const {
   ceres::Problem::Options options;
   options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   auto problem = std::make_unique<ceres::Problem>(options);
   // One loss for all: Ceres deletes it once.
   ceres::LossFunction* loss = loss_width > 0 ? new ceres::CauchyLoss(loss_width) : nullptr;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    if (used_[i]) problem->AddResidualBlock(blocks_[i].cost.get(), loss, blocks_[i].parameters);
+    if (!used_[i]) continue;
+    std::vector<double*> parameters = blocks_[i].parameters;
+    for (double*& parameter : parameters) parameter = places.of(parameter);
+    problem->AddResidualBlock(blocks_[i].cost.get(), loss, parameters);
   }
   for (const auto& candidates : held_) {
     const auto first = std::find_if(
         candidates.begin(), candidates.end(),
-        [&](const double* parameter) { return problem->HasParameterBlock(parameter); });
-    if (first != candidates.end()) problem->SetParameterBlockConstant(*first);
+        [&](const double* parameter) { return problem->HasParameterBlock(places.of(parameter)); });
+    if (first != candidates.end()) problem->SetParameterBlockConstant(places.of(*first));
   }
   return problem;
+}
+
+RobustFit::Places RobustFit::places_in_order() const {
+  Places places;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const auto& sizes = blocks_[i].cost->parameter_block_sizes();
+    for (std::size_t j = 0; used_[i] && j < sizes.size(); ++j) {
+      const double* parameter = blocks_[i].parameters[j];
+      if (!places.begins.emplace(parameter, places.values.size()).second) continue;
+      places.values.insert(places.values.end(), parameter, parameter + sizes[j]);
+    }
+  }
+  return places;
 }
 
 bool RobustFit::minimize(double loss_width) {
@@ -126,7 +142,10 @@ int RobustFit::degrees_of_freedom() const {
 }
 
 std::optional<Matrix2> RobustFit::covariance(const double* parameter) const {
-  const auto all = problem(0);
+  // Ceres goes through the parameters by their addresses, and with them goes the rounding.
+  const Places places = places_in_order();
+  parameter = places.of(parameter);
+  const auto all = problem(0, places);
   if (!all->HasParameterBlock(parameter) || all->IsParameterBlockConstant(parameter)) {
     return std::nullopt;
   }

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -50,7 +51,20 @@ class RobustFit {
     std::unique_ptr<ceres::CostFunction> cost;
     std::vector<double*> parameters;
   };
-  std::unique_ptr<ceres::Problem> problem(double loss_width) const;
+  /// Where parameters are for Ceres: copies of some, the others themselves.
+  struct Places {
+    mutable std::vector<double> values;
+    std::map<const double*, std::size_t> begins;
+
+    template <typename Number>
+    Number* of(Number* parameter) const {
+      const auto begin = begins.find(parameter);
+      return begin == begins.end() ? parameter : &values[begin->second];
+    }
+  };
+  /// Copies of the parameters that are used, in the order in which residuals name them.
+  Places places_in_order() const;
+  std::unique_ptr<ceres::Problem> problem(double loss_width, const Places& places = {}) const;
   bool minimize(double loss_width);
   void measure();
   double scatter() const;

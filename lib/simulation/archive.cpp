@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/archive.h"
+
+#include <algorithm>
+#include <mutex>
+#include <stdexcept>
+
+#include "captures/csv_writer.h"
+#include "captures/in_parallel.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+void check(const Scene& scene) {
+  const auto has = [&](const std::string& folder) {
+    return std::any_of(scene.sets.begin(), scene.sets.end(),
+                       [&](const CaptureSet& set) { return set.folder == folder; });
+  };
+  if (!scene.archive) throw std::invalid_argument("the scene has no key 'archive'");
+  if (scene.lamps.empty() || !scene.board || !has("boards") || !has("rotation")) {
+    throw std::invalid_argument(
+        "an archive's scene has lamps, a board, and captures in folders boards and rotation");
+  }
+}
+
+void write_table(const Scene& scene, std::size_t sessions, const fs::path& output) {
+  CsvWriter table(output / "archive.csv", {"camera", "session", "fault", "damage", "damaged"});
+  for (std::size_t i = 0; i < sessions; ++i) {
+    const ArchiveSession session = archive_session(scene, i);
+    table.row({session.camera, session.session, name_of(session.fault), name_of(session.damage),
+               session.damaged});
+  }
+  table.save();
+}
+
+/// Renders a session out of sight, then moves it to its place. Nothing is done when it is there.
+bool render(const ArchiveSession& session, const fs::path& output, const std::string& origin) {
+  const fs::path place = output / session.camera / session.session;
+  if (fs::exists(place)) return false;
+  const fs::path unfinished = output / ".unfinished" / (session.camera + "-" + session.session);
+  fs::create_directories(place.parent_path());
+  fs::create_directories(unfinished);
+  const std::string first_line = origin.substr(0, origin.find('\n'));
+  simulate(session.scene, unfinished,
+           {{}, 1, first_line + ": " + session.camera + "/" + session.session + " of an archive\n"},
+           [](const SimulationSummary&, std::size_t) {});
+  damage(session, unfinished);
+  fs::rename(unfinished, place);
+  return true;
+}
+
+}  // namespace
+
+SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, const fs::path& output,
+                                   const SimulationOptions& options,
+                                   const SimulationProgress& progress) {
+  check(scene);
+  claim_for_simulation(output, options.origin);
+  write_table(scene, sessions, output);
+  SimulationSummary summary;
+  std::mutex counting;
+  try {
+    in_parallel(sessions, options.threads, [&](std::size_t index) {
+      const bool rendered = render(archive_session(scene, index), output, options.origin);
+      const std::lock_guard lock(counting);
+      ++(rendered ? summary.rendered : summary.found);
+      progress(summary, sessions);
+    });
+  } catch (const fs::filesystem_error& failure) {
+    throw InputError(failure.path1(), "cannot be made: " + failure.code().message());
+  }
+  fs::remove(output / ".unfinished");  // when it is empty
+  return summary;
+}
+
+}  // namespace vlp

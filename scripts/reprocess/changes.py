@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""What changed from one run over an archive to the next, and the gates for it.
+
+Sessions are paired by camera and session where the inputs are the same. Sessions of a camera share its
+lens, so cameras are what the interval counts: the mean over cameras of the change of mean_mm, with its
+95 % interval by normal theory, of 10 cameras or more.
+"""
+import json
+import math
+import statistics
+
+import yaml
+
+HAVE_RESULT = ("pass", "gate")
+FEWEST_CAMERAS = 10
+
+
+def name_of(row):
+    return f"{row['camera']}/{row['session']}"
+
+
+def with_figures(rows):
+    return [row for row in rows if row["verdict"] in HAVE_RESULT and row["mean_mm"]]
+
+
+def counts_of(rows):
+    verdicts = [row["verdict"] for row in rows]
+    figures = sorted(float(row["mean_mm"]) for row in with_figures(rows))
+    counts = {"sessions": len(rows)}
+    for verdict in ("pass", "gate", "no result", "crashed"):
+        counts[verdict.replace(" ", "_")] = verdicts.count(verdict)
+    if figures:
+        counts["mean_mm"] = statistics.fmean(figures)
+        counts["median_mm"] = statistics.median(figures)
+        counts["p90_mm"] = figures[math.ceil(0.9 * len(figures)) - 1]
+    return counts
+
+
+def interval_of(differences):
+    """differences: (camera, change). Mean over cameras, and what it is within."""
+    by_camera = {}
+    for camera, change in differences:
+        by_camera.setdefault(camera, []).append(change)
+    means = [statistics.fmean(changes) for changes in by_camera.values()]
+    mean = statistics.fmean(means)
+    if len(means) < FEWEST_CAMERAS:
+        return mean, None
+    half = 1.96 * statistics.stdev(means) / math.sqrt(len(means))
+    return mean, [mean - half, mean + half]
+
+
+def changes_of(rows, before_rows):
+    before = {name_of(row): row for row in before_rows}
+    both = [(row, before[name_of(row)]) for row in rows if name_of(row) in before]
+    same_inputs = [(row, old) for row, old in both if row["inputs"] == old["inputs"]]
+    changes = {
+        "only_now": len(rows) - len(both),
+        "only_before": len(before) - len(both),
+        "other_inputs": len(both) - len(same_inputs),
+        "newly_failed": [],
+        "newly_good": [],
+    }
+    pairs = []
+    for row, old in same_inputs:
+        good, was_good = row["verdict"] in HAVE_RESULT, old["verdict"] in HAVE_RESULT
+        if was_good and not good:
+            changes["newly_failed"].append(name_of(row))
+        elif good and not was_good:
+            changes["newly_good"].append(name_of(row))
+        elif good and row["mean_mm"] and old["mean_mm"]:
+            pairs.append((row, old, float(row["mean_mm"]) - float(old["mean_mm"])))
+    changes |= {
+        "pairs": len(pairs),
+        "better": sum(change < 0 for _, _, change in pairs),
+        "worse": sum(change > 0 for _, _, change in pairs),
+        "same": sum(change == 0 for _, _, change in pairs),
+    }
+    if pairs:
+        mean, interval = interval_of([(row["camera"], change) for row, _, change in pairs])
+        changes["mean_difference_mm"] = mean
+        if interval:
+            changes["interval_95_mm"] = interval
+            better, worse = interval[1] < 0, interval[0] > 0
+            changes["verdict"] = "better" if better else "worse" if worse else "no evidence"
+        else:
+            changes["verdict"] = f"fewer than {FEWEST_CAMERAS} cameras cannot tell"
+    pairs.sort(key=lambda pair: (-abs(pair[2]), name_of(pair[0])))
+    return changes, pairs
+
+
+# What a gate holds at most: its value, or None where there is none.
+GATES = {
+    "no_result": lambda counts, changes: counts["no_result"] + counts["crashed"],
+    "no_result_share": lambda counts, changes: (counts["no_result"] + counts["crashed"]) / counts["sessions"],
+    "gate_share": lambda counts, changes: counts["gate"] / counts["sessions"],
+    "mean_mm": lambda counts, changes: counts.get("mean_mm"),
+    "median_mm": lambda counts, changes: counts.get("median_mm"),
+    "p90_mm": lambda counts, changes: counts.get("p90_mm"),
+    "newly_failed": lambda counts, changes: changes and len(changes["newly_failed"]),
+    "worse_share": lambda counts, changes: changes and changes["pairs"] and changes["worse"] / changes["pairs"],
+    "mean_difference_mm": lambda counts, changes: changes and changes.get("interval_95_mm", [None, None])[1],
+}
+
+
+def read_gates(file):
+    """format: vlp-archive-gates/1, gates: {NAME: LIMIT}. Throws ValueError."""
+    try:
+        document = yaml.safe_load(file.read_text())
+    except yaml.YAMLError as failure:
+        raise ValueError(f"{file}: is not YAML: {' '.join(str(failure).split())}") from failure
+    if not isinstance(document, dict) or document.get("format") != "vlp-archive-gates/1":
+        raise ValueError(f"{file}: should begin with format: vlp-archive-gates/1")
+    gates = document.get("gates")
+    if set(document) != {"format", "gates"} or not isinstance(gates, dict) or not gates:
+        raise ValueError(f"{file}: should hold format and gates: {{NAME: LIMIT}}")
+    for name, limit in gates.items():
+        if name not in GATES:
+            raise ValueError(f"{file}: gate '{name}' is unknown; there are: {', '.join(GATES)}")
+        if isinstance(limit, bool) or not isinstance(limit, (int, float)) or not math.isfinite(limit):
+            raise ValueError(f"{file}: {name}: should be a number")
+    return gates
+
+
+def check_gates(gates, counts, changes):
+    """A figure that there is not, of too few cameras or without earlier results, does not pass."""
+    results = []
+    for name, limit in gates.items():
+        value = GATES[name](counts, changes)
+        passed = value is not None and value <= limit
+        results.append({"name": name, "value": value, "limit": limit, "passed": passed})
+    return results
+
+
+def load(file):
+    return json.loads(file.read_text())

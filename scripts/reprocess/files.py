@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Files that appear whole or not at all, and digests."""
+import csv
+import hashlib
+import io
+import json
+import os
+from pathlib import Path
+
+# What the stages read of a session, as scripts/calibrate.sh has it.
+INPUTS = ["boards", "rotation", "dispersion", "check", "board.yaml", "lamps.yaml", "camera.yaml", "gates.yaml"]
+
+
+def write_whole(file, text):
+    file = Path(file)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_name(f".{file.name}.{os.getpid()}")
+    with open(unfinished, "w", newline="") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    os.replace(unfinished, file)
+
+
+def write_if_other(file, text):
+    """Leaves a file alone that says the same already, so that nothing counts as changed."""
+    file = Path(file)
+    if not file.exists() or file.read_text() != text:
+        write_whole(file, text)
+
+
+def table(columns, rows):
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n", extrasaction="ignore")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def read_table(file):
+    with open(file, newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def json_text(value):
+    return json.dumps(value, indent=1, sort_keys=True) + "\n"
+
+
+def digest(text):
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def file_digest(file):
+    sha = hashlib.sha256()
+    with open(file, "rb") as stream:
+        while block := stream.read(1 << 20):
+            sha.update(block)
+    return sha.hexdigest()
+
+
+def input_files(session):
+    """The files below a session that the stages read: (name, entry), in order. Folders that cannot be
+    read have none; it is for the programs to say so."""
+
+    def below(folder, prefix):
+        try:
+            entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+        except OSError:
+            return
+        for entry in entries:
+            if entry.is_dir():
+                yield from below(entry.path, prefix + entry.name + "/")
+            else:
+                yield prefix + entry.name, entry
+
+    for name, entry in below(session, ""):
+        if name.split("/")[0] in INPUTS:
+            yield name, entry
+
+
+def entry_digest(entry):
+    try:
+        return file_digest(entry.path) if entry.is_file() else "not a file"
+    except OSError:
+        return "cannot be read"
+
+
+def input_digest(session):
+    return digest("".join(f"{entry_digest(entry)}  {name}\n" for name, entry in input_files(session)))

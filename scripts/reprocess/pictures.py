@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of the overview, drawn by gnuplot, as data for <img>."""
+import base64
+import subprocess
+
+from files import read_table
+
+BEFORE, NOW = "#E69F00", "#0072B2"  # of the palette of Okabe and Ito
+MOST_POINTS = 4000
+BETWEEN = "(0.02, 0.05, 0.2, 0.5, 2, 5, 20, 50, 200, 500)"  # marks on logarithmic axes
+
+
+def drawn(script, size="640,420"):
+    head = f"set terminal svg size {size} font 'sans,14' background 'white'\nset grid lc rgb '#cccccc'\n"
+    run = subprocess.run(["gnuplot"], input=(head + script).encode(), capture_output=True, check=True)
+    return "data:image/svg+xml;base64," + base64.b64encode(run.stdout).decode()
+
+
+def block(name, points):
+    """A table of numbers, thinned out evenly when it is long."""
+    step = max(1, -(-len(points) // MOST_POINTS))
+    lines = [" ".join(f"{number:.6g}" for number in point) for point in points[::step]]
+    return f"${name} << END\n" + "\n".join(lines) + "\nEND\n"
+
+
+def shares(values):
+    values = sorted(values)
+    return [(value, (i + 1) / len(values)) for i, value in enumerate(values)]
+
+
+def distribution(now, before):
+    script = block("now", shares(now)) + "set xlabel 'mean horizontal error of a session (mm)'\n"
+    script += "set ylabel 'share of the sessions'\nset yrange [0:1]\nset key bottom right\nset logscale x\n"
+    script += f"set xtics add {BETWEEN}\n"
+    plots = [f"$now using 1:2 with lines lw 2 lc rgb '{NOW}' title 'now'"]
+    if before:
+        script += block("before", shares(before))
+        plots.insert(0, f"$before using 1:2 with lines lw 2 dt 2 lc rgb '{BEFORE}' title 'before'")
+    return drawn(script + "plot " + ", ".join(plots) + "\n")
+
+
+def scatter(pairs):
+    """pairs: (before, now)."""
+    script = block("pairs", pairs) + "set xlabel 'before (mm)'\nset ylabel 'now (mm)'\nset logscale xy\n"
+    script += f"set size square\nset key top left\nset xtics add {BETWEEN}\nset ytics add {BETWEEN}\n"
+    script += f"plot x with lines lc rgb '#888888' title 'the same', $pairs with points pt 7 ps 0.4 lc rgb '{NOW}' title 'a session'\n"
+    return drawn(script, "520,520")
+
+
+def errors(truth_file, fixes_file):
+    truth = {row["image"]: row for row in read_table(truth_file)}
+    vectors = []
+    for row in read_table(fixes_file):
+        true = truth.get(row["image"])
+        if row["status"] == "ok" and true:
+            x, y = float(true["x_m"]), float(true["y_m"])
+            vectors.append((x, y, float(row["x_m"]) - x, float(row["y_m"]) - y))
+    return vectors
+
+
+def floor(truth_file, before_file, now_file):
+    """Error vectors over the floor, before and now, so much larger that the largest is well seen."""
+    before, now = errors(truth_file, before_file), errors(truth_file, now_file)
+    if not before or not now:
+        return None, 0
+    largest = max((dx * dx + dy * dy) ** 0.5 for _, _, dx, dy in before + now) or 1e-9
+    scale = 0.15 / largest
+    exponent = 10 ** (len(str(int(scale))) - 1)
+    scale = max(1, int(scale / exponent) * exponent)
+    script = block("before", [(x, y, scale * dx, scale * dy) for x, y, dx, dy in before])
+    script += block("now", [(x, y, scale * dx, scale * dy) for x, y, dx, dy in now])
+    script += "set size ratio -1\nset xlabel 'x (m)'\nset ylabel 'y (m)'\nset offsets graph 0.1, 0.1, 0.1, 0.1\n"
+    script += f"plot $before with vectors lw 2 dt 2 lc rgb '{BEFORE}' title 'before', "
+    script += f"$now with vectors lw 2 lc rgb '{NOW}' title 'now'\n"
+    return drawn(script, "520,380"), scale

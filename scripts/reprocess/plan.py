@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Lists the sessions of an archive in shards, and says what they are reprocessed with.
+
+Writes into RESULTS/.state: run.json (toolbox and options), shards/N.list (a session a line, with the
+number, size and latest change of its files: a glance that tells which shards to look into), shards.txt
+(how many), again.txt (rows to make again), and compare.json. What has not changed is not touched, so that Snakemake runs the rest.
+"""
+import argparse
+import re
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from changes import read_gates
+from files import digest, input_files, json_text, write_if_other, write_whole
+from toolbox import toolbox
+
+
+def fail(message):
+    print(f"reprocess.sh: error: {message}", file=sys.stderr)
+    sys.exit(2)
+
+
+def sessions_in(archive):
+    for camera in sorted(archive.iterdir()):
+        if camera.is_dir() and not camera.name.startswith("."):
+            for session in sorted(camera.iterdir()):
+                if session.is_dir() and not session.name.startswith("."):
+                    yield f"{camera.name}/{session.name}"
+
+
+def glance(session):
+    count = size = latest = 0
+    for _, entry in input_files(session):
+        count += 1
+        if entry.is_file():
+            status = entry.stat()
+            size, latest = size + status.st_size, max(latest, status.st_mtime_ns)
+    return f"{count} {size} {latest}"
+
+
+def write_shards(archive, state, shard_size):
+    sessions = list(sessions_in(archive))
+    if not sessions:
+        fail(f"{archive}: no sessions in it; ARCHIVE/CAMERA/SESSION/ is where captures are looked for")
+    for name in sessions:
+        if not re.fullmatch(r"[\w.-]+/[\w.-]+", name, re.ASCII):
+            fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_' and '-'")
+    with ThreadPoolExecutor(16) as threads:  # most of it is waiting for the file system
+        glances = list(threads.map(lambda name: glance(archive / name), sessions))
+    wanted = set()
+    for first in range(0, len(sessions), shard_size):
+        file = state / "shards" / f"{first // shard_size:06d}.list"
+        wanted.add(file)
+        names = sessions[first : first + shard_size]
+        lines = [f"{name}\t{seen}\n" for name, seen in zip(names, glances[first : first + shard_size])]
+        write_if_other(file, "".join(lines))
+    for file in set((state / "shards").glob("*.list")) - wanted:
+        file.unlink()
+    write_if_other(state / "shards.txt", f"{len(wanted)}\n")
+    return len(sessions)
+
+
+def again(state):
+    """The rows to make whatever Snakemake thinks: those that are missing beside a summary, and those
+    with crashes, which may have been for want of memory or disk."""
+    rows = [state / "rows" / f"{file.stem}.csv" for file in sorted((state / "shards").glob("*.list"))]
+    wanted = [file for file in rows if not file.exists() or ",crashed," in file.read_text()]
+    return [f".state/rows/{file.name}\n" for file in wanted]
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("archive", type=Path)
+    parser.add_argument("results", type=Path)
+    parser.add_argument("--bin", type=Path, required=True)
+    parser.add_argument("--gates", type=Path)
+    parser.add_argument("--session-gates", type=Path)
+    parser.add_argument("--previous", type=Path)
+    parser.add_argument("--shard-size", type=int, default=20)
+    parser.add_argument("--camera-option", action="append", default=[])
+    options = parser.parse_args()
+    archive, results = options.archive.resolve(), options.results.resolve()
+    for file in (options.gates, options.session_gates):
+        if file and not file.is_file():
+            fail(f"{file}: is not a file")
+    if options.gates:
+        try:
+            read_gates(options.gates)
+        except ValueError as failure:
+            fail(failure)
+    if options.previous and not (options.previous / "summary.csv").is_file():
+        fail(f"{options.previous}: holds no summary.csv of an earlier run")
+    if options.shard_size < 1:
+        fail("--shard-size: should be 1 or more")
+
+    state = results / ".state"
+    (state / "logs").mkdir(parents=True, exist_ok=True)  # a cluster's jobs find it
+    run = {
+        "archive": str(archive),
+        "bin": str(options.bin.resolve()),
+        "camera": " ".join(options.camera_option),
+        "session_gates": str(options.session_gates.resolve()) if options.session_gates else "",
+        "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
+        **toolbox(options.bin),
+    }
+    count = write_shards(archive, state, options.shard_size)
+    write_whole(state / "again.txt", "".join(again(state)))
+    write_if_other(state / "run.json", json_text(run))
+    previous = options.previous.resolve() if options.previous else None
+    compare = {
+        "previous": str(previous) if previous else "",
+        "previous_digest": digest((previous / "summary.csv").read_text()) if previous else "",
+        "gates": str(options.gates.resolve()) if options.gates else "",
+        "gates_digest": digest(options.gates.read_text()) if options.gates else "",
+    }
+    write_if_other(state / "compare.json", json_text(compare))
+    print(f"{count} sessions in {archive}")
+
+
+if __name__ == "__main__":
+    main()

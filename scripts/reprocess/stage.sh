@@ -1,0 +1,13 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Runs a program of the toolbox as a stage. What it says goes to LOG; its processor time, user and
+# system, and its exit code go to LOG.end. A gate that is not met (1) does not end the session; a program
+# that hangs does, after an hour.
+stage() {  # LOG PROGRAM ARGUMENT...
+  local log=$1 code=0 TIMEFORMAT='%U %S'
+  shift
+  { time timeout 3600 "$@" >"$log" 2>&1; } 2>"$log.end" || code=$?
+  echo "$code" >>"$log.end"
+  [ "$code" -le 1 ]
+}

@@ -1,0 +1,58 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/rotation/robust_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+/// A point off by a common offset and by its own turn.
+struct TurnedPoint {
+  Eigen::Vector2d point, seen;
+
+  template <typename T>
+  bool operator()(const T* offset, const T* turn, T* residual) const {
+    residual[0] = point.x() - turn[0] * point.y() + offset[0] - seen.x();
+    residual[1] = point.y() + turn[0] * point.x() + offset[1] - seen.y();
+    return true;
+  }
+};
+
+/// The covariance of the offset, with the turns in memory in some order.
+Matrix2 covariance_with(const std::vector<std::size_t>& order) {
+  constexpr std::size_t turns = 12;
+  std::vector<double> memory(2 * turns + 2, 0.0);
+  double* offset = memory.data() + 2 * order[turns];
+  Random random(1);
+  RobustFit fit;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector2d point(random.uniform(-1, 1), random.uniform(-1, 1));
+    const Eigen::Vector2d seen = point + 0.01 * Eigen::Vector2d(random.normal(), random.normal());
+    fit.add(std::make_unique<ceres::AutoDiffCostFunction<TurnedPoint, 2, 2, 1>>(
+                new TurnedPoint{point, seen}),
+            {offset, memory.data() + 2 * order[random.index(turns)]});
+  }
+  EXPECT_TRUE(fit.solve());
+  const auto covariance = fit.covariance(offset);
+  EXPECT_TRUE(covariance);
+  return covariance.value_or(Matrix2::Zero());
+}
+
+TEST(RobustFit, RoundsAlikeWhereverItsParametersAre) {
+  std::vector<std::size_t> order(13);
+  std::iota(order.begin(), order.end(), 0);
+  const Matrix2 expected = covariance_with(order);
+  Random random(2);
+  for (int i = 0; i < 20; ++i) {
+    for (std::size_t j = order.size(); j-- > 1;) std::swap(order[j], order[random.index(j + 1)]);
+    EXPECT_EQ(covariance_with(order), expected);
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,103 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-simulate --archive as its users call it.
+#include <set>
+
+#include "captures/csv_reader.h"
+#include "small_simulation.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// Four sessions render in about 0.2 s: two captures of a board, four of lamps.
+class SimulateArchive : public SmallSimulation {
+ protected:
+  SimulateArchive() {
+    change_scene("captures:",
+                 "archive: {sessions_per_camera: 2, focal_share: 0.01, center_px: 1, "
+                 "distortion_share: 0.05, tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, "
+                 "fault_share: 0.5, damage_share: 0.25}\ncaptures:");
+    change_scene("folder: lamps", "folder: rotation");
+    change_scene("count: 8", "count: 2");
+    change_scene("heights_m: [0, 0.3], turn: {count: 2", "heights_m: [0], turn: {count: 1");
+  }
+  Files archive(int sessions, const std::string& options = "") {
+    const auto result = simulate("--archive " + std::to_string(sessions) + " " + options);
+    EXPECT_EQ(result.exit_code, 0) << result.errors;
+    return files_below(output);
+  }
+};
+
+TEST_F(SimulateArchive, GrowsWithoutAChangeToWhatIsThere) {
+  const Files four = archive(4), ten = archive(10);
+  for (const auto& [name, content] : four) {
+    if (name != "archive.csv") {
+      EXPECT_TRUE(ten.at(name) == content) << name;
+    }
+  }
+  EXPECT_TRUE(ten.at("archive.csv").starts_with(four.at("archive.csv")));
+  EXPECT_GT(ten.size(), 2 * four.size());
+  fs::remove_all(output);
+  EXPECT_TRUE(archive(10, "--threads 3") == ten);
+}
+
+TEST_F(SimulateArchive, GoesOnWhereItWasInterrupted) {
+  const Files expected = archive(10);
+  // As a run leaves it that is killed after it damaged session 6 and before that was in its place.
+  for (const char* session : {"camera-00003/session-02", "camera-00001/session-01"}) {
+    std::string name = session;
+    name[name.find('/')] = '-';
+    fs::create_directories(output / ".unfinished");
+    fs::rename(output / session, output / ".unfinished" / name);
+  }
+  fs::remove(output / ".unfinished/camera-00001-session-01/boards/0001.png");
+  EXPECT_EQ(simulate("--archive 10").output,
+            "rendered 2 sessions, 8 were there; in " + output.string() + "\n");
+  EXPECT_TRUE(files_below(output) == expected);
+}
+
+TEST_F(SimulateArchive, DamagesWhatTheTableSays) {
+  const Files files = archive(32);
+  const CsvTable table(output / "archive.csv");
+  ASSERT_EQ(table.rows(), 32U);
+  std::set<std::string> kinds;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto cell = [&](const char* column) {
+      return std::string(table.text(row, table.required(column)));
+    };
+    const fs::path session = output / cell("camera") / cell("session");
+    const fs::path target = session / cell("damaged");
+    const std::string damage = cell("damage"), cut = session / "rotation/0000.png";
+    SCOPED_TRACE(session.string() + " " + damage);
+    kinds.insert(damage);
+    EXPECT_EQ(fs::exists(target), damage != "missing");
+    if (damage == "empty") {
+      EXPECT_TRUE(fs::is_empty(target));
+    }
+    if (damage == "cut-images") {
+      EXPECT_EQ(fs::file_size(target / "0000.png"), 600U);
+    }
+    if (damage == "wrong-board") {
+      EXPECT_THAT(TemporaryFolder::content_of(target), HasSubstr("tag25h9"));
+    }
+    if (damage.empty()) {
+      EXPECT_EQ(fs::file_size(cut) == 600, cell("fault") == "cut-image");
+    }
+  }
+  EXPECT_EQ(kinds.size(), 5U) << "four kinds and none";
+}
+
+TEST_F(SimulateArchive, RefusesASceneWithoutSpreadsAndFoldersAsked) {
+  EXPECT_THAT(simulate("--archive 2 --only boards").errors, HasSubstr("--only"));
+  change_scene("archive: {", "# {");
+  const auto result = simulate("--archive 2");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("the scene has no key 'archive'"));
+  EXPECT_FALSE(fs::exists(output));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,48 @@
+#!/bin/bash
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# An archive of ten sessions, of which three are damaged: each good one has its result, each bad one its
+# reason, and the archive is as it was. Leaves archive and results for the other tests.
+source "$(dirname "$0")/common.sh"
+rm -rf "$scratch"
+mkdir -p "$scratch"
+# Sessions 2, 5 and 9 are damaged; 3 leans, 8 is out of focus.
+sed 's/fault_share: .*/fault_share: 0.2/; s/damage_share: .*/damage_share: 0.3/' \
+  "$source_dir/datasets/archive/scene.yaml" >"$scratch/scene.yaml"
+"$bin/vlp-simulate" --quiet "$scratch/scene.yaml" --archive 10 -o "$archive"
+before=$(state_of_archive)
+reprocess "$baseline" --cores 2 >"$scratch/said"
+cat "$scratch/said"
+[ "$before" = "$(state_of_archive)" ] || fail "the archive has changed"
+grep -q '^no result   3, and 0 that crashed' "$scratch/said" || fail "three sessions are damaged"
+[ "$(wc -l <"$baseline/summary.csv")" = 11 ] || fail "a row per session"
+while IFS=, read -r camera session _ damage _; do
+  [ "$camera" != camera ] || continue
+  name=$camera/$session
+  if [ -n "$damage" ]; then
+    [ ! -e "$baseline/sessions/$name" ] || fail "$name is damaged ($damage) and has a result"
+    grep -q '"reason": "vlp-[a-z]*: error: ' "$baseline/failed/$name/session.json" || fail "$name has no reason"
+    ls "$baseline/failed/$name/logs/"*.txt >/dev/null || fail "$name has no log"
+  else
+    [ ! -e "$baseline/failed/$name" ] || fail "$name is whole and has no result"
+    for file in calibration.yaml camera.cameramodel fixes.csv evaluation.json session.json; do
+      [ -s "$baseline/sessions/$name/$file" ] || fail "$name has no $file"
+    done
+  fi
+done <"$archive/archive.csv"
+# What the chain gives is what its programs give by hand, byte for byte.
+station=$archive/camera-00001/session-01 hand=$scratch/hand
+mkdir "$hand"
+(
+  PATH=$bin:$PATH
+  vlp-intrinsics "$station/boards" --board "$station/board.yaml" --row-time-s 3e-5 --readout rows -o "$hand/lens.yaml"
+  for stage in rotation dispersion; do
+    from=$([ $stage = rotation ] && echo lens || echo rotation)
+    vlp-$stage "$station/$stage" --lamps "$station/lamps.yaml" --calibration "$hand/$from.yaml" -o "$hand/$stage.yaml"
+  done
+  vlp-locate "$station/check" --lamps "$station/lamps.yaml" --calibration "$hand/dispersion.yaml" -o "$hand/fixes.csv"
+) >"$hand/said" 2>&1
+cmp "$hand/fixes.csv" "$baseline/sessions/camera-00001/session-01/fixes.csv"
+if grep -q 'src="http\|<script' "$baseline/overview.html"; then fail "the overview is not self-contained"; fi
+rm -rf "$hand"

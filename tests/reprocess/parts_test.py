@@ -1,0 +1,155 @@
+#!/usr/bin/python3
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""The parts of scripts/reprocess, whose folder is the argument."""
+import os
+import random
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, sys.argv.pop(1))
+try:
+    import yaml  # noqa: F401
+except ImportError:
+    print("yaml is missing: scripts/setup.sh --batch")
+    sys.exit(77)
+import changes
+import files
+import outcome
+
+
+def row(number, verdict, mean, inputs="same"):
+    mean = f"{mean:.6g}" if mean is not None else ""
+    name = {"camera": f"c{number // 2:04d}", "session": f"s{number % 2}"}
+    return {**name, "verdict": verdict, "mean_mm": mean, "inputs": inputs}
+
+
+class Changes(unittest.TestCase):
+    def test_counts_each_kind_once(self):
+        before = [row(0, "pass", 1), row(1, "pass", 1), row(2, "gate", 1), row(3, "pass", 1)]
+        before += [row(4, "no result", None), row(5, "pass", 1), row(6, "pass", 1), row(9, "pass", 1)]
+        now = [row(0, "pass", 0.5), row(1, "pass", 2), row(2, "gate", 1), row(3, "no result", None)]
+        now += [row(4, "pass", 1), row(5, "crashed", None), row(6, "pass", 2, "other"), row(8, "pass", 1)]
+        found, pairs = changes.changes_of(now, before)
+        self.assertEqual([found[key] for key in ("better", "worse", "same", "pairs")], [1, 1, 1, 3])
+        self.assertEqual(found["newly_failed"], ["c0001/s1", "c0002/s1"])
+        self.assertEqual(found["newly_good"], ["c0002/s0"])
+        self.assertEqual([found[key] for key in ("other_inputs", "only_now", "only_before")], [1, 1, 1])
+        self.assertEqual([change for _, _, change in pairs], [1, -0.5, 0])
+        self.assertIn("cannot tell", found["verdict"])
+
+    def test_says_better_or_worse_only_with_evidence(self):
+        def verdict(shift):
+            chance = random.Random(1)
+            before = [row(i, "pass", 1) for i in range(100)]
+            now = [row(i, "pass", 1 + shift + chance.gauss(0, 0.05)) for i in range(100)]
+            return changes.changes_of(now, before)[0]["verdict"]
+
+        self.assertEqual([verdict(shift) for shift in (-0.05, 0, 0.05)], ["better", "no evidence", "worse"])
+
+    def test_interval_holds_the_truth_19_times_in_20(self):
+        # Sessions of a camera alike: were they counted alone, only 83 % of the intervals would.
+        chance = random.Random(2)
+        held = 0
+        for _ in range(1000):
+            differences = []
+            for camera in range(40):
+                shift = chance.gauss(0.3, 1)
+                differences += [(camera, shift)] * 2
+            _, (low, high) = changes.interval_of(differences)
+            held += low <= 0.3 <= high
+        self.assertGreater(held, 920)  # 950 expected, less 4 sigma of 7 and that of few cameras
+        self.assertLess(held, 975)
+
+    def test_gates_hold_what_they_say(self):
+        counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 3), row(2, "no result", None), row(3, "crashed", None)])
+        gates = {"no_result": 2, "no_result_share": 0.4, "gate_share": 0.25, "mean_mm": 2, "p90_mm": 2, "newly_failed": 0}
+        passed = [gate["passed"] for gate in changes.check_gates(gates, counts, None)]
+        self.assertEqual(passed, [True, False, True, True, False, False])
+
+    def test_refuses_gates_that_it_does_not_know(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "gates.yaml"
+            for text, problem in (
+                ("gates: {no_result: 0}", "should begin with format"),
+                ("format: vlp-archive-gates/1\n", "should hold"),
+                ("format: vlp-archive-gates/1\ngates: {}\n", "should hold"),
+                ("format: vlp-archive-gates/1\ngates: {odd: 1}\n", "gate 'odd' is unknown"),
+                ("format: vlp-archive-gates/1\ngates: {mean_mm: .inf}\n", "should be a number"),
+                ("format: vlp-archive-gates/1\ngates: {mean_mm: true}\n", "should be a number"),
+                ("format: [", "is not YAML"),
+            ):
+                file.write_text(text)
+                with self.assertRaisesRegex(ValueError, problem):
+                    changes.read_gates(file)
+
+
+class Outcome(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.archive, self.work = (Path(self.folder.name) / name for name in ("archive", "work"))
+        (self.archive / "c/s/check").mkdir(parents=True)
+        (self.work / "logs").mkdir(parents=True)
+        self.run = {"archive": str(self.archive)}
+
+    def ends(self, stage, code, said=""):
+        (self.work / "logs" / f"{stage}.txt").write_text(said)
+        (self.work / "logs" / f"{stage}.txt.end").write_text(f"0.25 0.05\n{code}\n")
+
+    def outcome(self):
+        return outcome.outcome_of(self.work, "c/s", self.run)
+
+    def test_passes_with_the_last_file(self):
+        self.ends("lens", 0)
+        self.ends("locate", 0)
+        (self.work / "fixes.csv").touch()
+        self.assertEqual(self.outcome()["verdict"], "pass")
+        self.assertEqual(outcome.cost_of(self.work), "0.600")
+
+    def test_tells_the_gate_in_the_words_of_the_program(self):
+        self.ends("lens", 1, "views 3\nvlp-intrinsics: warning: few views\nvlp-intrinsics: error: rms_px is 2\n")
+        (self.work / "fixes.csv").touch()
+        found = self.outcome()
+        self.assertEqual((found["verdict"], found["reason"]), ("gate", "vlp-intrinsics: error: rms_px is 2"))
+
+    def test_tells_the_reason_without_the_folder_of_the_archive(self):
+        self.ends("lens", 0)
+        self.ends("rotation", 2, f"vlp-rotation: error: {self.archive}/c/s/rotation: is empty\n")
+        found = self.outcome()
+        self.assertEqual((found["verdict"], found["reason"]), ("no result", "vlp-rotation: error: c/s/rotation: is empty"))
+
+    def test_calls_a_crash_a_crash(self):
+        self.ends("rotation", 139)
+        end = self.work / "logs/rotation.txt.end"
+        end.write_text("stage.sh: line 12: 345 Killed\n" + end.read_text())
+        found = self.outcome()
+        self.assertEqual((found["verdict"], found["reason"]), ("crashed", "rotation ended with exit code 139"))
+
+    def test_a_stage_without_an_end_is_a_crash(self):
+        self.ends("lens", 0)
+        (self.work / "logs/rotation.txt").touch()
+        self.assertEqual(self.outcome()["verdict"], "crashed")
+
+
+class Files(unittest.TestCase):
+    def test_digest_is_of_names_and_contents_of_what_is_read(self):
+        with tempfile.TemporaryDirectory() as folder:
+            session = Path(folder)
+            (session / "boards").mkdir()
+            (session / "boards/0.png").write_text("one")
+            first = files.input_digest(session)
+            (session / "notes.txt").write_text("not read")
+            os.utime(session / "boards/0.png", (1, 1))
+            self.assertEqual(files.input_digest(session), first)
+            (session / "boards/0.png").rename(session / "boards/1.png")
+            second = files.input_digest(session)
+            (session / "boards/1.png").write_text("two")
+            self.assertEqual(len({first, second, files.input_digest(session)}), 3)
+
+
+if __name__ == "__main__":
+    unittest.main()

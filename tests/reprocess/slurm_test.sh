@@ -1,0 +1,98 @@
+#!/bin/bash
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# A Slurm of two nodes on this machine, started here: the archive gives the same bytes as without it, and
+# also when a node is killed in mid-run and then Snakemake itself.
+source "$(dirname "$0")/common.sh"
+PATH=$PATH:/usr/sbin
+for program in munged slurmctld slurmd sbatch scontrol; do
+  command -v $program >/dev/null || { echo "$program is missing: scripts/setup.sh --batch"; exit 77; }
+done
+# A node is a process namespace, so that it can be killed with all that runs on it.
+unshare --pid --fork --kill-child true 2>/dev/null || { echo "unshare is not permitted here"; exit 77; }
+
+cluster=$(mktemp -d)  # short: the socket's path is limited to 108 characters
+chmod 755 "$cluster"
+nodes=() munged='' controller='' runs=()
+clean_up() {
+  for pid in "${runs[@]}"; do kill -9 -- "-$pid" 2>/dev/null || true; done
+  for pid in "${nodes[@]}" $controller $munged; do kill -9 "$pid" 2>/dev/null || true; done
+  wait 2>/dev/null || true
+  rm -rf "$cluster"
+}
+trap clean_up EXIT
+
+mkdir "$cluster/state" "$cluster/spool-n1" "$cluster/spool-n2"
+head -c 1024 /dev/urandom >"$cluster/munge.key"
+chmod 600 "$cluster/munge.key"
+munged --foreground --key-file="$cluster/munge.key" --socket="$cluster/munge" --num-threads=2 \
+  --pid-file="$cluster/munged.pid" --log-file="$cluster/munged.log" --seed-file="$cluster/munged.seed" &
+munged=$!
+port=$((20000 + $$ % 20000))
+export SLURM_CONF=$cluster/slurm.conf
+cat >"$SLURM_CONF" <<CONF
+ClusterName=vlp
+SlurmctldHost=$(hostname -s)(127.0.0.1)
+SlurmctldPort=$port
+AuthType=auth/munge
+AuthInfo=socket=$cluster/munge
+CredType=cred/munge
+SlurmUser=$(id -un)
+SlurmdUser=$(id -un)
+StateSaveLocation=$cluster/state
+SlurmdSpoolDir=$cluster/spool-%n
+SlurmctldPidFile=$cluster/slurmctld.pid
+SlurmdPidFile=$cluster/slurmd-%n.pid
+SlurmctldLogFile=$cluster/slurmctld.log
+SlurmdLogFile=$cluster/slurmd-%n.log
+ProctrackType=proctrack/pgid
+TaskPlugin=task/none
+JobAcctGatherType=jobacct_gather/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+SlurmdParameters=config_overrides
+ReturnToService=2
+SlurmdTimeout=10
+MpiDefault=none
+NodeName=n[1-2] NodeHostname=$(hostname -s) NodeAddr=127.0.0.1 Port=$((port + 1))-$((port + 2)) CPUs=1 RealMemory=4000
+PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+CONF
+patiently() {  # SECONDS COMMAND...: until it succeeds
+  local ends=$((SECONDS + $1))
+  until "${@:2}" >/dev/null 2>&1; do
+    [ $SECONDS -lt $ends ] || { tail -n 20 "$cluster"/*.log >&2; fail "in vain: ${*:2}"; }
+    sleep 0.5
+  done
+}
+patiently 30 test -S "$cluster/munge"
+slurmctld -D >/dev/null 2>&1 &
+controller=$!
+for node in n1 n2; do
+  unshare --pid --fork --kill-child --mount-proc slurmd -D -N $node >/dev/null 2>&1 &
+  nodes+=($!)
+done
+both_idle() { [ "$(sinfo --noheader --states=idle --format=%D)" = 2 ]; }
+patiently 60 both_idle
+
+reprocess "$scratch/slurm" --profile slurm
+expect_baseline "$scratch/slurm"
+scontrol show job --oneliner | grep -q 'JobState=COMPLETED.*BatchHost=n2' || fail "no job ran on the second node"
+
+results=$scratch/slurm-killed
+rm -rf "$results"
+setsid "$source_dir/scripts/reprocess.sh" "$archive" "$results" --row-time-s 3e-5 --readout rows --shard-size 3 \
+  --profile slurm >"$scratch/said" 2>&1 &
+runs+=($!)
+works_on_n2() { squeue --noheader --states=running --nodelist=n2 | grep -q vlp; }
+patiently 120 works_on_n2
+kill -9 "${nodes[1]}"
+node_failed() { scontrol show job --oneliner | grep -q JobState=NODE_FAIL; }
+patiently 120 node_failed
+a_shard_is_done() { ls "$results"/.state/rows/*.csv; }
+patiently 300 a_shard_is_done
+kill -0 "${runs[0]}" 2>/dev/null || fail "the run ended with its node: $(cat "$scratch/said")"
+kill -9 -- "-${runs[0]}"
+[ ! -e "$results/summary.csv" ] || fail "Snakemake was killed too late"
+reprocess "$results" --profile slurm
+expect_baseline "$results"
