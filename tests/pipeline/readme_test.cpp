@@ -48,8 +48,9 @@ TEST(Readme, ItsCommandsWorkAsTyped) {
                                               folder / name);
   }
   for (const auto& command : commands) {
-    const auto result = run_program("cd '" + (folder / "").string() +
-                                    "' && export VLP_PROGRAMS_DIR=" VLP_PROGRAMS_DIR " && " + command);
+    const auto result =
+        run_program("cd '" + (folder / "").string() +
+                    "' && export VLP_PROGRAMS_DIR=" VLP_PROGRAMS_DIR " && " + command);
     EXPECT_EQ(result.exit_code, 0) << command << "\n" << result.errors;
   }
 }
