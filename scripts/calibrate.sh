@@ -18,153 +18,180 @@
 #   line-*/                     along a straight line each, with truth.csv (optional, for the report)
 #   gates.yaml                  what the errors have to keep to (optional)
 #
-# Results (default STATION_DIR/results): calibration.yaml, fixes.csv, evaluation.json, report.html,
-# and what each stage wrote and said. A row time that is not given is found from the rotation
-# captures. A stage whose inputs, options and program are as before is not run again.
+# Results (default STATION_DIR/results): calibration.yaml, check-fixes.csv, evaluation.json,
+# report.html, and what each stage wrote and said. A row time that is not given is found from the
+# rotation captures. A stage whose inputs, options, program and output are as before is not run
+# again; what this run does not make, or cannot, is removed.
 #
 # Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 the captures do not determine it.
 set -euo pipefail
 bin=${VLP_PROGRAMS_DIR:-$(cd "$(dirname "$0")/.." && pwd)/build/bin}
 
-usage() {
-  echo "calibrate.sh: $1; usage: calibrate.sh STATION_DIR [-o RESULTS_DIR] [--camera-id ID]" \
-    "[--row-time-s S] [--readout rows|columns]" >&2
+refuse() {
+  echo "calibrate.sh: $1" >&2
   exit 2
 }
-station='' results='' row_time='' camera=()
+station='' results='' camera=()
 while [ $# -gt 0 ]; do
   case $1 in
     -o | --output | --camera-id | --row-time-s | --readout)
-      [ $# -gt 1 ] || usage "$1 wants a value" ;;&
+      [ $# -gt 1 ] || refuse "$1 wants a value; see calibrate.sh --help" ;;&
     -o | --output) results=$2; shift ;;
-    --camera-id | --readout) camera+=("$1" "$2"); shift ;;
-    --row-time-s) row_time=$2; camera+=("$1" "$2"); shift ;;
+    --camera-id | --readout | --row-time-s) camera+=("$1" "$2"); shift ;;
     -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
-    -*) usage "unknown option $1" ;;
-    *) [ -z "$station" ] || usage "one station at a time, not also $1"; station=${1%/} ;;
+    -*) refuse "unknown option $1; see calibrate.sh --help" ;;
+    *) [ -z "$station" ] || refuse "one station at a time, not also $1"; station=${1%/} ;;
   esac
   shift
 done
-[ -n "$station" ] || usage "which STATION_DIR?"
+[ -n "$station" ] || refuse "which STATION_DIR? See calibrate.sh --help"
 results=${results:-$station/results}
 
 need() {  # NAME...: that which is missing ends it
   for name; do
-    [ -e "$station/$name" ] || { echo "$station/$name: missing" >&2; exit 2; }
+    [ -e "$station/$name" ] || refuse "$station/$name: missing; see calibrate.sh --help"
   done
 }
 need lamps.yaml rotation
-[ -e "$station/camera.yaml" ] || need board.yaml boards
-[ -x "$bin/vlp-evaluate" ] || { echo "$bin: no programs; run scripts/test.sh first" >&2; exit 2; }
-mkdir -p "$results/stages"
-verdict=0
+if [ -e "$station/camera.yaml" ]; then
+  [ ${#camera[@]} = 0 ] || refuse "${camera[0]}: $station/camera.yaml says what the camera is"
+else
+  need board.yaml boards
+fi
+for program in intrinsics train rotation dispersion locate evaluate; do
+  [ -x "$bin/vlp-$program" ] || refuse "$bin/vlp-$program: missing; run scripts/test.sh first"
+done
+mkdir -p "$results/stages" || refuse "$results: cannot be written to"
+[ ! "$results" -ef "$station" ] || refuse "$results: results go to a folder of their own"
+verdict=0 unmet=()
+final=("$results"/{calibration.yaml,evaluation.json,gates.xml,report.html})
 
 digest_of() {  # FILE OR FOLDER...: of names and contents
   for input; do
     if [ -d "$input" ]; then
-      (cd "$input" && find . -type f -print0 | sort -z | xargs -0 --no-run-if-empty sha256sum)
+      (cd "$input" && find -L . -type f -print0 | sort -z | xargs -0 --no-run-if-empty sha256sum)
     else
-      sha256sum "$input"
+      sha256sum <"$input"
     fi
   done
 }
 
-# Runs a program on inputs, options that begin with -- left as they are, unless all is as it was
-# when it last ended well. What it says goes to stages/NAME.txt.
+# Runs a program on inputs, unless these, its arguments, the program and its output are as they were
+# when it last ended. What it says goes to stages/NAME.txt.
 stage() {  # NAME INPUT... -- OUTPUT PROGRAM ARGUMENT...
-  local name=$1 inputs=() code=0 key
+  local name=$1 inputs=() code=0 state key
   shift
   while [ "$1" != -- ]; do inputs+=("$1"); shift; done
   local output=$results/$2 program=$3 log=$results/stages/$name.txt
   shift 3
   key=$( { digest_of "$bin/$program" "${inputs[@]}"; printf '%s\n' "$@"; } | sha256sum)
-  if [ -e "$output" ] && [ -e "$log.key" ] && [ "$(head -n 1 "$log.key")" = "$key" ]; then
-    code=$(tail -n 1 "$log.key")
-    printf '%-11s as before%s\n' "$name" "$([ "$code" = 0 ] || echo ', a gate is not met')"
+  if [ -e "$log.key" ] && [ "$(sed -n 1p "$log.key")" = "$key" ] && [ -e "$output" ] &&
+    [ "$(sed -n 2p "$log.key")" = "$(digest_of "$output")" ]
+  then
+    code=$(sed -n 3p "$log.key") state='as before'
   else
-    rm -f "$log.key"
+    rm -f "$log.key" "$output"
     local begin_us=${EPOCHREALTIME//[!0-9]/}
     "$bin/$program" "$@" >"$log" 2>"$log.messages" || code=$?
-    cat "$log.messages" >>"$log"
     if [ "$code" -gt 1 ]; then
       cat "$log.messages" >&2
-      rm "$log.messages"
-      echo "calibrate.sh: $name ended with exit code $code; see $log" >&2
+      rm -f "$log.messages" "${final[@]}"
+      echo "calibrate.sh: $name ended with exit code $code" >&2
       exit "$code"
     fi
+    sed -i '/: info: /d' "$log.messages"
     local tenths=$(((${EPOCHREALTIME//[!0-9]/} - begin_us + 50000) / 100000))
-    printf '%-11s %3d.%d s%s\n' "$name" $((tenths / 10)) $((tenths % 10)) \
-      "$([ "$code" = 0 ] || echo ', a gate is not met:')"
-    sed '/: info: /d; s/^/            /' "$log.messages"
-    rm "$log.messages"
-    printf '%s\n%s\n' "$key" "$code" >"$log.key"
+    state=$(printf '%3d.%d s' $((tenths / 10)) $((tenths % 10)))
+    printf '%s\n%s\n%s\n' "$key" "$(digest_of "$output")" "$code" >"$log.key"
   fi
-  [ "$code" = 0 ] || verdict=$code
+  printf '%-13s %s%s\n' "$name" "$state" "$([ "$code" = 0 ] || echo ', a gate is not met')"
+  sed 's/^/              /' "$log.messages"
+  if [ "$code" = 1 ]; then
+    verdict=1
+    unmet+=(--unmet "$name: $(sed -n 's/^.*: error: //p' "$log.messages" | paste -sd ' ')")
+  fi
 }
 
-lamps=$station/lamps.yaml
+# From here on the results are of this run.
+lamps=$station/lamps.yaml pictures=()
 if [ -e "$station/camera.yaml" ]; then
-  cp "$station/camera.yaml" "$results/lens.yaml"
+  rm -f "$results"/{lens,camera}.* "$results"/stages/{intrinsics,row-time}.*
+  lens=$station/camera.yaml
 else
+  lens=$results/lens.yaml
   stage intrinsics "$station/boards" "$station/board.yaml" -- lens.yaml vlp-intrinsics \
-    "$station/boards" --board "$station/board.yaml" "${camera[@]}" --cache "$results/stages/corners" \
-    --plot "$results/camera.svg" -o "$results/lens.yaml"
+    "$station/boards" --board "$station/board.yaml" "${camera[@]}" \
+    --cache "$results/stages/corners" --plot "$results/lens.svg" -o "$lens"
+  pictures+=(--picture "$results/lens.svg")
 fi
-if grep -q '^  row_time_s:' "$results/lens.yaml"; then
-  cp "$results/lens.yaml" "$results/camera.yaml"
+if grep -q '^  row_time_s:' "$lens"; then
+  rm -f "$results"/camera.yaml "$results"/stages/row-time.*
 else
-  stage row-time "$station/rotation" "$lamps" "$results/lens.yaml" -- camera.yaml vlp-train \
-    "$station/rotation" --row-time --lamps "$lamps" --calibration "$results/lens.yaml" \
-    -o "$results/camera.yaml"
+  stage row-time "$station/rotation" "$lamps" "$lens" -- camera.yaml vlp-train \
+    "$station/rotation" --row-time --lamps "$lamps" --calibration "$lens" -o "$results/camera.yaml"
+  lens=$results/camera.yaml
 fi
-stage rotation "$station/rotation" "$lamps" "$results/camera.yaml" -- rotated.yaml vlp-rotation \
-  "$station/rotation" --lamps "$lamps" --calibration "$results/camera.yaml" \
-  --plot "$results/rotation.svg" -o "$results/rotated.yaml"
+stage rotation "$station/rotation" "$lamps" "$lens" -- rotated.yaml vlp-rotation \
+  "$station/rotation" --lamps "$lamps" --calibration "$lens" --plot "$results/rotation.svg" \
+  -o "$results/rotated.yaml"
+pictures+=(--picture "$results/rotation.svg")
+calibration=$results/calibration.yaml
 if [ -e "$station/dispersion" ]; then
   stage dispersion "$station/dispersion" "$lamps" "$results/rotated.yaml" -- calibration.yaml \
     vlp-dispersion "$station/dispersion" --lamps "$lamps" --calibration "$results/rotated.yaml" \
-    --plot "$results/dispersion.svg" -o "$results/calibration.yaml"
+    --plot "$results/dispersion.svg" -o "$calibration"
+  pictures+=(--picture "$results/dispersion.svg")
 else
-  cp "$results/rotated.yaml" "$results/calibration.yaml"
+  rm -f "$results/dispersion.svg" "$results"/stages/dispersion.*
+  cp "$results/rotated.yaml" "$calibration" || refuse "$calibration: cannot be written"
 fi
 
-calibration=$results/calibration.yaml
 locate() {  # FOLDER: to FOLDER-fixes.csv
   local fixes=$1-fixes.csv
-  stage "locate-$1" "$station/$1" "$lamps" "$calibration" -- "$fixes" vlp-locate "$station/$1" \
+  stage "$1" "$station/$1" "$lamps" "$calibration" -- "$fixes" vlp-locate "$station/$1" \
     --lamps "$lamps" --calibration "$calibration" -o "$results/$fixes"
 }
-[ ! -e "$station/check" ] || locate check
+if [ -e "$station/check" ]; then locate check; else rm -f "$results"/check-fixes.csv; fi
 
 # Errors, where the truth is known, and the report with all pictures that there are.
 truth=$station/check/truth.csv
 if [ ! -e "$truth" ] && head -n 1 "$station/check/captures.csv" 2>/dev/null | grep -q x_m; then
   truth=$station/check/captures.csv
 fi
-if [ -e "$truth" ]; then
-  fixes=$results/check-fixes.csv
-  inputs=("$fixes" "$truth" "$lamps" "$calibration")
-  report=()
-  for picture in camera rotation dispersion; do
-    [ ! -e "$results/$picture.svg" ] || report+=(--picture "$results/$picture.svg")
-  done
-  for line in "$station"/line-*/; do
-    [ -e "$line/truth.csv" ] || continue
-    line=$(basename "$line")
-    locate "$line"
-    read -ra ends_m < <(awk -F, 'NR == 2 { print $2, $3 } END { print $2, $3 }' \
-      "$station/$line/truth.csv" | paste -sd ' ')
-    inputs+=("$results/$line-fixes.csv")
-    report+=(--track "$results/$line-fixes.csv" "${ends_m[@]}")
-  done
-  if [ -e "$station/gates.yaml" ]; then
-    inputs+=("$station/gates.yaml")
-    report+=(--gates "$station/gates.yaml" --junit "$results/gates.xml")
-  fi
-  stage evaluate "${inputs[@]}" -- report.html vlp-evaluate "$fixes" --truth "$truth" \
-    --lamps "$lamps" --calibration "$calibration" --json "$results/evaluation.json" \
-    --report "$results/report.html" "${report[@]}"
-  echo
-  cat "$results/stages/evaluate.txt"
+if [ ! -e "$truth" ]; then
+  rm -f "$results"/{evaluation.json,gates.xml,report.html}
+  echo "No errors and no report: $station/check has no truth.csv"
+  exit "$verdict"
 fi
+fixes=$results/check-fixes.csv
+inputs=("$fixes" "$truth" "$lamps" "$calibration")
+report=("${pictures[@]}")
+for ((i = 1; i < ${#pictures[@]}; i += 2)); do inputs+=("${pictures[i]}"); done
+
+ends_of() {  # TRUTH: x and y where a line begins, and where it ends
+  awk -F, '{ sub(/\r$/, "") }
+           NR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; next }
+           NF > 1 { x = $column["x_m"]; y = $column["y_m"]; if (!any++) printf "%s %s ", x, y }
+           END { print x, y }' "$1"
+}
+for line in "$station"/line-*/; do
+  line=$(basename "$line")
+  [ -e "$station/$line/truth.csv" ] || continue
+  locate "$line"
+  read -ra ends_m <<<"$(ends_of "$station/$line/truth.csv")"
+  [ ${#ends_m[@]} = 4 ] || refuse "$station/$line/truth.csv: has no x_m and y_m"
+  inputs+=("$results/$line-fixes.csv")
+  report+=(--track "$results/$line-fixes.csv" "${ends_m[@]}")
+done
+if [ -e "$station/gates.yaml" ]; then
+  inputs+=("$station/gates.yaml")
+  report+=(--gates "$station/gates.yaml" --junit "$results/gates.xml")
+else
+  rm -f "$results/gates.xml"
+fi
+stage evaluate "${inputs[@]}" -- report.html vlp-evaluate "$fixes" --truth "$truth" \
+  --lamps "$lamps" --calibration "$calibration" --json "$results/evaluation.json" \
+  --report "$results/report.html" "${report[@]}" "${unmet[@]}"
+echo
+cat "$results/stages/evaluate.txt"
 exit "$verdict"

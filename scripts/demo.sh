@@ -19,11 +19,15 @@ then
   exit 1
 fi
 
-station=out/demo/paper-rig
+rig=datasets/paper-rig station=out/demo/paper-rig
 echo "Rendering a camera's captures to $station ..."
-build/bin/vlp-simulate --quiet datasets/paper-rig/scene.yaml \
+build/bin/vlp-simulate --quiet $rig/scene.yaml \
   --only boards,rotation,dispersion,check,line-x,line-y -o $station
+cp $rig/gates.yaml $station/
 echo "Calibrating it, as scripts/calibrate.sh does with any folder of captures:"
-scripts/calibrate.sh $station -o out/demo/results --row-time-s 3e-5 --readout rows
+code=0
+scripts/calibrate.sh $station -o out/demo/results --camera-id paper-rig --row-time-s 3e-5 \
+  --readout rows || code=$?
 echo
 echo "Open out/demo/results/report.html; the calibration is out/demo/results/calibration.yaml"
+exit $code

@@ -27,17 +27,17 @@ class Chain : public testing::Test {
   std::string path(const std::string& name) const { return (folder / name).string(); }
   /// Captures as a scene describes them, in the folder that is calibrated.
   void render(const std::string& scene, const std::string& folders) const {
-    const auto result =
-        run_program("vlp-simulate -q " + scene + " --only " + folders + " -o " + path("station"));
+    const auto result = run_program("vlp-simulate -q " + scene + " --only " + folders + " -o '" +
+                                    path("a station") + "'");
     ASSERT_EQ(result.exit_code, 0) << result.errors;
   }
   ProgramResult calibrate(const std::string& options = "--row-time-s 3e-5 --readout rows") const {
     return run_program("VLP_PROGRAMS_DIR=" VLP_PROGRAMS_DIR " " VLP_SOURCE_DIR
-                       "/scripts/calibrate.sh " +
-                       path("station") + " " + options);
+                       "/scripts/calibrate.sh '" +
+                       path("a station") + "' " + options);
   }
   std::string result(const std::string& name) const {
-    return TemporaryFolder::content_of(folder / ("station/results/" + name));
+    return TemporaryFolder::content_of(folder / ("a station/results/" + name));
   }
   const TemporaryFolder folder;
 };
@@ -48,7 +48,7 @@ class Accuracy : public Chain, public testing::WithParamInterface<const char*> {
 TEST_P(Accuracy, KeepsToItsGates) {
   const std::string rig = kDatasets + GetParam();
   render(rig + "/scene.yaml", "boards,rotation,dispersion,check");
-  fs::copy(rig + "/gates.yaml", folder / "station/gates.yaml");
+  fs::copy(rig + "/gates.yaml", folder / "a station/gates.yaml");
   const auto run = calibrate();
   EXPECT_EQ(run.exit_code, 0) << run.output << run.errors;
   EXPECT_THAT(result("evaluation.json"), HasSubstr("vlp-evaluation/1"));
@@ -85,21 +85,22 @@ TEST_F(SmallStation, RunsOnlyWhatIsNotAsBefore) {
   EXPECT_EQ(result("report.html"), report);
 
   // A stage that something ended in the middle left no key.
-  fs::remove(folder / "station/results/stages/rotation.txt.key");
+  fs::remove(folder / "a station/results/stages/rotation.txt.key");
   // And a capture less in check.
-  fs::remove(folder / "station/check/0000.png");
+  fs::remove(folder / "a station/check/0000.png");
   const auto changed = calibrate("--readout rows");
   EXPECT_EQ(changed.exit_code, 0) << changed.output << changed.errors;
-  EXPECT_THAT(changed.output, HasSubstr("intrinsics  as before"));
-  EXPECT_THAT(changed.output, Not(HasSubstr("rotation    as before")));
-  EXPECT_THAT(changed.output, HasSubstr("dispersion  as before"));  // its input has the same bytes
-  EXPECT_THAT(changed.output, Not(HasSubstr("locate-check as before")));
+  EXPECT_THAT(changed.output, HasSubstr("intrinsics    as before"));
+  EXPECT_THAT(changed.output, Not(HasSubstr("rotation      as before")));
+  EXPECT_THAT(changed.output,
+              HasSubstr("dispersion    as before"));  // its input has the same bytes
+  EXPECT_THAT(changed.output, Not(HasSubstr("check         as before")));
   EXPECT_EQ(result("calibration.yaml"), calibration);
   EXPECT_THAT(result("evaluation.json"), HasSubstr("\"missing\""));
 }
 
 TEST_F(SmallStation, EndsWithTheVerdictOfTheGatesEachTime) {
-  folder.file("station/gates.yaml", "format: vlp-gates/1\ngates:\n  mean_mm: 1e-6\n");
+  folder.file("a station/gates.yaml", "format: vlp-gates/1\ngates:\n  mean_mm: 1e-6\n");
   for (int run = 0; run < 2; ++run) {
     const auto result = calibrate();
     EXPECT_EQ(result.exit_code, 1) << result.output << result.errors;
@@ -110,26 +111,65 @@ TEST_F(SmallStation, EndsWithTheVerdictOfTheGatesEachTime) {
   EXPECT_THAT(result("gates.xml"), HasSubstr("<failure"));
 }
 
+TEST_F(SmallStation, FollowsWhatIsInItsFolder) {
+  ASSERT_EQ(calibrate().exit_code, 0);
+  const std::string calibration = result("calibration.yaml");
+  // Without the dispersion nothing of it is left, and with it again all is as it was.
+  fs::rename(folder / "a station/dispersion", folder / "kept");
+  ASSERT_EQ(calibrate().exit_code, 0);
+  EXPECT_EQ(result("calibration.yaml"), result("rotated.yaml"));
+  EXPECT_FALSE(fs::exists(folder / "a station/results/dispersion.svg"));
+  fs::rename(folder / "kept", folder / "a station/dispersion");
+  ASSERT_EQ(calibrate().exit_code, 0);
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+  // A camera that is known already, and then is not.
+  fs::copy(folder / "a station/true_calibration.yaml", folder / "a station/camera.yaml");
+  EXPECT_THAT(calibrate().errors, HasSubstr("camera.yaml says what the camera is"));
+  ASSERT_EQ(calibrate("").exit_code, 0);
+  EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: paper-rig"));
+  EXPECT_FALSE(fs::exists(folder / "a station/results/lens.yaml"));
+  fs::remove(folder / "a station/camera.yaml");
+  ASSERT_EQ(calibrate().exit_code, 0);
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+  // A result that somebody changed is made again.
+  folder.file("a station/results/rotated.yaml", "changed\n");
+  EXPECT_THAT(calibrate().output, Not(HasSubstr("rotation      as before")));
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+}
+
+TEST_F(SmallStation, FailsWithTheLensWhoseGatesAreNotMet) {
+  std::size_t views = 0;
+  for (const auto& image : fs::directory_iterator(folder / "a station/boards")) {
+    if (image.path().extension() == ".png" && ++views > 5) fs::remove(image.path());
+  }
+  const auto run = calibrate();
+  EXPECT_EQ(run.exit_code, 1) << run.output << run.errors;
+  EXPECT_THAT(run.output, HasSubstr("a gate is not met"));
+  EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
+}
+
 TEST_F(SmallStation, EndsWhereAStageCannotGoOn) {
-  for (const auto& image : fs::directory_iterator(folder / "station/rotation")) {
+  ASSERT_EQ(calibrate().exit_code, 0);
+  for (const auto& image : fs::directory_iterator(folder / "a station/rotation")) {
     if (image.path().filename() != "0000.png") fs::remove(image.path());
   }
   const auto run = calibrate();
   EXPECT_EQ(run.exit_code, 3) << run.output;
   EXPECT_THAT(run.errors, HasSubstr("vlp-rotation: error: "));
   EXPECT_THAT(run.errors, HasSubstr("calibrate.sh: rotation ended with exit code 3"));
-  EXPECT_TRUE(fs::exists(folder / "station/results/camera.yaml"));
-  EXPECT_FALSE(fs::exists(folder / "station/results/calibration.yaml"));
+  EXPECT_TRUE(fs::exists(folder / "a station/results/lens.yaml"));
+  EXPECT_FALSE(fs::exists(folder / "a station/results/report.html")) << "of the captures before";
+  EXPECT_FALSE(fs::exists(folder / "a station/results/calibration.yaml"));
 }
 
 TEST_F(Chain, SaysWhatIsMissing) {
   const auto none = run_program(VLP_SOURCE_DIR "/scripts/calibrate.sh");
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.errors, HasSubstr("which STATION_DIR?"));
-  fs::create_directory(folder / "station");
+  fs::create_directory(folder / "a station");
   const auto empty = calibrate();
   EXPECT_EQ(empty.exit_code, 2);
-  EXPECT_THAT(empty.errors, HasSubstr("station/lamps.yaml: missing"));
+  EXPECT_THAT(empty.errors, HasSubstr("a station/lamps.yaml: missing"));
   EXPECT_EQ(calibrate("--nonsense").exit_code, 2);
   EXPECT_EQ(calibrate("--row-time-s").exit_code, 2);
 }

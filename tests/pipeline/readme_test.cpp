@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Every command in the README works as typed, in the order in which it stands there.
+/// The README's commands of our programs and of scripts/calibrate.sh work as typed, in the order in
+/// which they stand there.
 #include <gmock/gmock.h>
 
 #include <fstream>
