@@ -5,10 +5,20 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
+#include <regex>
 
 #include "support/temporary_folder.h"
 
 namespace vlp {
+namespace {
+
+/// How far a program is, which only slow machines get to read, is left out.
+std::string without_progress(const std::string& messages) {
+  static const std::regex progress("[^\n]*, [0-9.]+ a second, [0-9]+:[0-9]+ left\n");
+  return std::regex_replace(messages, progress, "");
+}
+
+}  // namespace
 
 ProgramResult run_program(const std::string& command) {
   const TemporaryFolder folder;
@@ -17,7 +27,8 @@ ProgramResult run_program(const std::string& command) {
                            output.string() + "' 2>'" + errors.string() + "' </dev/null";
   const int status = std::system(line.c_str());
   const int exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return {exit_code, TemporaryFolder::content_of(output), TemporaryFolder::content_of(errors)};
+  return {exit_code, TemporaryFolder::content_of(output),
+          without_progress(TemporaryFolder::content_of(errors))};
 }
 
 }  // namespace vlp

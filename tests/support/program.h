@@ -12,7 +12,8 @@ struct ProgramResult {
   std::string errors;
 };
 
-/// Runs a shell command line; `vlp-...` programs are found in the build.
+/// Runs a shell command line; `vlp-...` programs are found in the build. Lines of progress are left
+/// out of the errors.
 ProgramResult run_program(const std::string& command);
 
 }  // namespace vlp
