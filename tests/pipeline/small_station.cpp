@@ -3,6 +3,7 @@
 #include "small_station.h"
 
 #include <algorithm>
+#include <sstream>
 
 namespace vlp {
 
@@ -55,6 +56,17 @@ void SmallStation::drop(const fs::path& image, const fs::path& step) const {
   const fs::path making = step / ("." + image.filename().string());
   fs::copy_file(image, making, fs::copy_options::overwrite_existing);
   fs::rename(making, step / image.filename());
+}
+
+std::string SmallStation::comparable_calibration(const std::string& camera) const {
+  std::istringstream all(result(camera, "calibration.yaml"));
+  std::string kept;
+  for (std::string line; std::getline(all, line);) {
+    const bool left_out =
+        line.find("covariance: ") != std::string::npos || line.find("  id: ") != std::string::npos;
+    if (!left_out) kept += line + "\n";
+  }
+  return kept;
 }
 
 std::string SmallStation::result(const std::string& camera, const std::string& name) const {

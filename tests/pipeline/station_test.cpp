@@ -23,10 +23,7 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
               AllOf(HasSubstr("<strong>PASS"), HasSubstr("check_mean_mm"), HasSubstr("LENSMODEL")));
   // A unit calibrated again keeps its history, and gives the same calibration.
   EXPECT_EQ(run_program(batch("0002") + " --threads 1").exit_code, 0);
-  std::string again = this->result("0002", "calibration.yaml");
-  const auto id = again.find("\"0002\"");
-  ASSERT_NE(id, std::string::npos);
-  EXPECT_EQ(again.replace(id, 6, "\"0001\""), calibration);
+  EXPECT_EQ(comparable_calibration("0002"), comparable_calibration("0001"));
 
   EXPECT_THAT(records("list").output, HasSubstr("2 runs, 2 passed"));
   EXPECT_THAT(records("list --camera-id 0002").output, HasSubstr("1 runs, 1 passed"));

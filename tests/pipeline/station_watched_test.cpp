@@ -45,9 +45,8 @@ TEST_F(WatchedStation, ComesToTheSameAsFromFullFoldersAndPutsTheImagesAway) {
   const auto result = run_program(run("b", "--idle-s 60"));
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.errors, AllOf(HasSubstr("boards 0000.png: taken"), HasSubstr("(16/16)")));
-  std::string calibration = this->result("b", "calibration.yaml");
-  calibration.replace(calibration.find("\"b\""), 3, "\"a\"");
-  EXPECT_EQ(calibration, this->result("a", "calibration.yaml"));
+  EXPECT_NE(comparable_calibration("a"), "");
+  EXPECT_EQ(comparable_calibration("b"), comparable_calibration("a"));
   EXPECT_FALSE(fs::exists(captures("b")));
   int kept = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder / "station/captures")) {
