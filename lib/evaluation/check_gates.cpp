@@ -94,6 +94,20 @@ std::string names() {
   return all;
 }
 
+/// What is wrong with a limit; empty when nothing is.
+std::string problem_of(const std::string& name, double limit) {
+  constexpr int digits = 6;
+  if (limit < 0) {
+    return "should not be negative, as no figure is to be below zero: " +
+           significant(limit, digits);
+  }
+  if (name == "missing" && limit > 1) {
+    return "should be a share from 0 to 1, not " + significant(limit, digits) + ": for " +
+           significant(limit, digits) + " % say " + significant(limit / 100, digits);
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string gate_descriptions() {
@@ -120,6 +134,9 @@ Gate gate_of(const std::string& text) {
   if (failure != std::errc() || stop != end || !std::isfinite(limit)) {
     throw std::invalid_argument("gate '" + text + "' should be NAME=VALUE with a finite number");
   }
+  if (const std::string problem = problem_of(name, limit); !problem.empty()) {
+    throw std::invalid_argument("gate '" + name + "' " + problem);
+  }
   return {name, limit};
 }
 
@@ -130,7 +147,11 @@ std::vector<Gate> read_gates(const std::filesystem::path& file) {
   YamlMap map = entry.map();
   std::vector<Gate> gates;
   for (const KnownGate& gate : kKnown) {
-    if (const auto limit = map.optional(gate.name)) gates.push_back({gate.name, limit->number()});
+    const auto limit = map.optional(gate.name);
+    if (!limit) continue;
+    gates.push_back({gate.name, limit->number()});
+    const std::string problem = problem_of(gate.name, gates.back().limit);
+    if (!problem.empty()) throw limit->error(problem);
   }
   map.finish();
   if (gates.empty()) throw entry.error("holds no gate; the gates are: " + names());

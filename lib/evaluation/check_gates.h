@@ -21,13 +21,13 @@ struct Gate {
 std::string gate_descriptions();
 
 /// The gate that "NAME=VALUE" says. Throws std::invalid_argument when the name is not known (and
-/// says which are) or the value is not a finite number.
+/// says which are), or the value is not a finite number, is negative, or of `missing` above 1.
 Gate gate_of(const std::string& text);
 
 /// Reads `vlp-gates/1`:
 ///   format: vlp-gates/1
 ///   gates: {mean_mm: 1, p90_mm: 2, missing: 0}
-/// Throws InputError: a name that is not known, a limit that is not a number, no gate.
+/// Throws InputError: a name that is not known, a limit that gate_of() would refuse, no gate.
 std::vector<Gate> read_gates(const std::filesystem::path& file);
 
 /// In the order of the gates. Throws std::invalid_argument when there is no such figure, because

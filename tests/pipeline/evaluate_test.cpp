@@ -82,6 +82,9 @@ TEST_F(Evaluate, TakesGatesFromAFileAndMoreFromTheCommandLine) {
   const auto unknown = with_truth("--gates gates.yaml");
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.errors, HasSubstr("gates.yaml:4: gates: key 'mean' is unknown"));
+  folder.file("gates.yaml", "format: vlp-gates/1\ngates:\n  missing: 50\n");
+  EXPECT_THAT(with_truth("--gates gates.yaml").errors,
+              HasSubstr("gates.yaml:3: gates.missing: should be a share from 0 to 1, not 50"));
 }
 
 TEST_F(Evaluate, HoldsFixesAgainstAPathAndALine) {
@@ -159,6 +162,8 @@ TEST_F(Evaluate, NamesFileAndLineOfBadInput) {
   EXPECT_THAT(refused(kFixes + "a.png,ok,nan,0,0,0,,,,,3,0\n"),
               HasSubstr("fixes.csv:2: x_m: should be a finite number, not 'nan'"));
   EXPECT_THAT(refused(kFixes + "a.png,ok,,0,0,0,,,,,3,0\n"), HasSubstr("fixes.csv:2: x_m"));
+  EXPECT_THAT(refused(kFixes + "a.png,ok,1e308,0,0,0,,,,,3,0\n"),
+              HasSubstr("fixes.csv:2: x_m: should be within 1,000 km"));
   EXPECT_THAT(refused(kFixes + "a.png,ok,0,0,0,0,-1,1,1,1,3,0\n"),
               HasSubstr("fixes.csv:2: sd_x_m: should not be negative"));
   EXPECT_THAT(refused(kFixes), HasSubstr("fixes.csv: holds no fix"));
@@ -171,6 +176,7 @@ TEST_F(Evaluate, EndsWithTwoOnBadUsage) {
   for (const char* options :
        {"", "--truth truth.csv --line 0 0 1 0", "--line 0 0 0 0", "--line 0 0 1",
         "--truth truth.csv --gate mean=1", "--truth truth.csv --gate mean_mm=x",
+        "--truth truth.csv --gate missing=50", "--truth truth.csv --gate mean_mm=-1",
         "--truth truth.csv --gate mean_mm=1,mean_mm=2", "--truth truth.csv --gate fitted_mean_mm=1",
         "--truth truth.csv --junit a.xml", "--truth truth.csv --json truth.csv",
         "--truth truth.csv --noise-px 1", "--truth truth.csv --station-mm 0",
