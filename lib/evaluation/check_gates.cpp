@@ -36,10 +36,10 @@ std::optional<double> of_stations_mm(const Evaluation& e, double StationFigures:
 std::optional<double> of_fit_mm(const Evaluation& e, double ErrorFigures::*figure) {
   return e.fit ? std::optional(kMm * e.fit->distances_m.*figure) : std::nullopt;
 }
-/// The end of the difference's interval that is nearer to better.
+/// The end of the difference's interval that is nearer to better; nothing is certain of too few.
 std::optional<double> worse_mm(const Evaluation& e) {
-  if (!e.comparison || !e.comparison->interval_m) return std::nullopt;
-  return kMm * e.comparison->interval_m->low;
+  if (!e.comparison || e.comparison->pairs == 0) return std::nullopt;
+  return e.comparison->too_few() ? 0 : kMm * e.comparison->interval_m->low;
 }
 
 const std::array kKnown{
@@ -78,7 +78,8 @@ const std::array kKnown{
               [](const Evaluation& e) { return of_fit_mm(e, &ErrorFigures::max); }},
     KnownGate{"worse_mm", "mm",
               "by how much the mean error is certainly larger than that of --compare (lower end of "
-              "the difference's interval): 0 fails on the verdict 'worse'",
+              "the difference's interval): 0 fails on the verdict 'worse'; of fewer "
+              "than 20 stations or captures nothing is certain",
               worse_mm},
 };
 

@@ -42,7 +42,7 @@ TEST(EvaluationFigures, SaysMillimetresAndLeavesOutWhatThereIsNot) {
 
 TEST(EvaluationFigures, GivesEachFigureItsOwnInterval) {
   Evaluation full = evaluation();
-  full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, {0.005, 0.006}, {0.007, 0.008}, 5};
+  full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, Interval{0.005, 0.006}, {0.007, 0.008}, 5};
   full.drawn = "stations";
   const auto lines = texts(report_figures(full));
   EXPECT_THAT(lines, Contains("horizontal error, median | 2 | mm | 3 to 4"));
