@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "captures/csv_writer.h"
@@ -174,7 +175,13 @@ std::vector<GateResult> check_gates(const std::vector<Gate>& gates, const Evalua
   return results;
 }
 
+GateResult unmet_gate(const std::string& text) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  return {text, "", none, none, false};
+}
+
 std::string words_of(const GateResult& gate) {
+  if (gate.is_text()) return gate.name;
   constexpr int digits = 4;
   const std::string unit = gate.unit.empty() ? "" : " " + gate.unit;
   return gate.name + " is " + significant(gate.value, digits) + unit + ", at most " +

@@ -3,6 +3,7 @@
 #include "evaluation/report/evaluation_figures.h"
 
 #include "captures/csv_writer.h"
+#include "evaluation/cautions.h"
 #include "geometry/angles.h"
 
 namespace vlp {
@@ -91,6 +92,9 @@ std::vector<std::string> report_notes(const Evaluation& evaluation) {
       note += " (95 %: " + between(1e3 * interval_m->low, 1e3 * interval_m->high) + " mm)";
     }
     notes.push_back(note + ".");
+  }
+  for (const std::string& caution : cautions_of_few(evaluation)) {
+    notes.push_back("Caution: " + caution + ".");
   }
   return notes;
 }
