@@ -33,7 +33,7 @@ void print_horizontal(const Evaluation& evaluation) {
   }
   print_figure("mean", figures.mean, intervals ? &intervals->mean : nullptr);
   print_figure("median", figures.median, intervals ? &intervals->median : nullptr);
-  print_figure("p90", figures.p90, intervals ? &intervals->p90 : nullptr);
+  print_figure("p90", figures.p90, intervals && intervals->p90 ? &*intervals->p90 : nullptr);
   print_figure("rms", figures.rms, intervals ? &intervals->rms : nullptr);
   print_figure("max", figures.max, nullptr);
   fmt::print("\nshare of the fixes, and the error in mm that it does not exceed\n");
@@ -99,8 +99,8 @@ void print_ratios(const Evaluation& evaluation) {
 }
 
 void print_comparison(const Comparison& comparison) {
-  fmt::print("compared    {}: mean error differs by {:+.3f} mm", comparison.verdict(),
-             mm(comparison.mean_difference_m));
+  fmt::print("compared    {}{}: mean error differs by {:+.3f} mm", comparison.verdict(),
+             comparison.too_few() ? ", too few" : "", mm(comparison.mean_difference_m));
   if (const auto& interval_m = comparison.interval_m) {
     fmt::print(" (95 %: {:+.3f} to {:+.3f})", mm(interval_m->low), mm(interval_m->high));
   }
@@ -127,6 +127,10 @@ void print_evaluation(const Evaluation& evaluation, const std::vector<GateResult
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
   for (const GateResult& gate : gates) {
+    if (gate.is_text()) {
+      fmt::print("NOT MET gate {}\n", gate.name);
+      continue;
+    }
     fmt::print("{:6} gate {:16} {:>10.4g} {:3} at most {:.4g}\n", gate.passed ? "met" : "NOT MET",
                gate.name, gate.value, gate.unit, gate.limit);
   }

@@ -45,6 +45,7 @@ std::string report_of(const CLI::App& app, const ReportOption& option,
                       const ReportSubject& subject) {
   Report report;
   report.gates = subject.gates;
+  report.caution = subject.caution;
   report.figures = report_figures(subject.evaluation);
   report.notes = report_notes(subject.evaluation);
   report.title = "Accuracy report: " + subject.input.fixes.file.filename().string();

@@ -28,6 +28,8 @@ struct ReportSubject {
   const EvaluationInput& input;
   const Evaluation& evaluation;
   const std::vector<GateResult>& gates;
+  /// Beside the verdict; may be empty.
+  std::string caution;
   /// May be empty.
   std::string lamps, calibration;
   /// All files that were read, for the digests.

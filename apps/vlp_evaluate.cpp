@@ -8,12 +8,14 @@
 #include <future>
 
 #include "app.h"
+#include "evaluation/cautions.h"
 #include "evaluation/check_gates.h"
 #include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
 #include "print_evaluation.h"
 #include "report_option.h"
 #include "rig/file.h"
+#include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
@@ -21,7 +23,7 @@ namespace {
 struct Options {
   std::string fixes, truth, path, compare, lamps, calibration, gates_file, json, junit;
   std::vector<double> line_m;  // X0 Y0 X1 Y1
-  std::vector<std::string> gates;
+  std::vector<std::string> gates, unmet;
   double noise_px = 0;
   double station_mm = 1;
   int threads = all_cores();
@@ -48,6 +50,18 @@ std::vector<Gate> gates_of(const Options& options) {
   return gates;
 }
 
+/// What a report and XML can say: UTF-8 without control characters.
+CLI::Validator one_line() {
+  return {[](std::string& text) {
+            const bool control = std::any_of(
+                text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == '\x7f'; });
+            return !text.empty() && !control && utf8_length(text) == text.size()
+                       ? ""
+                       : "should be one line of UTF-8 text";
+          },
+          ""};
+}
+
 std::vector<std::string> inputs_of(const Options& options) {
   return {options.fixes, options.truth,       options.path,      options.compare,
           options.lamps, options.calibration, options.gates_file};
@@ -64,7 +78,7 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
       !line_m.empty() && line_m[0] == line_m[2] && line_m[1] == line_m[3]) {
     throw std::invalid_argument("--line begins where it ends");
   }
-  if (!options.junit.empty() && gates.empty()) {
+  if (!options.junit.empty() && gates.empty() && options.unmet.empty()) {
     throw std::invalid_argument(
         "--junit tells of gates, and there are none: add --gate or --gates");
   }
@@ -117,18 +131,25 @@ EvaluationInput input_of(const Options& options) {
   return input;
 }
 
-void warn(const EvaluationInput& input, const Evaluation& evaluation) {
+/// Those of stages before come first.
+std::vector<GateResult> results_of(const Options& options, const std::vector<Gate>& gates,
+                                   const Evaluation& evaluation) {
+  std::vector<GateResult> results;
+  for (const std::string& text : options.unmet) results.push_back(unmet_gate(text));
+  const auto checked = check_gates(gates, evaluation);
+  results.insert(results.end(), checked.begin(), checked.end());
+  return results;
+}
+
+void warn(const EvaluationInput& input, const Evaluation& evaluation, const std::string& missing) {
   if (input.limit && !evaluation.limit) {
     spdlog::warn("no theoretical limit: the truth has no z_m and yaw_rad, or sees no two lamps");
   }
   if (input.line_m && !evaluation.fit) {
     spdlog::warn("no line is fitted: the fixes are spread in no direction");
   }
-  constexpr std::size_t few = 50;
-  if (evaluation.intervals_m && evaluation.intervals_m->units < few) {
-    spdlog::info("of so few as {} {} intervals are somewhat too narrow, that of p90 most",
-                 evaluation.intervals_m->units, evaluation.drawn);
-  }
+  if (!missing.empty()) spdlog::warn("{}", missing);
+  for (const std::string& caution : cautions_of_few(evaluation)) spdlog::info("{}", caution);
 }
 
 void run(const CLI::App& app, const Options& options) {
@@ -141,17 +162,18 @@ void run(const CLI::App& app, const Options& options) {
     throw Undetermined(fmt::format("{}: not one of {} captures has a fix ({} of them: {})",
                                    options.fixes, evaluation.captures, count, status));
   }
-  const std::vector<GateResult> results = check_gates(gates, evaluation);
+  const std::vector<GateResult> results = results_of(options, gates, evaluation);
+  const std::string missing = unasked_missing(evaluation, results);
   std::string report;
   if (!options.report.file.empty()) {
-    report = report_of(
-        app, options.report,
-        {input, evaluation, results, options.lamps, options.calibration, inputs_of(options)});
+    report = report_of(app, options.report,
+                       {input, evaluation, results, missing, options.lamps, options.calibration,
+                        inputs_of(options)});
   }
   if (!options.json.empty()) write_file(options.json, json_of(evaluation, results));
   if (!options.junit.empty()) write_file(options.junit, junit_of(results));
   if (!report.empty()) write_file(options.report.file, report);
-  warn(input, evaluation);
+  warn(input, evaluation, missing);
   print_evaluation(evaluation, results);
   std::string failed;
   for (const GateResult& gate : results) {
@@ -186,6 +208,12 @@ void add_options(CLI::App& app, Options& options) {
       ->allow_extra_args(false)
       ->option_text("NAME=VALUE");
   app.add_option("--gates", options.gates_file, "Gates from a file, vlp-gates/1");
+  app.add_option("--unmet", options.unmet,
+                 "A gate that was not met before, e.g. of vlp-intrinsics: makes the verdict FAIL; "
+                 "again for another")
+      ->allow_extra_args(false)
+      ->check(one_line())
+      ->option_text("TEXT");
   app.add_option("--json", options.json, "Write the figures for programs, evaluation.json");
   app.add_option("--junit", options.junit, "Write the gates for a CI system, JUnit XML");
   auto* lamps = app.add_option(

@@ -169,6 +169,16 @@ double CsvTable::number(std::size_t row, Column column) const {
   return *value;
 }
 
+double CsvTable::coordinate_m(std::size_t row, Column column) const {
+  const double value_m = number(row, column);
+  if (std::abs(value_m) > kFarthest_m) {
+    throw error(
+        row, column,
+        "should be within 1,000 km, in metres, not '" + std::string(text(row, column)) + "'");
+  }
+  return value_m;
+}
+
 int CsvTable::integer(std::size_t row, Column column) const {
   const auto value = parsed<int>(text(row, column));
   if (!value) {

@@ -13,6 +13,9 @@
 
 namespace vlp {
 
+/// No coordinate is further off: a number beyond is a slip, and its square need not be finite.
+inline constexpr double kFarthest_m = 1e6;
+
 /// A CSV file with a header line, read whole: RFC 4180 quoting, LF or CRLF, an optional UTF-8
 /// byte order mark. Columns are found by name in any order; columns that nobody asks for are
 /// kept out of the way. Errors name file, line and column.
@@ -34,6 +37,8 @@ class CsvTable {
   /// Each throws InputError for anything but a finite, or a whole, number.
   double number(std::size_t row, Column column) const;
   int integer(std::size_t row, Column column) const;
+  /// number() of a coordinate in metres; throws beyond kFarthest_m, too.
+  double coordinate_m(std::size_t row, Column column) const;
   /// Nothing for an empty field.
   std::optional<double> optional_number(std::size_t row, Column column) const;
 

@@ -39,10 +39,11 @@ std::optional<Eigen::Vector4d> sd_in(const CsvTable& csv, std::size_t row,
 
 FixRow::Fix fix_in(const CsvTable& csv, std::size_t row, const FixColumns& columns) {
   const auto [x_m, y_m, z_m, yaw_rad] = columns.pose;
-  FixRow::Fix fix{{{csv.number(row, x_m), csv.number(row, y_m), csv.number(row, z_m)},
-                   csv.number(row, yaw_rad)},
-                  sd_in(csv, row, columns),
-                  0};
+  FixRow::Fix fix{
+      {{csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m), csv.coordinate_m(row, z_m)},
+       csv.number(row, yaw_rad)},
+      sd_in(csv, row, columns),
+      0};
   if (columns.residual_px) {
     fix.residual_px = csv.optional_number(row, *columns.residual_px).value_or(0);
   }

@@ -40,7 +40,8 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
 /// Reads what write_fixes() writes. Only image, status, x_m, y_m, z_m and yaw_rad are needed; an sd
 /// that is not there for all four is none; where the status is not "ok", the figures are not
 /// looked at. Throws InputError: see CsvTable; an image or a status that is empty; an image twice;
-/// a fix whose figures are not finite, or an sd that is negative; no rows.
+/// a fix whose figures are not finite or further off than kFarthest_m, or an sd that is negative;
+/// no rows.
 std::vector<FixRow> read_fixes(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -39,8 +39,8 @@ Path read_path(const std::filesystem::path& file) {
   const auto z_m = csv.optional("z_m");
   Path path;
   for (std::size_t row = 0; row < csv.rows(); ++row) {
-    path.waypoints_m.emplace_back(csv.number(row, x_m), csv.number(row, y_m));
-    if (z_m) path.z_m.push_back(csv.number(row, *z_m));
+    path.waypoints_m.emplace_back(csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m));
+    if (z_m) path.z_m.push_back(csv.coordinate_m(row, *z_m));
   }
   const bool leads_somewhere =
       std::any_of(path.waypoints_m.begin(), path.waypoints_m.end(),

@@ -25,8 +25,8 @@ struct NearestOnPath {
 
 NearestOnPath nearest_on(const Path& path, const Eigen::Vector2d& place_m);
 
-/// Reads x_m, y_m and, optionally, z_m. Throws InputError: see CsvTable; fewer than two waypoints,
-/// or all at one place.
+/// Reads x_m, y_m and, optionally, z_m. Throws InputError: see CsvTable; a waypoint further off
+/// than kFarthest_m; fewer than two, or all at one place.
 Path read_path(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -23,8 +23,8 @@ std::vector<TruthRow> read_truth(const std::filesystem::path& file) {
     }
     TruthRow& read = rows.emplace_back();
     read.image = name;
-    read.xy_m = {csv.number(row, x_m), csv.number(row, y_m)};
-    if (z_m) read.z_m = csv.optional_number(row, *z_m);
+    read.xy_m = {csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m)};
+    if (z_m && !csv.text(row, *z_m).empty()) read.z_m = csv.coordinate_m(row, *z_m);
     if (yaw_rad) read.yaw_rad = csv.optional_number(row, *yaw_rad);
     read.line = csv.line(row);
   }

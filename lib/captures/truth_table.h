@@ -21,7 +21,8 @@ struct TruthRow {
 };
 
 /// Reads image, x_m, y_m and, optionally, z_m and yaw_rad, fields of which may be empty. Throws
-/// InputError: see CsvTable; an image name that is empty; an image twice; no rows.
+/// InputError: see CsvTable; a place further off than kFarthest_m; an image name that is empty; an
+/// image twice; no rows.
 std::vector<TruthRow> read_truth(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "captures/csv_writer.h"
@@ -36,10 +37,10 @@ std::optional<double> of_stations_mm(const Evaluation& e, double StationFigures:
 std::optional<double> of_fit_mm(const Evaluation& e, double ErrorFigures::*figure) {
   return e.fit ? std::optional(kMm * e.fit->distances_m.*figure) : std::nullopt;
 }
-/// The end of the difference's interval that is nearer to better.
+/// The end of the difference's interval that is nearer to better; nothing is certain of too few.
 std::optional<double> worse_mm(const Evaluation& e) {
-  if (!e.comparison || !e.comparison->interval_m) return std::nullopt;
-  return kMm * e.comparison->interval_m->low;
+  if (!e.comparison || e.comparison->pairs == 0) return std::nullopt;
+  return e.comparison->too_few() ? 0 : kMm * e.comparison->interval_m->low;
 }
 
 const std::array kKnown{
@@ -78,7 +79,8 @@ const std::array kKnown{
               [](const Evaluation& e) { return of_fit_mm(e, &ErrorFigures::max); }},
     KnownGate{"worse_mm", "mm",
               "by how much the mean error is certainly larger than that of --compare (lower end of "
-              "the difference's interval): 0 fails on the verdict 'worse'",
+              "the difference's interval): 0 fails on the verdict 'worse'; of fewer "
+              "than 20 stations or captures nothing is certain",
               worse_mm},
 };
 
@@ -92,6 +94,20 @@ std::string names() {
   std::string all;
   for (const KnownGate& gate : kKnown) all.append(all.empty() ? "" : ", ").append(gate.name);
   return all;
+}
+
+/// What is wrong with a limit; empty when nothing is.
+std::string problem_of(const std::string& name, double limit) {
+  constexpr int digits = 6;
+  if (limit < 0) {
+    return "should not be negative, as no figure is to be below zero: " +
+           significant(limit, digits);
+  }
+  if (name == "missing" && limit > 1) {
+    return "should be a share from 0 to 1, not " + significant(limit, digits) + ": for " +
+           significant(limit, digits) + " % say " + significant(limit / 100, digits);
+  }
+  return "";
 }
 
 }  // namespace
@@ -120,6 +136,9 @@ Gate gate_of(const std::string& text) {
   if (failure != std::errc() || stop != end || !std::isfinite(limit)) {
     throw std::invalid_argument("gate '" + text + "' should be NAME=VALUE with a finite number");
   }
+  if (const std::string problem = problem_of(name, limit); !problem.empty()) {
+    throw std::invalid_argument("gate '" + name + "' " + problem);
+  }
   return {name, limit};
 }
 
@@ -130,7 +149,11 @@ std::vector<Gate> read_gates(const std::filesystem::path& file) {
   YamlMap map = entry.map();
   std::vector<Gate> gates;
   for (const KnownGate& gate : kKnown) {
-    if (const auto limit = map.optional(gate.name)) gates.push_back({gate.name, limit->number()});
+    const auto limit = map.optional(gate.name);
+    if (!limit) continue;
+    gates.push_back({gate.name, limit->number()});
+    const std::string problem = problem_of(gate.name, gates.back().limit);
+    if (!problem.empty()) throw limit->error(problem);
   }
   map.finish();
   if (gates.empty()) throw entry.error("holds no gate; the gates are: " + names());
@@ -152,7 +175,13 @@ std::vector<GateResult> check_gates(const std::vector<Gate>& gates, const Evalua
   return results;
 }
 
+GateResult unmet_gate(const std::string& text) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  return {text, "", none, none, false};
+}
+
 std::string words_of(const GateResult& gate) {
+  if (gate.is_text()) return gate.name;
   constexpr int digits = 4;
   const std::string unit = gate.unit.empty() ? "" : " " + gate.unit;
   return gate.name + " is " + significant(gate.value, digits) + unit + ", at most " +

@@ -21,20 +21,23 @@ struct Gate {
 std::string gate_descriptions();
 
 /// The gate that "NAME=VALUE" says. Throws std::invalid_argument when the name is not known (and
-/// says which are) or the value is not a finite number.
+/// says which are), or the value is not a finite number, is negative, or of `missing` above 1.
 Gate gate_of(const std::string& text);
 
 /// Reads `vlp-gates/1`:
 ///   format: vlp-gates/1
 ///   gates: {mean_mm: 1, p90_mm: 2, missing: 0}
-/// Throws InputError: a name that is not known, a limit that is not a number, no gate.
+/// Throws InputError: a name that is not known, a limit that gate_of() would refuse, no gate.
 std::vector<Gate> read_gates(const std::filesystem::path& file);
 
 /// In the order of the gates. Throws std::invalid_argument when there is no such figure, because
 /// what it needs is not there. Precondition: the names are known.
 std::vector<GateResult> check_gates(const std::vector<Gate>& gates, const Evaluation& evaluation);
 
-/// For example "mean_mm is 1.25 mm, at most 1 mm is asked for".
+/// A gate of a stage before that was not met, as text: not passed.
+GateResult unmet_gate(const std::string& text);
+
+/// For example "mean_mm is 1.25 mm, at most 1 mm is asked for"; of text, that alone.
 std::string words_of(const GateResult& gate);
 
 }  // namespace vlp

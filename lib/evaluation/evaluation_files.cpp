@@ -89,11 +89,13 @@ Json json_of(const StatedRatio& stated) {
 Json json_of(const Comparison& comparison) {
   Json json{{"verdict", comparison.verdict()},
             {"pairs", comparison.pairs},
+            {"units", comparison.units},
             {"only_these", comparison.only_these},
             {"only_others", comparison.only_others},
             {"smaller_errors", comparison.smaller},
             {"larger_errors", comparison.larger},
             {"mean_difference_mm", kMm.of_one * comparison.mean_difference_m}};
+  if (comparison.too_few()) json["why"] = "too few";
   if (comparison.interval_m) json["interval_95_mm"] = json_of(*comparison.interval_m);
   return json;
 }
@@ -101,11 +103,12 @@ Json json_of(const Comparison& comparison) {
 Json json_of(const std::vector<GateResult>& gates) {
   Json list = Json::array();
   for (const GateResult& gate : gates) {
-    list.push_back({{"name", gate.name},
-                    {"unit", gate.unit},
-                    {"value", gate.value},
-                    {"limit", gate.limit},
-                    {"passed", gate.passed}});
+    Json entry{{"name", gate.name}};
+    if (!gate.is_text()) {
+      entry.update({{"unit", gate.unit}, {"value", gate.value}, {"limit", gate.limit}});
+    }
+    entry["passed"] = gate.passed;
+    list.push_back(std::move(entry));
   }
   return list;
 }
@@ -123,10 +126,13 @@ std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>&
             {"missing", evaluation.missing},
             {"horizontal", json_of(evaluation.horizontal_m, kMm)}};
   if (const auto& intervals = evaluation.intervals_m) {
-    json["horizontal"]["intervals_95"] = {
-        {"drawn", evaluation.drawn},           {"units", intervals->units},
-        {"mean_mm", json_of(intervals->mean)}, {"median_mm", json_of(intervals->median)},
-        {"p90_mm", json_of(intervals->p90)},   {"rms_mm", json_of(intervals->rms)}};
+    json["horizontal"]["intervals_95"] = {{"drawn", evaluation.drawn},
+                                          {"units", intervals->units},
+                                          {"mean_mm", json_of(intervals->mean)},
+                                          {"median_mm", json_of(intervals->median)}};
+    Json& json_of_intervals = json["horizontal"]["intervals_95"];
+    if (intervals->p90) json_of_intervals["p90_mm"] = json_of(*intervals->p90);
+    json_of_intervals["rms_mm"] = json_of(intervals->rms);
   }
   json["horizontal"]["cdf"] = json_of(evaluation.distribution_m);
   if (evaluation.height_m) json["height"] = json_of(*evaluation.height_m, kMm);

@@ -13,7 +13,8 @@ namespace vlp {
 /// `evaluation.json`, for programs: format "vlp-evaluation/1". Every key ends in the unit of its
 /// figure (_mm, _deg, _m); shares and ratios have none, counts are called after what they count.
 /// What there is not is left out. Errors have mean, median, p90, max and rms; intervals are of 95
-/// %.
+/// %. A gate of a stage before has its text for a name, and neither unit, value nor limit. A
+/// comparison of too few units has a "why".
 std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>& gates);
 
 /// JUnit XML, for CI systems: a test case for each gate, failed with words_of() it.

@@ -54,6 +54,17 @@ TEST(PathTable, HasItsNearestPointWhereItIsNearest) {
   }
 }
 
+TEST(PathTable, RefusesWhatIsTooFarOff) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& row) {
+    return refusal_of([&] { read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n" + row)); });
+  };
+  EXPECT_EQ(refusal("1e6,-1e6,0\n"), "");
+  EXPECT_THAT(refusal("1e308,0,0\n"), HasSubstr("p.csv:3: x_m: should be within 1,000 km"));
+  EXPECT_THAT(refusal("0,-1e7,0\n"), HasSubstr("p.csv:3: y_m"));
+  EXPECT_THAT(refusal("0,0,1e7\n"), HasSubstr("p.csv:3: z_m"));
+}
+
 TEST(PathTable, HasHeightsInBetween) {
   const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
   EXPECT_DOUBLE_EQ(*nearest_on(path, {1, 1e-3}).z_m, 0.5);

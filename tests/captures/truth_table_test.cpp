@@ -32,6 +32,9 @@ TEST(TruthTable, NamesTheLineOfBadRows) {
   EXPECT_THAT(refusal("a,0,0,\na,1,1,\n"), HasSubstr("t.csv:3: image: 'a' stands twice"));
   EXPECT_THAT(refusal("a,0,0,\n,1,1,\n"), HasSubstr("t.csv:3: image: is empty"));
   EXPECT_THAT(refusal("a,inf,0,\n"), HasSubstr("t.csv:2: x_m"));
+  EXPECT_THAT(refusal("a,1e308,0,\n"), HasSubstr("t.csv:2: x_m: should be within 1,000 km"));
+  EXPECT_THAT(refusal("a,0,-1e7,\n"), HasSubstr("t.csv:2: y_m"));
+  EXPECT_THAT(refusal("a,0,0,1e7\n"), HasSubstr("t.csv:2: z_m"));
   EXPECT_THAT(refusal("a,,0,\n"), HasSubstr("t.csv:2: x_m"));
   EXPECT_THAT(refusal(""), HasSubstr("t.csv: holds no place"));
 }

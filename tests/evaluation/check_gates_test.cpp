@@ -51,6 +51,55 @@ TEST(Gates, AreRefusedWhereThereIsNoSuchFigure) {
   }
 }
 
+TEST(Gates, OfAComparisonOfTooFewDoNotFail) {
+  Evaluation compared = evaluation();
+  compared.comparison = Comparison{};
+  EXPECT_THROW(check_gates({{"worse_mm", 0}}, compared), std::invalid_argument);  // no pair
+  compared.comparison->pairs = compared.comparison->units = 19;
+  compared.comparison->interval_m = {0.1, 1};
+  EXPECT_TRUE(check_gates({{"worse_mm", 0}}, compared)[0].passed);
+  compared.comparison->interval_m = {};
+  EXPECT_TRUE(check_gates({{"worse_mm", 0}}, compared)[0].passed);
+  compared.comparison->units = 20;
+  compared.comparison->interval_m = {0.1, 1};
+  EXPECT_FALSE(check_gates({{"worse_mm", 0}}, compared)[0].passed);
+}
+
+TEST(Gates, HaveLimitsThatAFigureCanReach) {
+  const auto words = [](const char* text) -> std::string {
+    try {
+      return gate_of(text).name;
+    } catch (const std::invalid_argument& problem) {
+      return problem.what();
+    }
+  };
+  EXPECT_EQ(words("missing=50"),
+            "gate 'missing' should be a share from 0 to 1, not 50: for 50 % say 0.5");
+  EXPECT_THAT(words("mean_mm=-1"), HasSubstr("gate 'mean_mm' should not be negative"));
+  EXPECT_EQ(gate_of("missing=1").limit, 1);
+  EXPECT_EQ(gate_of("stated_ratio=50").limit, 50);
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& text) {
+    return refusal_of(
+        [&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\ngates:\n" + text)); });
+  };
+  EXPECT_THAT(refusal("  mean_mm: 1\n  missing: 1.5\n"),
+              HasSubstr("g.yaml:4: gates.missing: should be a share from 0 to 1"));
+  EXPECT_THAT(refusal("  yaw_rms_deg: -0.5\n"),
+              HasSubstr("g.yaml:3: gates.yaw_rms_deg: should not be negative"));
+}
+
+TEST(Gates, OfStagesBeforeAreTheirTextAndNotMet) {
+  const GateResult gate = unmet_gate("vlp-intrinsics: rms_px is 2");
+  EXPECT_FALSE(gate.passed);
+  EXPECT_EQ(words_of(gate), "vlp-intrinsics: rms_px is 2");
+  const auto json = nlohmann::json::parse(json_of(evaluation(), {gate}));
+  EXPECT_EQ(json["gates"][0], (nlohmann::json{{"name", gate.name}, {"passed", false}}));
+  EXPECT_EQ(json["passed"], false);
+  EXPECT_THAT(junit_of({gate}), HasSubstr("failures=\"1\""));
+  EXPECT_THAT(junit_of({gate}), HasSubstr("message=\"vlp-intrinsics: rms_px is 2\""));
+}
+
 TEST(Gates, AreReadFromWords) {
   const Gate gate = gate_of("p90_mm=2.5");
   EXPECT_EQ(gate.name, "p90_mm");
@@ -90,6 +139,22 @@ TEST(EvaluationFiles, AreJsonWithUnitsInTheKeys) {
   EXPECT_FALSE(json.contains("yaw"));
   EXPECT_EQ(json["gates"][0]["passed"], false);
   EXPECT_EQ(json["passed"], false);
+}
+
+TEST(EvaluationFiles, HaveNoIntervalOfP90OfFewUnits) {
+  Evaluation few = evaluation();
+  const Interval interval{0.001, 0.002};
+  few.intervals_m = {interval, interval, {}, interval, 19};
+  few.comparison = Comparison{};
+  const auto json = nlohmann::json::parse(json_of(few, {}));
+  EXPECT_FALSE(json["horizontal"]["intervals_95"].contains("p90_mm"));
+  EXPECT_NEAR(json["horizontal"]["intervals_95"]["rms_mm"][1].get<double>(), 2, 1e-9);
+  EXPECT_EQ(json["comparison"]["why"], "too few");
+  few.intervals_m->p90 = interval;
+  few.comparison->units = 20;
+  const auto enough = nlohmann::json::parse(json_of(few, {}));
+  EXPECT_NEAR(enough["horizontal"]["intervals_95"]["p90_mm"][0].get<double>(), 1, 1e-9);
+  EXPECT_FALSE(enough["comparison"].contains("why"));
 }
 
 TEST(EvaluationFiles, AreJUnitWithATestForEachGate) {

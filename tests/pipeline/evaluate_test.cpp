@@ -73,6 +73,35 @@ TEST_F(Evaluate, EndsWithOneAndAllIsWrittenWhenAGateIsNotMet) {
   EXPECT_EQ(with_truth("--gate mean_mm=2.5 --gate p90_mm=4.5").exit_code, 0);
 }
 
+TEST_F(Evaluate, FailsForAGateThatWasNotMetBefore) {
+  const std::string text = "vlp-intrinsics: rms_px is 2, at most 1";
+  const auto result = with_truth("--gate mean_mm=2.5,missing=1 --unmet '" + text +
+                                 "' --unmet other --json e.json --junit j.xml --report r.html");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, HasSubstr(text + "; other"));
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("NOT MET gate " + text + "\n"), HasSubstr("met    gate mean_mm"),
+                    testing::Not(HasSubstr("nan"))));
+  EXPECT_THAT(content("e.json"), HasSubstr("\"passed\": false"));
+  EXPECT_THAT(content("j.xml"), HasSubstr("tests=\"4\" failures=\"2\""));
+  EXPECT_THAT(content("r.html"), HasSubstr("<strong>FAIL</strong>2 of 4 gates are not met."));
+  EXPECT_EQ(with_truth("--unmet a --junit j.xml").exit_code, 1);
+  EXPECT_EQ(with_truth("--unmet ''").exit_code, 2);
+  EXPECT_EQ(with_truth("--unmet '{}'").exit_code, 1);
+  EXPECT_EQ(with_truth("--unmet '[a,b]'").exit_code, 1);
+  EXPECT_EQ(with_truth("--unmet \"$(printf 'a\\nb')\"").exit_code, 2);
+}
+
+TEST_F(Evaluate, SaysThatNoGateAsksForWhatIsMissing) {
+  const std::string words = "1 of 6 captures has no fix, and no gate 'missing' asks";
+  const auto result = with_truth("--gate mean_mm=2.5 --report r.html");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.errors, HasSubstr(words));
+  const std::string html = content("r.html");
+  EXPECT_LT(html.find("<strong>PASS</strong>"), html.find("<p>1 of 6 captures has no fix"));
+  EXPECT_THAT(with_truth("--gate missing=1").errors, testing::Not(HasSubstr(words)));
+}
+
 TEST_F(Evaluate, TakesGatesFromAFileAndMoreFromTheCommandLine) {
   folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1, max_mm: 5}\n");
   EXPECT_EQ(with_truth("--gates gates.yaml").exit_code, 1);
@@ -82,6 +111,9 @@ TEST_F(Evaluate, TakesGatesFromAFileAndMoreFromTheCommandLine) {
   const auto unknown = with_truth("--gates gates.yaml");
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.errors, HasSubstr("gates.yaml:4: gates: key 'mean' is unknown"));
+  folder.file("gates.yaml", "format: vlp-gates/1\ngates:\n  missing: 50\n");
+  EXPECT_THAT(with_truth("--gates gates.yaml").errors,
+              HasSubstr("gates.yaml:3: gates.missing: should be a share from 0 to 1, not 50"));
 }
 
 TEST_F(Evaluate, HoldsFixesAgainstAPathAndALine) {
@@ -159,6 +191,8 @@ TEST_F(Evaluate, NamesFileAndLineOfBadInput) {
   EXPECT_THAT(refused(kFixes + "a.png,ok,nan,0,0,0,,,,,3,0\n"),
               HasSubstr("fixes.csv:2: x_m: should be a finite number, not 'nan'"));
   EXPECT_THAT(refused(kFixes + "a.png,ok,,0,0,0,,,,,3,0\n"), HasSubstr("fixes.csv:2: x_m"));
+  EXPECT_THAT(refused(kFixes + "a.png,ok,1e308,0,0,0,,,,,3,0\n"),
+              HasSubstr("fixes.csv:2: x_m: should be within 1,000 km"));
   EXPECT_THAT(refused(kFixes + "a.png,ok,0,0,0,0,-1,1,1,1,3,0\n"),
               HasSubstr("fixes.csv:2: sd_x_m: should not be negative"));
   EXPECT_THAT(refused(kFixes), HasSubstr("fixes.csv: holds no fix"));
@@ -171,6 +205,7 @@ TEST_F(Evaluate, EndsWithTwoOnBadUsage) {
   for (const char* options :
        {"", "--truth truth.csv --line 0 0 1 0", "--line 0 0 0 0", "--line 0 0 1",
         "--truth truth.csv --gate mean=1", "--truth truth.csv --gate mean_mm=x",
+        "--truth truth.csv --gate missing=50", "--truth truth.csv --gate mean_mm=-1",
         "--truth truth.csv --gate mean_mm=1,mean_mm=2", "--truth truth.csv --gate fitted_mean_mm=1",
         "--truth truth.csv --junit a.xml", "--truth truth.csv --json truth.csv",
         "--truth truth.csv --noise-px 1", "--truth truth.csv --station-mm 0",

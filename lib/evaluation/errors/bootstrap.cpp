@@ -153,8 +153,10 @@ std::optional<ErrorIntervals> error_intervals(std::span<const double> errors,
     drawn[2][i] = p90;
     drawn[3][i] = rms;
   });
-  return ErrorIntervals{percentiles(drawn[0]), percentiles(drawn[1]), percentiles(drawn[2]),
-                        percentiles(drawn[3]), parts.units};
+  std::optional<Interval> p90;
+  if (parts.units >= kFewestUnitsOfP90) p90 = percentiles(drawn[2]);
+  return ErrorIntervals{percentiles(drawn[0]), percentiles(drawn[1]), p90, percentiles(drawn[3]),
+                        parts.units};
 }
 
 }  // namespace vlp

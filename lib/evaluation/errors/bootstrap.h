@@ -14,13 +14,18 @@ struct Interval {
 };
 
 struct ErrorIntervals {
-  Interval mean, median, p90, rms;
+  Interval mean, median;
+  /// Nothing of fewer than kFewestUnitsOfP90.
+  std::optional<Interval> p90;
+  Interval rms;
   /// That were drawn from.
   std::size_t units;
 };
 
 /// Fewer units tell too little to say how far to trust a figure.
 inline constexpr std::size_t kFewestUnits = 5;
+/// ... and fewer than these too little of the tenth that is worst: see error_intervals().
+inline constexpr std::size_t kFewestUnitsOfP90 = 20;
 
 /// Confidence intervals of the figures of `errors` (see ErrorFigures) by the percentile bootstrap
 /// (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, chapter 13) with 2,000 draws.
@@ -35,8 +40,9 @@ inline constexpr std::size_t kFewestUnits = 5;
 ///
 /// Percentile intervals of few units are too narrow. Of 5 / 10 / 20 / 50 / 100 units with a
 /// horizontal error each, that of the mean held the truth in 85 / 90 / 93 / 94 / 95 % of 2,000
-/// cases, that of p90 in 40 / 64 / 87 / 88 / 94 %. Nothing for fewer than kFewestUnits. Seeded: the
-/// same errors give the same intervals, whatever the threads.
+/// cases, that of p90 in 40 / 64 / 87 / 88 / 94 %. So there is none of p90 for fewer than
+/// kFewestUnitsOfP90, and nothing for fewer than kFewestUnits. Seeded: the same errors give the
+/// same intervals, whatever the threads.
 std::optional<ErrorIntervals> error_intervals(std::span<const double> errors,
                                               std::span<const std::size_t> units, int threads);
 

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluation/errors/comparison.h"
 
+#include <algorithm>
 #include <string>
+#include <utility>
 
 #include "captures/name_index.h"
 #include "rig/input_error.h"
@@ -28,9 +30,15 @@ void check_images_in(const FromFile<FixRow>& fixes, const FromFile<FixRow>& othe
                        " images are not: are both of the same captures?");
 }
 
+std::size_t count_different(std::vector<std::size_t> units) {
+  std::sort(units.begin(), units.end());
+  return static_cast<std::size_t>(std::unique(units.begin(), units.end()) - units.begin());
+}
+
 }  // namespace
 
 std::string_view Comparison::verdict() const {
+  if (too_few()) return "no evidence";
   if (interval_m && interval_m->high < 0) return "better";
   if (interval_m && interval_m->low > 0) return "worse";
   return "no evidence";
@@ -64,6 +72,7 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
     comparison.mean_difference_m /= static_cast<double>(comparison.pairs);
     const auto intervals = error_intervals(differences_m, units, threads);
     if (intervals) comparison.interval_m = intervals->mean;
+    comparison.units = count_different(std::move(units));
   }
   return comparison;
 }

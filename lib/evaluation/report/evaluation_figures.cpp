@@ -3,6 +3,7 @@
 #include "evaluation/report/evaluation_figures.h"
 
 #include "captures/csv_writer.h"
+#include "evaluation/cautions.h"
 #include "geometry/angles.h"
 
 namespace vlp {
@@ -22,14 +23,14 @@ ReportFigure length(const std::string& label, double value_m,
 void add_horizontal(std::vector<ReportFigure>& figures, const Evaluation& evaluation) {
   const ErrorFigures& errors_m = evaluation.horizontal_m;
   const auto& intervals_m = evaluation.intervals_m;
-  const auto line = [&](const char* name, double value_m, Interval ErrorIntervals::*part) {
-    figures.push_back(length(std::string("horizontal error, ") + name, value_m,
-                             intervals_m ? &(*intervals_m.*part) : nullptr));
+  const auto line = [&](const char* name, double value_m, const Interval* interval_m) {
+    figures.push_back(length(std::string("horizontal error, ") + name, value_m, interval_m));
   };
-  line("mean", errors_m.mean, &ErrorIntervals::mean);
-  line("median", errors_m.median, &ErrorIntervals::median);
-  line("90th percentile", errors_m.p90, &ErrorIntervals::p90);
-  line("root mean square", errors_m.rms, &ErrorIntervals::rms);
+  const bool p90 = intervals_m && intervals_m->p90;
+  line("mean", errors_m.mean, intervals_m ? &intervals_m->mean : nullptr);
+  line("median", errors_m.median, intervals_m ? &intervals_m->median : nullptr);
+  line("90th percentile", errors_m.p90, p90 ? &*intervals_m->p90 : nullptr);
+  line("root mean square", errors_m.rms, intervals_m ? &intervals_m->rms : nullptr);
   figures.push_back(length("horizontal error, largest", errors_m.max));
 }
 
@@ -85,11 +86,15 @@ std::vector<std::string> report_notes(const Evaluation& evaluation) {
   }
   if (const auto& comparison = evaluation.comparison) {
     std::string note = "Compared with the other fixes: " + std::string(comparison->verdict()) +
-                       "; the mean error differs by " + mm(comparison->mean_difference_m) + " mm";
+                       (comparison->too_few() ? ", too few" : "") + "; the mean error differs by " +
+                       mm(comparison->mean_difference_m) + " mm";
     if (const auto& interval_m = comparison->interval_m) {
       note += " (95 %: " + between(1e3 * interval_m->low, 1e3 * interval_m->high) + " mm)";
     }
     notes.push_back(note + ".");
+  }
+  for (const std::string& caution : cautions_of_few(evaluation)) {
+    notes.push_back("Caution: " + caution + ".");
   }
   return notes;
 }

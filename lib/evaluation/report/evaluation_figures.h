@@ -13,7 +13,8 @@ namespace vlp {
 /// The figures of an evaluation as the report words them. Precondition: there is a fix.
 std::vector<ReportFigure> report_figures(const Evaluation& evaluation);
 
-/// Sentences to go with them: captures without a fix, what the intervals drew, the comparison.
+/// Sentences to go with them: captures without a fix, what the intervals drew, the comparison,
+/// what few stations or captures mean.
 std::vector<std::string> report_notes(const Evaluation& evaluation);
 
 /// Of a drive: the fitted line's distances and the jitter; begins with the drive's name.

@@ -31,7 +31,14 @@ std::string quantity(double value, const std::string& unit) {
   return with_unit(significant(value, 4), unit);
 }
 
-std::string verdict(const std::vector<GateResult>& gates) {
+std::vector<std::string> row_of(const GateResult& gate) {
+  const std::string result = gate.passed ? "met" : "NOT\u00a0MET";
+  if (gate.is_text()) return {gate.name, "", "", result};
+  return {gate.name, quantity(gate.value, gate.unit),
+          "at most\u00a0" + quantity(gate.limit, gate.unit), result};
+}
+
+std::string verdict(const std::vector<GateResult>& gates, const std::string& caution) {
   if (gates.empty()) {
     return "<div class=\"verdict none\"><strong>NO VERDICT</strong>No gates were set.</div>\n";
   }
@@ -46,12 +53,11 @@ std::string verdict(const std::vector<GateResult>& gates) {
   HtmlTable table{"Gates", {"gate", "figure", "limit", "result"}, {}};
   for (const auto& gate : gates) {
     if (!gate.passed) table.marked.push_back(table.rows.size());
-    table.rows.push_back({gate.name, quantity(gate.value, gate.unit),
-                          "at most\u00a0" + quantity(gate.limit, gate.unit),
-                          gate.passed ? "met" : "NOT\u00a0MET"});
+    table.rows.push_back(row_of(gate));
   }
   return std::string("<div class=\"verdict ") + (missed == 0 ? "pass" : "fail") + "\"><strong>" +
-         (missed == 0 ? "PASS" : "FAIL") + "</strong>" + reason + "</div>\n" + html_table(table);
+         (missed == 0 ? "PASS" : "FAIL") + "</strong>" + reason +
+         (caution.empty() ? "" : html_element("p", caution)) + "</div>\n" + html_table(table);
 }
 
 std::string figures_of(const Report& report) {
@@ -97,7 +103,8 @@ std::string report_html(const Report& report) {
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n" +
          html_element("title", report.title) + "<style>" + std::string(kReportStyle) +
          "</style>\n</head>\n<body>\n<header>\n" + html_element("h1", report.title) +
-         "</header>\n<main>\n" + verdict(report.gates) + section("Figures", figures_of(report)) +
+         "</header>\n<main>\n" + verdict(report.gates, report.caution) +
+         section("Figures", figures_of(report)) +
          section("Camera", camera + pictures(ReportPart::camera)) +
          section("Rotation centre", rotation + pictures(ReportPart::rotation)) +
          section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +

@@ -33,6 +33,8 @@ struct Report {
   std::vector<ReportPicture> pictures;
   /// How the figures were made; part "evaluation".
   std::optional<HistoryEntry> evaluation;
+  /// What the verdict does not see, said beside it; for example of captures without a fix.
+  std::string caution = {};
 };
 
 /// One HTML page that needs nothing else: style and pictures are inside, there is no script.

@@ -53,7 +53,7 @@ std::array<int, 4> held(std::size_t stations, std::size_t captures, double bias,
     };
     counts[0] += holds(intervals->mean, mean);
     counts[1] += holds(intervals->median, median);
-    counts[2] += holds(intervals->p90, p90);
+    counts[2] += holds(*intervals->p90, p90);
     counts[3] += holds(intervals->rms, rms);
   }
   return counts;
@@ -104,7 +104,7 @@ TEST(Bootstrap, IsAsWideAsTheoryForManyErrors) {
     return std::sqrt(q * (1 - q)) / density / root;
   };
   expect_width(intervals->median, quantile_sd(0.5));
-  expect_width(intervals->p90, quantile_sd(0.9));
+  expect_width(*intervals->p90, quantile_sd(0.9));
 }
 
 TEST(Bootstrap, IsTheSameWhateverTheThreads) {
@@ -112,11 +112,12 @@ TEST(Bootstrap, IsTheSameWhateverTheThreads) {
   const Errors errors = draw(3000, 2, 1, 1, random);
   const auto one = error_intervals(errors.values, errors.units, 1);
   const auto four = error_intervals(errors.values, errors.units, 4);
-  for (const auto figure : {&ErrorIntervals::mean, &ErrorIntervals::median, &ErrorIntervals::p90,
-                            &ErrorIntervals::rms}) {
+  for (const auto figure : {&ErrorIntervals::mean, &ErrorIntervals::median, &ErrorIntervals::rms}) {
     EXPECT_EQ(((*one).*figure).low, ((*four).*figure).low);
     EXPECT_EQ(((*one).*figure).high, ((*four).*figure).high);
   }
+  EXPECT_EQ(one->p90->low, four->p90->low);
+  EXPECT_EQ(one->p90->high, four->p90->high);
 }
 
 TEST(Bootstrap, SaysNothingOfFewUnits) {
@@ -127,13 +128,21 @@ TEST(Bootstrap, SaysNothingOfFewUnits) {
   EXPECT_EQ(intervals->units, 5);
 }
 
+TEST(Bootstrap, SaysNothingOfTheWorstTenthOfFewUnits) {
+  Random random(5);
+  const Errors few = draw(kFewestUnitsOfP90 - 1, 3, 1, 1, random);
+  EXPECT_FALSE(error_intervals(few.values, few.units, 1)->p90);
+  const Errors enough = draw(kFewestUnitsOfP90, 3, 1, 1, random);
+  EXPECT_TRUE(error_intervals(enough.values, enough.units, 1)->p90);
+}
+
 TEST(Bootstrap, OfEqualErrorsHasNoWidth) {
   const std::vector<double> errors(20, 2.5);
   std::vector<std::size_t> units(20);
   std::iota(units.begin(), units.end(), std::size_t{0});
   const auto intervals = error_intervals(errors, units, 1);
   EXPECT_EQ(intervals->median.low, 2.5);
-  EXPECT_EQ(intervals->p90.high, 2.5);
+  EXPECT_EQ(intervals->p90->high, 2.5);
   EXPECT_DOUBLE_EQ(intervals->mean.low, 2.5);
 }
 

@@ -37,13 +37,26 @@ std::string_view verdict_of(const Pairs& all) {
 TEST(Comparison, SeesSmallDifferencesInPairs) {
   EXPECT_EQ(verdict_of(pairs(100, 1e-4)), "worse");
   EXPECT_EQ(verdict_of(pairs(100, -1e-4)), "better");
-  EXPECT_EQ(verdict_of(pairs(4, 1)), "no evidence");  // too few
+  EXPECT_EQ(verdict_of(pairs(kFewestUnitsCompared, 1e-2)), "worse");
+  EXPECT_EQ(verdict_of(pairs(kFewestUnitsCompared - 1, 1e-2)), "no evidence");  // too few
+  EXPECT_EQ(verdict_of(pairs(4, 1)), "no evidence");
   const Pairs same = pairs(100, 0);
   EXPECT_EQ(compare(same.fixes, same.errors, same.fixes, same.errors, 1).verdict(), "no evidence");
 }
 
+TEST(Comparison, CountsUnitsAndNotPairs) {
+  Pairs all = pairs(100, 1e-2);
+  for (FixError& error : all.errors) error.unit = 3 * (error.unit % 19);
+  const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
+  EXPECT_EQ(comparison.units, 19);
+  EXPECT_EQ(comparison.verdict(), "no evidence");
+  EXPECT_GT(comparison.interval_m->low, 0);
+}
+
 TEST(Comparison, NeedsTheWholeIntervalOnOneSide) {
   Comparison comparison;
+  EXPECT_EQ(comparison.verdict(), "no evidence");
+  comparison.units = kFewestUnitsCompared;
   EXPECT_EQ(comparison.verdict(), "no evidence");
   comparison.interval_m = {-1, 0.1};
   EXPECT_EQ(comparison.verdict(), "no evidence");
@@ -61,6 +74,7 @@ TEST(Comparison, CountsPairsAndWhatIsMissing) {
   all.other_errors.erase(all.other_errors.begin() + 9);
   const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
   EXPECT_EQ(comparison.pairs, 6);
+  EXPECT_EQ(comparison.units, 6);
   EXPECT_EQ(comparison.larger, 6);
   EXPECT_EQ(comparison.only_these, 1);
   EXPECT_EQ(comparison.only_others, 3);

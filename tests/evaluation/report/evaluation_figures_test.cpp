@@ -23,6 +23,7 @@ std::vector<std::string> texts(const std::vector<ReportFigure>& figures) {
 Evaluation evaluation() {
   Evaluation evaluation;
   evaluation.against = "truth";
+  evaluation.drawn = "captures";
   evaluation.captures = 10;
   evaluation.fixes = 8;
   evaluation.missing = {{"degenerate", 1}, {"no row", 1}};
@@ -42,18 +43,26 @@ TEST(EvaluationFigures, SaysMillimetresAndLeavesOutWhatThereIsNot) {
 
 TEST(EvaluationFigures, GivesEachFigureItsOwnInterval) {
   Evaluation full = evaluation();
-  full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, {0.005, 0.006}, {0.007, 0.008}, 5};
+  full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, Interval{0.005, 0.006}, {0.007, 0.008}, 5};
   full.drawn = "stations";
   const auto lines = texts(report_figures(full));
   EXPECT_THAT(lines, Contains("horizontal error, median | 2 | mm | 3 to 4"));
   EXPECT_THAT(lines, Contains("horizontal error, root mean square | 5 | mm | 7 to 8"));
+  EXPECT_THAT(lines, Contains("horizontal error, 90th percentile | 3 | mm | 5 to 6"));
   EXPECT_THAT(report_notes(full), Contains(HasSubstr("bootstrap over 5 stations")));
+  EXPECT_THAT(report_notes(full), Contains(HasSubstr("Caution: of so few as 5 stations")));
+  full.intervals_m->p90 = {};
+  EXPECT_THAT(texts(report_figures(full)),
+              Contains("horizontal error, 90th percentile | 3 | mm | "));
+  full.comparison = Comparison{};
+  EXPECT_THAT(report_notes(full), Contains(HasSubstr("other fixes: no evidence, too few; the")));
 }
 
 TEST(EvaluationFigures, NotesWhatIsMissingAndWhatErrorsAre) {
   const auto notes = report_notes(evaluation());
   EXPECT_THAT(notes, ElementsAre("Horizontal errors are distances from the true place, by image.",
-                                 "Captures without a fix: 1 degenerate, 1 no row."));
+                                 "Captures without a fix: 1 degenerate, 1 no row.",
+                                 "Caution: there are too few captures for intervals."));
 }
 
 TEST(EvaluationFigures, OfADriveBearItsName) {

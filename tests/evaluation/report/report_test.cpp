@@ -23,6 +23,20 @@ TEST(Report, BeginsWithTheVerdictAndNamesTheGates) {
   EXPECT_LT(html.find("<h1>unit 7</h1>"), html.find("FAIL</strong>"));
 }
 
+TEST(Report, ShowsTheTextOfAGateOfAStageBefore) {
+  const std::string html =
+      report_html({"unit 7", {{"lens: too few", "", NAN, NAN, false}}, {}, {}, {}, {}, {}});
+  EXPECT_THAT(html, HasSubstr("<strong>FAIL</strong>1 of 1 gate is not met."));
+  EXPECT_THAT(html, HasSubstr("<th scope=\"row\">lens: too few</th><td></td><td></td>"
+                              "<td>NOT\u00a0MET</td>"));
+}
+
+TEST(Report, SaysTheCautionInTheVerdictsBox) {
+  Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, true}}, {}, {}, {}, {}, {}};
+  report.caution = "9 of 10 <captures>";
+  EXPECT_THAT(report_html(report), HasSubstr("(1 gate).<p>9 of 10 &lt;captures&gt;</p>\n</div>"));
+}
+
 TEST(Report, WithoutGatesHasNoVerdict) {
   const std::string html = report_html({"unit 7", {}, {}, {}, {}, {}, {}});
   EXPECT_THAT(html, HasSubstr("NO VERDICT"));

@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/cautions.h"
+
+#include <algorithm>
+
+namespace vlp {
+namespace {
+
+/// Of so many units percentile intervals are nearly as wide as they should be: error_intervals().
+constexpr std::size_t kEnoughUnits = 50;
+
+std::string so_few(std::size_t units, const std::string& drawn) {
+  return "of so few as " + std::to_string(units) + " " + drawn + " ";
+}
+
+}  // namespace
+
+std::string unasked_missing(const Evaluation& evaluation, const std::vector<GateResult>& gates) {
+  const std::size_t missing = evaluation.captures - evaluation.fixes;
+  const bool asked = std::any_of(gates.begin(), gates.end(), [](const GateResult& gate) {
+    return gate.name == "missing" && !gate.is_text();
+  });
+  if (gates.empty() || missing == 0 || asked) return "";
+  return std::to_string(missing) + " of " + std::to_string(evaluation.captures) +
+         (missing == 1 ? " captures has" : " captures have") +
+         " no fix, and no gate 'missing' asks";
+}
+
+std::vector<std::string> cautions_of_few(const Evaluation& evaluation) {
+  std::vector<std::string> cautions;
+  const std::string& drawn = evaluation.drawn;
+  if (const auto& intervals = evaluation.intervals_m; !intervals) {
+    cautions.push_back("there are too few " + drawn + " for intervals");
+  } else if (intervals->units < kEnoughUnits) {
+    const std::string p90 =
+        intervals->p90 ? ", that of p90 most"
+                       : ", and p90 has none, which takes " + std::to_string(kFewestUnitsOfP90);
+    cautions.push_back(so_few(intervals->units, drawn) + "intervals are somewhat too narrow" + p90);
+  }
+  if (const auto& comparison = evaluation.comparison; !comparison) {
+    return cautions;
+  } else if (comparison->too_few()) {
+    cautions.push_back(so_few(comparison->units, drawn) +
+                       "with a fix in both files a comparison is no evidence, which takes " +
+                       std::to_string(kFewestUnitsCompared));
+  } else if (comparison->units < kEnoughUnits) {
+    cautions.push_back(so_few(comparison->units, drawn) +
+                       "with a fix in both files the difference's interval is somewhat too narrow");
+  }
+  return cautions;
+}
+
+}  // namespace vlp

@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/cautions.h"
+
+#include <gmock/gmock.h>
+
+#include "evaluation/check_gates.h"
+
+namespace vlp {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+Evaluation evaluation(std::size_t units) {
+  Evaluation evaluation;
+  evaluation.captures = 432;
+  evaluation.fixes = 39;
+  evaluation.drawn = "stations";
+  const Interval interval{0, 1};
+  evaluation.intervals_m = {interval, interval, {}, interval, units};
+  if (units >= kFewestUnitsOfP90) evaluation.intervals_m->p90 = interval;
+  return evaluation;
+}
+
+TEST(Cautions, TellOfMissingFixesThatNoGateAsksFor) {
+  const GateResult mean{"mean_mm", "mm", 1, 2, true}, missing{"missing", "", 0.9, 1, true};
+  EXPECT_EQ(unasked_missing(evaluation(50), {mean}),
+            "393 of 432 captures have no fix, and no gate 'missing' asks");
+  EXPECT_EQ(unasked_missing(evaluation(50), {mean, missing}), "");
+  EXPECT_NE(unasked_missing(evaluation(50), {mean, unmet_gate("missing")}), "");
+  EXPECT_EQ(unasked_missing(evaluation(50), {}), "");
+  Evaluation all = evaluation(50);
+  all.fixes = all.captures - 1;
+  EXPECT_THAT(unasked_missing(all, {mean}), HasSubstr("1 of 432 captures has no fix"));
+  all.fixes = all.captures;
+  EXPECT_EQ(unasked_missing(all, {mean}), "");
+}
+
+TEST(Cautions, TellOfFewUnits) {
+  EXPECT_THAT(cautions_of_few(evaluation(50)), IsEmpty());
+  EXPECT_THAT(cautions_of_few(evaluation(49)),
+              ElementsAre("of so few as 49 stations intervals are somewhat too narrow, that of p90 "
+                          "most"));
+  EXPECT_THAT(cautions_of_few(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
+  Evaluation none = evaluation(4);
+  none.intervals_m = {};
+  EXPECT_THAT(cautions_of_few(none), ElementsAre("there are too few stations for intervals"));
+}
+
+TEST(Cautions, CountTheUnitsOfThePairs) {
+  Evaluation compared = evaluation(1000);
+  compared.comparison = Comparison{};
+  compared.comparison->units = 8;
+  EXPECT_THAT(cautions_of_few(compared),
+              ElementsAre("of so few as 8 stations with a fix in both files a comparison is no "
+                          "evidence, which takes 20"));
+  compared.comparison->units = 49;
+  EXPECT_THAT(cautions_of_few(compared), ElementsAre(HasSubstr("49 stations with a fix in both")));
+  compared.comparison->units = 50;
+  EXPECT_THAT(cautions_of_few(compared), IsEmpty());
+}
+
+}  // namespace
+}  // namespace vlp
