@@ -47,11 +47,11 @@ std::string options_of(const CLI::App& app, const std::vector<std::string>& inpu
 }  // namespace
 
 std::string sha256_of_images(const std::filesystem::path& folder) {
-  Sha256 sha;
+  std::string lines;
   for (const auto& image : images_in(folder)) {
-    sha.add(fmt::format("{}  {}\n", sha256_of_file(image), image.filename().string()));
+    lines += fmt::format("{}  {}\n", sha256_of_file(image), image.filename().string());
   }
-  return sha.digits();
+  return sha256_of_text(lines);
 }
 
 HistoryEntry history_entry(const CLI::App& app, const std::vector<std::string>& inputs) {
