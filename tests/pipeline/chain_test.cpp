@@ -126,7 +126,7 @@ TEST_F(SmallStation, FollowsWhatIsInItsFolder) {
   fs::copy(folder / "a station/true_calibration.yaml", folder / "a station/camera.yaml");
   EXPECT_THAT(calibrate().errors, HasSubstr("camera.yaml says what the camera is"));
   ASSERT_EQ(calibrate("").exit_code, 0);
-  EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: paper-rig"));
+  EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: \"paper-rig\""));
   EXPECT_FALSE(fs::exists(folder / "a station/results/lens.yaml"));
   fs::remove(folder / "a station/camera.yaml");
   ASSERT_EQ(calibrate().exit_code, 0);

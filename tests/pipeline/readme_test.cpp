@@ -13,8 +13,8 @@
 namespace vlp {
 namespace {
 
-/// The indented command lines that begin with one of our programs or scripts, joined where a
-/// backslash says so.
+/// The indented command lines that begin with one of our programs, scripts/calibrate.sh or cp,
+/// joined where a backslash says so.
 std::vector<std::string> commands_in(const std::string& file) {
   std::vector<std::string> commands;
   std::ifstream readme(file);
