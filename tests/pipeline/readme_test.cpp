@@ -23,7 +23,7 @@ std::vector<std::string> commands_in(const std::string& file) {
     if (continues) {
       commands.back() += line;
     } else if (line.starts_with("    build/bin/vlp-") ||
-               line.starts_with("    scripts/calibrate")) {
+               line.starts_with("    scripts/calibrate") || line.starts_with("    cp ")) {
       commands.push_back(line.substr(4));
     } else {
       continue;
