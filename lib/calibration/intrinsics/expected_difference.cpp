@@ -8,16 +8,11 @@
 #include <limits>
 #include <vector>
 
+#include "calibration/intrinsics/cross_matrix.h"
 #include "calibration/intrinsics/projection_difference.h"
 
 namespace vlp {
 namespace {
-
-Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
 
 /// How the pixel that shows a ray changes.
 struct Place {
@@ -33,7 +28,8 @@ std::vector<Place> places_of(const Lens& lens, const std::array<int, 2>& imager_
     const Eigen::Vector3d ray = seen->direction.normalized();
     const auto projection = lens.project_with_jacobians(ray);
     if (!projection) continue;
-    places.push_back({-projection->d_pixel_d_point * cross(ray), projection->d_pixel_d_parameters});
+    places.push_back(
+        {-projection->d_pixel_d_point * cross_matrix(ray), projection->d_pixel_d_parameters});
   }
   return places;
 }

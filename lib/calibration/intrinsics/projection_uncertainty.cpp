@@ -7,21 +7,17 @@
 #include <cmath>
 #include <limits>
 
+#include "calibration/intrinsics/cross_matrix.h"
+
 namespace vlp {
 namespace {
-
-Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
 
 /// exp(r + dr) = exp(J dr) exp(r), to first order in dr: the left Jacobian of the rotations.
 Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& r) {
   const double angle = r.norm();
   constexpr double tiny = 1e-6;
-  if (angle < tiny) return Eigen::Matrix3d::Identity() + cross(r) / 2;
-  const Eigen::Matrix3d k = cross(r / angle);
+  if (angle < tiny) return Eigen::Matrix3d::Identity() + cross_matrix(r) / 2;
+  const Eigen::Matrix3d k = cross_matrix(r / angle);
   return Eigen::Matrix3d::Identity() + (1 - std::cos(angle)) / angle * k +
          (1 - std::sin(angle) / angle) * k * k;
 }
@@ -73,7 +69,7 @@ Eigen::Matrix2d ProjectionUncertainty::covariance(const Eigen::Vector2d& pixel) 
   }
   Eigen::Matrix<double, 2, Eigen::Dynamic> gradient(2, covariance_.rows());
   gradient << projection->d_pixel_d_parameters,
-      -projection->d_pixel_d_point * cross(ray->direction);
+      -projection->d_pixel_d_point * cross_matrix(ray->direction);
   return gradient * covariance_ * gradient.transpose();
 }
 

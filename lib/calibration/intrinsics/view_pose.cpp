@@ -7,6 +7,8 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
+#include "calibration/intrinsics/cross_matrix.h"
+
 namespace vlp {
 namespace {
 
@@ -41,10 +43,8 @@ std::optional<Placed> stepped(Corners corners, const Lens& lens, const Placed& p
     const auto projection = lens.project_with_jacobians(point);
     if (!projection) return {};
     const Eigen::Vector3d turned = point - pose.translation_m;
-    Eigen::Matrix3d cross;
-    cross << 0, turned.z(), -turned.y(), -turned.z(), 0, turned.x(), turned.y(), -turned.x(), 0;
     Eigen::Matrix<double, 2, 6> jacobian;
-    jacobian << projection->d_pixel_d_point * cross, projection->d_pixel_d_point;
+    jacobian << -projection->d_pixel_d_point * cross_matrix(turned), projection->d_pixel_d_point;
     normal += jacobian.transpose() * jacobian;
     right += jacobian.transpose() * (corner.pixel - projection->pixel);
   }
