@@ -84,11 +84,7 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
   std::vector<FixRow> rows;
   rows.reserve(csv.rows());
   for (std::size_t row = 0; row < csv.rows(); ++row) {
-    const auto name = csv.text(row, image);
-    if (name.empty()) throw csv.error(row, image, "is empty");
-    if (!images.insert(name)) {
-      throw csv.error(row, image, "'" + std::string(name) + "' stands twice");
-    }
+    const auto name = unique_name(csv, row, image, images);
     FixRow& read = rows.emplace_back(FixRow{std::string(name),
                                             std::string(csv.text(row, status)),
                                             {},

@@ -44,4 +44,14 @@ std::optional<std::size_t> NameIndex::find(std::string_view name) const {
   return slot.next_place - 1;
 }
 
+std::string_view unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
+                             NameIndex& names) {
+  const std::string_view name = csv.text(row, column);
+  if (name.empty()) throw csv.error(row, column, "is empty");
+  if (!names.insert(name)) {
+    throw csv.error(row, column, "'" + std::string(name) + "' stands twice");
+  }
+  return name;
+}
+
 }  // namespace vlp

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "captures/csv_reader.h"
+
 namespace vlp {
 
 /// Where names stand: a hash table with open addressing, for tables of millions of rows. It holds
@@ -33,5 +35,10 @@ class NameIndex {
   std::vector<Slot> slots_;
   std::vector<std::string_view> names_;
 };
+
+/// The name in a cell, put into `names`. Throws InputError when it is empty or stands in a row
+/// before.
+std::string_view unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
+                             NameIndex& names);
 
 }  // namespace vlp

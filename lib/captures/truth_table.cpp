@@ -16,11 +16,7 @@ std::vector<TruthRow> read_truth(const std::filesystem::path& file) {
   std::vector<TruthRow> rows;
   rows.reserve(csv.rows());
   for (std::size_t row = 0; row < csv.rows(); ++row) {
-    const auto name = csv.text(row, image);
-    if (name.empty()) throw csv.error(row, image, "is empty");
-    if (!images.insert(name)) {
-      throw csv.error(row, image, "'" + std::string(name) + "' stands twice");
-    }
+    const auto name = unique_name(csv, row, image, images);
     TruthRow& read = rows.emplace_back();
     read.image = name;
     read.xy_m = {csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m)};
