@@ -4,112 +4,21 @@
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <future>
 
 #include "app.h"
+#include "evaluate_options.h"
 #include "evaluation/cautions.h"
 #include "evaluation/check_gates.h"
 #include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
 #include "print_evaluation.h"
-#include "report_option.h"
 #include "rig/file.h"
-#include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
 
-struct Options {
-  std::string fixes, truth, path, compare, lamps, calibration, gates_file, json, junit;
-  std::vector<double> line_m;  // X0 Y0 X1 Y1
-  std::vector<std::string> gates, unmet;
-  double noise_px = 0;
-  double station_mm = 1;
-  int threads = all_cores();
-  ReportOption report;
-};
-
-/// The files' gates; those of the command line are added, and hold where both say something.
-std::vector<Gate> gates_of(const Options& options) {
-  std::vector<Gate> gates;
-  if (!options.gates_file.empty()) gates = read_gates(options.gates_file);
-  const auto from_file = gates.size();
-  for (const std::string& text : options.gates) {
-    const Gate gate = gate_of(text);
-    const auto same = std::find_if(gates.begin(), gates.end(),
-                                   [&](const Gate& other) { return other.name == gate.name; });
-    if (same == gates.end()) {
-      gates.push_back(gate);
-    } else if (same < gates.begin() + static_cast<std::ptrdiff_t>(from_file)) {
-      same->limit = gate.limit;
-    } else {
-      throw std::invalid_argument("gate '" + gate.name + "' stands twice");
-    }
-  }
-  return gates;
-}
-
-/// What a report and XML can say: UTF-8 without control characters.
-CLI::Validator one_line() {
-  return {[](std::string& text) {
-            const bool control = std::any_of(
-                text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == '\x7f'; });
-            return !text.empty() && !control && utf8_length(text) == text.size()
-                       ? ""
-                       : "should be one line of UTF-8 text";
-          },
-          ""};
-}
-
-std::vector<std::string> inputs_of(const Options& options) {
-  return {options.fixes, options.truth,       options.path,      options.compare,
-          options.lamps, options.calibration, options.gates_file};
-}
-
-void check_options(const Options& options, const std::vector<Gate>& gates) {
-  const int references = (options.truth.empty() ? 0 : 1) + (options.path.empty() ? 0 : 1) +
-                         (options.line_m.empty() ? 0 : 1);
-  if (references != 1) {
-    throw std::invalid_argument(
-        "say what to hold the fixes against: one of --truth, --path, --line");
-  }
-  if (const auto& line_m = options.line_m;
-      !line_m.empty() && line_m[0] == line_m[2] && line_m[1] == line_m[3]) {
-    throw std::invalid_argument("--line begins where it ends");
-  }
-  if (!options.junit.empty() && gates.empty() && options.unmet.empty()) {
-    throw std::invalid_argument(
-        "--junit tells of gates, and there are none: add --gate or --gates");
-  }
-  if (options.noise_px == 0 && options.report.file.empty() && !options.lamps.empty()) {
-    throw std::invalid_argument("--lamps is for the theoretical limit, which needs --noise-px");
-  }
-  if (options.noise_px == 0 && options.report.file.empty() && !options.calibration.empty()) {
-    throw std::invalid_argument(
-        "--calibration is for the theoretical limit, which needs --lamps and --noise-px");
-  }
-  std::vector<std::string> inputs = inputs_of(options);
-  const ReportOption& report = options.report;
-  inputs.insert(inputs.end(), report.pictures.begin(), report.pictures.end());
-  for (const auto& track : report.tracks) {
-    inputs.push_back(std::get<0>(track));
-    if (std::get<1>(track) == std::get<3>(track) && std::get<2>(track) == std::get<4>(track)) {
-      throw std::invalid_argument("--track begins where it ends: " + std::get<0>(track));
-    }
-  }
-  check_output(options.json, inputs);
-  check_output(options.junit, inputs);
-  check_output(report.file, inputs);
-  if (!options.json.empty() && options.json == options.junit) {
-    throw std::invalid_argument("--json and --junit name one file");
-  }
-  if (!report.file.empty() && (report.file == options.json || report.file == options.junit)) {
-    throw std::invalid_argument("--report and another output name one file");
-  }
-}
-
-EvaluationInput input_of(const Options& options) {
+EvaluationInput input_of(const EvaluateOptions& options) {
   EvaluationInput input;
   // The two large tables side by side; of two that are bad the fixes are told of.
   auto truth = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, [&] {
@@ -132,7 +41,7 @@ EvaluationInput input_of(const Options& options) {
 }
 
 /// Those of stages before come first.
-std::vector<GateResult> results_of(const Options& options, const std::vector<Gate>& gates,
+std::vector<GateResult> results_of(const EvaluateOptions& options, const std::vector<Gate>& gates,
                                    const Evaluation& evaluation) {
   std::vector<GateResult> results;
   for (const std::string& text : options.unmet) results.push_back(unmet_gate(text));
@@ -152,9 +61,9 @@ void warn(const EvaluationInput& input, const Evaluation& evaluation, const std:
   for (const std::string& caution : cautions_of_few(evaluation)) spdlog::info("{}", caution);
 }
 
-void run(const CLI::App& app, const Options& options) {
+void run(const CLI::App& app, const EvaluateOptions& options) {
   const std::vector<Gate> gates = gates_of(options);
-  check_options(options, gates);
+  check_evaluate_options(options, gates);
   const EvaluationInput input = input_of(options);
   const Evaluation evaluation = evaluate(input);
   if (evaluation.fixes == 0) {
@@ -182,54 +91,6 @@ void run(const CLI::App& app, const Options& options) {
   if (!failed.empty()) throw GateNotMet(failed);
 }
 
-void add_options(CLI::App& app, Options& options) {
-  app.add_option("fixes", options.fixes, "fixes.csv of vlp-locate")->required();
-  app.add_option("--truth", options.truth,
-                 "truth.csv: image, x_m, y_m [, z_m, yaw_rad]; a capture of it without a fix is "
-                 "missing");
-  app.add_option("--path", options.path,
-                 "The path driven: a CSV of waypoints, x_m, y_m [, z_m]; errors are distances from "
-                 "it");
-  app.add_option("--line", options.line_m,
-                 "The straight line commanded: errors are distances from it, of the fixes and, as "
-                 "in the paper, of a line fitted to them")
-      ->expected(4)
-      ->check(finite())
-      ->option_text("X0_M Y0_M X1_M Y1_M");
-  app.add_option("--station-mm", options.station_mm,
-                 "Captures whose true places are within so much are of one station (default 1)")
-      ->check(finite_positive());
-  app.add_option("--compare", options.compare,
-                 "Other fixes of the same captures: are these better, worse, or is there no "
-                 "evidence?");
-  app.add_option("--gate", options.gates,
-                 "What a figure has to be at most; again for another, or with commas")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->option_text("NAME=VALUE");
-  app.add_option("--gates", options.gates_file, "Gates from a file, vlp-gates/1");
-  app.add_option("--unmet", options.unmet,
-                 "A gate that was not met before, e.g. of vlp-intrinsics: makes the verdict FAIL; "
-                 "again for another")
-      ->allow_extra_args(false)
-      ->check(one_line())
-      ->option_text("TEXT");
-  app.add_option("--json", options.json, "Write the figures for programs, evaluation.json");
-  app.add_option("--junit", options.junit, "Write the gates for a CI system, JUnit XML");
-  auto* lamps = app.add_option(
-      "--lamps", options.lamps,
-      "Lamp map, lamps.yaml, for the theoretical limit at the true places, and the report");
-  auto* calibration = app.add_option("--calibration", options.calibration,
-                                     "... the camera; the limit is that of a level one");
-  auto* noise = app.add_option("--noise-px", options.noise_px,
-                               "... and the standard deviation of each lamp's pixel, per axis")
-                    ->check(finite_positive());
-  noise->needs(lamps)->needs(calibration);
-  add_report_options(app, options.report);
-  app.add_option("--threads", options.threads, "For the intervals (default: one a core)")
-      ->check(CLI::Range(1, 1024));
-}
-
 }  // namespace
 }  // namespace vlp
 
@@ -246,8 +107,8 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml --lamps datasets/example/lamps.yaml \\\n"
       "    --report report.html\n",
       "vlp-evaluate");
-  vlp::Options options;
-  vlp::add_options(app, options);
+  vlp::EvaluateOptions options;
+  vlp::add_evaluate_options(app, options);
   app.footer("Gates:\n" + vlp::gate_descriptions());
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }
