@@ -5,12 +5,11 @@
 #include <soci/postgresql/soci-postgresql.h>
 #include <soci/sqlite3/soci-sqlite3.h>
 
-#include <algorithm>
 #include <chrono>
 #include <thread>
 
-#include "rig/input_error.h"
 #include "station/record_tables.h"
+#include "station/records_database.h"
 
 namespace vlp {
 namespace {
@@ -28,19 +27,6 @@ void open(soci::session& sql, const std::string& where) {
   // What is committed is on the disk; a second connection sees runs whole.
   sql << "PRAGMA synchronous = FULL";
   sql << "PRAGMA foreign_keys = ON";
-}
-
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
-/// Password and user are nobody's business in a message.
-std::string shown(const std::string& where) {
-  const auto at = where.find('@');
-  return where.starts_with("postgresql://") && at != std::string::npos
-             ? "postgresql://" + where.substr(at + 1)
-             : where;
 }
 
 void put_figures(soci::session& sql, const RunRecord& record) {
@@ -67,49 +53,7 @@ void put_images(soci::session& sql, const RunRecord& record) {
   }
 }
 
-std::string condition(const RunFilter& filter) {
-  std::string text = "WHERE 1 = 1";
-  if (!filter.camera.empty()) text += " AND runs.camera = :camera";
-  if (!filter.station.empty()) text += " AND runs.station = :station";
-  if (!filter.verdict.empty()) text += " AND runs.verdict = :verdict";
-  if (!filter.kind.empty()) text += " AND runs.kind = :kind";
-  return text;
-}
-
-void bind(soci::statement& statement, const RunFilter& filter) {
-  for (const std::string* value :
-       {&filter.camera, &filter.station, &filter.verdict, &filter.kind}) {
-    if (!value->empty()) statement.exchange(soci::use(*value));
-  }
-}
-
-template <typename Row>
-std::vector<Row> last_of(std::vector<Row> rows, int last) {
-  const auto kept = static_cast<std::size_t>(last);
-  if (last > 0 && rows.size() > kept) {
-    rows.erase(rows.begin(), rows.end() - static_cast<std::ptrdiff_t>(kept));
-  }
-  return rows;
-}
-
 }  // namespace
-
-struct Records::Database {
-  std::string where;
-  soci::session sql;
-
-  /// Errors name the database.
-  template <typename Action>
-  auto run(const Action& action) {
-    try {
-      return action();
-    } catch (const InputError&) {
-      throw;
-    } catch (const std::exception& error) {
-      throw InputError(shown(where), "the records: " + one_line(error.what()));
-    }
-  }
-};
 
 Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
   database_->where = where;
@@ -162,94 +106,6 @@ bool Records::has(const std::string& run) {
     database_->sql << "SELECT COUNT(*) FROM runs WHERE run = :run", soci::into(count),
         soci::use(run);
     return count > 0;
-  });
-}
-
-std::vector<RunSummary> Records::list(const RunFilter& filter) {
-  return database_->run([&] {
-    RunSummary row;
-    std::vector<RunSummary> rows;
-    soci::statement statement(database_->sql);
-    statement.exchange(soci::into(row.run));
-    statement.exchange(soci::into(row.kind));
-    statement.exchange(soci::into(row.station));
-    statement.exchange(soci::into(row.camera));
-    statement.exchange(soci::into(row.ended_utc));
-    statement.exchange(soci::into(row.verdict));
-    statement.exchange(soci::into(row.causes));
-    bind(statement, filter);
-    statement.alloc();
-    statement.prepare("SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
-                      condition(filter) + " ORDER BY ended_utc, run");
-    statement.define_and_bind();
-    statement.execute();
-    while (statement.fetch()) rows.push_back(row);
-    return last_of(std::move(rows), filter.last);
-  });
-}
-
-std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilter& filter) {
-  return database_->run([&] {
-    TrendPoint row;
-    std::vector<TrendPoint> rows;
-    soci::statement statement(database_->sql);
-    statement.exchange(soci::into(row.run));
-    statement.exchange(soci::into(row.camera));
-    statement.exchange(soci::into(row.verdict));
-    statement.exchange(soci::into(row.value));
-    bind(statement, filter);
-    statement.exchange(soci::use(figure));
-    statement.alloc();
-    statement.prepare(
-        "SELECT runs.run, runs.camera, runs.verdict, figures.value FROM runs JOIN figures ON "
-        "figures.run = runs.run " +
-        condition(filter) +
-        " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, "
-        "runs.run");
-    statement.define_and_bind();
-    statement.execute();
-    while (statement.fetch()) rows.push_back(row);
-    return last_of(std::move(rows), filter.last);
-  });
-}
-
-std::optional<RunRecord> Records::find(const std::string& run) {
-  return database_->run([&]() -> std::optional<RunRecord> {
-    soci::session& sql = database_->sql;
-    RunRecord record;
-    record.run = run;
-    sql << "SELECT kind, station, camera, ended_utc, verdict, causes, program, libraries, "
-           "config_sha256, calibration FROM runs WHERE run = :run",
-        soci::into(record.kind), soci::into(record.station), soci::into(record.camera),
-        soci::into(record.ended_utc), soci::into(record.verdict), soci::into(record.causes),
-        soci::into(record.program), soci::into(record.libraries), soci::into(record.config_sha256),
-        soci::into(record.calibration), soci::use(run);
-    if (!sql.got_data()) return std::nullopt;
-    StationFigure figure;
-    double value = 0, gate = 0;
-    int at_least = 0;
-    soci::indicator has_value = soci::i_null, has_gate = soci::i_null;
-    soci::statement figures =
-        (sql.prepare << "SELECT name, value, gate, at_least FROM figures WHERE run = :run ORDER "
-                        "BY place",
-         soci::into(figure.name), soci::into(value, has_value), soci::into(gate, has_gate),
-         soci::into(at_least), soci::use(run));
-    figures.execute();
-    while (figures.fetch()) {
-      figure.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
-      figure.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
-      figure.at_least = at_least != 0;
-      record.figures.push_back(figure);
-    }
-    RunRecord::Image image;
-    soci::statement images =
-        (sql.prepare << "SELECT step, image, sha256, refused FROM images WHERE run = :run ORDER "
-                        "BY step, image",
-         soci::into(image.step), soci::into(image.name), soci::into(image.sha256),
-         soci::into(image.refused), soci::use(run));
-    images.execute();
-    while (images.fetch()) record.images.push_back(image);
-    return record;
   });
 }
 
