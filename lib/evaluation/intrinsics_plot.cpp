@@ -103,9 +103,16 @@ std::string map_of(const IntrinsicsPlot& plot) {
               half_u + "):(" + half_v +
               "):3 with boxxyerror fillstyle solid linecolor palette notitle";
   if (!lines.empty()) {
+    // Room for the labels.
+    const auto away = [](const char* column, int size_px) {
+      return "abs(" + std::string(column) + " / " + std::to_string(size_px) + " - 0.5) < 0.44";
+    };
+    const std::string inside =
+        away("$1", plot.imager_px[0]) + " && " + away("$2", plot.imager_px[1]);
     commands +=
         ", $lines using 1:2 with lines linewidth 1.5 linecolor rgb 'white' notitle"
-        ", $lines using 1:2:(sprintf('%g', $3)) every 1000::3 with labels boxed notitle";
+        ", $lines using (" +
+        inside + " ? $1 : NaN):2:(sprintf('%g', $3)) every 1000::3 with labels boxed notitle";
   }
   return commands + "\n";
 }

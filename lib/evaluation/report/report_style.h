@@ -41,13 +41,13 @@ footer { margin-top: 2rem; font-size: .85rem; color: #444; }
 @media print {
   body { max-width: none; padding: 0; font-size: 10pt; }
   h2, caption, summary { break-after: avoid; }
-  figure, .verdict, tr, table { break-inside: avoid; }
+  figure, .verdict, tr { break-inside: avoid; }
   img { min-width: 0; max-width: 100%; max-height: 108mm; object-fit: contain; }
   .large img { max-height: 150mm; }
   table, figcaption { font-size: 9pt; }
   .scroll { overflow: visible; }
   .verdict { print-color-adjust: exact; }
-  .digests table { break-inside: auto; font-size: 7pt; line-height: 1.2; }
+  .digests table { font-size: 7pt; line-height: 1.2; }
   .digests th, .digests td { padding-top: .1rem; padding-bottom: .1rem; }
   details::details-content { content-visibility: visible; block-size: auto; }
 }
