@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A million fixes against their truth: reading both tables; the figures with their intervals.
+/// A million fixes against their truth: the program; of it reading both tables; the figures with
+/// their intervals.
 #include <benchmark/benchmark.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -46,6 +48,17 @@ void arguments(benchmark::internal::Benchmark* benchmark) {
   benchmark->ArgNames({"fixes", "at_each"})->Unit(benchmark::kMillisecond)->UseRealTime();
   benchmark->Args({1000, 12})->Args({1000000, 1})->Args({1000000, 12})->Iterations(1);
 }
+
+void program(benchmark::State& state) {
+  const Tables tables =
+      written(static_cast<std::size_t>(state.range(0)), static_cast<std::size_t>(state.range(1)));
+  const std::string command = VLP_PROGRAMS_DIR "/vlp-evaluate " + tables.fixes.string() +
+                              " --truth " + tables.truth.string() + " > /dev/null";
+  for (auto _ : state) {
+    if (std::system(command.c_str()) != 0) state.SkipWithError("vlp-evaluate failed");
+  }
+}
+BENCHMARK(program)->Apply(arguments);
 
 void read_tables(benchmark::State& state) {
   const Tables tables =
