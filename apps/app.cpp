@@ -103,9 +103,10 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
     }
     return kBadInput;
   } catch (const GateNotMet& error) {
-    if (std::fflush(stdout) != 0) return kBadInput;
     spdlog::error("{}", error.what());
-    return kGateNotMet;
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return kGateNotMet;
+    spdlog::error("stdout cannot be written");
+    return kBadInput;
   } catch (const Undetermined& error) {
     spdlog::error("{}", error.what());
     return kUndetermined;

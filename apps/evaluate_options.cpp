@@ -3,7 +3,11 @@
 #include "evaluate_options.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
 
+#include "captures/csv_reader.h"
 #include "rig/yaml_text.h"
 
 namespace vlp {
@@ -19,6 +23,24 @@ CLI::Validator one_line() {
                        : "should be one line of UTF-8 text";
           },
           ""};
+}
+
+/// X0, Y0, X1, Y1.
+void check_line(const std::string& option, const std::array<double, 4>& line_m) {
+  if (line_m[0] == line_m[2] && line_m[1] == line_m[3]) {
+    throw std::invalid_argument(option + ": the line begins where it ends");
+  }
+  for (const double value_m : line_m) {
+    if (std::abs(value_m) > kFarthest_m) {
+      throw std::invalid_argument(option + ": should be within 1,000 km, in metres");
+    }
+  }
+}
+
+/// Outputs, which need not exist; empty: none.
+bool same_file(const std::string& one, const std::string& other) {
+  const auto of = [](const std::string& file) { return std::filesystem::weakly_canonical(file); };
+  return !one.empty() && !other.empty() && of(one) == of(other);
 }
 
 }  // namespace
@@ -54,9 +76,8 @@ void check_evaluate_options(const EvaluateOptions& options, const std::vector<Ga
     throw std::invalid_argument(
         "say what to hold the fixes against: one of --truth, --path, --line");
   }
-  if (const auto& line_m = options.line_m;
-      !line_m.empty() && line_m[0] == line_m[2] && line_m[1] == line_m[3]) {
-    throw std::invalid_argument("--line begins where it ends");
+  if (const auto& line_m = options.line_m; !line_m.empty()) {
+    check_line("--line", {line_m[0], line_m[1], line_m[2], line_m[3]});
   }
   if (!options.junit.empty() && gates.empty() && options.unmet.empty()) {
     throw std::invalid_argument(
@@ -65,26 +86,24 @@ void check_evaluate_options(const EvaluateOptions& options, const std::vector<Ga
   if (options.noise_px == 0 && options.report.file.empty() && !options.lamps.empty()) {
     throw std::invalid_argument("--lamps is for the theoretical limit, which needs --noise-px");
   }
-  if (options.noise_px == 0 && options.report.file.empty() && !options.calibration.empty()) {
-    throw std::invalid_argument(
-        "--calibration is for the theoretical limit, which needs --lamps and --noise-px");
+  if (options.noise_px > 0 && options.truth.empty()) {
+    throw std::invalid_argument("--noise-px is for the theoretical limit, which needs --truth");
   }
   std::vector<std::string> inputs = inputs_of(options);
   const ReportOption& report = options.report;
   inputs.insert(inputs.end(), report.pictures.begin(), report.pictures.end());
   for (const auto& track : report.tracks) {
-    inputs.push_back(std::get<0>(track));
-    if (std::get<1>(track) == std::get<3>(track) && std::get<2>(track) == std::get<4>(track)) {
-      throw std::invalid_argument("--track begins where it ends: " + std::get<0>(track));
-    }
+    const auto& [fixes, x0_m, y0_m, x1_m, y1_m] = track;
+    inputs.push_back(fixes);
+    check_line("--track " + fixes, {x0_m, y0_m, x1_m, y1_m});
   }
   check_output(options.json, inputs);
   check_output(options.junit, inputs);
   check_output(report.file, inputs);
-  if (!options.json.empty() && options.json == options.junit) {
+  if (same_file(options.json, options.junit)) {
     throw std::invalid_argument("--json and --junit name one file");
   }
-  if (!report.file.empty() && (report.file == options.json || report.file == options.junit)) {
+  if (same_file(report.file, options.json) || same_file(report.file, options.junit)) {
     throw std::invalid_argument("--report and another output name one file");
   }
 }
@@ -103,8 +122,10 @@ void add_evaluate_options(CLI::App& app, EvaluateOptions& options) {
       ->expected(4)
       ->check(finite())
       ->option_text("X0_M Y0_M X1_M Y1_M");
-  app.add_option("--station-mm", options.station_mm,
-                 "Captures whose true places are within so much are of one station (default 1)")
+  app.add_option(
+         "--station-mm", options.station_mm,
+         "Captures whose true places are within so much are of one station (default: 1, and "
+         "what a turn about the calibration's lever arm adds)")
       ->check(finite_positive());
   app.add_option("--compare", options.compare,
                  "Other fixes of the same captures: are these better, worse, or is there no "
@@ -127,7 +148,8 @@ void add_evaluate_options(CLI::App& app, EvaluateOptions& options) {
       "--lamps", options.lamps,
       "Lamp map, lamps.yaml, for the theoretical limit at the true places, and the report");
   auto* calibration = app.add_option("--calibration", options.calibration,
-                                     "... the camera; the limit is that of a level one");
+                                     "... the camera; the limit is that of a level one; its "
+                                     "lever arm is for --station-mm");
   auto* noise = app.add_option("--noise-px", options.noise_px,
                                "... and the standard deviation of each lamp's pixel, per axis")
                     ->check(finite_positive());

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,7 @@ struct EvaluateOptions {
   std::vector<double> line_m;  // X0 Y0 X1 Y1
   std::vector<std::string> gates, unmet;
   double noise_px = 0;
-  double station_mm = 1;
+  std::optional<double> station_mm;
   int threads = all_cores();
   ReportOption report;
 };

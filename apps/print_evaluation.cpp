@@ -99,8 +99,10 @@ void print_ratios(const Evaluation& evaluation) {
 }
 
 void print_comparison(const Comparison& comparison) {
-  fmt::print("compared    {}{}: mean error differs by {:+.3f} mm", comparison.verdict(),
-             comparison.too_few() ? ", too few" : "", mm(comparison.mean_difference_m));
+  fmt::print("compared    {}{}", comparison.verdict(), comparison.too_few() ? ", too few" : "");
+  if (comparison.pairs > 0) {
+    fmt::print(": mean error differs by {:+.3f} mm", mm(comparison.mean_difference_m));
+  }
   if (const auto& interval_m = comparison.interval_m) {
     fmt::print(" (95 %: {:+.3f} to {:+.3f})", mm(interval_m->low), mm(interval_m->high));
   }

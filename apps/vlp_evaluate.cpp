@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <future>
 
 #include "app.h"
@@ -18,6 +19,15 @@
 namespace vlp {
 namespace {
 
+/// Where the camera turns about a lever arm, the places of one station are two of them apart.
+double station_m(const EvaluateOptions& options) {
+  constexpr double repeated_m = 1e-3;
+  if (options.station_mm) return 1e-3 * *options.station_mm;
+  if (options.calibration.empty()) return repeated_m;
+  const auto center = read_calibration(options.calibration).rotation_center;
+  return repeated_m + (center && center->lever_arm_m ? 2 * center->lever_arm_m->norm() : 0);
+}
+
 EvaluationInput input_of(const EvaluateOptions& options) {
   EvaluationInput input;
   // The two large tables side by side; of two that are bad the fixes are told of.
@@ -30,7 +40,7 @@ EvaluationInput input_of(const EvaluateOptions& options) {
   if (const auto& line_m = options.line_m; !line_m.empty()) {
     input.line_m = {Eigen::Vector2d{line_m[0], line_m[1]}, Eigen::Vector2d{line_m[2], line_m[3]}};
   }
-  input.station_m = 1e-3 * options.station_mm;
+  input.station_m = station_m(options);
   if (!options.compare.empty()) input.others = {options.compare, read_fixes(options.compare)};
   if (options.noise_px > 0) {
     input.limit = {read_lamp_map(options.lamps), read_calibration(options.calibration).camera,
@@ -67,7 +77,9 @@ void run(const CLI::App& app, const EvaluateOptions& options) {
   const EvaluationInput input = input_of(options);
   const Evaluation evaluation = evaluate(input);
   if (evaluation.fixes == 0) {
-    const auto& [status, count] = *evaluation.missing.begin();
+    const auto& [status, count] =
+        *std::max_element(evaluation.missing.begin(), evaluation.missing.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; });
     throw Undetermined(fmt::format("{}: not one of {} captures has a fix ({} of them: {})",
                                    options.fixes, evaluation.captures, count, status));
   }

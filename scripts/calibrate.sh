@@ -14,13 +14,13 @@
 #   rotation/                   captures while the camera turns on the spot
 #   dispersion/                 at a known station, turning; captures.csv says where (optional)
 #   check/                      to locate; with truth.csv, or places in captures.csv, also the errors
-#                               (optional)
+#                               and the report (optional)
 #   line-*/                     along a straight line each, with truth.csv (optional, for the report)
 #   gates.yaml                  what the errors have to keep to (optional)
 #
 # Results (default STATION_DIR/results): calibration.yaml, check-fixes.csv, evaluation.json,
 # report.html, and what each stage wrote and said. A row time that is not given is found from the
-# rotation captures. A stage whose inputs, options, program and output are as before is not run
+# rotation captures. A stage whose inputs, options, program and outputs are as before is not run
 # again; what this run does not make, or cannot, is removed.
 #
 # Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 the captures do not determine it.
@@ -61,8 +61,10 @@ fi
 for program in intrinsics train rotation dispersion locate evaluate; do
   [ -x "$bin/vlp-$program" ] || refuse "$bin/vlp-$program: missing; run scripts/test.sh first"
 done
+for folder in "$station" "$station"/{boards,rotation,dispersion,check}; do
+  [ ! "$results" -ef "$folder" ] || refuse "$results: results go to a folder of their own"
+done
 mkdir -p "$results/stages" || refuse "$results: cannot be written to"
-[ ! "$results" -ef "$station" ] || refuse "$results: results go to a folder of their own"
 verdict=0 unmet=()
 final=("$results"/{calibration.yaml,evaluation.json,gates.xml,report.html})
 
@@ -76,21 +78,23 @@ digest_of() {  # FILE OR FOLDER...: of names and contents
   done
 }
 
-# Runs a program on inputs, unless these, its arguments, the program and its output are as they were
+# Runs a program on inputs, unless these, its arguments, the program and its outputs are as they were
 # when it last ended. What it says goes to stages/NAME.txt.
-stage() {  # NAME INPUT... -- OUTPUT PROGRAM ARGUMENT...
-  local name=$1 inputs=() code=0 state key
+stage() {  # NAME INPUT... -- OUTPUT... -- PROGRAM ARGUMENT...
+  local name=$1 inputs=() outputs=() code=0 state key
   shift
   while [ "$1" != -- ]; do inputs+=("$1"); shift; done
-  local output=$results/$2 program=$3 log=$results/stages/$name.txt
-  shift 3
+  shift
+  while [ "$1" != -- ]; do outputs+=("$results/$1"); shift; done
+  local program=$2 log=$results/stages/$name.txt
+  shift 2
   key=$( { digest_of "$bin/$program" "${inputs[@]}"; printf '%s\n' "$@"; } | sha256sum)
-  if [ -e "$log.key" ] && [ "$(sed -n 1p "$log.key")" = "$key" ] && [ -e "$output" ] &&
-    [ "$(sed -n 2p "$log.key")" = "$(digest_of "$output")" ]
+  if [ -e "$log.key" ] && [ "$(sed -n 1p "$log.key")" = "$key" ] &&
+    [ "$(sed -n 2p "$log.key")" = "$(digest_of "${outputs[@]}" 2>/dev/null | sha256sum)" ]
   then
     code=$(sed -n 3p "$log.key") state='as before'
   else
-    rm -f "$log.key" "$output"
+    rm -f "$log.key" "${outputs[@]}"
     local begin_us=${EPOCHREALTIME//[!0-9]/}
     "$bin/$program" "$@" >"$log" 2>"$log.messages" || code=$?
     if [ "$code" -gt 1 ]; then
@@ -102,7 +106,7 @@ stage() {  # NAME INPUT... -- OUTPUT PROGRAM ARGUMENT...
     sed -i '/: info: /d' "$log.messages"
     local tenths=$(((${EPOCHREALTIME//[!0-9]/} - begin_us + 50000) / 100000))
     state=$(printf '%3d.%d s' $((tenths / 10)) $((tenths % 10)))
-    printf '%s\n%s\n%s\n' "$key" "$(digest_of "$output")" "$code" >"$log.key"
+    printf '%s\n%s\n%s\n' "$key" "$(digest_of "${outputs[@]}" | sha256sum)" "$code" >"$log.key"
   fi
   printf '%-13s %s%s\n' "$name" "$state" "$([ "$code" = 0 ] || echo ', a gate is not met')"
   sed 's/^/              /' "$log.messages"
@@ -119,36 +123,37 @@ if [ -e "$station/camera.yaml" ]; then
   lens=$station/camera.yaml
 else
   lens=$results/lens.yaml
-  stage intrinsics "$station/boards" "$station/board.yaml" -- lens.yaml vlp-intrinsics \
+  stage intrinsics "$station/boards" "$station/board.yaml" -- lens.yaml lens.svg -- vlp-intrinsics \
     "$station/boards" --board "$station/board.yaml" "${camera[@]}" \
     --cache "$results/stages/corners" --plot "$results/lens.svg" -o "$lens"
   pictures+=(--picture "$results/lens.svg")
 fi
-if grep -q '^  row_time_s:' "$lens"; then
+if grep -q 'row_time_s:' "$lens"; then
   rm -f "$results"/camera.yaml "$results"/stages/row-time.*
 else
-  stage row-time "$station/rotation" "$lamps" "$lens" -- camera.yaml vlp-train \
+  stage row-time "$station/rotation" "$lamps" "$lens" -- camera.yaml -- vlp-train \
     "$station/rotation" --row-time --lamps "$lamps" --calibration "$lens" -o "$results/camera.yaml"
   lens=$results/camera.yaml
 fi
-stage rotation "$station/rotation" "$lamps" "$lens" -- rotated.yaml vlp-rotation \
-  "$station/rotation" --lamps "$lamps" --calibration "$lens" --plot "$results/rotation.svg" \
-  -o "$results/rotated.yaml"
+stage rotation "$station/rotation" "$lamps" "$lens" -- rotated.yaml rotation.svg -- \
+  vlp-rotation "$station/rotation" --lamps "$lamps" --calibration "$lens" \
+  --plot "$results/rotation.svg" -o "$results/rotated.yaml"
 pictures+=(--picture "$results/rotation.svg")
 calibration=$results/calibration.yaml
 if [ -e "$station/dispersion" ]; then
-  stage dispersion "$station/dispersion" "$lamps" "$results/rotated.yaml" -- calibration.yaml \
-    vlp-dispersion "$station/dispersion" --lamps "$lamps" --calibration "$results/rotated.yaml" \
-    --plot "$results/dispersion.svg" -o "$calibration"
+  stage dispersion "$station/dispersion" "$lamps" "$results/rotated.yaml" -- \
+    calibration.yaml dispersion.svg -- vlp-dispersion "$station/dispersion" --lamps "$lamps" \
+    --calibration "$results/rotated.yaml" --plot "$results/dispersion.svg" -o "$calibration"
   pictures+=(--picture "$results/dispersion.svg")
 else
   rm -f "$results/dispersion.svg" "$results"/stages/dispersion.*
   cp "$results/rotated.yaml" "$calibration" || refuse "$calibration: cannot be written"
 fi
+final=("$results"/{evaluation.json,gates.xml,report.html})  # what follows does not change the camera
 
 locate() {  # FOLDER: to FOLDER-fixes.csv
   local fixes=$1-fixes.csv
-  stage "$1" "$station/$1" "$lamps" "$calibration" -- "$fixes" vlp-locate "$station/$1" \
+  stage "$1" "$station/$1" "$lamps" "$calibration" -- "$fixes" -- vlp-locate "$station/$1" \
     --lamps "$lamps" --calibration "$calibration" -o "$results/$fixes"
 }
 if [ -e "$station/check" ]; then locate check; else rm -f "$results"/check-fixes.csv; fi
@@ -159,7 +164,7 @@ if [ ! -e "$truth" ] && head -n 1 "$station/check/captures.csv" 2>/dev/null | gr
   truth=$station/check/captures.csv
 fi
 if [ ! -e "$truth" ]; then
-  rm -f "$results"/{evaluation.json,gates.xml,report.html}
+  rm -f "${final[@]}"
   echo "No errors and no report: $station/check has no truth.csv"
   exit "$verdict"
 fi
@@ -179,17 +184,22 @@ for line in "$station"/line-*/; do
   [ -e "$station/$line/truth.csv" ] || continue
   locate "$line"
   read -ra ends_m <<<"$(ends_of "$station/$line/truth.csv")"
-  [ ${#ends_m[@]} = 4 ] || refuse "$station/$line/truth.csv: has no x_m and y_m"
+  if [[ ! ${ends_m[*]} =~ ^([-+.eE0-9]+( |$)){4}$ ]]; then
+    rm -f "${final[@]}"
+    refuse "$station/$line/truth.csv: its x_m and y_m are no plain numbers"
+  fi
   inputs+=("$results/$line-fixes.csv")
   report+=(--track "$results/$line-fixes.csv" "${ends_m[@]}")
 done
+outputs=(report.html evaluation.json)
 if [ -e "$station/gates.yaml" ]; then
+  outputs+=(gates.xml)
   inputs+=("$station/gates.yaml")
   report+=(--gates "$station/gates.yaml" --junit "$results/gates.xml")
 else
   rm -f "$results/gates.xml"
 fi
-stage evaluate "${inputs[@]}" -- report.html vlp-evaluate "$fixes" --truth "$truth" \
+stage evaluate "${inputs[@]}" -- "${outputs[@]}" -- vlp-evaluate "$fixes" --truth "$truth" \
   --lamps "$lamps" --calibration "$calibration" --json "$results/evaluation.json" \
   --report "$results/report.html" "${report[@]}" "${unmet[@]}"
 echo

@@ -7,6 +7,7 @@
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
 #include "captures/name_index.h"
+#include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
@@ -91,6 +92,9 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
                                             lamps ? csv.integer(row, *lamps) : 0,
                                             csv.line(row)});
     if (read.status.empty()) throw csv.error(row, status, "is empty");
+    if (utf8_length(read.status) != read.status.size()) {
+      throw csv.error(row, status, "should be UTF-8");
+    }
     if (read.status == "ok") read.fix = fix_in(csv, row, columns);
   }
   if (rows.empty()) throw InputError(file, "holds no fix");

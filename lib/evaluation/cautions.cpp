@@ -31,8 +31,8 @@ std::vector<std::string> cautions_of_few(const Evaluation& evaluation) {
   std::vector<std::string> cautions;
   const std::string& drawn = evaluation.drawn;
   if (const auto& intervals = evaluation.intervals_m; !intervals) {
-    cautions.push_back("there are too few " + drawn + " for intervals");
-  } else if (intervals->units < kEnoughUnits) {
+    cautions.push_back("there are too few " + drawn + " with a fix for intervals");
+  } else if (intervals->units < (evaluation.against == "truth" ? kEnoughUnits : kPathRuns)) {
     const std::string p90 =
         intervals->p90 ? ", that of p90 most"
                        : ", and p90 has none, which takes " + std::to_string(kFewestUnitsOfP90);

@@ -8,6 +8,7 @@
 
 #include "captures/csv_writer.h"
 #include "evaluation/plot_parts.h"
+#include "evaluation/round_numbers.h"
 
 namespace vlp {
 namespace {
@@ -16,7 +17,7 @@ constexpr std::size_t kMostSteps = 500;
 constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::vermillion,
                                                 plot_colors::green, plot_colors::purple};
 
-std::string mm(double value_m) { return significant(1e3 * value_m, 3); }
+std::string mm(double value_m) { return readable(1e3 * value_m, 3); }
 
 /// Error in mm and share in per cent.
 std::string steps_of(std::vector<double> errors_m) {

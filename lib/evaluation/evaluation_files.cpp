@@ -93,8 +93,10 @@ Json json_of(const Comparison& comparison) {
             {"only_these", comparison.only_these},
             {"only_others", comparison.only_others},
             {"smaller_errors", comparison.smaller},
-            {"larger_errors", comparison.larger},
-            {"mean_difference_mm", kMm.of_one * comparison.mean_difference_m}};
+            {"larger_errors", comparison.larger}};
+  if (comparison.pairs > 0) {
+    json["mean_difference_mm"] = kMm.of_one * comparison.mean_difference_m;
+  }
   if (comparison.too_few()) json["why"] = "too few";
   if (comparison.interval_m) json["interval_95_mm"] = json_of(*comparison.interval_m);
   return json;

@@ -14,7 +14,10 @@ namespace vlp {
 /// figure (_mm, _deg, _m); shares and ratios have none, counts are called after what they count.
 /// What there is not is left out. Errors have mean, median, p90, max and rms; intervals are of 95
 /// %. A gate of a stage before has its text for a name, and neither unit, value nor limit. A
-/// comparison of too few units has a "why".
+/// comparison of too few units has a "why". Objects: horizontal (with intervals_95 and cdf), height
+/// and yaw (with bias), repeated (bias and scatter of stations with two fixes or more, and the
+/// list), fitted_line (of --line; jitter, angle, ends), stated_ratio (errors / stated sd), limit
+/// (errors / theoretical limit), comparison (verdict, pairs, difference), gates, passed.
 std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>& gates);
 
 /// JUnit XML, for CI systems: a test case for each gate, failed with words_of() it.

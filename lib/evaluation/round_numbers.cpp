@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "captures/csv_writer.h"
+
 namespace vlp {
 
 double round_below(double value) {
@@ -21,6 +23,10 @@ std::vector<double> round_numbers(double least, double most) {
   }
   if (numbers.size() == 1) numbers.push_back(round_below(numbers.back() * 2.5));
   return numbers;
+}
+
+std::string readable(double value, int digits) {
+  return std::abs(value) >= std::pow(10, digits) ? fixed(value, 0) : significant(value, digits);
 }
 
 }  // namespace vlp

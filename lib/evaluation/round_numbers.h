@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
 #include <vector>
 
 namespace vlp {
@@ -13,5 +14,9 @@ double round_below(double value);
 /// Those numbers in turn, two or more, from the last that is no larger than `least` to the first
 /// that is no smaller than `most`. Precondition: 0 < least <= most.
 std::vector<double> round_numbers(double least, double most);
+
+/// For people: that many significant digits, but all of those before the point and no exponent for
+/// it.
+std::string readable(double value, int digits);
 
 }  // namespace vlp

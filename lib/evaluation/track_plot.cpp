@@ -49,6 +49,7 @@ std::string layers(const std::string& columns) {
 
 Drawing drawing_of(const TrackPlot& plot) {
   assert(plot.commanded_m[0] != plot.commanded_m[1] && plot.fitted_m[0] != plot.fitted_m[1]);
+  assert(!plot.fixes_m.empty());
   const LineFrame frame(plot.commanded_m);
   const std::size_t step = thinning_step(plot.fixes_m.size(), kMostFixes);
   std::string commanded, fixes, fitted;
@@ -63,9 +64,14 @@ Drawing drawing_of(const TrackPlot& plot) {
     floor.extend(plot.fixes_m[i]);
     along.extend(frame.of(plot.fixes_m[i]));
   }
-  // Drawn as long as the drive is, wherever its two points are.
+  // Drawn as far as the fixes go, wherever its two points are: a drive that ends early shows.
   const LineFrame fitted_frame(plot.fitted_m);
-  for (const auto& end_m : plot.commanded_m) {
+  const auto along_fitted_m = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return fitted_frame.of(a).x() < fitted_frame.of(b).x();
+  };
+  const auto [first, last] =
+      std::minmax_element(plot.fixes_m.begin(), plot.fixes_m.end(), along_fitted_m);
+  for (const auto& end_m : {*first, *last}) {
     const Eigen::Vector2d foot_m =
         fitted_frame.start_m + fitted_frame.of(end_m).x() * fitted_frame.along;
     fitted += row_of(frame, foot_m);

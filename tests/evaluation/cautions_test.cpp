@@ -46,7 +46,8 @@ TEST(Cautions, TellOfFewUnits) {
   EXPECT_THAT(cautions_of_few(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
   Evaluation none = evaluation(4);
   none.intervals_m = {};
-  EXPECT_THAT(cautions_of_few(none), ElementsAre("there are too few stations for intervals"));
+  EXPECT_THAT(cautions_of_few(none),
+              ElementsAre("there are too few stations with a fix for intervals"));
 }
 
 TEST(Cautions, CountTheUnitsOfThePairs) {

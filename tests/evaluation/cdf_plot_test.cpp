@@ -25,7 +25,7 @@ TEST(CdfPlot, SaysThatTheLargestIsOffThePicture) {
   std::vector<double> errors_m(100, 0.001);
   errors_m[50] = 1;
   const CdfPlot plot{"a", {{"b", errors_m, 0.001, 0.001}}};
-  EXPECT_THAT(drawing_of(plot).commands, HasSubstr("the largest, 1e+03 mm, is off the picture"));
+  EXPECT_THAT(drawing_of(plot).commands, HasSubstr("the largest, 1000 mm, is off the picture"));
 }
 
 TEST(CdfPlot, OfManyErrorsEndsWithTheLargest) {

@@ -131,10 +131,22 @@ TEST_F(SmallStation, FollowsWhatIsInItsFolder) {
   fs::remove(folder / "a station/camera.yaml");
   ASSERT_EQ(calibrate().exit_code, 0);
   EXPECT_EQ(result("calibration.yaml"), calibration);
-  // A result that somebody changed is made again.
+  // A result that somebody changed, or took away, is made again.
   folder.file("a station/results/rotated.yaml", "changed\n");
   EXPECT_THAT(calibrate().output, Not(HasSubstr("rotation      as before")));
   EXPECT_EQ(result("calibration.yaml"), calibration);
+  fs::remove(folder / "a station/results/rotation.svg");
+  fs::remove(folder / "a station/results/evaluation.json");
+  ASSERT_EQ(calibrate().exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder / "a station/results/rotation.svg"));
+  EXPECT_TRUE(fs::exists(folder / "a station/results/evaluation.json"));
+  // A drive that cannot be taken costs the report, not the calibration.
+  folder.file("a station/line-x/truth.csv", "image,x_m,y_m\n0000.png,\"0\",0\n");
+  const auto bad_line = calibrate();
+  EXPECT_EQ(bad_line.exit_code, 2);
+  EXPECT_THAT(bad_line.errors, HasSubstr("line-x/truth.csv: its x_m and y_m are no plain numbers"));
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+  EXPECT_FALSE(fs::exists(folder / "a station/results/report.html"));
 }
 
 TEST_F(SmallStation, FailsWithTheLensWhoseGatesAreNotMet) {
@@ -170,8 +182,8 @@ TEST_F(Chain, SaysWhatIsMissing) {
   const auto empty = calibrate();
   EXPECT_EQ(empty.exit_code, 2);
   EXPECT_THAT(empty.errors, HasSubstr("a station/lamps.yaml: missing"));
-  EXPECT_EQ(calibrate("--nonsense").exit_code, 2);
-  EXPECT_EQ(calibrate("--row-time-s").exit_code, 2);
+  EXPECT_THAT(calibrate("--nonsense").errors, HasSubstr("unknown option --nonsense"));
+  EXPECT_THAT(calibrate("--row-time-s").errors, HasSubstr("--row-time-s wants a value"));
 }
 
 }  // namespace

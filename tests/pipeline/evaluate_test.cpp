@@ -208,7 +208,8 @@ TEST_F(Evaluate, EndsWithTwoOnBadUsage) {
         "--truth truth.csv --gate missing=50", "--truth truth.csv --gate mean_mm=-1",
         "--truth truth.csv --gate mean_mm=1,mean_mm=2", "--truth truth.csv --gate fitted_mean_mm=1",
         "--truth truth.csv --junit a.xml", "--truth truth.csv --json truth.csv",
-        "--truth truth.csv --noise-px 1", "--truth truth.csv --station-mm 0",
+        "--truth truth.csv --noise-px 1", "--truth truth.csv --station-mm 0", "--line 0 0 1e7 0",
+        "--truth truth.csv --json a --report ./a",
         "--truth truth.csv --json a --junit a --gate mean_mm=1"}) {
     EXPECT_EQ(evaluate(options).exit_code, 2) << options;
   }
@@ -216,8 +217,17 @@ TEST_F(Evaluate, EndsWithTwoOnBadUsage) {
 }
 
 TEST_F(Evaluate, GivesTheSameBytesWhateverTheThreads) {
+  std::string fixes = kFixes, truth = "image,x_m,y_m\n";
+  for (int i = 0; i < 60; ++i) {  // enough for intervals
+    const std::string name = std::to_string(i) + ".png,", x_m = std::to_string(i);
+    fixes += name + "ok," + x_m + ".00" + std::to_string(i % 7) + ",0,0,0,,,,,3,0\n";
+    truth += name + x_m + ",0\n";
+  }
+  folder.file("fixes.csv", fixes);
+  folder.file("truth.csv", truth);
   with_truth("--threads 1 --json one.json");
   with_truth("--threads 4 --json four.json");
+  EXPECT_THAT(content("one.json"), HasSubstr("intervals_95"));
   EXPECT_EQ(content("one.json"), content("four.json"));
   EXPECT_THAT(content("one.json"), StartsWith("{\n  \"format\": \"vlp-evaluation/1\""));
 }

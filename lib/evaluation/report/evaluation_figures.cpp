@@ -2,14 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluation/report/evaluation_figures.h"
 
-#include "captures/csv_writer.h"
+#include <cmath>
+
 #include "evaluation/cautions.h"
+#include "evaluation/round_numbers.h"
 #include "geometry/angles.h"
 
 namespace vlp {
 namespace {
 
-std::string number(double value) { return significant(value, 3); }
+std::string number(double value) { return readable(value, 3); }
 std::string mm(double value_m) { return number(1e3 * value_m); }
 
 std::string between(double low, double high) { return number(low) + " to " + number(high); }
@@ -34,6 +36,22 @@ void add_horizontal(std::vector<ReportFigure>& figures, const Evaluation& evalua
   figures.push_back(length("horizontal error, largest", errors_m.max));
 }
 
+std::string note_of(const Comparison& comparison) {
+  std::string note = "Compared with the other fixes: " + std::string(comparison.verdict()) +
+                     (comparison.too_few() ? ", too few" : "") + "; ";
+  if (comparison.pairs > 0) {
+    note += "the mean error is " + mm(std::abs(comparison.mean_difference_m)) + " mm " +
+            (comparison.mean_difference_m < 0 ? "smaller" : "larger") + " than theirs";
+  }
+  if (const auto& interval_m = comparison.interval_m) {
+    note +=
+        " (difference, 95 %: " + between(1e3 * interval_m->low, 1e3 * interval_m->high) + " mm)";
+  }
+  return note + (comparison.pairs > 0 ? "; " : "") + std::to_string(comparison.pairs) +
+         " captures have a fix in both, " + std::to_string(comparison.only_these) + " only here, " +
+         std::to_string(comparison.only_others) + " only there.";
+}
+
 }  // namespace
 
 std::vector<ReportFigure> report_figures(const Evaluation& evaluation) {
@@ -50,8 +68,10 @@ std::vector<ReportFigure> report_figures(const Evaluation& evaluation) {
         {"yaw error, root mean square", number(deg_from_rad(yaw_rad->sizes.rms)), "degrees", ""});
   }
   if (const auto& stations = evaluation.stations) {
-    figures.push_back(length("bias of the stations, root mean square", stations->bias_m));
-    figures.push_back(length("scatter at a station", stations->scatter_m));
+    const std::string of = " (" + std::to_string(stations->stations.size()) + " stations with " +
+                           std::to_string(stations->fixes) + " fixes)";
+    figures.push_back(length("bias of the stations, root mean square" + of, stations->bias_m));
+    figures.push_back(length("scatter at a station" + of, stations->scatter_m));
   }
   if (evaluation.stated) {
     figures.push_back({"error over its stated deviation (1: right)",
@@ -84,15 +104,7 @@ std::vector<std::string> report_notes(const Evaluation& evaluation) {
     notes.push_back("The intervals are of a bootstrap over " + std::to_string(intervals->units) +
                     " " + evaluation.drawn + ".");
   }
-  if (const auto& comparison = evaluation.comparison) {
-    std::string note = "Compared with the other fixes: " + std::string(comparison->verdict()) +
-                       (comparison->too_few() ? ", too few" : "") + "; the mean error differs by " +
-                       mm(comparison->mean_difference_m) + " mm";
-    if (const auto& interval_m = comparison->interval_m) {
-      note += " (95 %: " + between(1e3 * interval_m->low, 1e3 * interval_m->high) + " mm)";
-    }
-    notes.push_back(note + ".");
-  }
+  if (evaluation.comparison) notes.push_back(note_of(*evaluation.comparison));
   for (const std::string& caution : cautions_of_few(evaluation)) {
     notes.push_back("Caution: " + caution + ".");
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <pugixml.hpp>
 #include <string_view>
 
 #include "rig/input_error.h"
@@ -67,6 +68,17 @@ std::string_view svg_title(std::string_view svg) {
   return svg.substr(start + opening.size(), end - start - opening.size());
 }
 
+/// It ends in the chunk IEND and its check sum.
+bool is_whole_png(std::string_view png) {
+  constexpr std::string_view end("IEND\xAE\x42\x60\x82");
+  return png.ends_with(end);
+}
+
+bool is_whole_svg(const std::string& svg) {
+  pugi::xml_document document;
+  return document.load_buffer(svg.data(), svg.size()) && document.child("svg").first_child();
+}
+
 ReportPicture picture_of(std::string image, const std::string& name) {
   const std::string_view title = svg_title(image);
   const auto* kind = std::find_if(kKinds.begin(), kKinds.end(),
@@ -85,8 +97,12 @@ ReportPicture read_report_picture(const std::filesystem::path& file) {
   image.resize(static_cast<std::size_t>(stream.gcount()));
   if (image.size() > kMostBytes) throw InputError(file, "is longer than 16 MiB; draw less into it");
   constexpr std::size_t head = 1024;
-  if (image.rfind("\x89PNG", 0) != 0 && image.substr(0, head).find("<svg") == std::string::npos) {
+  const bool png = image.starts_with("\x89PNG");
+  if (!png && image.substr(0, head).find("<svg") == std::string::npos) {
     throw InputError(file, "is neither an SVG nor a PNG");
+  }
+  if (png ? !is_whole_png(image) : !is_whole_svg(image)) {
+    throw InputError(file, "is cut short, or holds no picture");
   }
   return picture_of(std::move(image), file.filename().string());
 }

@@ -62,7 +62,7 @@ TEST(EvaluationFigures, NotesWhatIsMissingAndWhatErrorsAre) {
   const auto notes = report_notes(evaluation());
   EXPECT_THAT(notes, ElementsAre("Horizontal errors are distances from the true place, by image.",
                                  "Captures without a fix: 1 degenerate, 1 no row.",
-                                 "Caution: there are too few captures for intervals."));
+                                 "Caution: there are too few captures with a fix for intervals."));
 }
 
 TEST(EvaluationFigures, OfADriveBearItsName) {

@@ -32,7 +32,8 @@ TEST(ReportPicture, TakesOthersByTheirName) {
   const auto file = folder.file("my room.svg", "<?xml?><svg><title>else</title></svg>");
   EXPECT_EQ(read_report_picture(file).part, ReportPart::other);
   EXPECT_EQ(read_report_picture(file).caption, "my room.svg");
-  EXPECT_EQ(read_report_picture(folder.file("a.png", "\x89PNG...")).part, ReportPart::other);
+  EXPECT_EQ(read_report_picture(folder.file("a.png", "\x89PNG...IEND\xAE\x42\x60\x82")).part,
+            ReportPart::other);
 }
 
 TEST(ReportPicture, RefusesWhatIsNone) {
@@ -43,6 +44,11 @@ TEST(ReportPicture, RefusesWhatIsNone) {
               HasSubstr("a.svg: is neither an SVG nor a PNG"));
   EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("b.svg", "x,y\n")); }),
               HasSubstr("b.svg: is neither"));
+  for (const char* cut : {"<?xml?><svg><title>else</title>", "<svg></svg>", "\x89PNG.."}) {
+    EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("d.svg", cut)); }),
+                HasSubstr("d.svg: is cut short"))
+        << cut;
+  }
   const std::string long_svg = "<svg>" + std::string((16u << 20) + 1, ' ');
   EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("c.svg", long_svg)); }),
               HasSubstr("c.svg: is longer than 16 MiB"));
