@@ -4,22 +4,17 @@
 
 Writes into RESULTS/.state: run.json (toolbox and options), shards/N.list (a session a line, with the
 number, size and latest change of its files: a glance that tells which shards to look into), shards.txt
-(how many), again.txt (rows to make again), and compare.json. What has not changed is not touched, so that Snakemake runs the rest.
+(how many), again.txt (rows to make again), and compare.json. What has not changed is not touched, so that
+Snakemake runs the rest.
 """
 import argparse
 import re
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from changes import read_gates
+from checks import check, fail
 from files import digest, input_files, json_text, write_if_other, write_whole
 from toolbox import toolbox
-
-
-def fail(message):
-    print(f"reprocess.sh: error: {message}", file=sys.stderr)
-    sys.exit(2)
 
 
 def sessions_in(archive):
@@ -45,8 +40,8 @@ def write_shards(archive, state, shard_size):
     if not sessions:
         fail(f"{archive}: no sessions in it; ARCHIVE/CAMERA/SESSION/ is where captures are looked for")
     for name in sessions:
-        if not re.fullmatch(r"[\w.-]+/[\w.-]+", name, re.ASCII):
-            fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_' and '-'")
+        if not re.fullmatch(r"\w[\w .-]*/\w[\w .-]*", name, re.ASCII):
+            fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks")
     with ThreadPoolExecutor(16) as threads:  # most of it is waiting for the file system
         glances = list(threads.map(lambda name: glance(archive / name), sessions))
     wanted = set()
@@ -82,19 +77,7 @@ def main():
     parser.add_argument("--camera-option", action="append", default=[])
     options = parser.parse_args()
     archive, results = options.archive.resolve(), options.results.resolve()
-    for file in (options.gates, options.session_gates):
-        if file and not file.is_file():
-            fail(f"{file}: is not a file")
-    if options.gates:
-        try:
-            read_gates(options.gates)
-        except ValueError as failure:
-            fail(failure)
-    if options.previous and not (options.previous / "summary.csv").is_file():
-        fail(f"{options.previous}: holds no summary.csv of an earlier run")
-    if options.shard_size < 1:
-        fail("--shard-size: should be 1 or more")
-
+    check(options)
     state = results / ".state"
     (state / "logs").mkdir(parents=True, exist_ok=True)  # a cluster's jobs find it
     run = {
@@ -120,4 +103,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (OSError, UnicodeDecodeError) as failure:
+        fail(failure)

@@ -1,0 +1,25 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a session of an archive holds, as scripts/calibrate.sh has it."""
+
+# What the stages read of it.
+INPUTS = ["board.yaml", "boards", "camera.yaml", "check", "dispersion", "gates.yaml", "lamps.yaml", "rotation"]
+
+
+def truth_of(station):
+    """The table with the true places of the captures to locate, or None."""
+    check = station / "check"
+    if (check / "truth.csv").exists():
+        return check / "truth.csv"
+    try:
+        with open(check / "captures.csv", encoding="utf-8", errors="replace") as captures:
+            return check / "captures.csv" if "x_m" in captures.readline() else None
+    except OSError:
+        return None
+
+
+def last_file(station):
+    """What the last stage of the chain makes."""
+    if truth_of(station):
+        return "evaluation.json"
+    return "fixes.csv" if (station / "check").exists() else "calibration.yaml"
