@@ -86,7 +86,12 @@ if ! "$python" -m snakemake --snakefile "$scripts/Snakefile" --directory "$resul
   --rerun-incomplete --rerun-triggers mtime --keep-going --scheduler greedy "${how[@]}" \
   >"$log" 2>&1
 then
-  grep -E '^[A-Za-z]*Error|Error in rule|    log:' "$log" >&2 || tail -n 20 "$log" >&2
+  mapfile -t failed < <(grep -A 8 '^Error in rule' "$log" | sed -n 's/^ *log: \([^ ]*\).*/\1/p' | sort -u | head -n 5)
+  [ ${#failed[@]} -gt 0 ] || tail -n 20 "$log" >&2
+  for said in "${failed[@]}"; do
+    words=$(tail -n 1 "$results/$said")
+    echo "$results/$said: ${words:-holds nothing; is the disk full?}" >&2
+  done
   echo "reprocess.sh: error: not all could be done; see $log; the same command goes on" >&2
   exit 3
 fi

@@ -41,8 +41,9 @@ def current(name, key):
     return None
 
 
-def run_chain(run, names, work):
-    """The rule per stage of session.smk for sessions, one after another."""
+def run_chain(run, names, work, lock):
+    """The rule per stage of session.smk for sessions, one after another. Snakemake holds the lock, too: when
+    it is told to end it ends its stages first, and may outlive us."""
     config = {key: run[key] for key in ("archive", "bin", "camera", "session_gates")}
     write_whole(work / "config.json", json_text({**config, "sessions": names}))
     subprocess.run(
@@ -51,6 +52,7 @@ def run_chain(run, names, work):
         + ["--keep-going", "--nolock", "--rerun-incomplete", "--rerun-triggers", "mtime", "--quiet", "all"]
         + ["--latency-wait", "0"],
         cwd=work,
+        pass_fds=[lock.fileno()],
         check=False,  # the outcome of each session says what came of it
     )
 
@@ -97,7 +99,7 @@ def stated_cost(name):
         return ""
 
 
-def reprocess(run, shard, names):
+def reprocess(run, shard, names, lock):
     work = (STATE / "work" / shard).absolute()
     sessions, stale = {}, {}
     for name in names:
@@ -113,7 +115,7 @@ def reprocess(run, shard, names):
             begun.mkdir(parents=True, exist_ok=True)
             (begun / key).touch()
     if stale:
-        run_chain(run, list(stale), work)
+        run_chain(run, list(stale), work, lock)
     for name, keys in stale.items():
         sessions[name] = outcome_of(work / name, name, run) | keys | {"version": run["version"]}
         write_whole(COSTS / name, cost_of(work / name))
@@ -131,7 +133,7 @@ def main():
     with open(STATE / "locks" / shard, "w") as lock:
         # A job that the cluster gave up may still be at work.
         fcntl.flock(lock, fcntl.LOCK_EX)
-        rows = reprocess(run, shard, [line.split("\t")[0] for line in lines])
+        rows = reprocess(run, shard, [line.split("\t")[0] for line in lines], lock)
     write_whole(STATE / "rows" / f"{shard}.csv", table(COLUMNS, rows))
 
 
