@@ -12,10 +12,10 @@ sed 's/fault_share: .*/fault_share: 0.2/; s/damage_share: .*/damage_share: 0.3/'
   "$source_dir/datasets/archive/scene.yaml" >"$scratch/scene.yaml"
 "$bin/vlp-simulate" --quiet "$scratch/scene.yaml" --archive 10 -o "$archive"
 before=$(state_of_archive)
-reprocess "$baseline" --shard-size 3 --cores 2 >"$scratch/said"
-cat "$scratch/said"
+reprocess "$baseline" --shard-size 3 --cores 2 >"$said"
+cat "$said"
 [ "$before" = "$(state_of_archive)" ] || fail "the archive has changed"
-grep -q '^no result   3, and 0 that crashed' "$scratch/said" || fail "three sessions are damaged"
+grep -q '^no result   3, and 0 that crashed' "$said" || fail "three sessions are damaged"
 [ "$(wc -l <"$baseline/summary.csv")" = 11 ] || fail "a row per session"
 while IFS=, read -r camera session _ damage _; do
   [ "$camera" != camera ] || continue

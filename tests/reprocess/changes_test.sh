@@ -13,9 +13,9 @@ cp -a "$baseline" "$previous"
 awk -F, -v OFS=, 'NR > 1 && $7 && !done { $7 /= 2; done = 1 } 1' "$baseline/summary.csv" >"$previous/summary.csv"
 printf 'format: vlp-archive-gates/1\ngates: {no_result: 3, newly_failed: 0, worse_share: 0.1}\n' >"$scratch/gates.yaml"
 code=0
-reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gates.yaml" >"$scratch/said" 2>"$scratch/errors" || code=$?
+reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
 [ "$code" = 1 ] || fail "exit code $code"
-grep -q '^changed     0 better, 1 worse, 6 the same, 0 newly without' "$scratch/said" || fail "$(cat "$scratch/said")"
+grep -q '^changed     0 better, 1 worse, 6 the same, 0 newly without' "$said" || fail "$(cat "$said")"
 grep -q 'gate worse_share: is 0.1429, at most 0.1 is asked for' "$scratch/errors" || fail "$(cat "$scratch/errors")"
 [ "$(wc -l <"$scratch/errors")" = 1 ] || fail "the other gates are met"
 grep -q '>FAIL<' "$results/overview.html" || fail "the overview says nothing"
@@ -32,8 +32,8 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   few="$archive/unit 2/few boards"
   rm "$few"/boards/00{05..19}.png
   mv "$few/check/truth.csv" "$few/check/captures.csv"
-  reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" >"$scratch/said"
-  grep -q '^gates       2 with a result that misses a gate' "$scratch/said" || fail "$(cat "$scratch/said")"
+  reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" >"$said"
+  grep -q '^gates       2 with a result that misses a gate' "$said" || fail "$(cat "$said")"
   grep -q '^camera.*vlp-evaluate: error: mean_mm is .* at most 0.0001 mm' "$scratch/gates-results/summary.csv" || fail "no reason"
   grep -q '^unit 2,few boards,gate,12,.*vlp-evaluate: error: lens: ' "$scratch/gates-results/summary.csv" || fail "no reason"
   grep -q '"passed": false' "$scratch/gates-results/sessions/unit 2/few boards/evaluation.json" || fail "passes without a lens"

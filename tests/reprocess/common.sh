@@ -6,6 +6,7 @@ set -euo pipefail
 source_dir=$1 bin=$2 scratch=$3
 export VLP_PROGRAMS_DIR=$bin
 archive=$scratch/archive baseline=$scratch/baseline
+said=$scratch/$(basename "$0" .sh).said
 
 /usr/bin/python3 -c 'import snakemake' 2>/dev/null ||
   { echo "snakemake is missing: scripts/setup.sh --batch"; exit 77; }
@@ -20,7 +21,7 @@ reprocess() {  # RESULTS OPTION...
 }
 # The same as a process group, to be killed as a whole: kill -9 -- -$!
 start_reprocess() {  # RESULTS OPTION...
-  setsid "$source_dir/scripts/reprocess.sh" "$archive" "$1" "${options[@]}" "${@:2}" >"$scratch/said" 2>&1 &
+  setsid "$source_dir/scripts/reprocess.sh" "$archive" "$1" "${options[@]}" "${@:2}" >"$said" 2>&1 &
 }
 patiently() {  # SECONDS COMMAND...: until it succeeds
   local ends=$((SECONDS + $1))

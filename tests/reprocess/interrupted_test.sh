@@ -25,7 +25,7 @@ for moment in '*/work/*/logs/lens.txt' '*/work/*/rotated.yaml' '*/sessions/*/ses
     [ ! -e "$session" ] || [ -s "$session/session.json" ] || fail "$session is not whole"
   done
 done
-run() { reprocess "$results" --shard-size 1 --cores 2 >"$results-said"; }
+run() { reprocess "$results" --shard-size 1 --cores 2 >"$said"; }
 run
 expect_baseline "$results" "${sessions[@]:0:2}"
 cmp "$baseline/failed/$broken/session.json" "$results/failed/$broken/session.json"
@@ -66,11 +66,11 @@ chmod +x "$results-bin/vlp-locate"
 touch "$results-crash"
 VLP_PROGRAMS_DIR=$results-bin run
 [ "$(redone | wc -l)" = 3 ] || fail "another program makes all stale"
-grep -q '^no result   1, and 1 that crashed' "$results-said" || fail "$(cat "$results-said")"
+grep -q '^no result   1, and 1 that crashed' "$said" || fail "$(cat "$said")"
 grep -q '"reason": "locate ended with exit code 137"' "$results/failed/$good/session.json" || fail "no reason"
 rm "$results-crash"
 VLP_PROGRAMS_DIR=$results-bin run
-grep -q '^no result   1, and 0 that crashed' "$results-said" || fail "$(cat "$results-said")"
+grep -q '^no result   1, and 0 that crashed' "$said" || fail "$(cat "$said")"
 [ "$(redone)" = "$good/session.json" ] && [ ! -e "$results/failed/$good" ] || fail "it has a result now"
 
 # With .state gone what it knew is found out again, but for the costs.

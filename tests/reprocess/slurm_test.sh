@@ -54,7 +54,7 @@ SelectType=select/cons_tres
 SelectTypeParameters=CR_Core
 SlurmdParameters=config_overrides
 ReturnToService=2
-SlurmdTimeout=5
+SlurmdTimeout=10
 MpiDefault=none
 NodeName=n[1-2] NodeHostname=$(hostname -s) NodeAddr=127.0.0.1 Port=$((port + 1))-$((port + 2)) CPUs=1 RealMemory=4000
 PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
@@ -73,7 +73,8 @@ results=$scratch/slurm
 rm -rf "$results" "$results-killed"
 reprocess "$results" --profile slurm --shard-size 3
 expect_baseline "$results"
-scontrol show job --oneliner | grep -q 'JobState=COMPLETED.*BatchHost=n2' || fail "no job ran on the second node"
+done_on_n2() { scontrol show job --oneliner | grep 'JobState=COMPLETED.*BatchHost=n2'; }
+done_on_n2 >/dev/null || fail "no job ran on the second node: $(scontrol show job --oneliner)"
 
 results=$scratch/slurm-killed
 start_reprocess "$results" --profile slurm --shard-size 3
@@ -81,11 +82,12 @@ runs+=($!)
 works_on_n2() { squeue --noheader --states=running --nodelist=n2 | grep vlp; }
 patiently 120 works_on_n2
 kill -9 "${nodes[1]}"
+scontrol update NodeName=n2 State=DOWN Reason=killed  # Slurm finds out alone, but later
 node_failed() { scontrol show job --oneliner | grep JobState=NODE_FAIL; }
 patiently 120 node_failed
 a_shard_is_done() { ls "$results"/.state/rows/*.csv; }
 patiently 300 a_shard_is_done
-kill -0 "${runs[0]}" 2>/dev/null || fail "the run ended with its node: $(cat "$scratch/said")"
+kill -0 "${runs[0]}" 2>/dev/null || fail "the run ended with its node: $(cat "$said")"
 kill -9 -- "-${runs[0]}"
 [ ! -e "$results/summary.csv" ] || fail "Snakemake was killed too late"
 reprocess "$results" --profile slurm --shard-size 3
