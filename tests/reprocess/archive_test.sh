@@ -31,18 +31,15 @@ while IFS=, read -r camera session _ damage _; do
     done
   fi
 done <"$archive/archive.csv"
-# What the chain gives is what its programs give by hand, byte for byte.
-station=$archive/camera-00001/session-01 hand=$scratch/hand
-mkdir "$hand"
-(
-  PATH=$bin:$PATH
-  vlp-intrinsics "$station/boards" --board "$station/board.yaml" --row-time-s 3e-5 --readout rows -o "$hand/lens.yaml"
-  for stage in rotation dispersion; do
-    from=$([ $stage = rotation ] && echo lens || echo rotation)
-    vlp-$stage "$station/$stage" --lamps "$station/lamps.yaml" --calibration "$hand/$from.yaml" -o "$hand/$stage.yaml"
-  done
-  vlp-locate "$station/check" --lamps "$station/lamps.yaml" --calibration "$hand/dispersion.yaml" -o "$hand/fixes.csv"
-) >"$hand/said" 2>&1
-cmp "$hand/fixes.csv" "$baseline/sessions/camera-00001/session-01/fixes.csv"
+# What the chain gives is what calibrate.sh gives, byte for byte, and its report is of the same.
+name=camera-00001/session-01 alone=$scratch/alone
+"$source_dir/scripts/calibrate.sh" "$archive/$name" -o "$alone" --camera-id camera-00001 "${options[@]}" >"$said"
+cmp "$alone/check-fixes.csv" "$baseline/sessions/$name/fixes.csv"
+cmp "$alone/lens.cameramodel" "$baseline/sessions/$name/camera.cameramodel"
+for part in camera intrinsics_report rotation_center dispersion; do
+  part_of() { sed -n "/^$part:/,/^[a-z]/p" "$1"; }
+  [ -n "$(part_of "$alone/calibration.yaml")" ] || fail "calibrate.sh gives no $part"
+  diff <(part_of "$alone/calibration.yaml") <(part_of "$baseline/sessions/$name/calibration.yaml")
+done
 if grep -q 'src="http\|<script' "$baseline/overview.html"; then fail "the overview is not self-contained"; fi
-rm -rf "$hand"
+rm -rf "$alone"
