@@ -58,7 +58,7 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-[ ${#folders[@]} = 2 ] || usage "which ARCHIVE and RESULTS?"
+[ ${#folders[@]} = 2 ] || usage "ARCHIVE and RESULTS are missing, or something more is there"
 results=${folders[1]}
 snakemake=$("$python" -c 'from importlib.metadata import version; print(version("snakemake"))' 2>/dev/null) ||
   refuse "snakemake is missing; run scripts/setup.sh --batch"
@@ -76,7 +76,11 @@ mkdir -p "$results/.state" 2>/dev/null && : 2>/dev/null >>"$results/.state/lock"
   refuse "$results: cannot be written to"
 exec 9>>"$results/.state/lock"
 flock --nonblock 9 || refuse "$results: another run is at work there"
-"$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}"
+if ! "$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}"; then
+  if [ ! -e "$results/.state/run.json" ]; then rm -r "$results/.state"; fi
+  rmdir "$results" 2>/dev/null || true
+  exit 2
+fi
 log=$results/.state/reprocess.log
 mapfile -t again <"$results/.state/again.txt"
 [ ${#again[@]} = 0 ] || how+=(--forcerun "${again[@]}")

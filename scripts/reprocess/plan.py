@@ -57,11 +57,11 @@ def write_shards(archive, state, shard_size):
     return len(sessions)
 
 
-def again(state):
+def again(state, summary):
     """The rows to make whatever Snakemake thinks: those that are missing beside a summary, and those
     with crashes, which may have been for want of memory or disk."""
     rows = [state / "rows" / f"{file.stem}.csv" for file in sorted((state / "shards").glob("*.list"))]
-    wanted = [file for file in rows if not file.exists() or ",crashed," in file.read_text()]
+    wanted = [file for file in rows if (",crashed," in file.read_text() if file.exists() else summary.exists())]
     return [f".state/rows/{file.name}\n" for file in wanted]
 
 
@@ -89,7 +89,7 @@ def main():
         **toolbox(options.bin),
     }
     count = write_shards(archive, state, options.shard_size)
-    write_whole(state / "again.txt", "".join(again(state)))
+    write_whole(state / "again.txt", "".join(again(state, results / "summary.csv")))
     write_if_other(state / "run.json", json_text(run))
     previous = options.previous.resolve() if options.previous else None
     compare = {

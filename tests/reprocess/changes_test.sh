@@ -46,7 +46,7 @@ refused() {  # MESSAGE ARGUMENT...: exit code 2 and one line
   [ "$code" = 2 ] && grep -q -- "$1" "$scratch/errors" && [ "$(wc -l <"$scratch/errors")" = 1 ] ||
     fail "${*:2}: $code $(cat "$scratch/errors")"
 }
-refused 'which ARCHIVE' "$archive"
+refused 'ARCHIVE and RESULTS are missing' "$archive"
 refused 'is in the archive' "$archive" "$archive/results"
 refused 'is not a folder' "$scratch/nowhere" "$scratch/refused"
 refused 'unknown option' "$archive" "$scratch/refused" --odd
@@ -63,4 +63,5 @@ refused "gate 'odd' is unknown; there are: no_result" "$archive" "$scratch/refus
 mkdir -p "$scratch/empty" "$scratch/odd/camera/it's"
 refused 'no sessions in it' "$scratch/empty" "$scratch/refused"
 refused 'names of cameras and sessions' "$scratch/odd" "$scratch/refused"
+[ ! -e "$scratch/refused" ] || fail "something is left of what was refused"
 rm -rf "$results" "$previous" "$scratch"/gates* "$scratch/refused"
