@@ -21,7 +21,7 @@
 # --previous       results of an earlier run to compare with
 # --gates          what the archive as a whole has to keep to, vlp-archive-gates/1
 # --session-gates  gates of vlp-evaluate for sessions that have no gates.yaml of their own
-# --shard-size N   sessions in a job (default 20)
+# --shard-size N   sessions in a job at most (default 50)
 #
 # Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 not all could be done.
 set -euo pipefail
@@ -65,7 +65,11 @@ snakemake=$("$python" -c 'from importlib.metadata import version; print(version(
 if [[ $profile == "$scripts/profiles/"* && $snakemake != 7.* ]]; then
   refuse "$profile is for Snakemake 7, this is $snakemake: give --profile a folder of your own, see reprocess/README.md"
 fi
-if [ -n "$profile" ]; then how=(--profile "$profile"); else how=(--cores "$cores"); fi
+if [ -n "$profile" ]; then
+  how=(--profile "$profile")
+else
+  how=(--cores "$cores") plan+=(--at-a-time "$cores")
+fi
 
 export PYTHONDONTWRITEBYTECODE=1
 case $(realpath -m "$results")/ in

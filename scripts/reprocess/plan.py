@@ -35,7 +35,17 @@ def glance(session):
     return f"{count} {size} {latest}"
 
 
-def write_shards(archive, state, shard_size):
+def shard_ends(sessions, size, at_a_time):
+    """Where each shard ends. Few of them are made alike in length and as many as end together, so that no
+    core waits for the last; of many, all but the last stay as they are when sessions are added."""
+    count = -(-sessions // size)
+    if count >= 8 * at_a_time:
+        return [min(end, sessions) for end in range(size, sessions + size, size)]
+    count = min(sessions, -(-count // at_a_time) * at_a_time)
+    return [sessions * (i + 1) // count for i in range(count)]
+
+
+def write_shards(archive, state, size, at_a_time):
     sessions = list(sessions_in(archive))
     if not sessions:
         fail(f"{archive}: no sessions in it; ARCHIVE/CAMERA/SESSION/ is where captures are looked for")
@@ -44,13 +54,14 @@ def write_shards(archive, state, shard_size):
             fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks")
     with ThreadPoolExecutor(16) as threads:  # most of it is waiting for the file system
         glances = list(threads.map(lambda name: glance(archive / name), sessions))
+    lines = [f"{name}\t{seen}\n" for name, seen in zip(sessions, glances)]
     wanted = set()
-    for first in range(0, len(sessions), shard_size):
-        file = state / "shards" / f"{first // shard_size:06d}.list"
+    first = 0
+    for number, end in enumerate(shard_ends(len(sessions), size, at_a_time)):
+        file = state / "shards" / f"{number:06d}.list"
         wanted.add(file)
-        names = sessions[first : first + shard_size]
-        lines = [f"{name}\t{seen}\n" for name, seen in zip(names, glances[first : first + shard_size])]
-        write_if_other(file, "".join(lines))
+        write_if_other(file, "".join(lines[first:end]))
+        first = end
     for file in set((state / "shards").glob("*.list")) - wanted:
         file.unlink()
     write_if_other(state / "shards.txt", f"{len(wanted)}\n")
@@ -73,7 +84,8 @@ def main():
     parser.add_argument("--gates", type=Path)
     parser.add_argument("--session-gates", type=Path)
     parser.add_argument("--previous", type=Path)
-    parser.add_argument("--shard-size", type=int, default=20)
+    parser.add_argument("--shard-size", type=int, default=50)
+    parser.add_argument("--at-a-time", type=int, default=1)
     parser.add_argument("--camera-option", action="append", default=[])
     options = parser.parse_args()
     archive, results = options.archive.resolve(), options.results.resolve()
@@ -88,7 +100,7 @@ def main():
         "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
         **toolbox(options.bin),
     }
-    count = write_shards(archive, state, options.shard_size)
+    count = write_shards(archive, state, options.shard_size, options.at_a_time)
     write_whole(state / "again.txt", "".join(again(state, results / "summary.csv")))
     write_if_other(state / "run.json", json_text(run))
     previous = options.previous.resolve() if options.previous else None

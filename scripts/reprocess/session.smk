@@ -9,7 +9,7 @@ from pathlib import Path
 from shlex import quote
 
 sys.path.insert(0, workflow.basedir)
-from station import last_file, truth_of
+from station import last_file, row_time_known, truth_of
 
 archive = Path(config["archive"])
 shell.prefix(f"source {quote(workflow.basedir + '/stage.sh')}; PATH={quote(config['bin'])}:$PATH; ")
@@ -23,6 +23,11 @@ def session_gates(wildcards):
     own = archive / wildcards.session / "gates.yaml"
     gates = own if own.exists() else config["session_gates"]
     return ["--gates", gates] if gates else []
+
+
+def calibrated_lens(wildcards):
+    known = row_time_known(archive / wildcards.session, config["camera"])
+    return wildcards.session + ("/lens.yaml" if known else "/camera.yaml")
 
 
 def dispersion(wildcards):
@@ -54,7 +59,7 @@ rule lens:
         " --camera-id={params.id:q} {params.camera} --threads 1 -o {output:q}; fi"
 
 
-rule row_time:
+rule row_time:  # where it is not stated
     input:
         "{session}/lens.yaml",
     output:
@@ -64,14 +69,13 @@ rule row_time:
     params:
         station=in_archive(""),
     shell:
-        "if grep -q '^  row_time_s:' {input:q}; then cp {input:q} {output:q};"
-        " else stage {log:q} vlp-train {params.station:q}/rotation --row-time"
-        " --lamps {params.station:q}/lamps.yaml --calibration {input:q} --threads 1 -o {output:q}; fi"
+        "stage {log:q} vlp-train {params.station:q}/rotation --row-time"
+        " --lamps {params.station:q}/lamps.yaml --calibration {input:q} --threads 1 -o {output:q}"
 
 
 rule rotation:
     input:
-        "{session}/camera.yaml",
+        calibrated_lens,
     output:
         "{session}/rotated.yaml",
     log:

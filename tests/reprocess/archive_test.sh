@@ -36,10 +36,6 @@ name=camera-00001/session-01 alone=$scratch/alone
 "$source_dir/scripts/calibrate.sh" "$archive/$name" -o "$alone" --camera-id camera-00001 "${options[@]}" >"$said"
 cmp "$alone/check-fixes.csv" "$baseline/sessions/$name/fixes.csv"
 cmp "$alone/lens.cameramodel" "$baseline/sessions/$name/camera.cameramodel"
-for part in camera intrinsics_report rotation_center dispersion; do
-  part_of() { sed -n "/^$part:/,/^[a-z]/p" "$1"; }
-  [ -n "$(part_of "$alone/calibration.yaml")" ] || fail "calibrate.sh gives no $part"
-  diff <(part_of "$alone/calibration.yaml") <(part_of "$baseline/sessions/$name/calibration.yaml")
-done
+cmp "$alone/calibration.yaml" "$baseline/sessions/$name/calibration.yaml"
 if grep -q 'src="http\|<script' "$baseline/overview.html"; then fail "the overview is not self-contained"; fi
 rm -rf "$alone"

@@ -20,6 +20,7 @@ except ImportError:
 import changes
 import files
 import outcome
+import plan
 import shard
 import station
 
@@ -192,7 +193,29 @@ class Shard(unittest.TestCase):
             self.assertEqual(found, sorted([*outcome.KEPT.values(), "session.json", "logs/lens.txt"]))
 
 
+class Plan(unittest.TestCase):
+    def test_shards_end_together(self):
+        def lengths(*arguments):
+            ends = plan.shard_ends(*arguments)
+            return [end - start for start, end in zip([0, *ends], ends)]
+
+        self.assertEqual(lengths(100, 50, 2), [50, 50])
+        self.assertEqual(lengths(110, 50, 2), [27, 28, 27, 28])
+        self.assertEqual(lengths(3, 50, 8), [1, 1, 1])
+        self.assertEqual(lengths(10, 3, 1), [2, 3, 2, 3])
+        self.assertEqual(lengths(810, 50, 2), [50] * 16 + [10])
+
+
 class Station(unittest.TestCase):
+    def test_knows_whether_there_is_a_row_time(self):
+        with tempfile.TemporaryDirectory() as folder:
+            known = [station.row_time_known(Path(folder), options) for options in ("", "--row-time-s 3e-5")]
+            (Path(folder) / "camera.yaml").write_text("camera:\n  id: a\n")
+            known.append(station.row_time_known(Path(folder), "--row-time-s 3e-5"))
+            (Path(folder) / "camera.yaml").write_text("camera:\n  id: a\n  row_time_s: 3e-5\n")
+            known.append(station.row_time_known(Path(folder), ""))
+            self.assertEqual(known, [False, True, False, True])
+
     def test_knows_what_the_last_stage_makes(self):
         with tempfile.TemporaryDirectory() as folder:
             check = Path(folder) / "check"
