@@ -117,6 +117,8 @@ void add_detect_options(CLI::App& app, DetectOptions& options) {
   app.add_option("--exposure-s", options.exposure_s,
                  "Exposure of the images, for the check of the lamp map (default: short)")
       ->check(finite_positive());
+  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
 }
 
 CaptureDetections detect_folder(const DetectOptions& options, const LampMap& lamps,

@@ -39,13 +39,13 @@ void check_frequencies(const LampMap& lamps, const std::string& lamps_file);
 void check_lamps(const std::vector<Frame>& frames, const LampMap& lamps,
                  const std::string& lamps_file);
 
-/// Adds --classifier, --annotate, --readout and --exposure-s.
+/// Adds --classifier, --annotate, --readout, --exposure-s and --threads.
 void add_detect_options(CLI::App& app, DetectOptions& options);
 
-/// The lamps in a folder of images, on all cores, with progress and a warning for each image that
-/// is skipped, for each two lamps of the map that are too much alike; `output` must not be one of
-/// the images. Throws InputError: no row time, no frequency, no image, a classifier of other lamps
-/// or of another row time; Undetermined when no lamp is identified.
+/// The lamps in a folder of images, `threads` at a time, with progress and a warning for each image
+/// that is skipped, for each two lamps of the map that are too much alike; `output` must not be one
+/// of the images. Throws InputError: no row time, no frequency, no image, a classifier of other
+/// lamps or of another row time; Undetermined when no lamp is identified.
 CaptureDetections detect_folder(const DetectOptions& options, const LampMap& lamps,
                                 const std::optional<Calibration>& calibration);
 

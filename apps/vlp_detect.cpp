@@ -59,7 +59,5 @@ int main(int argc, char** argv) {
       ->excludes("--calibration");
   app.add_option("-o,--output", options.output, "Where to write detections.csv")->required();
   vlp::add_detect_options(app, options);
-  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

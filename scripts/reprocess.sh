@@ -21,30 +21,36 @@
 # --previous       results of an earlier run to compare with
 # --gates          what the archive as a whole has to keep to, vlp-archive-gates/1
 # --session-gates  gates of vlp-evaluate for sessions that have no gates.yaml of their own
-# --shard-size N   sessions in a job (default 20)
+# --shard-size N   sessions in a job at most (default 50)
 #
-# Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 some shards could not be done.
+# Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 not all could be done.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
 bin=${VLP_PROGRAMS_DIR:-$(cd "$scripts/../.." && pwd)/build/bin}
 python=${VLP_PYTHON:-/usr/bin/python3}  # the one that Debian's snakemake is for
 
-usage() {
-  echo "reprocess.sh: error: $1; see reprocess.sh --help" >&2
+refuse() {
+  echo "reprocess.sh: error: $1" >&2
   exit 2
 }
-folders=() plan=() how=()
+usage() { refuse "$1; see reprocess.sh --help"; }
+folders=() plan=() profile=''
 cores=$(nproc)
 while [ $# -gt 0 ]; do
   case $1 in
     --gates | --session-gates | --previous | --shard-size | --cores | --profile | --row-time-s | --readout)
-      [ $# -gt 1 ] || usage "$1 wants a value" ;;&
+      [ $# -gt 1 ] || usage "$1 wants a value"
+      case $1 in
+        --cores | --shard-size) [[ $2 =~ ^[1-9][0-9]*$ ]] || usage "$1: should be a number from 1" ;;
+        --row-time-s) [[ $2 =~ ^[0-9.]+(e-?[0-9]+)?$ ]] || usage "$1: should be seconds" ;;
+        --readout) [[ $2 =~ ^(rows|columns)$ ]] || usage "$1: should be rows or columns" ;;
+      esac ;;&
     --gates | --session-gates | --previous | --shard-size) plan+=("$1" "$2"); shift ;;
     --row-time-s | --readout) plan+=("--camera-option=$1" "--camera-option=$2"); shift ;;
     --cores) cores=$2; shift ;;
     --profile)
-      how=(--profile "$2")
-      if [ -d "$scripts/profiles/$2" ]; then how=(--profile "$scripts/profiles/$2"); fi
+      if [ -d "$scripts/profiles/$2" ]; then profile=$scripts/profiles/$2; else profile=$2; fi
+      [ -e "$profile/config.yaml" ] || usage "--profile $2: neither of ours nor a folder with config.yaml"
       shift ;;
     -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
     -*) usage "unknown option $1" ;;
@@ -52,32 +58,49 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-[ ${#folders[@]} = 2 ] || usage "which ARCHIVE and RESULTS?"
-[[ $cores =~ ^[1-9][0-9]*$ ]] || usage "--cores: should be a number from 1"
+[ ${#folders[@]} = 2 ] || usage "ARCHIVE and RESULTS are missing, or something more is there"
 results=${folders[1]}
-"$python" -c 'import snakemake' 2>/dev/null ||
-  { echo "reprocess.sh: error: snakemake is missing; run scripts/setup.sh --batch" >&2; exit 2; }
-[ ${#how[@]} -gt 0 ] || how=(--cores "$cores")
+snakemake=$("$python" -c 'from importlib.metadata import version; print(version("snakemake"))' 2>/dev/null) ||
+  refuse "snakemake is missing; run scripts/setup.sh --batch"
+if [[ $profile == "$scripts/profiles/"* && $snakemake != 7.* ]]; then
+  refuse "$profile is for Snakemake 7, this is $snakemake: give --profile a folder of your own, see reprocess/README.md"
+fi
+if [ -n "$profile" ]; then
+  how=(--profile "$profile")
+else
+  how=(--cores "$cores") plan+=(--at-a-time "$cores")
+fi
 
 export PYTHONDONTWRITEBYTECODE=1
 case $(realpath -m "$results")/ in
   "$(realpath -m "${folders[0]}")"/*) usage "$results: is in the archive, which is only read" ;;
 esac
 [ -d "${folders[0]}" ] || usage "${folders[0]}: is not a folder"
-mkdir -p "$results/.state"
-exec 9>"$results/.state/lock"
-flock --nonblock 9 || usage "$results: another run is at work there"
-"$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}"
+mkdir -p "$results/.state" 2>/dev/null && : 2>/dev/null >>"$results/.state/lock" ||
+  refuse "$results: cannot be written to"
+exec 9>>"$results/.state/lock"
+flock --nonblock 9 || refuse "$results: another run is at work there"
+if ! "$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}"; then
+  if [ ! -e "$results/.state/run.json" ]; then rm -r "$results/.state"; fi
+  rmdir "$results" 2>/dev/null || true
+  exit 2
+fi
 log=$results/.state/reprocess.log
 mapfile -t again <"$results/.state/again.txt"
 [ ${#again[@]} = 0 ] || how+=(--forcerun "${again[@]}")
-# A run that was killed leaves Snakemake's own lock, which the one above stands for.
+# A run that was killed leaves Snakemake's own lock, which the one above stands for: Snakemake holds it to
+# its end, should this shell end before, and its jobs do not.
 if ! "$python" -m snakemake --snakefile "$scripts/Snakefile" --directory "$results" --nolock \
   --rerun-incomplete --rerun-triggers mtime --keep-going --scheduler greedy "${how[@]}" \
-  >"$log" 2>&1 9>&-
+  >"$log" 2>&1
 then
-  grep -E '^Error|Error in rule|    log:' "$log" >&2 || tail -n 20 "$log" >&2
-  echo "reprocess.sh: error: some shards could not be done; see $log; the same command goes on" >&2
+  mapfile -t failed < <(grep -A 8 '^Error in rule' "$log" | sed -n 's/^ *log: \([^ ]*\).*/\1/p' | sort -u | head -n 5)
+  [ ${#failed[@]} -gt 0 ] || tail -n 20 "$log" >&2
+  for said in "${failed[@]}"; do
+    words=$(tail -n 1 "$results/$said")
+    echo "$results/$said: ${words:-holds nothing; is the disk full?}" >&2
+  done
+  echo "reprocess.sh: error: not all could be done; see $log; the same command goes on" >&2
   exit 3
 fi
 exec "$python" "$scripts/verdict.py" "$results"

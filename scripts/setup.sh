@@ -25,7 +25,7 @@ packages=(
 case ${1:-} in
   '') ;;
   # Snakemake, and a Slurm on one machine for the tests of its profile.
-  --batch) packages+=(snakemake slurmctld slurmd slurm-client munge) ;;
+  --batch) packages+=(snakemake slurmctld slurmd slurm-client munge procps) ;;
   *) echo "setup.sh: unknown option $1; there is --batch" >&2; exit 2 ;;
 esac
 

@@ -4,7 +4,8 @@
 
 Sessions are paired by camera and session where the inputs are the same. Sessions of a camera share its
 lens, so cameras are what the interval counts: the mean over cameras of the change of mean_mm, with its
-95 % interval by normal theory, of 10 cameras or more.
+95 % interval by Student's distribution, of 20 cameras or more. A session whose figure changes by no more
+than a micrometre is the same.
 """
 import json
 import math
@@ -13,7 +14,8 @@ import statistics
 import yaml
 
 HAVE_RESULT = ("pass", "gate")
-FEWEST_CAMERAS = 10
+FEWEST_CAMERAS = 20  # as vlp-evaluate asks for 20 stations
+SAME_MM = 0.001  # nobody measures less
 
 
 def name_of(row):
@@ -37,6 +39,13 @@ def counts_of(rows):
     return counts
 
 
+def student_975(freedoms):
+    """Its quantile, by the expansion of Fisher and Cornish: to 0.001 from 19 degrees of freedom on."""
+    z = statistics.NormalDist().inv_cdf(0.975)
+    first, second = (z**3 + z) / 4, (5 * z**5 + 16 * z**3 + 3 * z) / 96
+    return z + first / freedoms + second / freedoms**2
+
+
 def interval_of(differences):
     """differences: (camera, change). Mean over cameras, and what it is within."""
     by_camera = {}
@@ -46,7 +55,7 @@ def interval_of(differences):
     mean = statistics.fmean(means)
     if len(means) < FEWEST_CAMERAS:
         return mean, None
-    half = 1.96 * statistics.stdev(means) / math.sqrt(len(means))
+    half = student_975(len(means) - 1) * statistics.stdev(means) / math.sqrt(len(means))
     return mean, [mean - half, mean + half]
 
 
@@ -58,6 +67,7 @@ def changes_of(rows, before_rows):
         "only_now": len(rows) - len(both),
         "only_before": len(before) - len(both),
         "other_inputs": len(both) - len(same_inputs),
+        "same_inputs": len(same_inputs),
         "newly_failed": [],
         "newly_good": [],
     }
@@ -72,9 +82,9 @@ def changes_of(rows, before_rows):
             pairs.append((row, old, float(row["mean_mm"]) - float(old["mean_mm"])))
     changes |= {
         "pairs": len(pairs),
-        "better": sum(change < 0 for _, _, change in pairs),
-        "worse": sum(change > 0 for _, _, change in pairs),
-        "same": sum(change == 0 for _, _, change in pairs),
+        "better": sum(change < -SAME_MM for _, _, change in pairs),
+        "worse": sum(change > SAME_MM for _, _, change in pairs),
+        "same": sum(abs(change) <= SAME_MM for _, _, change in pairs),
     }
     if pairs:
         mean, interval = interval_of([(row["camera"], change) for row, _, change in pairs])
@@ -97,8 +107,8 @@ GATES = {
     "mean_mm": lambda counts, changes: counts.get("mean_mm"),
     "median_mm": lambda counts, changes: counts.get("median_mm"),
     "p90_mm": lambda counts, changes: counts.get("p90_mm"),
-    "newly_failed": lambda counts, changes: changes and len(changes["newly_failed"]),
-    "worse_share": lambda counts, changes: changes and changes["pairs"] and changes["worse"] / changes["pairs"],
+    "newly_failed": lambda counts, changes: len(changes["newly_failed"]) if changes and changes["same_inputs"] else None,
+    "worse_share": lambda counts, changes: changes["worse"] / changes["pairs"] if changes and changes["pairs"] else None,
     "mean_difference_mm": lambda counts, changes: changes and changes.get("interval_95_mm", [None, None])[1],
 }
 

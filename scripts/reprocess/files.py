@@ -8,8 +8,7 @@ import json
 import os
 from pathlib import Path
 
-# What the stages read of a session, as scripts/calibrate.sh has it.
-INPUTS = ["boards", "rotation", "dispersion", "check", "board.yaml", "lamps.yaml", "camera.yaml", "gates.yaml"]
+from station import INPUTS
 
 
 def write_whole(file, text):
@@ -63,20 +62,20 @@ def input_files(session):
     """The files below a session that the stages read: (name, entry), in order. Folders that cannot be
     read have none; it is for the programs to say so."""
 
-    def below(folder, prefix):
+    def below(folder, prefix, wanted=None):
         try:
             entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
         except OSError:
             return
         for entry in entries:
+            if wanted and entry.name not in wanted:
+                continue
             if entry.is_dir():
                 yield from below(entry.path, prefix + entry.name + "/")
             else:
                 yield prefix + entry.name, entry
 
-    for name, entry in below(session, ""):
-        if name.split("/")[0] in INPUTS:
-            yield name, entry
+    yield from below(session, "", set(INPUTS))
 
 
 def entry_digest(entry):

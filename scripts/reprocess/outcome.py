@@ -5,6 +5,8 @@ import json
 import re
 from pathlib import Path
 
+from station import last_file
+
 STAGES = ["lens", "row_time", "rotation", "dispersion", "locate", "evaluate"]
 FIGURES = ["captures", "fixes", "missing_share", "mean_mm", "median_mm", "p90_mm", "max_mm", "rms_px"]
 COLUMNS = ["camera", "session", "verdict", *FIGURES, "reason", "version", "inputs", "key", "cpu_s"]
@@ -57,25 +59,23 @@ def figures_of(folder):
 
 def outcome_of(folder, name, run):
     """The verdict: "pass"; "gate", when there is a result that misses a gate; "no result", when a stage
-    refused its input; "crashed", when one ended in another way, or not at all."""
+    refused its input; "crashed", when one ended in another way, or not at all, or could not write."""
     camera, session = name.split("/")
     ends = ends_of(folder)
     outcome = {"camera": camera, "session": session, "verdict": "pass", "reason": ""}
-    gates = [said(folder, stage, run["archive"]) for stage, (code, _) in ends.items() if code == 1]
-    if gates:
-        outcome |= {"verdict": "gate", "reason": "; ".join(gates)}
+    missed = [stage for stage, (code, _) in ends.items() if code == 1]
+    if missed:  # vlp-evaluate tells of those before it, too
+        telling = ["evaluate"] if "evaluate" in missed else missed
+        reasons = [said(folder, stage, run["archive"]) for stage in telling]
+        outcome |= {"verdict": "gate", "reason": "; ".join(reasons)}
     for stage, (code, _) in ends.items():
         if code in (2, 3):
-            return outcome | {"verdict": "no result", "reason": said(folder, stage, run["archive"])}
+            reason = said(folder, stage, run["archive"])
+            verdict = "crashed" if ": cannot be written" in reason else "no result"
+            return outcome | {"verdict": verdict, "reason": reason}
         if code > 3:
             return outcome | {"verdict": "crashed", "reason": f"{stage} ended with exit code {code}"}
     asked = last_file(Path(run["archive"]) / name)
     if not (folder / asked).exists():
         return outcome | {"verdict": "crashed", "reason": f"there is no {asked}, and no stage says why"}
     return outcome | figures_of(folder)
-
-
-def last_file(station):
-    if (station / "check/truth.csv").exists():
-        return "evaluation.json"
-    return "fixes.csv" if (station / "check").exists() else "calibration.yaml"

@@ -4,22 +4,17 @@
 
 Writes into RESULTS/.state: run.json (toolbox and options), shards/N.list (a session a line, with the
 number, size and latest change of its files: a glance that tells which shards to look into), shards.txt
-(how many), again.txt (rows to make again), and compare.json. What has not changed is not touched, so that Snakemake runs the rest.
+(how many), again.txt (rows to make again), and compare.json. What has not changed is not touched, so that
+Snakemake runs the rest.
 """
 import argparse
 import re
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from changes import read_gates
+from checks import check, fail
 from files import digest, input_files, json_text, write_if_other, write_whole
 from toolbox import toolbox
-
-
-def fail(message):
-    print(f"reprocess.sh: error: {message}", file=sys.stderr)
-    sys.exit(2)
 
 
 def sessions_in(archive):
@@ -40,33 +35,44 @@ def glance(session):
     return f"{count} {size} {latest}"
 
 
-def write_shards(archive, state, shard_size):
+def shard_ends(sessions, size, at_a_time):
+    """Where each shard ends. Few of them are made alike in length and as many as end together, so that no
+    core waits for the last; of many, all but the last stay as they are when sessions are added."""
+    count = -(-sessions // size)
+    if count >= 8 * at_a_time:
+        return [min(end, sessions) for end in range(size, sessions + size, size)]
+    count = min(sessions, -(-count // at_a_time) * at_a_time)
+    return [sessions * (i + 1) // count for i in range(count)]
+
+
+def write_shards(archive, state, size, at_a_time):
     sessions = list(sessions_in(archive))
     if not sessions:
         fail(f"{archive}: no sessions in it; ARCHIVE/CAMERA/SESSION/ is where captures are looked for")
     for name in sessions:
-        if not re.fullmatch(r"[\w.-]+/[\w.-]+", name, re.ASCII):
-            fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_' and '-'")
+        if not re.fullmatch(r"\w[\w .-]*/\w[\w .-]*", name, re.ASCII):
+            fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks")
     with ThreadPoolExecutor(16) as threads:  # most of it is waiting for the file system
         glances = list(threads.map(lambda name: glance(archive / name), sessions))
+    lines = [f"{name}\t{seen}\n" for name, seen in zip(sessions, glances)]
     wanted = set()
-    for first in range(0, len(sessions), shard_size):
-        file = state / "shards" / f"{first // shard_size:06d}.list"
+    first = 0
+    for number, end in enumerate(shard_ends(len(sessions), size, at_a_time)):
+        file = state / "shards" / f"{number:06d}.list"
         wanted.add(file)
-        names = sessions[first : first + shard_size]
-        lines = [f"{name}\t{seen}\n" for name, seen in zip(names, glances[first : first + shard_size])]
-        write_if_other(file, "".join(lines))
+        write_if_other(file, "".join(lines[first:end]))
+        first = end
     for file in set((state / "shards").glob("*.list")) - wanted:
         file.unlink()
     write_if_other(state / "shards.txt", f"{len(wanted)}\n")
     return len(sessions)
 
 
-def again(state):
+def again(state, summary):
     """The rows to make whatever Snakemake thinks: those that are missing beside a summary, and those
     with crashes, which may have been for want of memory or disk."""
     rows = [state / "rows" / f"{file.stem}.csv" for file in sorted((state / "shards").glob("*.list"))]
-    wanted = [file for file in rows if not file.exists() or ",crashed," in file.read_text()]
+    wanted = [file for file in rows if (",crashed," in file.read_text() if file.exists() else summary.exists())]
     return [f".state/rows/{file.name}\n" for file in wanted]
 
 
@@ -78,23 +84,12 @@ def main():
     parser.add_argument("--gates", type=Path)
     parser.add_argument("--session-gates", type=Path)
     parser.add_argument("--previous", type=Path)
-    parser.add_argument("--shard-size", type=int, default=20)
+    parser.add_argument("--shard-size", type=int, default=50)
+    parser.add_argument("--at-a-time", type=int, default=1)
     parser.add_argument("--camera-option", action="append", default=[])
     options = parser.parse_args()
     archive, results = options.archive.resolve(), options.results.resolve()
-    for file in (options.gates, options.session_gates):
-        if file and not file.is_file():
-            fail(f"{file}: is not a file")
-    if options.gates:
-        try:
-            read_gates(options.gates)
-        except ValueError as failure:
-            fail(failure)
-    if options.previous and not (options.previous / "summary.csv").is_file():
-        fail(f"{options.previous}: holds no summary.csv of an earlier run")
-    if options.shard_size < 1:
-        fail("--shard-size: should be 1 or more")
-
+    check(options)
     state = results / ".state"
     (state / "logs").mkdir(parents=True, exist_ok=True)  # a cluster's jobs find it
     run = {
@@ -105,8 +100,8 @@ def main():
         "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
         **toolbox(options.bin),
     }
-    count = write_shards(archive, state, options.shard_size)
-    write_whole(state / "again.txt", "".join(again(state)))
+    count = write_shards(archive, state, options.shard_size, options.at_a_time)
+    write_whole(state / "again.txt", "".join(again(state, results / "summary.csv")))
     write_if_other(state / "run.json", json_text(run))
     previous = options.previous.resolve() if options.previous else None
     compare = {
@@ -120,4 +115,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (OSError, UnicodeDecodeError) as failure:
+        fail(failure)

@@ -4,17 +4,15 @@
 # The chain of a session, a rule per stage; shard.py runs it for the sessions of a shard. Nothing of the
 # archive is an input for Snakemake: what is missing there is for the programs to report, and ends
 # their session alone.
+import sys
 from pathlib import Path
 from shlex import quote
 
+sys.path.insert(0, workflow.basedir)
+from station import last_file, row_time_known, truth_of
+
 archive = Path(config["archive"])
 shell.prefix(f"source {quote(workflow.basedir + '/stage.sh')}; PATH={quote(config['bin'])}:$PATH; ")
-
-
-def last_of(session):
-    if (archive / session / "check/truth.csv").exists():
-        return session + "/evaluation.json"
-    return session + ("/fixes.csv" if (archive / session / "check").exists() else "/calibration.yaml")
 
 
 def in_archive(name):
@@ -27,7 +25,12 @@ def session_gates(wildcards):
     return ["--gates", gates] if gates else []
 
 
-def station(wildcards):
+def calibrated_lens(wildcards):
+    known = row_time_known(archive / wildcards.session, config["camera"])
+    return wildcards.session + ("/lens.yaml" if known else "/camera.yaml")
+
+
+def dispersion(wildcards):
     """A calibration without a known station is that of the rotation."""
     return "1" if (archive / wildcards.session / "dispersion").exists() else ""
 
@@ -38,7 +41,7 @@ wildcard_constraints:
 
 rule all:
     input:
-        [last_of(session) for session in config["sessions"]],
+        [f"{session}/{last_file(archive / session)}" for session in config["sessions"]],
 
 
 rule lens:
@@ -48,14 +51,15 @@ rule lens:
         "{session}/logs/lens.txt",
     params:
         station=in_archive(""),
+        id=lambda wildcards: wildcards.session.split("/")[0],
         camera=config["camera"],
     shell:
-        "if [ -e {params.station:q}/camera.yaml ]; then stage {log} cp {params.station:q}/camera.yaml {output};"
-        " else stage {log} vlp-intrinsics {params.station:q}/boards --board {params.station:q}/board.yaml"
-        " {params.camera} --threads 1 -o {output}; fi"
+        "if [ -f {params.station:q}/camera.yaml ]; then ln -sf {params.station:q}/camera.yaml {output:q};"
+        " else stage {log:q} vlp-intrinsics {params.station:q}/boards --board {params.station:q}/board.yaml"
+        " --camera-id={params.id:q} {params.camera} --threads 1 -o {output:q}; fi"
 
 
-rule row_time:
+rule row_time:  # where it is not stated
     input:
         "{session}/lens.yaml",
     output:
@@ -65,14 +69,13 @@ rule row_time:
     params:
         station=in_archive(""),
     shell:
-        "if grep -q '^  row_time_s:' {input}; then cp {input} {output};"
-        " else stage {log} vlp-train {params.station:q}/rotation --row-time"
-        " --lamps {params.station:q}/lamps.yaml --calibration {input} --threads 1 -o {output}; fi"
+        "stage {log:q} vlp-train {params.station:q}/rotation --row-time"
+        " --lamps {params.station:q}/lamps.yaml --calibration {input:q} --threads 1 -o {output:q}"
 
 
 rule rotation:
     input:
-        "{session}/camera.yaml",
+        calibrated_lens,
     output:
         "{session}/rotated.yaml",
     log:
@@ -80,8 +83,8 @@ rule rotation:
     params:
         station=in_archive(""),
     shell:
-        "stage {log} vlp-rotation {params.station:q}/rotation --lamps {params.station:q}/lamps.yaml"
-        " --calibration {input} -o {output}"
+        "stage {log:q} vlp-rotation {params.station:q}/rotation --lamps {params.station:q}/lamps.yaml"
+        " --calibration {input:q} --threads 1 -o {output:q}"
 
 
 rule dispersion:
@@ -93,11 +96,11 @@ rule dispersion:
         "{session}/logs/dispersion.txt",
     params:
         station=in_archive(""),
-        known=station,
+        known=dispersion,
     shell:
-        "if [ -z {params.known:q} ]; then cp {input} {output};"
-        " else stage {log} vlp-dispersion {params.station:q}/dispersion"
-        " --lamps {params.station:q}/lamps.yaml --calibration {input} -o {output}; fi"
+        "if [ -z {params.known:q} ]; then cp {input:q} {output:q};"
+        " else stage {log:q} vlp-dispersion {params.station:q}/dispersion"
+        " --lamps {params.station:q}/lamps.yaml --calibration {input:q} --threads 1 -o {output:q}; fi"
 
 
 rule locate:
@@ -110,20 +113,23 @@ rule locate:
     params:
         station=in_archive(""),
     shell:
-        "stage {log} vlp-locate {params.station:q}/check --lamps {params.station:q}/lamps.yaml"
-        " --calibration {input} -o {output}"
+        "stage {log:q} vlp-locate {params.station:q}/check --lamps {params.station:q}/lamps.yaml"
+        " --calibration {input:q} --threads 1 -o {output:q}"
 
 
 rule evaluate:
     input:
-        "{session}/fixes.csv",
+        fixes="{session}/fixes.csv",
+        calibration="{session}/calibration.yaml",
     output:
         "{session}/evaluation.json",
     log:
         "{session}/logs/evaluate.txt",
     params:
-        station=in_archive(""),
+        truth=lambda wildcards: truth_of(archive / wildcards.session),
         gates=session_gates,
     shell:
-        "stage {log} vlp-evaluate {input} --truth {params.station:q}/check/truth.csv"
-        " {params.gates:q} --threads 1 --json {output}"
+        "find_unmet {wildcards.session:q}/logs/{{lens,row_time,rotation,dispersion,locate}}.txt;"
+        " stage {log:q} vlp-evaluate {input.fixes:q} --truth {params.truth:q}"
+        " --calibration {input.calibration:q}"
+        ' {params.gates:q} "${{unmet[@]}}" --threads 1 --json {output:q}'

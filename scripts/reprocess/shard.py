@@ -8,6 +8,7 @@ has the key, the verdict and the reason. A folder appears whole: it is made in .
 """
 import fcntl
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -17,10 +18,15 @@ from files import digest, input_digest, json_text, table, write_whole
 from outcome import COLUMNS, KEPT, cost_of, outcome_of
 
 STATE = Path(".state")
+COSTS = STATE / "costs"
 
 
 def place_of(name, verdict):
     return Path("failed" if verdict in ("no result", "crashed") else "sessions") / name
+
+
+def key_of(inputs, run):
+    return digest(json_text([inputs, run["toolbox"], run["camera"], run["session_gates_digest"]]))
 
 
 def current(name, key):
@@ -28,15 +34,16 @@ def current(name, key):
     for place in (Path("sessions") / name, Path("failed") / name):
         try:
             session = json.loads((place / "session.json").read_text())
-        except (FileNotFoundError, NotADirectoryError):
+        except (FileNotFoundError, NotADirectoryError, ValueError):
             continue
         if session["key"] == key and session["verdict"] != "crashed":
             return session
     return None
 
 
-def run_chain(run, names, work):
-    """The rule per stage of session.smk for sessions, one after another."""
+def run_chain(run, names, work, lock):
+    """The rule per stage of session.smk for sessions, one after another. Snakemake holds the lock, too: when
+    it is told to end it ends its stages first, and may outlive us."""
     config = {key: run[key] for key in ("archive", "bin", "camera", "session_gates")}
     write_whole(work / "config.json", json_text({**config, "sessions": names}))
     subprocess.run(
@@ -45,22 +52,32 @@ def run_chain(run, names, work):
         + ["--keep-going", "--nolock", "--rerun-incomplete", "--rerun-triggers", "mtime", "--quiet", "all"]
         + ["--latency-wait", "0"],
         cwd=work,
+        pass_fds=[lock.fileno()],
         check=False,  # the outcome of each session says what came of it
     )
 
 
+def same_file(source, target):
+    """Under another name, too: what the programs have brought safely to disk is not written again."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+
+
 def publish(session, work):
-    """Moves what a session gave to its place, and nothing else of it remains."""
+    """Takes what a session gave to its place, and nothing else of it remains. The work is left as it is,
+    so that this can be done again."""
     name = f"{session['camera']}/{session['session']}"
     ready = STATE / "ready" / name
     shutil.rmtree(ready, ignore_errors=True)
     (ready / "logs").mkdir(parents=True)
     for file in KEPT:
         if (work / name / file).is_file():
-            shutil.move(work / name / file, ready / KEPT[file])
+            same_file(work / name / file, ready / KEPT[file])
     for log in sorted((work / name / "logs").glob("*.txt")):
         if log.stat().st_size > 0:
-            shutil.move(log, ready / "logs" / log.name)
+            same_file(log, ready / "logs" / log.name)
     write_whole(ready / "session.json", json_text(session))
     place = place_of(name, session["verdict"])
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -74,12 +91,20 @@ def publish(session, work):
     ready.rename(place)
 
 
-def reprocess(run, shard, names):
+def stated_cost(name):
+    """In seconds; empty when .state was taken away since."""
+    try:
+        return (COSTS / name).read_text()
+    except FileNotFoundError:
+        return ""
+
+
+def reprocess(run, shard, names, lock):
     work = (STATE / "work" / shard).absolute()
     sessions, stale = {}, {}
     for name in names:
         inputs = input_digest(Path(run["archive"]) / name)
-        key = digest(json_text([inputs, run["toolbox"], run["camera"], run["session_gates_digest"]]))
+        key = key_of(inputs, run)
         sessions[name] = current(name, key)
         if sessions[name] is None:
             stale[name] = {"key": key, "inputs": inputs}
@@ -90,16 +115,14 @@ def reprocess(run, shard, names):
             begun.mkdir(parents=True, exist_ok=True)
             (begun / key).touch()
     if stale:
-        run_chain(run, list(stale), work)
-    costs_folder = STATE / "costs"
+        run_chain(run, list(stale), work, lock)
     for name, keys in stale.items():
         sessions[name] = outcome_of(work / name, name, run) | keys | {"version": run["version"]}
-        write_whole(costs_folder / name, cost_of(work / name))
+        write_whole(COSTS / name, cost_of(work / name))
         publish(sessions[name], work)
     shutil.rmtree(work, ignore_errors=True)
     print(f"{len(names)} sessions, {len(stale)} reprocessed")
-    costs = {name: (costs_folder / name).read_text() for name in names}
-    return [sessions[name] | {"cpu_s": costs[name]} for name in names]
+    return [sessions[name] | {"cpu_s": stated_cost(name)} for name in names]
 
 
 def main():
@@ -110,7 +133,7 @@ def main():
     with open(STATE / "locks" / shard, "w") as lock:
         # A job that the cluster gave up may still be at work.
         fcntl.flock(lock, fcntl.LOCK_EX)
-        rows = reprocess(run, shard, [line.split("\t")[0] for line in lines])
+        rows = reprocess(run, shard, [line.split("\t")[0] for line in lines], lock)
     write_whole(STATE / "rows" / f"{shard}.csv", table(COLUMNS, rows))
 
 

@@ -12,7 +12,7 @@ def main():
     results = Path(sys.argv[1])
     said = load(results / "changes.json")
     counts, changes = said["counts"], said["changes"]
-    cost_s = sum(float(row["cpu_s"]) for row in read_table(results / "summary.csv"))
+    cost_s = sum(float(row["cpu_s"] or 0) for row in read_table(results / "summary.csv"))
     print(f"passed      {counts['pass']}")
     print(f"gates       {counts['gate']} with a result that misses a gate")
     print(f"no result   {counts['no_result']}, and {counts['crashed']} that crashed; see failed/")

@@ -110,6 +110,18 @@ TEST_F(Detect, GivesTheSameBytesWhateverTheThreads) {
   const std::string one = TemporaryFolder::content_of(folder / "found.csv");
   ASSERT_EQ(detect(kRig + "/sample", "--threads 4").exit_code, 0);
   EXPECT_EQ(TemporaryFolder::content_of(folder / "found.csv"), one);
+  const std::string locate = "vlp-locate " + kRig + "/sample --lamps " + kRig +
+                             "/lamps.yaml --calibration " + kRig + "/true_calibration.yaml -o " +
+                             (folder / "fixes").string();
+  ASSERT_EQ(run_program(locate + "1.csv --threads 1").exit_code, 0);
+  ASSERT_EQ(run_program(locate + "4.csv --threads 4").exit_code, 0);
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "fixes4.csv"),
+            TemporaryFolder::content_of(folder / "fixes1.csv"));
+  for (const char* program : {"vlp-locate", "vlp-rotation", "vlp-dispersion"}) {
+    const auto none = run_program(program + locate.substr(locate.find(' ')) + ".csv --threads 0");
+    EXPECT_EQ(none.exit_code, 2);
+    EXPECT_THAT(none.errors, HasSubstr("--threads"));
+  }
 }
 
 TEST_F(Detect, SkipsAndCountsImagesThatItCannotUse) {

@@ -5,73 +5,76 @@
 # What is current is not run again, what is stale is, and a run that is killed goes on.
 source "$(dirname "$0")/common.sh"
 results=$scratch/interrupted
-rm -rf "$results" "$scratch/bin"
+rm -rf "$results" "$results-bin" "$results-mark"
+good=camera-00001/session-01 broken=$(cd "$baseline/failed" && echo */* | cut -d' ' -f1)
+sessions=("$good" camera-00002/session-01 "$broken")
+take "$results-archive" "${sessions[@]}"
 
-# Killed at three moments, the whole of it; then to its end.
-for wait_s in 4 6 8; do
-  setsid "$source_dir/scripts/reprocess.sh" "$archive" "$results" --row-time-s 3e-5 --readout rows \
-    --shard-size 3 --cores 2 >/dev/null 2>&1 &
-  sleep $wait_s
-  kill -9 -- -$! 2>/dev/null || true
+# Killed in a stage, between stages, and when the first session is done, the whole of it; then to its end.
+count() { { find "$results" -path "$1" 2>/dev/null || true; } | wc -l; }
+another() { [ "$(count "$1")" -gt "$before" ]; }
+for moment in '*/work/*/logs/lens.txt' '*/work/*/rotated.yaml' '*/sessions/*/session.json'; do
+  before=$(count "$moment")
+  start_reprocess "$results" --shard-size 1 --cores 1
+  patiently 60 another "$moment"
+  kill -9 -- -$!
   wait $! 2>/dev/null || true
+  [ ! -e "$results/summary.csv" ] || fail "killed too late"
   # What stands there is whole.
   for session in "$results"/sessions/*/* "$results"/failed/*/*; do
     [ ! -e "$session" ] || [ -s "$session/session.json" ] || fail "$session is not whole"
   done
 done
-reprocess "$results" --cores 2
-expect_baseline "$results"
-[ ! -e "$results/.state/work/000000" ] || fail "something is left of the work"
+run() { reprocess "$results" --shard-size 1 --cores 2 >"$said"; }
+run
+expect_baseline "$results" "${sessions[@]:0:2}"
+cmp "$baseline/failed/$broken/session.json" "$results/failed/$broken/session.json"
+[ -z "$(ls "$results/.state/work")" ] || fail "something is left of the work"
+redone() {  # since the last time
+  find "$results/sessions" "$results/failed" -name session.json -newer "$results-mark" -printf '%P\n' | sort
+  touch "$results-mark"
+}
+redone >/dev/null 2>&1 || true
 
-# Nothing is done twice.
-touch "$scratch/mark"
-reprocess "$results" --cores 2 >/dev/null
-[ -z "$(find "$results/sessions" "$results/failed" -newer "$scratch/mark")" ] || fail "done twice"
+# Nothing is done twice; a file that is only touched is looked at and found to be the same.
+touch "$archive/$good/lamps.yaml"
+run
+[ -z "$(redone)" ] || fail "done twice"
 
-# A touched file is looked at and found to be the same; another content is reprocessed, it alone.
-touch "$archive/camera-00001/session-01/lamps.yaml"
-reprocess "$results" --cores 2 >/dev/null
-[ -z "$(find "$results/sessions" "$results/failed" -newer "$scratch/mark")" ] || fail "touched, and done twice"
-sed -i.original 's/^/# changed\n/;:a;n;ba' "$archive/camera-00001/session-01/lamps.yaml"
-reprocess "$results" --cores 2 >/dev/null
-changed=$(find "$results/sessions" "$results/failed" -name session.json -newer "$scratch/mark")
-mv "$archive/camera-00001/session-01/lamps.yaml.original" "$archive/camera-00001/session-01/lamps.yaml"
-[ "$changed" = "$results/sessions/camera-00001/session-01/session.json" ] || fail "reprocessed: $changed"
-
-# A session that is repaired moves from failed/ to sessions/, and back.
-broken=$(cd "$results/failed" && echo */* | cut -d' ' -f1)
-good=$(cd "$results/sessions" && echo */* | cut -d' ' -f1)
-mv "$archive/$broken" "$scratch/broken"
+# Another content is reprocessed, it alone. A session that is repaired moves from failed/ to sessions/.
+sed -i '1a # changed' "$archive/$good/lamps.yaml"
+mv "$archive/$broken" "$results-broken"
 cp -r "$archive/$good" "$archive/$broken"
-reprocess "$results" --cores 2 >/dev/null
+run
+[ "$(redone)" = "$(printf '%s/session.json\n' "$good" "$broken" | sort)" ] || fail "another content is not seen, or too much"
 [ -e "$results/sessions/$broken" ] && [ ! -e "$results/failed/$broken" ] || fail "$broken is repaired"
-rm -r "$archive/$broken"
-mv "$scratch/broken" "$archive/$broken"
-reprocess "$results" --cores 2 >/dev/null
-expect_baseline "$results"
 
-# A program that crashes: its sessions are counted and kept aside, and tried again the next time.
-mkdir "$scratch/bin"
-ln -s "$bin"/vlp-* "$scratch/bin"
-rm "$scratch/bin/vlp-locate"
-cat >"$scratch/bin/vlp-locate" <<PROGRAM
+# And back. In the meantime another version of a program has come, which crashes with one session: it is
+# kept aside and tried again the next time, it alone.
+rm -r "$archive/$broken"
+mv "$results-broken" "$archive/$broken"
+sed -i 2d "$archive/$good/lamps.yaml"
+mkdir "$results-bin"
+ln -s "$bin"/vlp-* "$results-bin"
+rm "$results-bin/vlp-locate"
+cat >"$results-bin/vlp-locate" <<PROGRAM
 #!/bin/bash
-[ ! -e "$scratch/crash" ] || [[ \$1 != *camera-00001/session-01* ]] || kill -9 \$\$
+[ ! -e "$results-crash" ] || [[ \$1 != *$good* ]] || kill -9 \$\$
 exec "$bin/vlp-locate" "\$@"
 PROGRAM
-chmod +x "$scratch/bin/vlp-locate"
-touch "$scratch/crash"
-VLP_PROGRAMS_DIR=$scratch/bin reprocess "$results" --cores 2 >"$scratch/said"
-grep -q '^no result   3, and 1 that crashed' "$scratch/said" || fail "$(cat "$scratch/said")"
-grep -q '"reason": "locate ended with exit code 137"' "$results/failed/camera-00001/session-01/session.json" ||
-  fail "the crash has no reason"
-rm "$scratch/crash"
-VLP_PROGRAMS_DIR=$scratch/bin reprocess "$results" --cores 2 >"$scratch/said"
-grep -q '^no result   3, and 0 that crashed' "$scratch/said" || fail "$(cat "$scratch/said")"
-[ ! -e "$results/failed/camera-00001/session-01" ] || fail "it has a result now"
-rm -r "$scratch/bin"
-touch "$scratch/mark"
+chmod +x "$results-bin/vlp-locate"
+touch "$results-crash"
+VLP_PROGRAMS_DIR=$results-bin run
+[ "$(redone | wc -l)" = 3 ] || fail "another program makes all stale"
+grep -q '^no result   1, and 1 that crashed' "$said" || fail "$(cat "$said")"
+grep -q '"reason": "locate ended with exit code 137"' "$results/failed/$good/session.json" || fail "no reason"
+rm "$results-crash"
+VLP_PROGRAMS_DIR=$results-bin run
+grep -q '^no result   1, and 0 that crashed' "$said" || fail "$(cat "$said")"
+[ "$(redone)" = "$good/session.json" ] && [ ! -e "$results/failed/$good" ] || fail "it has a result now"
 
-# Other options are another key.
-"$source_dir/scripts/reprocess.sh" "$archive" "$results" --row-time-s 3e-5 --shard-size 3 --cores 2 >/dev/null
-[ "$(find "$results/sessions" -name session.json -newer "$scratch/mark" | wc -l)" = 7 ] || fail "stale results"
+# With .state gone what it knew is found out again, but for the costs.
+rm -r "$results/.state" "$results/.snakemake"
+VLP_PROGRAMS_DIR=$results-bin run
+[ -z "$(redone)" ] || fail "done twice"
+rm -r "$results" "$results"-*

@@ -7,6 +7,7 @@ import random
 import sys
 import tempfile
 import unittest
+import unittest.mock
 from pathlib import Path
 
 sys.dont_write_bytecode = True
@@ -19,6 +20,9 @@ except ImportError:
 import changes
 import files
 import outcome
+import plan
+import shard
+import station
 
 
 def row(number, verdict, mean, inputs="same"):
@@ -61,7 +65,7 @@ class Changes(unittest.TestCase):
                 differences += [(camera, shift)] * 2
             _, (low, high) = changes.interval_of(differences)
             held += low <= 0.3 <= high
-        self.assertGreater(held, 920)  # 950 expected, less 4 sigma of 7 and that of few cameras
+        self.assertGreater(held, 920)  # 950 expected, less 4 sigma of 7
         self.assertLess(held, 975)
 
     def test_gates_hold_what_they_say(self):
@@ -69,6 +73,22 @@ class Changes(unittest.TestCase):
         gates = {"no_result": 2, "no_result_share": 0.4, "gate_share": 0.25, "mean_mm": 2, "p90_mm": 2, "newly_failed": 0}
         passed = [gate["passed"] for gate in changes.check_gates(gates, counts, None)]
         self.assertEqual(passed, [True, False, True, True, False, False])
+
+    def test_gates_without_a_pair_are_not_met(self):
+        now, before = [row(0, "pass", 1, "new")], [row(0, "pass", 1, "old")]
+        found, _ = changes.changes_of(now, before)
+        gates = {"newly_failed": 0, "worse_share": 1, "mean_difference_mm": 1}
+        passed = [gate["passed"] for gate in changes.check_gates(gates, changes.counts_of(now), found)]
+        self.assertEqual(passed, [False, False, False])
+
+    def test_less_than_a_micrometre_is_the_same(self):
+        now = [row(0, "pass", 1.0005), row(1, "pass", 0.9995), row(2, "pass", 1.002)]
+        found, _ = changes.changes_of(now, [row(i, "pass", 1) for i in range(3)])
+        self.assertEqual([found[key] for key in ("better", "worse", "same")], [0, 1, 2])
+
+    def test_students_quantile_is_that_of_tables(self):
+        for freedoms, quantile in ((19, 2.093), (50, 2.0086), (100, 1.984)):
+            self.assertAlmostEqual(changes.student_975(freedoms), quantile, delta=0.001)
 
     def test_refuses_gates_that_it_does_not_know(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -129,10 +149,85 @@ class Outcome(unittest.TestCase):
         found = self.outcome()
         self.assertEqual((found["verdict"], found["reason"]), ("crashed", "rotation ended with exit code 139"))
 
+    def test_a_full_disk_is_a_crash_that_is_tried_again(self):
+        self.ends("lens", 2, "vlp-intrinsics: error: c/s/lens.yaml: cannot be written: No space left on device\n")
+        self.assertEqual(self.outcome()["verdict"], "crashed")
+
+    def test_vlp_evaluate_tells_of_all_gates(self):
+        self.ends("lens", 1, "vlp-intrinsics: error: rms_px is 2\n")
+        self.ends("evaluate", 1, "vlp-evaluate: error: lens: rms_px is 2; mean_mm is 3\n")
+        (self.work / "fixes.csv").touch()
+        self.assertEqual(self.outcome()["reason"], "vlp-evaluate: error: lens: rms_px is 2; mean_mm is 3")
+
     def test_a_stage_without_an_end_is_a_crash(self):
         self.ends("lens", 0)
         (self.work / "logs/rotation.txt").touch()
         self.assertEqual(self.outcome()["verdict"], "crashed")
+
+
+class Shard(unittest.TestCase):
+    def test_key_is_of_inputs_programs_and_options(self):
+        run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "bin": "/bin"}
+        keys = [shard.key_of("i", run), shard.key_of("j", run), shard.key_of("i", run | {"bin": "/other"})]
+        keys += [shard.key_of("i", run | {name: "x"}) for name in ("toolbox", "camera", "session_gates_digest")]
+        self.assertEqual(keys[0], keys[2])
+        self.assertEqual(len(set(keys)), 5)
+
+    def test_a_session_whose_publishing_was_interrupted_is_whole_the_next_time(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            session = {"camera": "c", "session": "s", "verdict": "pass"}
+            work = Path("work")
+            (work / "c/s/logs").mkdir(parents=True)
+            (work / "c/s/logs/lens.txt").write_text("said")
+            for file in outcome.KEPT:
+                (work / "c/s" / file).write_text(file)
+            former = Path("sessions/c/s")
+            former.mkdir(parents=True)
+            for step in ("write_whole", "place_of"):  # fails there, then goes through
+                with unittest.mock.patch.object(shard, step, side_effect=KeyboardInterrupt):
+                    self.assertRaises(KeyboardInterrupt, shard.publish, session, work)
+            shard.publish(session, work)
+            found = sorted(str(file.relative_to(former)) for file in former.rglob("*") if file.is_file())
+            self.assertEqual(found, sorted([*outcome.KEPT.values(), "session.json", "logs/lens.txt"]))
+
+
+class Plan(unittest.TestCase):
+    def test_shards_end_together(self):
+        def lengths(*arguments):
+            ends = plan.shard_ends(*arguments)
+            return [end - start for start, end in zip([0, *ends], ends)]
+
+        self.assertEqual(lengths(100, 50, 2), [50, 50])
+        self.assertEqual(lengths(110, 50, 2), [27, 28, 27, 28])
+        self.assertEqual(lengths(3, 50, 8), [1, 1, 1])
+        self.assertEqual(lengths(10, 3, 1), [2, 3, 2, 3])
+        self.assertEqual(lengths(810, 50, 2), [50] * 16 + [10])
+
+
+class Station(unittest.TestCase):
+    def test_knows_whether_there_is_a_row_time(self):
+        with tempfile.TemporaryDirectory() as folder:
+            known = [station.row_time_known(Path(folder), options) for options in ("", "--row-time-s 3e-5")]
+            (Path(folder) / "camera.yaml").write_text("camera:\n  id: a\n")
+            known.append(station.row_time_known(Path(folder), "--row-time-s 3e-5"))
+            (Path(folder) / "camera.yaml").write_text("camera:\n  id: a\n  row_time_s: 3e-5\n")
+            known.append(station.row_time_known(Path(folder), ""))
+            self.assertEqual(known, [False, True, False, True])
+
+    def test_knows_what_the_last_stage_makes(self):
+        with tempfile.TemporaryDirectory() as folder:
+            check = Path(folder) / "check"
+            self.assertEqual(station.last_file(Path(folder)), "calibration.yaml")
+            check.mkdir()
+            (check / "captures.csv").write_text("image,time_s\n")
+            self.assertEqual(station.last_file(Path(folder)), "fixes.csv")
+            (check / "captures.csv").write_text("image,x_m,y_m\n")
+            self.assertEqual(station.truth_of(Path(folder)), check / "captures.csv")
+            (check / "truth.csv").touch()
+            self.assertEqual(station.truth_of(Path(folder)), check / "truth.csv")
+            self.assertEqual(station.last_file(Path(folder)), "evaluation.json")
 
 
 class Files(unittest.TestCase):
@@ -143,6 +238,8 @@ class Files(unittest.TestCase):
             (session / "boards/0.png").write_text("one")
             first = files.input_digest(session)
             (session / "notes.txt").write_text("not read")
+            (session / "results").mkdir()
+            (session / "results/boards").write_text("not read")
             os.utime(session / "boards/0.png", (1, 1))
             self.assertEqual(files.input_digest(session), first)
             (session / "boards/0.png").rename(session / "boards/1.png")

@@ -5,6 +5,7 @@
 # A Slurm of two nodes on this machine, started here: the archive gives the same bytes as without it, and
 # also when a node is killed in mid-run and then Snakemake itself.
 source "$(dirname "$0")/common.sh"
+export CI=true  # Snakemake asks for its jobs each second then, not each ten
 PATH=$PATH:/usr/sbin
 for program in munged slurmctld slurmd sbatch scontrol; do
   command -v $program >/dev/null || { echo "$program is missing: scripts/setup.sh --batch"; exit 77; }
@@ -29,7 +30,7 @@ chmod 600 "$cluster/munge.key"
 munged --foreground --key-file="$cluster/munge.key" --socket="$cluster/munge" --num-threads=2 \
   --pid-file="$cluster/munged.pid" --log-file="$cluster/munged.log" --seed-file="$cluster/munged.seed" &
 munged=$!
-port=$((20000 + $$ % 20000))
+port=$((20000 + $$ % 12000))  # below those that systems give away
 export SLURM_CONF=$cluster/slurm.conf
 cat >"$SLURM_CONF" <<CONF
 ClusterName=vlp
@@ -58,13 +59,6 @@ MpiDefault=none
 NodeName=n[1-2] NodeHostname=$(hostname -s) NodeAddr=127.0.0.1 Port=$((port + 1))-$((port + 2)) CPUs=1 RealMemory=4000
 PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 CONF
-patiently() {  # SECONDS COMMAND...: until it succeeds
-  local ends=$((SECONDS + $1))
-  until "${@:2}" >/dev/null 2>&1; do
-    [ $SECONDS -lt $ends ] || { tail -n 20 "$cluster"/*.log >&2; fail "in vain: ${*:2}"; }
-    sleep 0.5
-  done
-}
 patiently 30 test -S "$cluster/munge"
 slurmctld -D >/dev/null 2>&1 &
 controller=$!
@@ -75,24 +69,26 @@ done
 both_idle() { [ "$(sinfo --noheader --states=idle --format=%D)" = 2 ]; }
 patiently 60 both_idle
 
-reprocess "$scratch/slurm" --profile slurm
-expect_baseline "$scratch/slurm"
-scontrol show job --oneliner | grep -q 'JobState=COMPLETED.*BatchHost=n2' || fail "no job ran on the second node"
+results=$scratch/slurm
+rm -rf "$results" "$results-killed"
+reprocess "$results" --profile slurm --shard-size 3
+expect_baseline "$results"
+done_on_n2() { scontrol show job --oneliner | grep 'JobState=COMPLETED.*BatchHost=n2'; }
+done_on_n2 >/dev/null || fail "no job ran on the second node: $(scontrol show job --oneliner)"
 
 results=$scratch/slurm-killed
-rm -rf "$results"
-setsid "$source_dir/scripts/reprocess.sh" "$archive" "$results" --row-time-s 3e-5 --readout rows --shard-size 3 \
-  --profile slurm >"$scratch/said" 2>&1 &
+start_reprocess "$results" --profile slurm --shard-size 3
 runs+=($!)
-works_on_n2() { squeue --noheader --states=running --nodelist=n2 | grep -q vlp; }
+works_on_n2() { squeue --noheader --states=running --nodelist=n2 | grep vlp; }
 patiently 120 works_on_n2
 kill -9 "${nodes[1]}"
-node_failed() { scontrol show job --oneliner | grep -q JobState=NODE_FAIL; }
+scontrol update NodeName=n2 State=DOWN Reason=killed  # Slurm finds out alone, but later
+node_failed() { scontrol show job --oneliner | grep JobState=NODE_FAIL; }
 patiently 120 node_failed
 a_shard_is_done() { ls "$results"/.state/rows/*.csv; }
 patiently 300 a_shard_is_done
-kill -0 "${runs[0]}" 2>/dev/null || fail "the run ended with its node: $(cat "$scratch/said")"
+kill -0 "${runs[0]}" 2>/dev/null || fail "the run ended with its node: $(cat "$said")"
 kill -9 -- "-${runs[0]}"
 [ ! -e "$results/summary.csv" ] || fail "Snakemake was killed too late"
-reprocess "$results" --profile slurm
+reprocess "$results" --profile slurm --shard-size 3
 expect_baseline "$results"

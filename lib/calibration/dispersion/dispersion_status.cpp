@@ -25,8 +25,9 @@ std::string_view explanation_of(DispersionStatus status) {
       return "the captures are at different yaws, over which the paper's circle averages the "
              "camera's error away: hold the yaw, or take --method camera";
     case DispersionStatus::diverged:
-      return "no offset explains the fixes: are all captures from the station, and is the "
-             "calibration this camera's? Add captures at other yaws";
+      return "no offset explains the fixes: is each lamp where the map has it, are all captures "
+             "from "
+             "the station, and is the calibration this camera's? Add captures at other yaws";
   }
   return "";
 }

@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether what scripts/reprocess.sh is told is right."""
+import subprocess
+import sys
+
+from changes import read_gates
+from files import read_table
+from toolbox import PROGRAMS
+
+
+def fail(message):
+    print(f"reprocess.sh: error: {message}", file=sys.stderr)
+    sys.exit(2)
+
+
+def check_programs(folder):
+    for program in PROGRAMS:
+        if not (folder / program).is_file():
+            fail(f"{folder / program}: missing; run scripts/test.sh first")
+
+
+def check_previous(previous, results):
+    table = previous / "summary.csv"
+    if not table.is_file():
+        fail(f"{previous}: holds no summary.csv of an earlier run")
+    if previous.resolve() == results.resolve():
+        fail(f"{previous}: this run writes there; --previous is another folder, e.g. a copy")
+    rows = read_table(table)
+    if not rows or not {"camera", "session", "verdict", "mean_mm", "inputs"} <= set(rows[0]):
+        fail(f"{table}: is not the summary of an earlier run: a column is missing, or all rows")
+
+
+def check_session_gates(options):
+    """By vlp-evaluate, which comes to its fixes when the gates are right."""
+    if options.session_gates:
+        command = [options.bin / "vlp-evaluate", "/dev/null", "--truth", "/dev/null", "--gates", options.session_gates]
+        said = subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()
+        if "error: /dev/null" not in said:
+            fail(said.split("error: ", 1)[-1])
+
+
+def check(options):
+    """What is wrong is said before anything is run."""
+    check_programs(options.bin)
+    for file in (options.gates, options.session_gates):
+        if file and not file.is_file():
+            fail(f"{file}: is not a file")
+    if options.gates:
+        try:
+            read_gates(options.gates)
+        except ValueError as failure:
+            fail(failure)
+    if options.previous:
+        check_previous(options.previous, options.results)
+    check_session_gates(options)
