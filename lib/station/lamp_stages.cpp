@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -26,6 +28,16 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// Why there are too few captures at known places; empty when there are enough.
+std::string places_problem(std::size_t known, std::size_t captures, int wanted) {
+  if (known > 0 && known >= std::min(captures, static_cast<std::size_t>(wanted))) return "";
+  return fmt::format(
+      "nothing tells where {} of the {} captures are: captures.csv or truth.csv of the step "
+      "should, "
+      "with x_m and y_m of each",
+      captures - known, captures);
+}
+
 std::vector<StationCapture> at_station(const StationConfig& config,
                                        const std::vector<Frame>& frames,
                                        const CapturesTable& places) {
@@ -43,6 +55,16 @@ std::vector<StationCapture> at_station(const StationConfig& config,
 }
 
 }  // namespace
+
+CapturesTable places_in(const std::filesystem::path& folder) {
+  CapturesTable places;
+  for (const char* table : {"captures.csv", "truth.csv"}) {
+    if (!places.empty() || !std::filesystem::exists(folder / table)) continue;
+    places = read_captures(folder / table);
+    std::erase_if(places, [](const auto& place) { return !place.second.x_m; });
+  }
+  return places;
+}
 
 StageResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                            const std::vector<Frame>& frames) {
@@ -69,11 +91,9 @@ StageResult solve_rotation(const StationConfig& config, const Calibration& calib
 StageResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
                              const std::vector<Frame>& frames, const CapturesTable& places) {
   const auto captures = at_station(config, frames, places);
-  if (captures.empty()) {
-    return {
-        "nothing tells where the camera is: captures.csv of the step, with x_m and y_m, or "
-        "dispersion_station_m"};
-  }
+  std::string problem =
+      places_problem(captures.size(), frames.size(), config.enough.dispersion_captures);
+  if (!problem.empty()) return {std::move(problem)};
   const DispersionFit fit =
       fit_dispersion(captures, config.lamps, calibration, DispersionMethod::camera);
   if (fit.status != DispersionStatus::ok) {
@@ -113,11 +133,9 @@ StageResult check_fixes(const StationConfig& config, const Calibration& calibrat
     if (fix.lamps > 2) residuals_px.push_back(fix.residual_px);
     sum_mm += error_mm;
   }
-  if (captures == 0) {
-    return {
-        "no capture of the check is at a known point: captures.csv or truth.csv of the step "
-        "should tell x_m and y_m"};
-  }
+  std::string problem = places_problem(static_cast<std::size_t>(captures), frames.size(),
+                                       config.enough.check_captures);
+  if (!problem.empty()) return {std::move(problem)};
   StageResult result{"", calibration};
   const auto fixes = static_cast<double>(errors_mm.size());
   result.values = {{"check_fixes", fixes / captures},

@@ -13,6 +13,7 @@
 #include <opencv2/core/version.hpp>
 #include <random>
 
+#include "captures/digest.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 
@@ -88,7 +89,12 @@ RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersi
   for (const std::string& cause : causes) record.causes += cause + "\n";
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
-      record.images.push_back({name_of(step), name, image.sha256, image.refused});
+      record.images.push_back({name_of(step), name, image.sha256,
+                               image.refused + (image.discarded ? " (not kept)" : "")});
+    }
+    for (const auto& file : unit.step(step).waiting) {
+      record.images.push_back({name_of(step), file.filename().string(), sha256_of_file(file),
+                               "not looked at: a step before is not done"});
     }
   }
   return record;

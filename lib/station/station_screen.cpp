@@ -34,6 +34,15 @@ std::string outcome_of(const UnitImage& image) {
   return image.refused.empty() ? "taken" : "refused: " + image.refused;
 }
 
+ScreenLine gate_line(const StationFigure& figure) {
+  const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
+  const std::string limit =
+      fmt::format("{} {:.4g}", figure.at_least ? ">=" : "<=", figure.limit.value_or(0));
+  const char* outcome = figure.met() ? "met" : figure.value ? "NOT MET" : "not reached";
+  return {fmt::format("{:<24}{:>12}{:>14}  {}", figure.name, value, limit, outcome),
+          figure.met() ? Tone::plain : Tone::bad};
+}
+
 const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",
                        "  ####   #####   ###     ###  ", "  #      #   #      #       # ",
                        "  #      #   #  ####    ####  "};
@@ -85,30 +94,24 @@ std::string last_image_line(const Unit& unit, StationStep step, const std::strin
 }
 
 std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
-  std::vector<ScreenLine> lines{{""}};
   const Tone tone = record.passed() ? Tone::good : Tone::bad;
+  std::vector<ScreenLine> lines{
+      {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
+  for (const StationFigure& figure : record.figures) {
+    if (figure.limit) lines.push_back(gate_line(figure));
+  }
+  std::istringstream causes(record.causes);
+  if (!record.causes.empty()) lines.push_back({""});
+  for (std::string cause; std::getline(causes, cause);) {
+    add_wrapped(lines, "Cause", cause, Tone::bad);
+  }
+  // Last, so that it stands on a terminal of 24 lines, too.
+  lines.push_back({""});
   for (const char* row : record.passed() ? kPass : kFail) lines.push_back({row, tone});
   lines.push_back({""});
   lines.push_back({fmt::format("{}   camera {}   {}", record.verdict, record.camera, record.station)
                        .substr(0, kColumns),
                    Tone::heading});
-  std::istringstream causes(record.causes);
-  for (std::string cause; std::getline(causes, cause);) {
-    add_wrapped(lines, "Cause", cause, Tone::bad);
-  }
-  lines.push_back({""});
-  lines.push_back({fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading});
-  for (const StationFigure& figure : record.figures) {
-    if (!figure.limit) continue;
-    const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
-    lines.push_back(
-        {fmt::format("{:<24}{:>12}{:>14}  {}", figure.name, value,
-                     fmt::format("{} {:.4g}", figure.at_least ? ">=" : "<=", *figure.limit),
-                     figure.met()   ? "met"
-                     : figure.value ? "NOT MET"
-                                    : "not reached"),
-         figure.met() ? Tone::plain : Tone::bad});
-  }
   return lines;
 }
 

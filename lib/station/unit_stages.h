@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,11 +36,17 @@ StageResult solve_boards(const StationConfig& config, const std::string& camera_
 StageResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                            const std::vector<Frame>& frames);
 
-/// What fixes at a known station still lack. Places: of the config, or those of captures.csv.
+/// Where captures of a step were, by image: captures.csv of its folder, else truth.csv, else
+/// nothing. Throws InputError for a table that cannot be read.
+CapturesTable places_in(const std::filesystem::path& folder);
+
+/// What fixes at a known station still lack. Places: those of captures.csv, or of the config. There
+/// is a problem when fewer captures than the station wants have one.
 StageResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
                              const std::vector<Frame>& frames, const CapturesTable& places);
 
-/// Fixes at known points. Captures without a place are not counted; without any there is a problem.
+/// Fixes at known points. Captures without a place are not counted; there is a problem when fewer
+/// than the station wants have one.
 StageResult check_fixes(const StationConfig& config, const Calibration& calibration,
                         const std::vector<Frame>& frames, const CapturesTable& places);
 

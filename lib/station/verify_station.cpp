@@ -28,11 +28,6 @@ UnitStep step_of(const fs::path& folder, int threads, const Look& look) {
   return step;
 }
 
-CapturesTable places_of(const fs::path& folder) {
-  return fs::exists(folder / "captures.csv") ? read_captures(folder / "captures.csv")
-                                             : CapturesTable{};
-}
-
 class Verification {
  public:
   Verification(const StationConfig& config, const fs::path& folder, int threads)
@@ -45,10 +40,7 @@ class Verification {
     UnitStep step = step_of(folder_ / "boards", threads_, [&](const fs::path& file) {
       return look_at_board(file, config_, detector);
     });
-    std::vector<BoardView> views;
-    for (const auto& [name, image] : step.images) {
-      if (image.refused.empty()) views.push_back(*image.view);
-    }
+    const auto views = views_of(step);
     if (!views.empty()) add("boards", solve_boards(config_, golden_.camera_id, views));
     note(StationStep::boards, step);
   }
@@ -60,7 +52,7 @@ class Verification {
     });
     const auto frames = frames_of(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
-    const auto places = places_of(step.folder);
+    const auto places = places_in(step.folder);
     add(name_of(each), each == StationStep::check
                            ? check_fixes(config_, golden_.calibration, frames, places)
                            : solve_dispersion(config_, golden_.calibration, frames, places));

@@ -15,16 +15,18 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
 
-/// A terminal of 80 x 40 that a program runs in.
+/// A terminal of 80 x 40, or another size, that a program runs in.
 class Tmux {
  public:
-  Tmux(const fs::path& folder, const std::string& command) : socket_((folder / "tmux").string()) {
-    run_program(tmux() + "new-session -d -x 80 -y 40 \"" + command + "; sleep 100\"");
+  Tmux(const fs::path& folder, const std::string& command, const char* size = "-x 80 -y 40")
+      : socket_((folder / "tmux").string()) {
+    run_program(tmux() + "new-session -d " + size + " \"" + command + "; sleep 100\"");
   }
   ~Tmux() { run_program(tmux() + "kill-server"); }
   Tmux(const Tmux&) = delete;
   Tmux& operator=(const Tmux&) = delete;
 
+  void resize(const char* size) const { run_program(tmux() + "resize-window " + size); }
   void type(const std::string& keys) const { run_program(tmux() + "send-keys " + keys); }
 
   /// What it shows, without empty lines at the end; `escapes`: with colours.
@@ -108,7 +110,7 @@ TEST_F(StationTerminal, GuidesThroughAUnit) {
   tmux.screen_with("check 7/8");
   const auto begin = std::chrono::steady_clock::now();
   drop("check", 7, 8);
-  const std::string verdict = tmux.screen_with("check_residual_px");
+  const std::string verdict = tmux.screen_with("PASS   camera");
   const std::chrono::duration<double> wait = std::chrono::steady_clock::now() - begin;
   RecordProperty("verdict_s", std::to_string(wait.count()));
   expect_screen(without_figures(verdict), "verdict.txt");
@@ -124,6 +126,38 @@ TEST_F(StationTerminal, ShowsColourAndStopsOnAKey) {
   tmux.type("q");
   EXPECT_THAT(tmux.screen_with("FAIL"), HasSubstr("boards: not enough images"));
   EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[31m"));
+}
+
+/// Lines of the screen with this text.
+int lines_with(const std::string& screen, const std::string& text) {
+  int count = 0;
+  for (auto at = screen.find(text); at != std::string::npos; at = screen.find(text, at + 1)) {
+    ++count;
+  }
+  return count;
+}
+
+TEST_F(StationTerminal, IsNotConfusedByTheTerminalsSize) {
+  if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
+  const Tmux tmux(folder / "",
+                  "PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null",
+                  "-x 80 -y 24");
+  const std::string keys = "q: verdict now";
+  tmux.screen_with(keys);
+  tmux.resize("-x 60 -y 12");
+  // It draws anew at once: the heading is at the top, the keys at the bottom, once each.
+  for (int i = 0; i < 100 && !tmux.screen().starts_with("station-1"); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  const std::string small = tmux.screen_with(keys);
+  EXPECT_THAT(small, testing::StartsWith("station-1"));
+  EXPECT_EQ(lines_with(small, "station-1"), 1) << small;
+  EXPECT_EQ(lines_with(small, keys), 1) << small;
+  tmux.resize("-x 80 -y 24");
+  tmux.screen_with("Next");
+  // The verdict is longer than 24 lines. Its end is what counts.
+  tmux.type("q");
+  EXPECT_THAT(tmux.screen_with("FAIL   camera"), HasSubstr("#      #   #   #####   #####"));
 }
 
 }  // namespace

@@ -56,12 +56,11 @@ TEST_F(WatchedStation, ComesToTheSameAsFromFullFoldersAndPutsTheImagesAway) {
 }
 
 TEST_F(WatchedStation, SaysWhyAnImageIsRefused) {
-  render("boards");
-  prepare("a");
-  const auto boards = images("boards");
   const auto at = captures("a") / "boards";
-  fs::copy_file(boards[0], at / "0.png");
-  fs::copy_file(boards[0], at / "1.png");
+  fs::create_directories(at);
+  const std::string view = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png";
+  fs::copy_file(view, at / "0.png");
+  fs::copy_file(view, at / "1.png");
   cv::imwrite((at / "2.png").string(), cv::Mat1b(600, 800, static_cast<unsigned char>(3)));
   cv::imwrite((at / "3.png").string(), cv::Mat1b(480, 640, static_cast<unsigned char>(90)));
   std::ofstream(at / "4.png") << "no image";
@@ -118,24 +117,58 @@ TEST_F(WatchedStation, GoesOnAfterItWasKilled) {
   EXPECT_EQ(kept, 48 * listed);
 }
 
+/// A captures.csv that comes last, and in parts, is read when it is whole.
+TEST_F(WatchedStation, WaitsForTheTablesOfPlaces) {
+  render();
+  prepare("a");
+  const auto table = captures("a") / "check/captures.csv";
+  const std::string places = TemporaryFolder::content_of(table);
+  std::ofstream(table) << places.substr(0, places.size() - 5);  // cut short
+  drop_all("a");
+  const auto result =
+      run_program("(sleep 6; mv " + folder.file("places", places).string() + " " + table.string() +
+                  ") & " + run("a", "--idle-s 60") + "; code=$?; wait; exit $code");
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+}
+
+/// Writes images, each some times: what a camera sees that rests for a while.
+bool write_video(const fs::path& file, const std::vector<fs::path>& images, int times) {
+  cv::VideoWriter video(file.string(), cv::VideoWriter::fourcc('F', 'F', 'V', '1'), 10, {800, 600},
+                        false);
+  if (!video.isOpened()) return false;
+  for (const auto& image : images) {
+    const cv::Mat frame = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
+    for (int i = 0; i < times; ++i) video.write(frame);
+  }
+  return true;
+}
+
 TEST_F(WatchedStation, TakesAVideo) {
   render();
   prepare("a");
-  cv::VideoWriter video((folder / "boards.avi").string(),
-                        cv::VideoWriter::fourcc('F', 'F', 'V', '1'), 10, {800, 600}, false);
-  if (!video.isOpened()) GTEST_SKIP() << "OpenCV writes no FFV1";
-  for (const auto& image : images("boards")) {
-    const cv::Mat frame = cv::imread(image.string(), cv::IMREAD_GRAYSCALE);
-    for (int i = 0; i < 3; ++i) video.write(frame);  // it rests for a while
-  }
-  video.release();
+  const std::string video = (folder / "boards.avi").string();
+  if (!write_video(video, images("boards"), 2)) GTEST_SKIP() << "OpenCV writes no FFV1";
   for (const char* step : {"rotation", "dispersion", "check"}) {
     for (const auto& image : images(step)) drop(image, captures("a") / step);
   }
-  const auto result =
-      run_program(run("a", "--idle-s 60 --source boards=" + (folder / "boards.avi").string()));
+  const auto result = run_program(run("a", "--idle-s 60 --source boards=" + video));
   EXPECT_EQ(result.exit_code, 0) << result.output << result.errors;
   EXPECT_THAT(result.errors, HasSubstr("refused: same pose as frame-000000.png"));
+  EXPECT_THAT(records("show").output, HasSubstr("images     48, 48 used"));
+}
+
+/// All its frames are refused, and none is kept: the record still tells why.
+TEST_F(WatchedStation, NamesTheCauseOfAVideoThatCannotBeUsed) {
+  change("scene.yaml", "blur_px: 0.7", "blur_px: 2.5");
+  change("scene.yaml", "count: 16", "count: 6");
+  render("boards");
+  const std::string video = (folder / "boards.avi").string();
+  if (!write_video(video, images("boards"), 1)) GTEST_SKIP() << "OpenCV writes no FFV1";
+  const auto result = run_program(run("a", "--idle-s 60 --source " + video));
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, HasSubstr("fails: the lens is blurred"));
+  EXPECT_THAT(result.output, HasSubstr("6 of 6 images refused: 6 blurred"));
+  EXPECT_THAT(records("show").output, HasSubstr("images     6, 0 used"));
 }
 
 TEST_F(WatchedStation, SurvivesAFullDisk) {
