@@ -10,6 +10,7 @@
 #include "app.h"
 #include "detection/image_file.h"
 #include "rig/input_error.h"
+#include "station/publish_run.h"
 #include "station/verify_station.h"
 #include "station_guide.h"
 
@@ -21,9 +22,9 @@ namespace fs = std::filesystem;
 const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 
 /// Record, files, and what the operator and the caller get to know.
-void conclude(const RunRecord& record, Records& records, const StationConfig& config,
-              Terminal& terminal) {
-  finish_run(record, records, config.results);
+void conclude(const RunRecord& record, const std::vector<ReportPicture>& pictures, Records& records,
+              const StationConfig& config, Terminal& terminal) {
+  finish_run(record, pictures, records, config.results);
   terminal.print(verdict_screen(record));
   spdlog::info("run {}: {}", record.run, (config.results / record.camera / record.run).string());
 }
@@ -51,7 +52,7 @@ void run_batch(const StationRunOptions& options, const StationConfig& config, Re
   unit.advance(true);
   const RunRecord record = record_of(unit, run, kProgram);
   Terminal terminal;
-  conclude(record, records, config, terminal);
+  conclude(record, unit.pictures(), records, config, terminal);
   fail_unless_passed(record);
 }
 
@@ -70,7 +71,7 @@ void run_watched(const StationRunOptions& options, const StationConfig& config, 
   guide_unit(options, unit, watched, sources, terminal);
   unit.advance(true);
   const RunRecord record = record_of(unit, watched.run(), kProgram);
-  conclude(record, records, config, terminal);
+  conclude(record, unit.pictures(), records, config, terminal);
   watched.put_away();
   fail_unless_passed(record);
 }
@@ -90,10 +91,10 @@ void run_verify(const StationRunOptions& options) {
   Records records(config.records);
   const fs::path arrived = config.captures / config.golden->camera_id;
   const bool batch = !options.batch.empty();
-  const RunRecord record =
+  const auto [record, pictures] =
       verify_station(config, batch ? fs::path(options.batch) : arrived, kProgram, options.threads);
   Terminal terminal;
-  conclude(record, records, config, terminal);
+  conclude(record, pictures, records, config, terminal);
   if (!batch) put_away(arrived, record.run);
   if (record.passed()) return;
   throw GateNotMet(fmt::format("station {} has moved: {}", record.station,

@@ -1,19 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/core.h>
-
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "calibration/dispersion/dispersion.h"
-#include "calibration/rotation/circle_center.h"
+#include "calibration/plots/calibration_plots.h"
 #include "calibration/rotation/turning_axis.h"
 #include "geometry/angles.h"
 #include "positioning/positioner.h"
 #include "rig/stage.h"
+#include "station/known_places.h"
 #include "station/unit_stages.h"
 
 namespace vlp {
@@ -26,16 +22,6 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
-}
-
-/// Why there are too few captures at known places; empty when there are enough.
-std::string places_problem(std::size_t known, std::size_t captures, int wanted) {
-  if (known > 0 && known >= std::min(captures, static_cast<std::size_t>(wanted))) return "";
-  return fmt::format(
-      "nothing tells where {} of the {} captures are: captures.csv or truth.csv of the step "
-      "should, "
-      "with x_m and y_m of each",
-      captures - known, captures);
 }
 
 std::vector<StationCapture> at_station(const StationConfig& config,
@@ -56,16 +42,6 @@ std::vector<StationCapture> at_station(const StationConfig& config,
 
 }  // namespace
 
-CapturesTable places_in(const std::filesystem::path& folder) {
-  CapturesTable places;
-  for (const char* table : {"captures.csv", "truth.csv"}) {
-    if (!places.empty() || !std::filesystem::exists(folder / table)) continue;
-    places = read_captures(folder / table);
-    std::erase_if(places, [](const auto& place) { return !place.second.x_m; });
-  }
-  return places;
-}
-
 StageResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                            const std::vector<Frame>& frames) {
   const Camera& camera = calibration.camera;
@@ -75,9 +51,10 @@ StageResult solve_rotation(const StationConfig& config, const Calibration& calib
   }
   const RotationFit fit = fit_turning_axis(spot, camera);
   if (!fit.converged) return {"the turn on the spot: no rotation centre fits the captures"};
+  const CircleCenters circles = fit_circle_centers(spot, camera);
   StageResult result{"", with_rotation_center(calibration, fit.center, {})};
   result.values = {{"rotation_px", fit.residual_px},
-                   {"rotation_spread_px", fit_circle_centers(spot, camera).spread_px},
+                   {"rotation_spread_px", circles.spread_px},
                    {"tilt_deg", deg_from_rad(tilt_of(fit.center).angle_rad)}};
   if (const auto& covariance = fit.center.covariance) {
     result.values.push_back({"rotation_sd_px", std::sqrt(covariance->trace())});
@@ -85,6 +62,9 @@ StageResult solve_rotation(const StationConfig& config, const Calibration& calib
   if (const auto& arm_m = fit.center.lever_arm_m) {
     result.values.push_back({"lever_arm_mm", kMillimetres * arm_m->norm()});
   }
+  result.drawing = [spot, circles, fit, camera] {
+    return drawing_of(plot_of(camera.id, spot, circles, fit, camera));
+  };
   return result;
 }
 
@@ -105,6 +85,7 @@ StageResult solve_dispersion(const StationConfig& config, const Calibration& cal
   if (const auto& world_m = fit.world_offset_m) {
     result.values.push_back({"world_mm", kMillimetres * world_m->norm()});
   }
+  result.drawing = [fit] { return drawing_of(plot_of("Fixes at a known station", fit)); };
   return result;
 }
 

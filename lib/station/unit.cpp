@@ -35,6 +35,7 @@ void Unit::advance(bool all_in) {
     state.enough = has_enough(step);
     if (!state.enough && !all_in) return;
     state.result = solve(step, all_in);
+    state.picture = state.result->drawing ? draw_aside(state.result->drawing) : StepPicture{};
     if (!state.result->problem.empty()) return;
   }
 }
@@ -51,6 +52,15 @@ std::optional<StationStep> Unit::current() const {
     if (!this->step(step).done()) return step;
   }
   return std::nullopt;
+}
+
+std::vector<ReportPicture> Unit::pictures() const {
+  std::vector<ReportPicture> pictures;
+  for (const UnitStep& state : steps_) {
+    if (!state.result || !state.picture.valid()) continue;
+    if (const auto& picture = state.picture.get()) pictures.push_back(*picture);
+  }
+  return pictures;
 }
 
 bool Unit::hopeless() const {

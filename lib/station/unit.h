@@ -55,6 +55,8 @@ class Unit {
   std::optional<Calibration> calibration() const;
   /// All figures, gates among them.
   std::vector<StationFigure> figures() const;
+  /// For the report: of lens, rotation centre and dispersion, as far as it came. Waits for them.
+  std::vector<ReportPicture> pictures() const;
   /// Why the unit fails, the root first; empty when it passes.
   std::vector<std::string> causes() const;
   const StationConfig& config() const { return config_; }

@@ -5,6 +5,7 @@
 
 #include "captures/digest.h"
 #include "rig/input_error.h"
+#include "station/known_places.h"
 #include "station/turn_map.h"
 #include "station/unit.h"
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +11,7 @@
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "detection/boards/detect_boards.h"
+#include "evaluation/gnuplot.h"
 #include "rig/calibration.h"
 #include "station/station_config.h"
 #include "station/station_figures.h"
@@ -26,6 +27,8 @@ struct StageResult {
   std::vector<NamedValue> values = {};
   /// Where to show the board next, after boards; else empty.
   std::string advice = {};
+  /// Makes its picture for the report, later; may be empty.
+  std::function<Drawing()> drawing = {};
 };
 
 /// The lens from views of the board, and how far it can be trusted.
@@ -35,10 +38,6 @@ StageResult solve_boards(const StationConfig& config, const std::string& camera_
 /// Rotation centre and tilt from a turn on the spot.
 StageResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                            const std::vector<Frame>& frames);
-
-/// Where captures of a step were, by image: captures.csv of its folder, else truth.csv, else
-/// nothing. Throws InputError for a table that cannot be read.
-CapturesTable places_in(const std::filesystem::path& folder);
 
 /// What fixes at a known station still lack. Places: those of captures.csv, or of the config. There
 /// is a problem when fewer captures than the station wants have one.

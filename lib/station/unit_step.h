@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "station/step_picture.h"
 #include "station/unit_image.h"
 #include "station/unit_stages.h"
 
@@ -26,6 +27,8 @@ struct UnitStep {
   bool enough = false;
   /// What the images come to, once there are enough of them.
   std::optional<StageResult> result = {};
+  /// Of the result, if it has one.
+  StepPicture picture = {};
   /// Of the images refused one after another, the last ones.
   int refused_in_a_row = 0;
   /// The image that came last.

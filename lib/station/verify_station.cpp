@@ -7,6 +7,7 @@
 #include "captures/in_parallel.h"
 #include "detection/image_file.h"
 #include "rig/input_error.h"
+#include "station/known_places.h"
 #include "station/lamp_faults.h"
 
 namespace vlp {
@@ -85,10 +86,19 @@ class Verification {
     return record;
   }
 
+  std::vector<ReportPicture> pictures() const {
+    std::vector<ReportPicture> pictures;
+    for (const StepPicture& drawn : drawn_) {
+      if (const auto& picture = drawn.get()) pictures.push_back(*picture);
+    }
+    return pictures;
+  }
+
  private:
   void add(const char* step, const StageResult& result) {
     if (!result.problem.empty()) causes_.push_back(fmt::format("{}: {}", step, result.problem));
     values_.insert(values_.end(), result.values.begin(), result.values.end());
+    if (result.drawing) drawn_.push_back(draw_aside(result.drawing));
   }
   void note(StationStep each, const UnitStep& step) {
     for (const auto& [name, image] : step.images) {
@@ -102,19 +112,20 @@ class Verification {
   int threads_;
   std::vector<Frame> frames_ = {};
   std::vector<NamedValue> values_ = {};
+  std::vector<StepPicture> drawn_ = {};
   std::vector<std::string> causes_ = {};
   std::vector<RunRecord::Image> images_ = {};
 };
 
 }  // namespace
 
-RunRecord verify_station(const StationConfig& config, const fs::path& folder,
-                         const ProgramVersion& program, int threads) {
+Verified verify_station(const StationConfig& config, const fs::path& folder,
+                        const ProgramVersion& program, int threads) {
   Verification verification(config, folder, threads);
   if (fs::is_directory(folder / "boards")) verification.boards();
   if (fs::is_directory(folder / "dispersion")) verification.lamps(StationStep::dispersion);
   verification.lamps(StationStep::check);
-  return verification.record(program);
+  return {verification.record(program), verification.pictures()};
 }
 
 }  // namespace vlp

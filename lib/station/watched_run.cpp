@@ -12,7 +12,7 @@
 
 #include "rig/file.h"
 #include "rig/input_error.h"
-#include "station/unit_report.h"
+#include "station/publish_run.h"
 
 namespace vlp {
 namespace {
@@ -78,7 +78,7 @@ void WatchedRun::begin(Records& records) {
     run_.erase(std::find(run_.begin(), run_.end(), '\n'), run_.end());
     finished_ = records.find(run_);
     if (!finished_) return;  // goes on
-    publish_run(*finished_, unit_.config().results);
+    publish_run(*finished_, {}, unit_.config().results);
     put_away();
     return;
   }
@@ -131,23 +131,6 @@ void put_away(const fs::path& folder, const std::string& run) {
   if (error) {
     throw InputError(folder, "cannot be put away as " + kept.string() + ": " + error.message());
   }
-}
-
-fs::path publish_run(const RunRecord& record, const fs::path& results) {
-  const fs::path folder = results / record.camera / record.run;
-  make_folder(folder);
-  fs::path calibration;
-  if (!record.calibration.empty()) {
-    calibration = folder / (record.passed() ? "calibration.yaml" : "failed-calibration.yaml");
-    write_file(calibration, record.calibration);
-  }
-  write_file(folder / "report.html", unit_report(record, calibration));
-  return folder;
-}
-
-void finish_run(const RunRecord& record, Records& records, const fs::path& results) {
-  records.keep(record);
-  publish_run(record, results);
 }
 
 }  // namespace vlp

@@ -64,13 +64,6 @@ class WatchedRun {
   std::vector<std::string> tables_;
 };
 
-/// Keeps the record, then writes RESULTS/CAMERA/RUN/: calibration.yaml when the unit passed,
-/// failed-calibration.yaml when it failed and came so far; report.html. Done again it changes
-/// nothing; a run that has its record can be published at any time. Throws InputError.
-void finish_run(const RunRecord& record, Records& records, const std::filesystem::path& results);
-/// The second half of it. The folder that it went to.
-std::filesystem::path publish_run(const RunRecord& record, const std::filesystem::path& results);
-
 /// Why a text cannot be a camera's id, which names folders; empty when it can.
 std::string camera_id_problem(const std::string& camera_id);
 

@@ -21,7 +21,10 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   const std::string calibration = this->result("0001", "calibration.yaml");
   EXPECT_THAT(calibration, AllOf(HasSubstr("rotation_center"), HasSubstr("dispersion")));
   EXPECT_THAT(this->result("0001", "report.html"),
-              AllOf(HasSubstr("<strong>PASS"), HasSubstr("check_mean_mm"), HasSubstr("LENSMODEL")));
+              AllOf(HasSubstr("<strong>PASS"), HasSubstr("check_mean_mm"), HasSubstr("LENSMODEL"),
+                    // the captions of the pictures of lens, rotation centre and dispersion
+                    HasSubstr("Coverage: the corners"), HasSubstr("Left: the lamps"),
+                    HasSubstr("Fixes at a known station minus")));
   // A unit calibrated again keeps its history, and gives the same calibration.
   EXPECT_EQ(run_program(batch("0002") + " --threads 1").exit_code, 0);
   EXPECT_EQ(comparable_calibration("0002"), comparable_calibration("0001"));

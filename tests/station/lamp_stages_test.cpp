@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 
+#include "station/known_places.h"
 #include "station/unit_stages.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
