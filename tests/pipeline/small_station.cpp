@@ -3,11 +3,14 @@
 #include "small_station.h"
 
 #include <algorithm>
+#include <array>
 #include <sstream>
 
 namespace vlp {
 
 namespace fs = std::filesystem;
+
+constexpr std::array kSteps{"boards", "rotation", "dispersion", "check"};
 
 SmallStation::SmallStation() {
   const fs::path data = fs::path(VLP_SOURCE_DIR) / "datasets/station";
@@ -56,6 +59,20 @@ void SmallStation::drop(const fs::path& image, const fs::path& step) const {
   const fs::path making = step / ("." + image.filename().string());
   fs::copy_file(image, making, fs::copy_options::overwrite_existing);
   fs::rename(making, step / image.filename());
+}
+
+void SmallStation::prepare(const std::string& camera) const {
+  for (const char* step : kSteps) {
+    fs::create_directories(captures(camera) / step);
+    const auto table = folder / "unit" / step / "captures.csv";
+    if (fs::exists(table)) fs::copy_file(table, captures(camera) / step / "captures.csv");
+  }
+}
+
+void SmallStation::drop_all(const std::string& camera) const {
+  for (const char* step : kSteps) {
+    for (const auto& image : images(step)) drop(image, captures(camera) / step);
+  }
 }
 
 std::string SmallStation::comparable_calibration(const std::string& camera) const {

@@ -45,6 +45,10 @@ class SmallStation : public testing::Test {
   std::vector<std::filesystem::path> images(const std::string& step) const;
   /// An image into a step's folder as a capture tool would do it: under another name first.
   void drop(const std::filesystem::path& image, const std::filesystem::path& step) const;
+  /// The folders of a camera with the tables, as the fixture of a station writes them.
+  void prepare(const std::string& camera) const;
+  /// All images of the unit, in the order of the steps.
+  void drop_all(const std::string& camera) const;
   /// The calibration of a camera without its id.
   std::string comparable_calibration(const std::string& camera) const;
   /// The one file of this name below the results of a camera; its content, empty without one.

@@ -134,15 +134,6 @@ TEST_F(Station, RefusesWhatItCannotUse) {
   EXPECT_THAT(run_program("vlp-station list --records " + (folder / "typo.db").string()).errors,
               HasSubstr("typo.db: there are no records"));
   EXPECT_FALSE(fs::exists(folder / "typo.db"));
-  // A source that is not there leaves nothing behind, and no more than one line.
-  const auto camera = run_program(run("0001", "--source boards=/dev/video99"));
-  EXPECT_EQ(camera.exit_code, 2);
-  EXPECT_EQ(camera.errors,
-            "vlp-station: error: /dev/video99: there is no such camera: is it connected?\n");
-  const auto video = run_program(run("0001", "--source " + folder.file("a.avi", "a").string()));
-  EXPECT_THAT(video.errors, AllOf(HasSubstr("a.avi: cannot be opened as a camera or a video\n"),
-                                  Not(HasSubstr("OpenCV"))));
-  EXPECT_FALSE(fs::exists(captures("0001")));
 }
 
 }  // namespace
