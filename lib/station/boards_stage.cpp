@@ -73,7 +73,6 @@ StageResult solve_boards(const StationConfig& config, const std::string& camera_
                    {"coverage", coverage.share}};
   if (report.halves) result.values.push_back({"halves_px", report.halves->rms_px});
   compare(config, solution, result.values);
-  result.advice = next_view(coverage);
   result.drawing = [solution,
                     title = camera_id + ", " + std::string(name_of(config.type.lens_model))] {
     return drawing_of(plot_of(title, solution));

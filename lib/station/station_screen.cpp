@@ -76,6 +76,11 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
     add_wrapped(lines, "Last", image->first + ": " + outcome_of(image->second),
                 image->second.refused.empty() ? Tone::good : Tone::bad);
   }
+  for (const StationFigure& figure : unit.figures()) {
+    // Blur is of all views so far: a few may mislead.
+    const bool known = figure.value && figure.name != "blur_px";
+    if (known && !figure.met()) add_wrapped(lines, "Fails", cause_of(figure), Tone::bad);
+  }
   if (state.refused_in_a_row > 1) {
     add_wrapped(lines, "Refused",
                 fmt::format("{} in a row; after {} the unit fails", state.refused_in_a_row,

@@ -25,8 +25,6 @@ struct StageResult {
   /// With the step's part, but for its history.
   Calibration calibration = {};
   std::vector<NamedValue> values = {};
-  /// Where to show the board next, after boards; else empty.
-  std::string advice = {};
   /// Makes its picture for the report, later; may be empty.
   std::function<Drawing()> drawing = {};
 };

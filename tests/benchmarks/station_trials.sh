@@ -6,13 +6,17 @@
 # good ones pass, and faulty ones fail with the cause named first. In the project's folder, built:
 #   tests/benchmarks/station_trials.sh good [COUNT [FIRST_SEED]]     by default 50 units, from seed 1
 #   tests/benchmarks/station_trials.sh faulty [COUNT [FIRST_SEED]]   5 of each kind
+#   tests/benchmarks/station_trials.sh timing [COUNT [FIRST_SEED]]   1 unit
 # A line for each; exit code 1 when one did not end as it should. A good unit takes 9 s of processor
-# time, six faulty ones 30 s.
+# time, six faulty ones 30 s. timing: the processor time from full folders, pictures included, and
+# how long the verdict takes after the last image, others coming every 50 ms before.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 PATH=$PWD/build/bin:$PATH
 what=${1:-good} count=${2:-} first=${3:-1}
-[ -n "$count" ] || count=$([ "$what" = good ] && echo 50 || echo 5)
+declare -A counts=([good]=50 [faulty]=5 [timing]=1)
+[ -n "${counts[$what]:-}" ] || { sed -n '5,14s/^# \?//p' "$0"; exit 2; }
+count=${count:-${counts[$what]}}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cp -rT datasets/station "$work/station"
@@ -102,6 +106,33 @@ faulty() {
   sed -i 's/first_id: 0/first_id: 30/' "$work/station/board.yaml"
   tried board "$1" 'wrong board'
   cp datasets/station/board.yaml "$work/station/board.yaml"
+}
+
+timing() {
+  scene_of "$1" 514.8 525.2 5 0.7
+  render
+  local TIMEFORMAT='%U %S' processor step image arriving=$work/station/captures/timing
+  processor=$({ time vlp-station run -q --station "$work/station/station.yaml" \
+    --camera-id batch --batch "$work/unit"; } 2>&1)
+  mkdir -p "$arriving"/{boards,rotation,dispersion,check}
+  cp "$work"/unit/dispersion/captures.csv "$arriving/dispersion/"
+  cp "$work"/unit/check/captures.csv "$arriving/check/"
+  vlp-station run -q --station "$work/station/station.yaml" --camera-id timing --idle-s 60 &
+  local station=$!
+  for step in boards rotation dispersion check; do
+    for image in "$work/unit/$step"/*.png; do
+      cp "$image" "$arriving/$step/.coming"
+      # The last one comes when all others are done with.
+      [ "${image##*/unit/}" != check/0035.png ] || sleep 3
+      local last_s=$EPOCHREALTIME
+      mv "$arriving/$step/.coming" "$arriving/$step/${image##*/}"
+      sleep 0.05
+    done
+  done
+  wait "$station" || wrong=$((wrong + 1))
+  awk -v seed="$1" -v p="$processor" -v a="$last_s" -v b="$EPOCHREALTIME" 'BEGIN {
+    split(p, t, " "); printf "timing     %4d   %.2f s of processor time, ", seed, t[1] + t[2]
+    printf "verdict %.2f s after the last image\n", b - a }'
 }
 
 for ((seed = first; seed < first + count; ++seed)); do "$what" "$seed"; done

@@ -20,7 +20,9 @@ class Tmux {
  public:
   Tmux(const fs::path& folder, const std::string& command, const char* size = "-x 80 -y 40")
       : socket_((folder / "tmux").string()) {
-    run_program(tmux() + "new-session -d " + size + " \"" + command + "; sleep 100\"");
+    const auto begun =
+        run_program(tmux() + "new-session -d " + size + " \"" + command + "; sleep 100\"");
+    EXPECT_EQ(begun.exit_code, 0) << begun.errors;
   }
   ~Tmux() { run_program(tmux() + "kill-server"); }
   Tmux(const Tmux&) = delete;
@@ -112,7 +114,8 @@ TEST_F(StationTerminal, GuidesThroughAUnit) {
   drop("check", 7, 8);
   const std::string verdict = tmux.screen_with("PASS   camera");
   const std::chrono::duration<double> wait = std::chrono::steady_clock::now() - begin;
-  RecordProperty("verdict_s", std::to_string(wait.count()));
+  // One second is wanted; the rest is for a machine that does other things, too.
+  EXPECT_LT(wait.count(), 5);
   expect_screen(without_figures(verdict), "verdict.txt");
   EXPECT_THAT(TemporaryFolder::content_of(folder / "log"), Not(HasSubstr("error")));
 }
@@ -126,6 +129,21 @@ TEST_F(StationTerminal, ShowsColourAndStopsOnAKey) {
   tmux.type("q");
   EXPECT_THAT(tmux.screen_with("FAIL"), HasSubstr("boards: not enough images"));
   EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[31m"));
+}
+
+/// The operator need not take the rest of the unit.
+TEST_F(StationTerminal, SaysThatAUnitWillFailAsSoonAsItIsKnown) {
+  if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
+  change("scene.yaml", "402.3, 297.4", "418.3, 285.4");
+  change("scene.yaml", "count: 16", "count: 12");
+  change("station.yaml", "board_views: 16", "board_views: 12");
+  render("boards");
+  prepare("0001");
+  drop("boards", 0, 12);
+  const Tmux tmux(folder / "",
+                  "PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
+  EXPECT_THAT(tmux.screen_with("Fails"),
+              testing::AllOf(HasSubstr("[x] boards"), HasSubstr("the lens is decentred")));
 }
 
 /// Lines of the screen with this text.
