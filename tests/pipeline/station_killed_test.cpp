@@ -157,6 +157,13 @@ TEST_F(StationKilled, SurvivesAFullDisk) {
   }
   fs::remove(fill);
   EXPECT_THAT(records("list --camera-id b").output, HasSubstr("1 runs, 0 passed"));
+  for (const char* camera : {"a", "b", "c"}) {
+    if (!fs::exists(small / camera)) continue;
+    for (const auto& run : fs::directory_iterator(small / camera)) {
+      EXPECT_EQ(records("show " + run.path().filename().string()).exit_code, 0)
+          << "results without a record";
+    }
+  }
   for (const auto& entry : fs::recursive_directory_iterator(small)) {
     if (entry.path().filename() != "failed-calibration.yaml") continue;
     EXPECT_THAT(TemporaryFolder::content_of(entry.path()), HasSubstr("intrinsics: ["));

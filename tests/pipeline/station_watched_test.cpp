@@ -60,7 +60,7 @@ TEST_F(WatchedStation, WaitsForTheTablesOfPlaces) {
   drop_all("a");
   const auto result =
       run_program("(sleep 4; mv " + folder.file("places", places).string() + " " + table.string() +
-                  ") & " + run("a", "--idle-s 60") + "; code=$?; wait; exit $code");
+                  ") & timeout 60 " + run("a", "") + "; code=$?; wait; exit $code");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
 }
 
