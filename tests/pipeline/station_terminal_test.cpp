@@ -3,6 +3,7 @@
 /// vlp-station at a real terminal (tmux), images dropped one by one; the screens are kept in
 /// station_screens/ as text.
 #include <chrono>
+#include <cstdlib>
 #include <regex>
 #include <thread>
 
@@ -18,13 +19,18 @@ using testing::Not;
 /// A terminal of 80 x 40, or another size, that a program runs in.
 class Tmux {
  public:
-  Tmux(const fs::path& folder, const std::string& command, const char* size = "-x 80 -y 40")
-      : socket_((folder / "tmux").string()) {
+  explicit Tmux(const std::string& command, const char* size = "-x 80 -y 40") {
+    // A socket's path has 107 characters at most: not in the test's folder.
+    EXPECT_NE(::mkdtemp(folder_.data()), nullptr);
     const auto begun =
         run_program(tmux() + "new-session -d " + size + " \"" + command + "; sleep 100\"");
     EXPECT_EQ(begun.exit_code, 0) << begun.errors;
   }
-  ~Tmux() { run_program(tmux() + "kill-server"); }
+  ~Tmux() {
+    run_program(tmux() + "kill-server");
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
   Tmux(const Tmux&) = delete;
   Tmux& operator=(const Tmux&) = delete;
 
@@ -49,8 +55,8 @@ class Tmux {
   }
 
  private:
-  std::string tmux() const { return "tmux -f /dev/null -S '" + socket_ + "' "; }
-  std::string socket_;
+  std::string tmux() const { return "tmux -f /dev/null -S '" + folder_ + "/socket' "; }
+  std::string folder_ = (fs::temp_directory_path() / "vlp-tmux-XXXXXX").string();
 };
 
 /// The screen as it is kept. A new one is written where VLP_WRITE_SCREENS is set.
@@ -86,8 +92,8 @@ TEST_F(StationTerminal, GuidesThroughAUnit) {
     fs::copy_file(folder / "unit" / step / "captures.csv",
                   captures("0001") / step / "captures.csv");
   }
-  const Tmux tmux(folder / "", "PATH='" VLP_PROGRAMS_DIR "':$PATH NO_COLOR=1 " +
-                                   run("0001", "--threads 1") + " 2>" + (folder / "log").string());
+  const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH NO_COLOR=1 " + run("0001", "--threads 1") +
+                  " 2>" + (folder / "log").string());
   expect_screen(tmux.screen_with("Ctrl-C"), "begin.txt");
   drop("boards", 0, 1);
   tmux.screen_with("0000.png: taken");
@@ -122,8 +128,7 @@ TEST_F(StationTerminal, GuidesThroughAUnit) {
 
 TEST_F(StationTerminal, ShowsColourAndStopsOnAKey) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
-  const Tmux tmux(folder / "",
-                  "PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
+  const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
   tmux.screen_with("Ctrl-C");
   EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[1m"));
   tmux.type("q");
@@ -140,8 +145,7 @@ TEST_F(StationTerminal, SaysThatAUnitWillFailAsSoonAsItIsKnown) {
   render("boards");
   prepare("0001");
   drop("boards", 0, 12);
-  const Tmux tmux(folder / "",
-                  "PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
+  const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
   EXPECT_THAT(tmux.screen_with("Fails"),
               testing::AllOf(HasSubstr("[x] boards"), HasSubstr("the lens is decentred")));
 }
@@ -157,8 +161,7 @@ int lines_with(const std::string& screen, const std::string& text) {
 
 TEST_F(StationTerminal, IsNotConfusedByTheTerminalsSize) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
-  const Tmux tmux(folder / "",
-                  "PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null",
+  const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null",
                   "-x 80 -y 24");
   const std::string keys = "q: verdict now";
   tmux.screen_with(keys);
