@@ -4,8 +4,6 @@
 
 #include <fmt/core.h>
 
-#include "calibration/intrinsics/projection_uncertainty.h"
-#include "evaluation/intrinsics_plot.h"
 #include "geometry/angles.h"
 
 namespace vlp {
@@ -39,24 +37,6 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("tilts         left {:.0f}, right {:.0f}, upper {:.0f}, lower {:.0f} degrees\n",
              deg_from_rad(left), deg_from_rad(right), deg_from_rad(upper), deg_from_rad(lower));
   fmt::print("next view     {}\n", next_view(coverage));
-}
-
-void draw_solution(const std::filesystem::path& picture, const std::string& title,
-                   const IntrinsicsSolution& solution) {
-  const BoardProblem& problem = solution.problem;
-  IntrinsicsPlot plot{title, problem.imager_px, {}, 0, {}};
-  const auto residuals_px = residuals_of(problem);
-  for (std::size_t i = 0; i < residuals_px.size(); ++i) {
-    if (!residuals_px[i].allFinite()) continue;
-    const Eigen::Vector3d& point = problem.points[i];
-    plot.corners.push_back({point.head<2>(), residuals_px[i], point.z() <= 0});
-  }
-  const ProjectionUncertainty uncertainty(solution);
-  for (const Eigen::Vector2d& pixel : pixel_grid(problem.imager_px)) {
-    if (pixel.y() == 0) ++plot.cols;
-    plot.sd_px.push_back(uncertainty.worst_px(pixel));
-  }
-  draw_intrinsics_plot(picture, plot);
 }
 
 }  // namespace vlp

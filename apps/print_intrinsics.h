@@ -2,9 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <filesystem>
-#include <string>
-
 #include "calibration/intrinsics/calibration_report.h"
 
 namespace vlp {
@@ -12,9 +9,5 @@ namespace vlp {
 /// What was solved and how far it can be trusted, on stdout.
 void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
                    const ViewCoverage& coverage, const HeldOut& held_out);
-
-/// Corners, residuals and uncertainty of a solution, as a picture. Throws InputError.
-void draw_solution(const std::filesystem::path& picture, const std::string& title,
-                   const IntrinsicsSolution& solution);
 
 }  // namespace vlp

@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "app.h"
+#include "calibration/plots/calibration_plots.h"
 #include "calibration/rotation/circle_center.h"
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/turning_axis.h"
 #include "capture_options.h"
 #include "check_map.h"
-#include "evaluation/rotation_plot.h"
 #include "history.h"
 #include "print_rotation.h"
 #include "rig/input_error.h"
@@ -53,24 +53,6 @@ void report_noise(const RotationFit& fit, const SpotCaptures& spot) {
       fit.residual_px, *spot.stated_px);
 }
 
-void draw_plot(const std::string& file, const std::string& title, const SpotCaptures& spot,
-               const CircleCenters& circles, const RotationFit& fit, const Camera& camera) {
-  RotationPlot plot{
-      title, {}, fit.center.center_px, undistorted_pixel(camera, Eigen::Vector2d::Zero())};
-  for (const auto& [lamp, height, circle] : circles.circles) {
-    const Eigen::Vector2d radii_px(camera.intrinsics[0], camera.intrinsics[1]);
-    plot.traces.push_back({spot.lamps[lamp].id,
-                           {},
-                           undistorted_pixel(camera, circle.circle.center),
-                           circle.circle.radius * radii_px});
-    for (const SpotSighting& sighting : spot.sightings) {
-      if (sighting.lamp != lamp || spot.captures[sighting.capture].height != height) continue;
-      plot.traces.back().places_px.push_back(undistorted_pixel(camera, sighting.ray.hnormalized()));
-    }
-  }
-  draw_rotation_plot(file, plot);
-}
-
 }  // namespace
 
 void rotate_on_spot(const CLI::App& app, const DetectOptions& detect, const std::string& method,
@@ -84,13 +66,15 @@ void rotate_on_spot(const CLI::App& app, const DetectOptions& detect, const std:
   const RotationFit fit = kMethods.at(method)(spot, camera);
   if (!fit.converged) {
     throw Undetermined(
-        "no rotation centre fits the captures: take them on one spot at each height, over more of "
+        "no rotation centre fits the captures: take them on one spot at each height, over more "
+        "of "
         "the turn, with more of the lamps in view, and see that lens and lamp map are right");
   }
   const CircleCenters circles = fit_circle_centers(spot, camera);
   HistoryEntry entry = history_entry(app, inputs);
   if (!plot.empty()) {
-    draw_plot(plot, fmt::format("{}, method {}", camera.id, method), spot, circles, fit, camera);
+    const std::string title = fmt::format("{}, method {}", camera.id, method);
+    draw_rotation_plot(plot, plot_of(title, spot, circles, fit, camera));
   }
   write_calibration(detect.output,
                     with_rotation_center(input.calibration, fit.center, std::move(entry)));

@@ -6,8 +6,10 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "app.h"
+#include "rig/input_error.h"
 #include "station/control_chart.h"
 #include "station/export_runs.h"
 #include "station/station_screen.h"
@@ -19,7 +21,12 @@ Records records_of(const StationRecordsOptions& options) {
   if (options.station.empty() == options.records.empty()) {
     throw std::invalid_argument("which records? Give --station or --records");
   }
-  return Records(options.records.empty() ? read_station(options.station).records : options.records);
+  const std::string where =
+      options.records.empty() ? read_station(options.station).records : options.records;
+  const bool is_server = where.find("://") != std::string::npos;
+  if (!is_server && !std::filesystem::exists(where))
+    throw InputError(where, "there are no records");
+  return Records(where);
 }
 
 /// The run that is named, or the last that the filter lets through.

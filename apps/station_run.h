@@ -12,9 +12,9 @@ struct StationRunOptions {
   std::string station, camera_id;
   /// A folder whose steps are full; empty: the folder of the station is watched.
   std::string batch;
-  /// Of a camera or video, by step: "boards=/dev/video0"; without a step for each in turn.
+  /// A camera or video for a step, "boards=/dev/video0"; without a step for those that have none.
   std::vector<std::string> sources;
-  /// Give the verdict when no image came for so long.
+  /// Give the verdict when no image came for so long, of a source none that could be used.
   std::optional<double> idle_s;
   int threads = 1;
 };
@@ -22,7 +22,8 @@ struct StationRunOptions {
 /// vlp-station run: a unit to its verdict. Throws GateNotMet when it fails.
 void run_unit(const StationRunOptions& options);
 
-/// vlp-station verify: the golden unit. Throws GateNotMet when the station has moved.
+/// vlp-station verify: the golden unit, from the folder `batch` or from where its images arrive.
+/// Throws GateNotMet when the station has moved.
 void run_verify(const StationRunOptions& options);
 
 }  // namespace vlp

@@ -4,9 +4,11 @@
 
 #include <fmt/core.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -57,28 +59,58 @@ Terminal::~Terminal() {
   std::signal(SIGTERM, SIG_DFL);
 }
 
-void Terminal::draw(const std::vector<ScreenLine>& lines) {
-  if (!interactive_) return;
-  std::string text;
-  for (const auto& [line, tone] : lines) {
-    text += colour_ ? fmt::format("{}{}\x1b[0m\x1b[K\n", colour_of(tone), line) : line + "\x1b[K\n";
+Terminal::Size Terminal::size() {
+  winsize known{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &known) != 0 || known.ws_col == 0 || known.ws_row == 0) {
+    return {80, 24};
   }
-  if (text == last_) return;
-  const std::string home = drawn_ > 0 ? fmt::format("\x1b[{}A\r", drawn_) : "";
+  return {known.ws_col, known.ws_row};
+}
+
+bool Terminal::resized() const { return interactive_ && drawn_ > 0 && size() != size_; }
+
+/// Puts the text in the place of what was drawn. After a change of size nobody knows where that is:
+/// all is cleared.
+void Terminal::show(const std::string& text, std::size_t lines) {
+  const Size now = size();
+  const bool moved = drawn_ > 0 && now != size_;
+  if (text == last_ && !moved) return;
+  const std::string home = moved        ? "\x1b[2J\x1b[H"
+                           : drawn_ > 0 ? fmt::format("\x1b[{}A\r", drawn_)
+                                        : "";
   fmt::print("{}{}\x1b[J", home, text);
   std::fflush(stdout);
   last_ = text;
-  drawn_ = lines.size();
+  drawn_ = lines;
+  size_ = now;
+}
+
+void Terminal::draw(const std::vector<ScreenLine>& lines) {
+  if (!interactive_) return;
+  const auto [columns, rows] = size();
+  const std::size_t shown = std::min(lines.size(), rows - 1);
+  std::string text;
+  for (std::size_t i = 0; i < shown; ++i) {
+    // The last line, with the keys, stays.
+    const auto& [line, tone] = i + 1 == shown ? lines.back() : lines[i];
+    text += toned(line.substr(0, columns), tone) + "\x1b[K\n";
+  }
+  show(text, shown);
 }
 
 void Terminal::print(const std::vector<ScreenLine>& lines) {
-  if (interactive_) {
-    draw(lines);
-    drawn_ = 0;
-    last_.clear();
-    return;
+  std::string text;
+  for (const auto& [line, tone] : lines) {
+    text += toned(line, tone) + (interactive_ ? "\x1b[K\n" : "\n");
   }
-  for (const auto& [line, tone] : lines) fmt::print("{}\n", line);
+  if (!interactive_) return fmt::print("{}", text);
+  show(text, lines.size());
+  drawn_ = 0;
+  last_.clear();
+}
+
+std::string Terminal::toned(const std::string& text, Tone tone) const {
+  return colour_ ? fmt::format("{}{}\x1b[0m", colour_of(tone), text) : text;
 }
 
 std::optional<char> Terminal::key(int wait_ms) const {

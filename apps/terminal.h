@@ -23,18 +23,30 @@ class Terminal {
   Terminal& operator=(const Terminal&) = delete;
 
   bool interactive() const { return interactive_; }
-  /// Redraws in place; only at a terminal, and only when something changed.
+  /// Redraws in place; only at a terminal, and only when something changed. What has no room at
+  /// the terminal's size is left out.
   void draw(const std::vector<ScreenLine>& lines);
   /// Prints in place of what was drawn, to stay.
   void print(const std::vector<ScreenLine>& lines);
+  /// Whether the terminal has another size than when it was drawn.
+  bool resized() const;
   /// The key that was pressed, if one was, waiting so long at most.
   std::optional<char> key(int wait_ms) const;
 
  private:
   struct Saved;
+  struct Size {
+    std::size_t columns, rows;
+    bool operator==(const Size&) const = default;
+  };
+  static Size size();
+  void show(const std::string& text, std::size_t lines);
+  std::string toned(const std::string& text, Tone tone) const;
+
   bool interactive_, colour_;
   std::size_t drawn_ = 0;
   std::string last_;
+  Size size_{};
   std::unique_ptr<Saved> saved_;
 };
 

@@ -10,9 +10,9 @@
 
 #include "app.h"
 #include "calibration/dispersion/dispersion.h"
+#include "calibration/plots/calibration_plots.h"
 #include "capture_options.h"
 #include "check_map.h"
-#include "evaluation/dispersion_plot.h"
 #include "history.h"
 #include "rig/stage.h"
 #include "station_captures.h"
@@ -75,19 +75,6 @@ void print_summary(const DispersionFit& fit, std::size_t captures) {
   }
 }
 
-void draw(const std::string& picture, const DispersionFit& fit) {
-  DispersionPlot plot{"Fixes at a known station", {{}, fit.before}, {{}, fit.after}, {}};
-  for (const auto& fix : fit.fixes) {
-    if (fix.used) {
-      plot.before.errors_m.push_back(fix.before_m);
-      plot.after.errors_m.push_back(fix.after_m);
-    } else {
-      plot.outliers_m.push_back(fix.before_m);
-    }
-  }
-  draw_dispersion_plot(picture, plot);
-}
-
 void run(const CLI::App& app, const Options& options) {
   const std::string table = captures_file(options.station, options.detect.folder);
   std::vector<std::string> inputs = inputs_of(options.detect);
@@ -106,7 +93,9 @@ void run(const CLI::App& app, const Options& options) {
   if (fit.status == DispersionStatus::no_fix) check_map_of_failure(input, levelled, options.detect);
   check(fit);
   HistoryEntry entry = history_entry(app, inputs);
-  if (!options.plot.empty()) draw(options.plot, fit);
+  if (!options.plot.empty()) {
+    draw_dispersion_plot(options.plot, plot_of("Fixes at a known station", fit));
+  }
   write_calibration(options.detect.output,
                     with_dispersion(calibration, fit.dispersion, std::move(entry)));
   if (!calibration.rotation_center) {

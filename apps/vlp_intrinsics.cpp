@@ -13,6 +13,7 @@
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/mrcal_files.h"
+#include "calibration/plots/calibration_plots.h"
 #include "history.h"
 #include "intrinsics_options.h"
 #include "print_intrinsics.h"
@@ -117,7 +118,8 @@ void run(const CLI::App& app, const IntrinsicsOptions& options) {
   write_cameramodel(beside(options.output, ".cameramodel"), solution);
   write_corners(beside(options.output, ".corners.vnl"), solution, input.names);
   if (!options.plot.empty()) {
-    draw_solution(options.plot, fmt::format("{}, {}", options.camera_id, options.lens), solution);
+    const std::string title = fmt::format("{}, {}", options.camera_id, options.lens);
+    draw_intrinsics_plot(options.plot, plot_of(title, solution));
   }
   print_summary(solution, report, coverage, held_out_fit(solution, input.held_out));
   const auto failed = gates_not_met(options.gates, solution, report);

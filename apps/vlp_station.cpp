@@ -16,14 +16,18 @@ void add_run(CLI::App& app, StationRunOptions& options) {
   run->add_option("--camera-id", options.camera_id, "The unit's camera")
       ->required()
       ->check([](const std::string& id) { return camera_id_problem(id); });
-  run->add_option("--batch", options.batch,
-                  "A folder whose folders boards, rotation, dispersion and check are full: no "
-                  "questions asked (default: the images that arrive in the station's folder)");
+  auto* batch =
+      run->add_option("--batch", options.batch,
+                      "A folder whose folders boards, rotation, dispersion and check are full: no "
+                      "questions asked (default: the images that arrive in the station's folder)");
   run->add_option("--source", options.sources,
                   "A V4L2 camera or a video file whose frames are taken for the present step, or "
-                  "STEP=SOURCE for one step")
+                  "STEP=SOURCE for one step; frames that are refused are not kept")
+      ->excludes(batch)
       ->option_text("[STEP=]SOURCE ...");
-  run->add_option("--idle-s", options.idle_s, "Give the verdict when no image came for so long")
+  run->add_option("--idle-s", options.idle_s,
+                  "Give the verdict when no image came for so long, of a source none that could be "
+                  "used")
       ->check(finite_positive());
   run->add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
@@ -33,10 +37,9 @@ void add_verify(CLI::App& app, StationRunOptions& options) {
   CLI::App* verify =
       app.add_subcommand("verify", "Measure the golden unit: has the station itself moved?");
   verify->add_option("--station", options.station, "The station, station.yaml")->required();
-  verify
-      ->add_option("--batch", options.batch,
-                   "Its images: a folder with check and, maybe, dispersion and boards")
-      ->required();
+  verify->add_option("--batch", options.batch,
+                     "Its images: a folder with check and, maybe, dispersion and boards (default: "
+                     "those that are in the station's folder, which are put away)");
   verify->add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
 }

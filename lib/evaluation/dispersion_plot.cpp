@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluation/dispersion_plot.h"
 
-#include "evaluation/gnuplot.h"
 #include "evaluation/plot_parts.h"
 
 namespace vlp {
@@ -36,7 +35,7 @@ std::string layer(const std::string& name, const std::string& color, const std::
 
 }  // namespace
 
-void draw_dispersion_plot(const std::filesystem::path& picture, const DispersionPlot& plot) {
+Drawing drawing_of(const DispersionPlot& plot) {
   std::string commands =
       points("before", plot.before.errors_m) + circle("before_circle", plot.before.circle) +
       points("after", plot.after.errors_m) + circle("after_circle", plot.after.circle) +
@@ -60,7 +59,11 @@ void draw_dispersion_plot(const std::filesystem::path& picture, const Dispersion
   commands +=
       ", '+' using (0):(0) every ::0::0 with points pointtype 1 pointsize 2 linewidth 2 linecolor "
       "rgb 'black' title 'station'\n";
-  draw(picture, {"dispersion", 720, 720, commands});
+  return {"dispersion", 720, 720, commands};
+}
+
+void draw_dispersion_plot(const std::filesystem::path& picture, const DispersionPlot& plot) {
+  draw(picture, drawing_of(plot));
 }
 
 }  // namespace vlp

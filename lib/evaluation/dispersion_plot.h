@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluation/gnuplot.h"
 #include "geometry/circle_fit.h"
 
 namespace vlp {
@@ -26,5 +27,7 @@ struct DispersionPlot {
 
 /// Draws it in millimetres, .png or .svg by the ending. Throws InputError, see draw().
 void draw_dispersion_plot(const std::filesystem::path& picture, const DispersionPlot& plot);
+/// The same before it is drawn.
+Drawing drawing_of(const DispersionPlot& plot);
 
 }  // namespace vlp

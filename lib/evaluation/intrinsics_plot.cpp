@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "captures/csv_writer.h"
-#include "evaluation/gnuplot.h"
 #include "evaluation/plot_parts.h"
 #include "evaluation/round_numbers.h"
 
@@ -123,7 +122,7 @@ double residual_magnification(double rms_px, int width_px) {
   return rms_px > 0 ? round_below(width_px / 40.0 / rms_px) : 1;
 }
 
-void draw_intrinsics_plot(const std::filesystem::path& picture, const IntrinsicsPlot& plot) {
+Drawing drawing_of(const IntrinsicsPlot& plot) {
   assert(plot.cols >= 2 && plot.sd_px.size() >= 2 * static_cast<std::size_t>(plot.cols));
   const auto [width, height] = plot.imager_px;
   const std::string times = significant(residual_magnification(rms_px(plot), width), kDigits);
@@ -154,7 +153,11 @@ void draw_intrinsics_plot(const std::filesystem::path& picture, const Intrinsics
       layers(plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
              arrows + "linewidth 2") +
       "set title 'uncertainty of the projection'\n" + map_of(plot) + "unset multiplot\n";
-  draw(picture, {"intrinsics", 900, 280 + 720 * height / width, commands});
+  return {"intrinsics", 900, 280 + 720 * height / width, commands};
+}
+
+void draw_intrinsics_plot(const std::filesystem::path& picture, const IntrinsicsPlot& plot) {
+  draw(picture, drawing_of(plot));
 }
 
 }  // namespace vlp

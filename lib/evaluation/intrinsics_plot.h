@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "evaluation/gnuplot.h"
+
 namespace vlp {
 
 /// How views of a board fit the lens that was solved for, over the image.
@@ -36,5 +38,7 @@ double residual_magnification(double rms_px, int width_px);
 /// Draws side by side the corners, their residuals enlarged, and the projection's standard
 /// deviation; .png or .svg by the ending. Throws InputError, see draw().
 void draw_intrinsics_plot(const std::filesystem::path& picture, const IntrinsicsPlot& plot);
+/// The same before it is drawn.
+Drawing drawing_of(const IntrinsicsPlot& plot);
 
 }  // namespace vlp

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <set>
 
-#include "evaluation/gnuplot.h"
 #include "evaluation/plot_parts.h"
 
 namespace vlp {
@@ -23,7 +22,7 @@ std::string square_around(const Eigen::AlignedBox2d& box) {
 
 }  // namespace
 
-void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot& plot) {
+Drawing drawing_of(const RotationPlot& plot) {
   std::string places, ellipses, labels;
   std::set<int> labelled;
   Eigen::AlignedBox2d image, centers(plot.rotation_center_px);
@@ -66,7 +65,11 @@ void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot
       "palette notitle, "
       "$labels using 1:2:(sprintf('%d', int($3))) with labels left offset 0.8,0 notitle, " +
       marks + "unset multiplot\n";
-  draw(picture, {"rotation", 1000, 560, commands});
+  return {"rotation", 1000, 560, commands};
+}
+
+void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot& plot) {
+  draw(picture, drawing_of(plot));
 }
 
 }  // namespace vlp

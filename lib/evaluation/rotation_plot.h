@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "evaluation/gnuplot.h"
+
 namespace vlp {
 
 /// Lamps while the camera turns on the spot, in the undistorted image (the figure 4 of Chen and
@@ -29,5 +31,7 @@ struct RotationPlot {
 /// Draws the traces, and beside them, enlarged, the centres of the ellipses, the rotation centre
 /// and the principal point; .png or .svg by the ending. Throws InputError, see draw().
 void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot& plot);
+/// The same before it is drawn.
+Drawing drawing_of(const RotationPlot& plot);
 
 }  // namespace vlp

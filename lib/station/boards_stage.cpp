@@ -6,6 +6,7 @@
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/calibration_report.h"
+#include "calibration/plots/calibration_plots.h"
 #include "rig/stage.h"
 #include "station/unit_stages.h"
 
@@ -72,7 +73,10 @@ StageResult solve_boards(const StationConfig& config, const std::string& camera_
                    {"coverage", coverage.share}};
   if (report.halves) result.values.push_back({"halves_px", report.halves->rms_px});
   compare(config, solution, result.values);
-  result.advice = next_view(coverage);
+  result.drawing = [solution,
+                    title = camera_id + ", " + std::string(name_of(config.type.lens_model))] {
+    return drawing_of(plot_of(title, solution));
+  };
   return result;
 }
 

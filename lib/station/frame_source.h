@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -11,20 +12,22 @@ namespace vlp {
 /// Frames of a camera (/dev/video0, by V4L2) or of a video file, through OpenCV.
 class FrameSource {
  public:
-  /// Throws InputError when it cannot be opened.
-  explicit FrameSource(const std::string& source);
+  /// A camera is asked for frames of this size. Throws InputError when it cannot be opened.
+  FrameSource(const std::string& source, const std::array<int, 2>& imager_px);
   ~FrameSource();
   FrameSource(const FrameSource&) = delete;
   FrameSource& operator=(const FrameSource&) = delete;
 
   /// Saves the next frame, grey, as FOLDER/frame-000123.png, whole or not at all, and returns its
-  /// path; nothing at the end of a file. Throws InputError when it cannot be written.
+  /// path; nothing at the end of a file. Throws InputError when it cannot be written, or when a
+  /// camera gives no frame.
   std::filesystem::path save_next(const std::filesystem::path& folder);
 
   bool ended() const { return ended_; }
 
  private:
   struct Capture;
+  std::string source_;
   std::unique_ptr<Capture> capture_;
   bool ended_ = false;
   int frames_ = 0;

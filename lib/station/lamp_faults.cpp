@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "calibration/levelling/map_doubt.h"
 #include "positioning/positioner.h"
 
 namespace vlp {
@@ -37,28 +38,21 @@ double misfit_px(std::span<const Frame> frames, const LampMap& map,
 
 struct Mend {
   double misfit_px;
-  std::string fault;
+  int lamp;
 };
 
-std::vector<Mend> mends(std::span<const Frame> frames, const LampMap& map,
-                        const Calibration& calibration) {
-  const auto& lamps = map.lamps;
-  std::vector<Mend> found;
-  for (std::size_t a = 0; a < lamps.size(); ++a) {
-    for (std::size_t b = a + 1; b < lamps.size(); ++b) {
-      LampMap swapped = map;
-      std::swap(swapped.lamps[a].position_m, swapped.lamps[b].position_m);
-      found.push_back({misfit_px(frames, swapped, calibration),
-                       fmt::format("lamps {} and {} are swapped", lamps[a].id, lamps[b].id)});
-    }
-    if (lamps.size() < 4) continue;  // with fewer than three no residual tells
+/// The lamp without which the map fits best. Precondition: four lamps or more; with fewer than
+/// three no residual tells.
+Mend best_without(std::span<const Frame> frames, const LampMap& map,
+                  const Calibration& calibration) {
+  Mend best{kWorst_px, 0};
+  for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     LampMap without = map;
-    without.lamps.erase(without.lamps.begin() + static_cast<std::ptrdiff_t>(a));
-    found.push_back(
-        {misfit_px(frames, without, calibration),
-         fmt::format("lamp {} is loose: it does not hang where the map says", lamps[a].id)});
+    without.lamps.erase(without.lamps.begin() + static_cast<std::ptrdiff_t>(i));
+    const double misfit = misfit_px(frames, without, calibration);
+    if (misfit < best.misfit_px) best = {misfit, map.lamps[i].id};
   }
-  return found;
+  return best;
 }
 
 std::vector<std::string> unseen(std::span<const Frame> frames, const LampMap& map) {
@@ -78,17 +72,21 @@ std::vector<std::string> unseen(std::span<const Frame> frames, const LampMap& ma
 
 std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
                                      const Calibration& calibration) {
-  constexpr std::size_t least_frames = 3;
+  constexpr std::size_t least_frames = 3, least_lamps = 4;
   constexpr double fits_px = 1, far_better = 0.3;
   if (frames.size() < least_frames) return {};
   std::vector<std::string> faults = unseen(frames, map);
+  std::string doubt = doubt_of_map(frames, map, calibration);
+  if (!doubt.empty()) {
+    faults.insert(faults.begin(), std::move(doubt));
+    return faults;
+  }
   const double now_px = misfit_px(frames, map, calibration);
-  if (now_px < fits_px) return faults;
-  auto found = mends(frames, map, calibration);
-  std::sort(found.begin(), found.end(),
-            [](const Mend& a, const Mend& b) { return a.misfit_px < b.misfit_px; });
-  if (!found.empty() && found.front().misfit_px < far_better * now_px) {
-    faults.insert(faults.begin(), found.front().fault);
+  if (now_px < fits_px || map.lamps.size() < least_lamps) return faults;
+  const Mend mend = best_without(frames, map, calibration);
+  if (mend.misfit_px < far_better * now_px) {
+    faults.insert(faults.begin(),
+                  fmt::format("lamp {} is loose: it does not hang where the map says", mend.lamp));
   }
   return faults;
 }

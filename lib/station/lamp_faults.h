@@ -13,8 +13,8 @@
 namespace vlp {
 
 /// What is wrong with the lamps of a station, as far as captures that do not fit the map tell it:
-/// two that are swapped, when the map with the two exchanged fits far better; one that hangs
-/// elsewhere, when the map without it does; one that is never seen although lamps around it are.
+/// two that are swapped, or a map that is mirrored (calibration/levelling/map_doubt.h); one that
+/// hangs elsewhere, when the map without it fits far better; one that is never seen.
 /// One line for people each; nothing when the map fits, or nothing single mends it.
 std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
                                      const Calibration& calibration);

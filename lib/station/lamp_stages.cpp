@@ -1,17 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "calibration/dispersion/dispersion.h"
-#include "calibration/rotation/circle_center.h"
+#include "calibration/plots/calibration_plots.h"
 #include "calibration/rotation/turning_axis.h"
 #include "geometry/angles.h"
 #include "positioning/positioner.h"
 #include "rig/stage.h"
+#include "station/known_places.h"
 #include "station/unit_stages.h"
 
 namespace vlp {
@@ -53,9 +51,10 @@ StageResult solve_rotation(const StationConfig& config, const Calibration& calib
   }
   const RotationFit fit = fit_turning_axis(spot, camera);
   if (!fit.converged) return {"the turn on the spot: no rotation centre fits the captures"};
+  const CircleCenters circles = fit_circle_centers(spot, camera);
   StageResult result{"", with_rotation_center(calibration, fit.center, {})};
   result.values = {{"rotation_px", fit.residual_px},
-                   {"rotation_spread_px", fit_circle_centers(spot, camera).spread_px},
+                   {"rotation_spread_px", circles.spread_px},
                    {"tilt_deg", deg_from_rad(tilt_of(fit.center).angle_rad)}};
   if (const auto& covariance = fit.center.covariance) {
     result.values.push_back({"rotation_sd_px", std::sqrt(covariance->trace())});
@@ -63,17 +62,18 @@ StageResult solve_rotation(const StationConfig& config, const Calibration& calib
   if (const auto& arm_m = fit.center.lever_arm_m) {
     result.values.push_back({"lever_arm_mm", kMillimetres * arm_m->norm()});
   }
+  result.drawing = [spot, circles, fit, camera] {
+    return drawing_of(plot_of(camera.id, spot, circles, fit, camera));
+  };
   return result;
 }
 
 StageResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
                              const std::vector<Frame>& frames, const CapturesTable& places) {
   const auto captures = at_station(config, frames, places);
-  if (captures.empty()) {
-    return {
-        "nothing tells where the camera is: captures.csv of the step, with x_m and y_m, or "
-        "dispersion_station_m"};
-  }
+  std::string problem =
+      places_problem(captures.size(), frames.size(), config.enough.dispersion_captures);
+  if (!problem.empty()) return {std::move(problem)};
   const DispersionFit fit =
       fit_dispersion(captures, config.lamps, calibration, DispersionMethod::camera);
   if (fit.status != DispersionStatus::ok) {
@@ -85,6 +85,7 @@ StageResult solve_dispersion(const StationConfig& config, const Calibration& cal
   if (const auto& world_m = fit.world_offset_m) {
     result.values.push_back({"world_mm", kMillimetres * world_m->norm()});
   }
+  result.drawing = [fit] { return drawing_of(plot_of("Fixes at a known station", fit)); };
   return result;
 }
 
@@ -113,11 +114,9 @@ StageResult check_fixes(const StationConfig& config, const Calibration& calibrat
     if (fix.lamps > 2) residuals_px.push_back(fix.residual_px);
     sum_mm += error_mm;
   }
-  if (captures == 0) {
-    return {
-        "no capture of the check is at a known point: captures.csv or truth.csv of the step "
-        "should tell x_m and y_m"};
-  }
+  std::string problem = places_problem(static_cast<std::size_t>(captures), frames.size(),
+                                       config.enough.check_captures);
+  if (!problem.empty()) return {std::move(problem)};
   StageResult result{"", calibration};
   const auto fixes = static_cast<double>(errors_mm.size());
   result.values = {{"check_fixes", fixes / captures},

@@ -60,16 +60,17 @@ Records::Records(const std::string& where) : database_(std::make_unique<Database
   database_->run([&] {
     open(database_->sql, where);
     // Two that make the tables at once get in each other's way once.
-    constexpr int tries = 20;
+    constexpr int tries = 8;
     for (int i = 1;; ++i) {
       try {
         return make_record_tables(database_->sql);
       } catch (const soci::soci_error&) {
         if (i == tries) throw;
-        std::this_thread::sleep_for(std::chrono::milliseconds(50 * i));
+        std::this_thread::sleep_for(std::chrono::milliseconds(20 * i));
       }
     }
   });
+  database_->ready = true;
 }
 
 Records::~Records() = default;

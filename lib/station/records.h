@@ -32,7 +32,8 @@ struct TrendPoint {
 /// The records of one or more stations in a database: a file of SQLite, or PostgreSQL by a
 /// connection string postgresql://... Tables are made when they are not there. Any number of
 /// programs may use it at once: each run is written in one transaction, and waits up to half a
-/// minute for others. What is kept is on the disk. Each throws InputError that names the database.
+/// minute for others. What is kept is on the disk. A connection that was lost is made again. Each
+/// throws InputError that names the database.
 class Records {
  public:
   explicit Records(const std::string& where);

@@ -16,16 +16,28 @@ struct Records::Database {
   std::string where;
   soci::session sql;
 
-  /// Errors name the database.
+  /// Tables are there; from then on a connection that was lost is made again.
+  bool ready = false;
+
+  /// Errors name the database. The action may be done twice.
   template <typename Action>
   auto run(const Action& action) {
     try {
+      try {
+        return action();
+      } catch (const soci::soci_error&) {
+        if (!ready || sql.is_connected()) throw;
+      }
+      // A unit takes its minutes: meanwhile the server was started anew, or the network fell
+      // asleep.
+      sql.reconnect();
       return action();
     } catch (const InputError&) {
       throw;
     } catch (const std::exception& error) {
       std::string what = error.what();
-      std::replace(what.begin(), what.end(), '\n', ' ');
+      std::replace_if(
+          what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
       throw InputError(shown(), "the records: " + what);
     }
   }

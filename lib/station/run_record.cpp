@@ -10,9 +10,11 @@
 #include <chrono>
 #include <ctime>
 #include <filesystem>
-#include <opencv2/core/version.hpp>
+#include <opencv2/core/utility.hpp>
 #include <random>
 
+#include "calibration/intrinsics/mrcal_files.h"
+#include "captures/digest.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 
@@ -44,8 +46,10 @@ std::string begun_utc(const std::string& run) {
 std::string now_utc() { return utc("%Y-%m-%dT%H:%M:%SZ"); }
 
 std::string library_versions() {
-  return fmt::format("OpenCV {}, Ceres {}, Eigen {}.{}.{}", CV_VERSION, CERES_VERSION_STRING,
-                     EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
+  return fmt::format("OpenCV {}, AprilTag {}, mrcal {}, Ceres {}, Eigen {}.{}.{}",
+                     cv::getVersionString(), VLP_APRILTAG_VERSION, mrcal_version(),
+                     CERES_VERSION_STRING, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
+                     EIGEN_MINOR_VERSION);
 }
 
 std::string calibration_text(const Calibration& calibration) {
@@ -88,7 +92,12 @@ RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersi
   for (const std::string& cause : causes) record.causes += cause + "\n";
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
-      record.images.push_back({name_of(step), name, image.sha256, image.refused});
+      record.images.push_back({name_of(step), name, image.sha256,
+                               image.refused + (image.discarded ? " (not kept)" : "")});
+    }
+    for (const auto& file : unit.step(step).waiting) {
+      record.images.push_back({name_of(step), file.filename().string(), sha256_of_file(file),
+                               "not looked at: a step before is not done"});
     }
   }
   return record;

@@ -34,6 +34,15 @@ std::string outcome_of(const UnitImage& image) {
   return image.refused.empty() ? "taken" : "refused: " + image.refused;
 }
 
+ScreenLine gate_line(const StationFigure& figure) {
+  const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
+  const std::string limit =
+      fmt::format("{} {:.4g}", figure.at_least ? ">=" : "<=", figure.limit.value_or(0));
+  const char* outcome = figure.met() ? "met" : figure.value ? "NOT MET" : "not reached";
+  return {fmt::format("{:<24}{:>12}{:>14}  {}", figure.name, value, limit, outcome),
+          figure.met() ? Tone::plain : Tone::bad};
+}
+
 const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",
                        "  ####   #####   ###     ###  ", "  #      #   #      #       # ",
                        "  #      #   #  ####    ####  "};
@@ -67,6 +76,11 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
     add_wrapped(lines, "Last", image->first + ": " + outcome_of(image->second),
                 image->second.refused.empty() ? Tone::good : Tone::bad);
   }
+  for (const StationFigure& figure : unit.figures()) {
+    // Blur is of all views so far: a few may mislead.
+    const bool known = figure.value && figure.name != "blur_px";
+    if (known && !figure.met()) add_wrapped(lines, "Fails", cause_of(figure), Tone::bad);
+  }
   if (state.refused_in_a_row > 1) {
     add_wrapped(lines, "Refused",
                 fmt::format("{} in a row; after {} the unit fails", state.refused_in_a_row,
@@ -85,30 +99,24 @@ std::string last_image_line(const Unit& unit, StationStep step, const std::strin
 }
 
 std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
-  std::vector<ScreenLine> lines{{""}};
   const Tone tone = record.passed() ? Tone::good : Tone::bad;
+  std::vector<ScreenLine> lines{
+      {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
+  for (const StationFigure& figure : record.figures) {
+    if (figure.limit) lines.push_back(gate_line(figure));
+  }
+  std::istringstream causes(record.causes);
+  if (!record.causes.empty()) lines.push_back({""});
+  for (std::string cause; std::getline(causes, cause);) {
+    add_wrapped(lines, "Cause", cause, Tone::bad);
+  }
+  // Last, so that it stands on a terminal of 24 lines, too.
+  lines.push_back({""});
   for (const char* row : record.passed() ? kPass : kFail) lines.push_back({row, tone});
   lines.push_back({""});
   lines.push_back({fmt::format("{}   camera {}   {}", record.verdict, record.camera, record.station)
                        .substr(0, kColumns),
                    Tone::heading});
-  std::istringstream causes(record.causes);
-  for (std::string cause; std::getline(causes, cause);) {
-    add_wrapped(lines, "Cause", cause, Tone::bad);
-  }
-  lines.push_back({""});
-  lines.push_back({fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading});
-  for (const StationFigure& figure : record.figures) {
-    if (!figure.limit) continue;
-    const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
-    lines.push_back(
-        {fmt::format("{:<24}{:>12}{:>14}  {}", figure.name, value,
-                     fmt::format("{} {:.4g}", figure.at_least ? ">=" : "<=", *figure.limit),
-                     figure.met()   ? "met"
-                     : figure.value ? "NOT MET"
-                                    : "not reached"),
-         figure.met() ? Tone::plain : Tone::bad});
-  }
   return lines;
 }
 

@@ -4,15 +4,13 @@
 
 #include <array>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "station/station_step.h"
-#include "station/unit_image.h"
-#include "station/unit_stages.h"
+#include "station/unit_step.h"
 
 namespace vlp {
 
@@ -21,31 +19,10 @@ struct ProgramVersion {
   std::string program, version;
 };
 
-/// One step of a unit.
-struct UnitStep {
-  /// Where captures.csv and truth.csv are looked for.
-  std::filesystem::path folder = {};
-  /// By name.
-  std::map<std::string, UnitImage> images = {};
-  /// Images that wait for the step before.
-  std::vector<std::filesystem::path> waiting = {};
-  /// There are as many as the station wants.
-  bool enough = false;
-  /// What the images come to, once there are enough of them.
-  std::optional<StageResult> result = {};
-  /// Of the images refused one after another, the last ones.
-  int refused_in_a_row = 0;
-  /// The image that came last.
-  std::string last = {};
-
-  bool done() const { return enough && result && result->problem.empty(); }
-  int used() const;
-};
-
 /// A unit on its way through the station. Images are looked at as they come; a step is solved as
 /// soon as it has enough, and again when its images change, and with it those that rest on it. The
 /// result depends on the images and their names only, not on threads, nor on when they came, unless
-/// more came than enough.
+/// more came than enough, or two that show the same: the first of them is taken.
 class Unit {
  public:
   /// `config` outlives it.
@@ -56,9 +33,15 @@ class Unit {
 
   /// Images of a step that came, or changed. One that comes when the step is done is not used.
   void add(StationStep step, const std::vector<std::filesystem::path>& files);
-  /// An image that is there no more.
+  /// An image that is there no more. What was refused because of it is taken.
   void remove(StationStep step, const std::string& name);
-  /// Solves what has enough; with `all_in`, nothing more comes, and what there is has to do.
+  /// The file of a refused image is there no more, but it was of the unit: the refusal stays, not
+  /// counted as one in a row, because a camera that moves blurs. Without a fault it is forgotten.
+  void discard(StationStep step, const std::string& name);
+  /// The step's captures.csv or truth.csv changed.
+  void reread(StationStep step);
+  /// Solves what has enough; with `all_in`, nothing more comes, and what there is has to do: then,
+  /// a captures.csv that cannot be read throws InputError, and is the step's problem before.
   void advance(bool all_in);
 
   const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
@@ -72,6 +55,8 @@ class Unit {
   std::optional<Calibration> calibration() const;
   /// All figures, gates among them.
   std::vector<StationFigure> figures() const;
+  /// For the report: of lens, rotation centre and dispersion, as far as it came. Waits for them.
+  std::vector<ReportPicture> pictures() const;
   /// Why the unit fails, the root first; empty when it passes.
   std::vector<std::string> causes() const;
   const StationConfig& config() const { return config_; }
@@ -82,9 +67,11 @@ class Unit {
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
   void look(StationStep step, const std::vector<std::filesystem::path>& files);
   void take(StationStep step, UnitImage image);
+  std::string superfluity(StationStep step, const UnitImage& image) const;
+  void drop(StationStep step, const std::string& name);
   void forget_after(StationStep step);
   bool has_enough(StationStep step) const;
-  StageResult solve(StationStep step) const;
+  StageResult solve(StationStep step, bool all_in) const;
   std::optional<Calibration> calibration_before(StationStep step) const;
   HistoryEntry history_of(StationStep step) const;
 
@@ -95,11 +82,5 @@ class Unit {
   std::unique_ptr<BoardDetector> boards_;
   std::array<UnitStep, 4> steps_;
 };
-
-/// The frames of the images that are used, by name.
-std::vector<Frame> frames_of(const UnitStep& step);
-
-/// Share of 8 x 6 parts of the image in which the views have corners.
-double board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px);
 
 }  // namespace vlp

@@ -20,6 +20,10 @@ struct UnitImage {
   std::string sha256;
   /// Why it is not used, for people; empty when it is.
   std::string refused = {};
+  /// Nothing is wrong with it, but others of its step show the same, or are enough.
+  bool superfluous = false;
+  /// The file is no more: a frame of a camera or a video that was refused.
+  bool discarded = false;
   /// Of the step `boards`; there also when the image is refused, but for one that shows no board.
   std::optional<BoardView> view = {};
   std::optional<double> blur_px = {};

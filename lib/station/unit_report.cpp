@@ -31,7 +31,8 @@ GateResult gate_of(const StationFigure& figure) {
 
 }  // namespace
 
-std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration) {
+std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration,
+                        const std::vector<ReportPicture>& pictures) {
   Report report;
   report.title = "Camera " + record.camera + " on " + record.station;
   std::istringstream causes(record.causes);
@@ -53,6 +54,7 @@ std::string unit_report(const RunRecord& record, const std::filesystem::path& ca
                          record.config_sha256 + "; " + std::to_string(used) + " of " +
                          std::to_string(record.images.size()) + " images used.");
   if (!calibration.empty()) report.calibration = read_calibration(calibration);
+  report.pictures = pictures;
   return report_html(report);
 }
 

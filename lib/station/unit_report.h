@@ -4,14 +4,17 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
+#include "evaluation/report/report_picture.h"
 #include "station/run_record.h"
 
 namespace vlp {
 
 /// The page for people that tells of a run (report.html): verdict, gates, causes, figures, the
-/// calibration with its history. It rests on the record alone. `calibration`: the file with the
+/// calibration with its history, and the pictures of its steps. `calibration`: the file with the
 /// record's calibration; empty when there is none. Throws InputError.
-std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration);
+std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration,
+                        const std::vector<ReportPicture>& pictures);
 
 }  // namespace vlp

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "detection/boards/detect_boards.h"
+#include "evaluation/gnuplot.h"
 #include "rig/calibration.h"
 #include "station/station_config.h"
 #include "station/station_figures.h"
@@ -23,8 +25,8 @@ struct StageResult {
   /// With the step's part, but for its history.
   Calibration calibration = {};
   std::vector<NamedValue> values = {};
-  /// Where to show the board next, after boards; else empty.
-  std::string advice = {};
+  /// Makes its picture for the report, later; may be empty.
+  std::function<Drawing()> drawing = {};
 };
 
 /// The lens from views of the board, and how far it can be trusted.
@@ -35,11 +37,13 @@ StageResult solve_boards(const StationConfig& config, const std::string& camera_
 StageResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                            const std::vector<Frame>& frames);
 
-/// What fixes at a known station still lack. Places: of the config, or those of captures.csv.
+/// What fixes at a known station still lack. Places: those of captures.csv, or of the config. There
+/// is a problem when fewer captures than the station wants have one.
 StageResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
                              const std::vector<Frame>& frames, const CapturesTable& places);
 
-/// Fixes at known points. Captures without a place are not counted; without any there is a problem.
+/// Fixes at known points. Captures without a place are not counted; there is a problem when fewer
+/// than the station wants have one.
 StageResult check_fixes(const StationConfig& config, const Calibration& calibration,
                         const std::vector<Frame>& frames, const CapturesTable& places);
 

@@ -7,6 +7,7 @@
 #include "captures/in_parallel.h"
 #include "detection/image_file.h"
 #include "rig/input_error.h"
+#include "station/known_places.h"
 #include "station/lamp_faults.h"
 
 namespace vlp {
@@ -28,11 +29,6 @@ UnitStep step_of(const fs::path& folder, int threads, const Look& look) {
   return step;
 }
 
-CapturesTable places_of(const fs::path& folder) {
-  return fs::exists(folder / "captures.csv") ? read_captures(folder / "captures.csv")
-                                             : CapturesTable{};
-}
-
 class Verification {
  public:
   Verification(const StationConfig& config, const fs::path& folder, int threads)
@@ -45,10 +41,7 @@ class Verification {
     UnitStep step = step_of(folder_ / "boards", threads_, [&](const fs::path& file) {
       return look_at_board(file, config_, detector);
     });
-    std::vector<BoardView> views;
-    for (const auto& [name, image] : step.images) {
-      if (image.refused.empty()) views.push_back(*image.view);
-    }
+    const auto views = views_of(step);
     if (!views.empty()) add("boards", solve_boards(config_, golden_.camera_id, views));
     note(StationStep::boards, step);
   }
@@ -60,7 +53,7 @@ class Verification {
     });
     const auto frames = frames_of(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
-    const auto places = places_of(step.folder);
+    const auto places = places_in(step.folder);
     add(name_of(each), each == StationStep::check
                            ? check_fixes(config_, golden_.calibration, frames, places)
                            : solve_dispersion(config_, golden_.calibration, frames, places));
@@ -93,10 +86,19 @@ class Verification {
     return record;
   }
 
+  std::vector<ReportPicture> pictures() const {
+    std::vector<ReportPicture> pictures;
+    for (const StepPicture& drawn : drawn_) {
+      if (const auto& picture = drawn.get()) pictures.push_back(*picture);
+    }
+    return pictures;
+  }
+
  private:
   void add(const char* step, const StageResult& result) {
     if (!result.problem.empty()) causes_.push_back(fmt::format("{}: {}", step, result.problem));
     values_.insert(values_.end(), result.values.begin(), result.values.end());
+    if (result.drawing) drawn_.push_back(draw_aside(result.drawing));
   }
   void note(StationStep each, const UnitStep& step) {
     for (const auto& [name, image] : step.images) {
@@ -110,19 +112,20 @@ class Verification {
   int threads_;
   std::vector<Frame> frames_ = {};
   std::vector<NamedValue> values_ = {};
+  std::vector<StepPicture> drawn_ = {};
   std::vector<std::string> causes_ = {};
   std::vector<RunRecord::Image> images_ = {};
 };
 
 }  // namespace
 
-RunRecord verify_station(const StationConfig& config, const fs::path& folder,
-                         const ProgramVersion& program, int threads) {
+Verified verify_station(const StationConfig& config, const fs::path& folder,
+                        const ProgramVersion& program, int threads) {
   Verification verification(config, folder, threads);
   if (fs::is_directory(folder / "boards")) verification.boards();
   if (fs::is_directory(folder / "dispersion")) verification.lamps(StationStep::dispersion);
   verification.lamps(StationStep::check);
-  return verification.record(program);
+  return {verification.record(program), verification.pictures()};
 }
 
 }  // namespace vlp

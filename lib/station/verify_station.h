@@ -8,13 +8,19 @@
 
 namespace vlp {
 
+/// What verify_station() has found, with the pictures of the boards and of the dispersion.
+struct Verified {
+  RunRecord record;
+  std::vector<ReportPicture> pictures;
+};
+
 /// Measures the station with its golden unit, a camera whose calibration is known: FOLDER/check/
 /// and, where they are there, FOLDER/dispersion/ and FOLDER/boards/. The lens that the boards give
 /// is compared with the known one (center_px, focal_percent, nominal_px): when it differs, the
 /// board has. The fixes are made with the known calibration: when they are off, lamps or known
 /// points have moved. Throws InputError without a golden unit in the configuration, or without
 /// images.
-RunRecord verify_station(const StationConfig& config, const std::filesystem::path& folder,
-                         const ProgramVersion& program, int threads);
+Verified verify_station(const StationConfig& config, const std::filesystem::path& folder,
+                        const ProgramVersion& program, int threads);
 
 }  // namespace vlp

@@ -24,6 +24,8 @@ class WatchedFolder {
   /// and time, in two looks one after another: it is no longer written. Names that begin with a dot
   /// are not looked at: files in the making.
   Changes look();
+  /// Of a file that is about to be removed: that it goes is no change.
+  void forget(const std::string& name) { files_.erase(name); }
 
   const std::filesystem::path& folder() const { return folder_; }
 

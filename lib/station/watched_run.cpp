@@ -3,6 +3,7 @@
 #include "station/watched_run.h"
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -11,7 +12,7 @@
 
 #include "rig/file.h"
 #include "rig/input_error.h"
-#include "station/unit_report.h"
+#include "station/publish_run.h"
 
 namespace vlp {
 namespace {
@@ -22,6 +23,18 @@ void make_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw InputError(folder, "cannot be made: " + error.message());
+}
+
+/// Changes when the tables that tell the captures' places do.
+std::string state_of_tables(const fs::path& folder) {
+  std::string state;
+  for (const char* table : {"captures.csv", "truth.csv"}) {
+    std::error_code none;
+    const auto bytes = fs::file_size(folder / table, none);
+    const auto time = fs::last_write_time(folder / table, none);
+    if (!none) state += fmt::format("{} {} {};", table, bytes, time.time_since_epoch().count());
+  }
+  return state;
 }
 
 }  // namespace
@@ -38,11 +51,13 @@ std::string camera_id_problem(const std::string& camera_id) {
 WatchedRun::WatchedRun(Unit& unit, Records& records)
     : unit_(unit), folder_(unit.config().captures / unit.camera_id()) {
   begin(records);
+  if (finished_) return;
   for (const StationStep step : kStationSteps) {
     make_folder(folder_ / name_of(step));
     steps_.emplace_back(folder_ / name_of(step));
   }
   waiting_.resize(steps_.size());
+  tables_.resize(steps_.size());
 }
 
 WatchedRun::~WatchedRun() {
@@ -61,12 +76,11 @@ void WatchedRun::begin(Records& records) {
   if (fs::exists(state)) {
     run_ = read_text_file(state, longest);
     run_.erase(std::find(run_.begin(), run_.end(), '\n'), run_.end());
-    const auto record = records.find(run_);
-    if (!record) return;  // goes on
-    publish_run(*record, unit_.config().results);
+    finished_ = records.find(run_);
+    if (!finished_) return;  // goes on
+    publish_run(*finished_, {}, unit_.config().results);
     put_away();
-    ::close(std::exchange(lock_, -1));
-    return begin(records);
+    return;
   }
   run_ = new_run();
   write_file(state, run_ + "\n");
@@ -74,9 +88,16 @@ void WatchedRun::begin(Records& records) {
 
 std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
   std::vector<Arrival> arrivals;
+  bool reread = false;
   for (const StationStep step : kStationSteps) {
     const auto index = static_cast<std::size_t>(step);
     auto& waiting = waiting_[index];
+    std::string tables = state_of_tables(steps_[index].folder());
+    if (tables != tables_[index]) {
+      tables_[index] = std::move(tables);
+      unit_.reread(step);
+      reread = true;
+    }
     const auto changes = steps_[index].look();
     for (const std::string& name : changes.gone) {
       std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
@@ -91,33 +112,25 @@ std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
     unit_.add(step, now);
     for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
   }
-  if (!arrivals.empty()) unit_.advance(false);
+  if (!arrivals.empty() || reread) unit_.advance(false);
   return arrivals;
 }
 
-void WatchedRun::put_away() {
-  const fs::path kept = folder_.string() + "." + run_;
+void WatchedRun::discard(StationStep step, const std::string& image) {
+  WatchedFolder& folder = steps_[static_cast<std::size_t>(step)];
+  std::error_code ignored;
+  fs::remove(folder.folder() / image, ignored);
+  folder.forget(image);
+  unit_.discard(step, image);
+}
+
+void put_away(const fs::path& folder, const std::string& run) {
+  const fs::path kept = folder.string() + "." + run;
   std::error_code error;
-  fs::rename(folder_, kept, error);
-  if (error)
-    throw InputError(folder_, "cannot be put away as " + kept.string() + ": " + error.message());
-}
-
-fs::path publish_run(const RunRecord& record, const fs::path& results) {
-  const fs::path folder = results / record.camera / record.run;
-  make_folder(folder);
-  fs::path calibration;
-  if (!record.calibration.empty()) {
-    calibration = folder / (record.passed() ? "calibration.yaml" : "failed-calibration.yaml");
-    write_file(calibration, record.calibration);
+  fs::rename(folder, kept, error);
+  if (error) {
+    throw InputError(folder, "cannot be put away as " + kept.string() + ": " + error.message());
   }
-  write_file(folder / "report.html", unit_report(record, calibration));
-  return folder;
-}
-
-void finish_run(const RunRecord& record, Records& records, const fs::path& results) {
-  records.keep(record);
-  publish_run(record, results);
 }
 
 }  // namespace vlp

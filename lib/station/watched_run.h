@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,19 +13,26 @@
 
 namespace vlp {
 
+/// The folder of a finished run, CAPTURES/CAMERA, becomes CAPTURES/CAMERA.RUN, images and all.
+/// Throws InputError.
+void put_away(const std::filesystem::path& folder, const std::string& run);
+
 /// A run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. The folders are the truth: an
-/// image that is taken away is no longer of the unit, one that is overwritten counts anew, and a
-/// program that starts again after it was killed goes on where it was, with the same name of the
-/// run (file
-/// `.run` there). One program at a time.
+/// image that is taken away is no longer of the unit, one that is overwritten counts anew, so does
+/// a captures.csv, and a program that starts again after it was killed goes on where it was, with
+/// the same name of the run (file `.run` there). One program at a time.
 class WatchedRun {
  public:
-  /// Makes the folders. A run there that has its record already is put away first. Throws
-  /// InputError: another program works on this camera, a folder cannot be made.
+  /// Makes the folders. Throws InputError: another program works on this camera, a folder cannot be
+  /// made.
   WatchedRun(Unit& unit, Records& records);
   ~WatchedRun();
   WatchedRun(const WatchedRun&) = delete;
   WatchedRun& operator=(const WatchedRun&) = delete;
+
+  /// The record of a run that was killed after its verdict: it is published and put away, and there
+  /// is nothing left to look at.
+  const std::optional<RunRecord>& finished() const { return finished_; }
 
   struct Arrival {
     StationStep step;
@@ -34,11 +42,14 @@ class WatchedRun {
   /// Takes what changed, a few images at a time, and solves what has enough.
   std::vector<Arrival> look(std::size_t most);
 
+  /// Takes away the file of a refused image, not the refusal (Unit::discard).
+  void discard(StationStep step, const std::string& image);
+
   const std::string& run() const { return run_; }
   const std::filesystem::path& folder() const { return folder_; }
 
-  /// After the record is kept: CAPTURES/CAMERA becomes CAPTURES/CAMERA.RUN, images and all.
-  void put_away();
+  /// After the record is kept.
+  void put_away() { vlp::put_away(folder_, run_); }
 
  private:
   void begin(Records& records);
@@ -46,17 +57,12 @@ class WatchedRun {
   Unit& unit_;
   std::filesystem::path folder_;
   std::string run_;
+  std::optional<RunRecord> finished_;
   int lock_ = -1;
   std::vector<WatchedFolder> steps_;
   std::vector<std::vector<std::filesystem::path>> waiting_;
+  std::vector<std::string> tables_;
 };
-
-/// Keeps the record, then writes RESULTS/CAMERA/RUN/: calibration.yaml when the unit passed,
-/// failed-calibration.yaml when it failed and came so far; report.html. Done again it changes
-/// nothing; a run that has its record can be published at any time. Throws InputError.
-void finish_run(const RunRecord& record, Records& records, const std::filesystem::path& results);
-/// The second half of it. The folder that it went to.
-std::filesystem::path publish_run(const RunRecord& record, const std::filesystem::path& results);
 
 /// Why a text cannot be a camera's id, which names folders; empty when it can.
 std::string camera_id_problem(const std::string& camera_id);

@@ -3,11 +3,14 @@
 #include "small_station.h"
 
 #include <algorithm>
+#include <array>
 #include <sstream>
 
 namespace vlp {
 
 namespace fs = std::filesystem;
+
+constexpr std::array kSteps{"boards", "rotation", "dispersion", "check"};
 
 SmallStation::SmallStation() {
   const fs::path data = fs::path(VLP_SOURCE_DIR) / "datasets/station";
@@ -58,13 +61,25 @@ void SmallStation::drop(const fs::path& image, const fs::path& step) const {
   fs::rename(making, step / image.filename());
 }
 
+void SmallStation::prepare(const std::string& camera) const {
+  for (const char* step : kSteps) {
+    fs::create_directories(captures(camera) / step);
+    const auto table = folder / "unit" / step / "captures.csv";
+    if (fs::exists(table)) fs::copy_file(table, captures(camera) / step / "captures.csv");
+  }
+}
+
+void SmallStation::drop_all(const std::string& camera) const {
+  for (const char* step : kSteps) {
+    for (const auto& image : images(step)) drop(image, captures(camera) / step);
+  }
+}
+
 std::string SmallStation::comparable_calibration(const std::string& camera) const {
   std::istringstream all(result(camera, "calibration.yaml"));
   std::string kept;
   for (std::string line; std::getline(all, line);) {
-    const bool left_out =
-        line.find("covariance: ") != std::string::npos || line.find("  id: ") != std::string::npos;
-    if (!left_out) kept += line + "\n";
+    if (line.find("  id: ") == std::string::npos) kept += line + "\n";
   }
   return kept;
 }

@@ -45,8 +45,11 @@ class SmallStation : public testing::Test {
   std::vector<std::filesystem::path> images(const std::string& step) const;
   /// An image into a step's folder as a capture tool would do it: under another name first.
   void drop(const std::filesystem::path& image, const std::filesystem::path& step) const;
-  /// The calibration of a camera without its id. The last digits of the covariances are left out:
-  /// under load they were seen to change from one run to another.
+  /// The folders of a camera with the tables, as the fixture of a station writes them.
+  void prepare(const std::string& camera) const;
+  /// All images of the unit, in the order of the steps.
+  void drop_all(const std::string& camera) const;
+  /// The calibration of a camera without its id.
   std::string comparable_calibration(const std::string& camera) const;
   /// The one file of this name below the results of a camera; its content, empty without one.
   std::string result(const std::string& camera, const std::string& name) const;

@@ -6,6 +6,7 @@
 namespace vlp {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
@@ -20,7 +21,10 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   const std::string calibration = this->result("0001", "calibration.yaml");
   EXPECT_THAT(calibration, AllOf(HasSubstr("rotation_center"), HasSubstr("dispersion")));
   EXPECT_THAT(this->result("0001", "report.html"),
-              AllOf(HasSubstr("<strong>PASS"), HasSubstr("check_mean_mm"), HasSubstr("LENSMODEL")));
+              AllOf(HasSubstr("<strong>PASS"), HasSubstr("check_mean_mm"), HasSubstr("LENSMODEL"),
+                    // the captions of the pictures of lens, rotation centre and dispersion
+                    HasSubstr("Coverage: the corners"), HasSubstr("Left: the lamps"),
+                    HasSubstr("Fixes at a known station minus")));
   // A unit calibrated again keeps its history, and gives the same calibration.
   EXPECT_EQ(run_program(batch("0002") + " --threads 1").exit_code, 0);
   EXPECT_EQ(comparable_calibration("0002"), comparable_calibration("0001"));
@@ -48,6 +52,14 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   EXPECT_EQ(moved.exit_code, 1);
   EXPECT_THAT(moved.errors, HasSubstr("lamp 5 is loose"));
   EXPECT_THAT(records("list --kind golden").output, HasSubstr("2 runs, 1 passed"));
+
+  // From where its images arrive, like any unit's; they are put away.
+  fs::create_directories(captures("0001"));
+  fs::copy(folder / "unit/check", captures("0001") / "check");
+  EXPECT_EQ(records("verify").exit_code, 1);
+  EXPECT_FALSE(fs::exists(captures("0001")));
+  EXPECT_THAT(records("list --kind golden").output, HasSubstr("3 runs, 1 passed"));
+  EXPECT_THAT(records("verify").errors, HasSubstr("check"));
 }
 
 TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {
@@ -56,7 +68,7 @@ TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.05, 0.27, 1.6]");
   const auto loose = run_program(batch("loose"));
   EXPECT_EQ(loose.exit_code, 1);
-  EXPECT_THAT(loose.errors, HasSubstr("lamp 5 is loose"));
+  EXPECT_THAT(loose.errors, HasSubstr("fails: lamp 5 is loose"));
   EXPECT_EQ(result("loose", "calibration.yaml"), "");
   EXPECT_NE(result("loose", "failed-calibration.yaml"), "");
   EXPECT_THAT(result("loose", "report.html"),
@@ -68,29 +80,35 @@ TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {
   change("lamps.yaml", "frequency_hz: 9999", "frequency_hz: 3800");
   const auto swapped = run_program(batch("swapped"));
   EXPECT_EQ(swapped.exit_code, 1);
-  EXPECT_THAT(swapped.errors, HasSubstr("lamps 2 and 5 are swapped"));
+  EXPECT_THAT(swapped.errors, HasSubstr("fails: lamps 2 and 5 look swapped"));
 
   folder.file("station/lamps.yaml", lamps);
   change("board.yaml", "first_id: 0", "first_id: 100");
   const auto board = run_program(batch("board"));
   EXPECT_EQ(board.exit_code, 1);
-  EXPECT_THAT(board.errors, HasSubstr("wrong board"));
+  EXPECT_THAT(board.errors, HasSubstr("fails: wrong board"));
   EXPECT_THAT(records("list").output, HasSubstr("3 runs, 0 passed"));
 }
 
 struct LensFault {
   const char* name;
   std::string from, to, cause;
+
+  friend void PrintTo(const LensFault& fault, std::ostream* out) { *out << fault.name; }
 };
 class FaultyLens : public SmallStation, public testing::WithParamInterface<LensFault> {};
 
 TEST_P(FaultyLens, FailsWithItsCause) {
   change("scene.yaml", GetParam().from, GetParam().to);
+  change("scene.yaml", "count: 16", "count: 12");
+  change("station.yaml", "board_views: 16", "board_views: 12");
   render("boards");
   const auto result = run_program(batch());
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.output, HasSubstr("FAIL   camera"));
-  EXPECT_THAT(records("show").output, HasSubstr(GetParam().cause)) << result.output;
+  // The cause is the first that is named, before what follows from it.
+  EXPECT_THAT(result.errors, HasSubstr("camera 0001 fails: " + GetParam().cause));
+  EXPECT_THAT(records("show").output, HasSubstr("Cause    " + GetParam().cause));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -103,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(
                               "  surround_e_per_s: 6.0e+5",
                               "white_e_per_s: 2.4e+4\n  black_e_per_s: 1.5e+3\n"
                               "  surround_e_per_s: 6.0e+3",
-                              "too dark"}),
+                              "boards (0/12): 12 of 12 images refused: 12 too dark"}),
     [](const auto& instance) { return instance.param.name; });
 
 TEST_F(Station, RefusesWhatItCannotUse) {
@@ -113,6 +131,9 @@ TEST_F(Station, RefusesWhatItCannotUse) {
   EXPECT_THAT(records("trend rms_mm").errors, HasSubstr("rms_px"));
   EXPECT_EQ(records("trend rms_px").exit_code, 3);
   EXPECT_THAT(records("verify --batch unit").errors, HasSubstr("golden"));
+  EXPECT_THAT(run_program("vlp-station list --records " + (folder / "typo.db").string()).errors,
+              HasSubstr("typo.db: there are no records"));
+  EXPECT_FALSE(fs::exists(folder / "typo.db"));
 }
 
 }  // namespace

@@ -133,6 +133,16 @@ TEST(Records, AreKeptInPostgres) {
                     .c_str()),
             0);
   check_records(server.uri());
+
+  // The server ends the connection, as one that is started anew does.
+  Records records(server.uri());
+  ASSERT_EQ(std::system(("psql -q '" + server.uri() +
+                         "' -o /dev/null -c 'SELECT pg_terminate_backend(pid) FROM "
+                         "pg_stat_activity WHERE pid <> pg_backend_pid()'")
+                            .c_str()),
+            0);
+  records.keep(sample(run_of(9), "c", 0.1));
+  EXPECT_TRUE(records.has(run_of(9)));
 }
 
 TEST(Records, RefuseAFileThatIsNoDatabase) {

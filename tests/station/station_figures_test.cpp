@@ -47,6 +47,13 @@ TEST(StationFigures, OfAGateAreThereWithoutAValue) {
   EXPECT_THAT(cause_of(figures[0]), AllOf(HasSubstr("not known"), HasSubstr("0.3")));
 }
 
+TEST(LibraryVersions, NamesThoseThatTheResultRestsOn) {
+  for (const char* library : {"OpenCV ", "AprilTag ", "mrcal ", "Ceres ", "Eigen "}) {
+    EXPECT_THAT(library_versions(),
+                testing::ContainsRegex(std::string(library) + "[0-9]+\\.[0-9]"));
+  }
+}
+
 TEST(RunName, TellsWhenTheRunBegan) {
   EXPECT_EQ(begun_utc("20261121T134501Z-0123456789abcdef"), "2026-11-21T13:45:01Z");
   EXPECT_EQ(begun_utc("run"), "");

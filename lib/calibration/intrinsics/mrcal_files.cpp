@@ -94,4 +94,6 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
   write_file(file, text);
 }
 
+std::string mrcal_version() { return VLP_MRCAL_VERSION; }
+
 }  // namespace vlp

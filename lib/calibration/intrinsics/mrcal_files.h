@@ -22,4 +22,8 @@ void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSoluti
 void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
                    std::span<const std::string> images);
 
+/// The version of mrcal that the toolbox was built with, as Debian's package tells it; "unknown"
+/// where there is no package.
+std::string mrcal_version();
+
 }  // namespace vlp

@@ -1,0 +1,175 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// A station that is killed at any moment, or has no room, loses nothing.
+#include <sys/mount.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "captures/digest.h"
+#include "small_station.h"
+#include "support/postgres_server.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// A number from the environment, for trials that take longer than a test may.
+int number_of(const char* variable, int otherwise) {
+  const char* text = std::getenv(variable);
+  return text == nullptr ? otherwise : std::atoi(text);
+}
+
+class StationKilled : public SmallStation {
+ protected:
+  /// Puts so many more images of the unit where they arrive, in the order of the steps.
+  void arrive(std::size_t count) const {
+    if (!fs::exists(captures("b"))) prepare("b");
+    for (const char* step : {"boards", "rotation", "dispersion", "check"}) {
+      for (const auto& image : images(step)) {
+        const auto there = captures("b") / step / image.filename();
+        if (count == 0 || fs::exists(there)) continue;
+        drop(image, there.parent_path());
+        --count;
+      }
+    }
+  }
+  /// What the records say of the camera's runs, with calibration and images.
+  nlohmann::json kept() const {
+    const auto file = folder / "kept.json";
+    const auto exported = records("export --camera-id b -o " + file.string());
+    EXPECT_EQ(exported.exit_code, 0) << exported.errors;
+    return nlohmann::json::parse(TemporaryFolder::content_of(file));
+  }
+  void kill_again_and_again(int kills) const;
+  void expect_all_there() const;
+};
+
+void StationKilled::kill_again_and_again(int kills) const {
+  Random random(static_cast<unsigned>(number_of("VLP_STATION_SEED", 1)));
+  for (int i = 0; i < kills; ++i) {
+    arrive(static_cast<std::size_t>(random.uniform(0, 60)));
+    const double wait_s = random.uniform(0, 2.5);
+    run_program("(exec " + run("b", "-q --idle-s 60") + ") & sleep " + std::to_string(wait_s) +
+                "; kill -9 $! 2>&-; wait");
+  }
+  arrive(1000);
+  const auto last = run_program(run("b", "-q --idle-s 60"));
+  EXPECT_EQ(last.exit_code, 0) << last.errors;
+}
+
+/// Every unit that came to its end has its record, its files, and all of its images, as they were.
+void StationKilled::expect_all_there() const {
+  const auto runs = kept();
+  std::size_t put_away = 0;
+  for (const auto& entry : fs::directory_iterator(folder / "station/captures")) {
+    if (entry.path().filename().string().starts_with("b.")) ++put_away;
+  }
+  EXPECT_EQ(put_away, runs.size());
+  EXPECT_GE(runs.size(), 1u);
+  for (const auto& run : runs) {
+    const std::string name = run["run"], calibration = run["calibration"];
+    EXPECT_EQ(run["verdict"], "PASS") << run["causes"];
+    EXPECT_EQ(run["images"].size(), 48u);
+    for (const auto& image : run["images"]) {
+      const auto file = folder / "station/captures" / ("b." + name) / std::string(image["step"]) /
+                        std::string(image["image"]);
+      EXPECT_EQ(sha256_of_file(file), image["sha256"]) << file;
+    }
+    const auto results = folder / "station/results/b" / name;
+    EXPECT_EQ(TemporaryFolder::content_of(results / "calibration.yaml"), calibration);
+    EXPECT_THAT(TemporaryFolder::content_of(results / "report.html"), HasSubstr("</html>"));
+  }
+  // Nothing else is there: no calibration without a record.
+  std::size_t results = 0;
+  for (const auto& entry : fs::directory_iterator(folder / "station/results/b")) {
+    if (entry.is_directory()) ++results;
+  }
+  EXPECT_EQ(results, runs.size());
+}
+
+// With VLP_STATION_KILLS=100 as the station was tried once.
+TEST_F(StationKilled, GoesOnWhereItWas) {
+  render();
+  kill_again_and_again(number_of("VLP_STATION_KILLS", 4));
+  expect_all_there();
+}
+
+TEST_F(StationKilled, GoesOnWhereItWasWithPostgres) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  change("station.yaml", "records: records.db", "records: \"" + server.uri() + "\"");
+  render();
+  kill_again_and_again(number_of("VLP_STATION_KILLS", 3));
+  expect_all_there();
+}
+
+/// Killed between record and end: the same command says what the verdict was, and nothing is done
+/// twice.
+TEST_F(StationKilled, AfterItsVerdictItSaysItAgain) {
+  prepare("b");
+  const auto fail = run_program(run("b", "-q --idle-s 0.2"));
+  EXPECT_EQ(fail.exit_code, 1);
+  fs::path away;
+  for (const auto& entry : fs::directory_iterator(folder / "station/captures")) {
+    away = entry.path();
+  }
+  fs::rename(away, captures("b"));  // as it was before the end
+  fs::remove_all(folder / "station/results");
+  const auto again = run_program(run("b", "--idle-s 60"));
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.output, HasSubstr("FAIL   camera b"));
+  EXPECT_NE(result("b", "report.html"), "");
+  EXPECT_TRUE(fs::exists(away));
+  EXPECT_FALSE(fs::exists(captures("b")));
+  EXPECT_EQ(kept().size(), 1u);
+}
+
+TEST_F(StationKilled, SurvivesAFullDisk) {
+  change("scene.yaml", "count: 16", "count: 8");
+  change("station.yaml", "board_views: 16", "board_views: 8");
+  render("boards");  // the unit fails, and has a record as long
+  const auto small = folder / "station/results";
+  fs::create_directory(small);
+  if (::mount("none", small.c_str(), "tmpfs", 0, "size=4m") != 0) {
+    GTEST_SKIP() << "no small file system can be mounted here";
+  }
+  change("station.yaml", "records: records.db", "records: results/records.db");
+  const std::string fill = (small / "full").string();
+  run_program("head -c 5000000 /dev/zero >" + fill + " || true");
+  EXPECT_EQ(run_program(batch("a")).exit_code, 2);
+  fs::resize_file(fill, 0);
+  ASSERT_EQ(run_program(batch("b")).exit_code, 1);
+  // Now so full that a record fits in part.
+  for (const int free_bytes : {4096, 12288}) {
+    fs::resize_file(fill, 0);
+    run_program("head -c 5000000 /dev/zero >" + fill + " || true");
+    fs::resize_file(fill, fs::file_size(fill) - static_cast<std::uintmax_t>(free_bytes));
+    const auto full = run_program(batch("c"));
+    EXPECT_THAT(full.exit_code, testing::AnyOf(1, 2)) << full.errors;
+    if (full.exit_code == 2) {
+      EXPECT_THAT(full.errors, HasSubstr("results"));
+    }
+  }
+  fs::remove(fill);
+  EXPECT_THAT(records("list --camera-id b").output, HasSubstr("1 runs, 0 passed"));
+  for (const char* camera : {"a", "b", "c"}) {
+    if (!fs::exists(small / camera)) continue;
+    for (const auto& run : fs::directory_iterator(small / camera)) {
+      EXPECT_EQ(records("show " + run.path().filename().string()).exit_code, 0)
+          << "results without a record";
+    }
+  }
+  for (const auto& entry : fs::recursive_directory_iterator(small)) {
+    if (entry.path().filename() != "failed-calibration.yaml") continue;
+    EXPECT_THAT(TemporaryFolder::content_of(entry.path()), HasSubstr("intrinsics: ["));
+  }
+  ::umount(small.c_str());
+}
+
+}  // namespace
+}  // namespace vlp
