@@ -39,7 +39,9 @@ void check_line(const std::string& option, const std::array<double, 4>& line_m) 
 
 /// Outputs, which need not exist; empty: none.
 bool same_file(const std::string& one, const std::string& other) {
-  const auto of = [](const std::string& file) { return std::filesystem::weakly_canonical(file); };
+  const auto of = [](const std::string& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
+  };
   return !one.empty() && !other.empty() && of(one) == of(other);
 }
 

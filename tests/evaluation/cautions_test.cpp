@@ -17,6 +17,7 @@ Evaluation evaluation(std::size_t units) {
   Evaluation evaluation;
   evaluation.captures = 432;
   evaluation.fixes = 39;
+  evaluation.against = "truth";
   evaluation.drawn = "stations";
   const Interval interval{0, 1};
   evaluation.intervals_m = {interval, interval, {}, interval, units};
@@ -44,6 +45,9 @@ TEST(Cautions, TellOfFewUnits) {
               ElementsAre("of so few as 49 stations intervals are somewhat too narrow, that of p90 "
                           "most"));
   EXPECT_THAT(cautions_of_few(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
+  Evaluation path = evaluation(30);  // as many runs as a path ever has
+  path.against = "path";
+  EXPECT_THAT(cautions_of_few(path), IsEmpty());
   Evaluation none = evaluation(4);
   none.intervals_m = {};
   EXPECT_THAT(cautions_of_few(none),

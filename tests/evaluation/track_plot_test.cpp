@@ -16,8 +16,8 @@ TEST(TrackPlot, ShowsDistancesToTheLeftOfTheCommandedLine) {
   const Drawing drawing = drawing_of(plot);
   EXPECT_THAT(drawing.commands, HasSubstr("1.002 0.5 0.5 -2 \n"));
   EXPECT_THAT(drawing.commands, HasSubstr("0.999 1.5 1.5 1 \n"));
-  // The fitted line is drawn along the whole commanded one.
-  EXPECT_THAT(drawing.commands, HasSubstr("1.001 0 0 -1 \n1.001 2 2 -1 \n"));
+  // The fitted line is drawn from the first fix to the last, not along the whole commanded one.
+  EXPECT_THAT(drawing.commands, HasSubstr("1.001 0.5 0.5 -1 \n1.001 1.5 1.5 -1 \n"));
   const std::string svg = svg_of(drawing);
   for (const char* part : {"<title>track</title>", "commanded", "fitted line", "north"}) {
     EXPECT_THAT(svg, HasSubstr(part));

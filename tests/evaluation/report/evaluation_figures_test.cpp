@@ -55,7 +55,9 @@ TEST(EvaluationFigures, GivesEachFigureItsOwnInterval) {
   EXPECT_THAT(texts(report_figures(full)),
               Contains("horizontal error, 90th percentile | 3 | mm | "));
   full.comparison = Comparison{};
-  EXPECT_THAT(report_notes(full), Contains(HasSubstr("other fixes: no evidence, too few; the")));
+  EXPECT_THAT(
+      report_notes(full),
+      Contains(HasSubstr("other fixes: no evidence, too few; 0 captures have a fix in both")));
 }
 
 TEST(EvaluationFigures, NotesWhatIsMissingAndWhatErrorsAre) {
