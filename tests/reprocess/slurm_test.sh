@@ -11,7 +11,7 @@ for program in munged slurmctld slurmd sbatch scontrol; do
   command -v $program >/dev/null || { echo "$program is missing: scripts/setup.sh --batch"; exit 77; }
 done
 # A node is a process namespace, so that it can be killed with all that runs on it.
-unshare --pid --fork --kill-child true 2>/dev/null || { echo "unshare is not permitted here"; exit 77; }
+unshare --pid --fork --kill-child --mount-proc true 2>/dev/null || { echo "unshare is not permitted here"; exit 77; }
 
 cluster=$(mktemp -d)  # short: the socket's path is limited to 108 characters
 chmod 755 "$cluster"
