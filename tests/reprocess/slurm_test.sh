@@ -12,6 +12,7 @@ for program in munged slurmctld slurmd sbatch scontrol; do
 done
 # A node is a process namespace, so that it can be killed with all that runs on it.
 unshare --pid --fork --kill-child --mount-proc true 2>/dev/null || { echo "unshare is not permitted here"; exit 77; }
+grep -q ' /sys/fs/cgroup' /proc/mounts || { echo "slurmd wants /sys/fs/cgroup, which is not mounted"; exit 77; }
 
 cluster=$(mktemp -d)  # short: the socket's path is limited to 108 characters
 chmod 755 "$cluster"
