@@ -5,7 +5,7 @@
 namespace vlp {
 
 void add_capture_options(CLI::App& app, DetectOptions& options, const CaptureTexts& texts) {
-  app.add_option("captures", options.folder, texts.captures)->required();
+  app.add_option("images", options.folder, texts.images)->required();
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
   app.add_option("--calibration", options.calibration, texts.calibration)->required();
   app.add_option("-o,--output", options.output, texts.output)->required();

@@ -12,12 +12,12 @@ namespace vlp {
 
 /// What --help says of the options that every program has which takes captures of lamps.
 struct CaptureTexts {
-  const char* captures;
+  const char* images;
   const char* calibration;
   const char* output;
 };
 
-/// Adds the captures, --lamps, --calibration, --output, and those of add_detect_options().
+/// Adds images, --lamps, --calibration, --output, and those of add_detect_options().
 void add_capture_options(CLI::App& app, DetectOptions& options, const CaptureTexts& texts);
 
 /// What such a program reads.

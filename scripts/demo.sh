@@ -29,5 +29,10 @@ code=0
 scripts/calibrate.sh $station -o out/demo/results --camera-id paper-rig --row-time-s 3e-5 \
   --readout rows || code=$?
 echo
-echo "Open out/demo/results/report.html; the calibration is out/demo/results/calibration.yaml"
+report=out/demo/results/report.html calibration=out/demo/results/calibration.yaml
+if [ -e $report ] && [ -e $calibration ]; then
+  echo "Open $report; the calibration is $calibration"
+else
+  echo "demo.sh: no report was made; see above" >&2
+fi
 exit $code

@@ -15,12 +15,14 @@ packages=(
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
   libopencv-dev libapriltag-dev libceres-dev libssl-dev
   nlohmann-json3-dev libpugixml-dev
-  libmrcal-dev libsuitesparse-dev libcairo2-dev libsoci-dev libsqlite3-dev libpq-dev
+  libmrcal-dev libsuitesparse-dev libcairo2-dev
+  libsoci-dev libboost-dev libsqlite3-dev libpq-dev  # SOCI's headers include Boost's since Debian 13
   gnuplot-nox fonts-dejavu-core
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev mrcal python3-mrcal poppler-utils unzip
   postgresql postgresql-client tmux util-linux  # of the station
   chromium-headless-shell python3  # the report is opened in a browser
+  debootstrap  # of tests/bare_root.sh
 )
 case ${1:-} in
   '') ;;
