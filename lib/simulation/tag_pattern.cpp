@@ -38,6 +38,13 @@ const std::map<std::string, Family>& families() {
   return all;
 }
 
+/// The id is an int to libapriltag, since version 3.4 an unsigned one.
+template <typename Id>
+image_u8_t* drawn_by(image_u8_t* (*draw)(apriltag_family_t*, Id), apriltag_family_t* family,
+                     int id) {
+  return draw(family, static_cast<Id>(id));
+}
+
 }  // namespace
 
 TagPattern tag_pattern(const std::string& name, int id, int border_bits) {
@@ -60,8 +67,8 @@ TagPattern tag_pattern(const std::string& name, int id, int border_bits) {
   pattern.outside = (codes->total_width - codes->width_at_border) / 2 - trimmed;
   const int width = pattern.width();
   pattern.white.assign(pattern.index(0, width), false);
-  const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> drawn(apriltag_to_image(codes.get(), id),
-                                                                 image_u8_destroy);
+  const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> drawn(
+      drawn_by(apriltag_to_image, codes.get(), id), image_u8_destroy);
   for (int row = extra; row < width - extra; ++row) {
     for (int column = extra; column < width - extra; ++column) {
       const int y = row - extra + trimmed, x = column - extra + trimmed;
