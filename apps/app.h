@@ -2,11 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+// Its header costs a file that includes it ten seconds of compilation.
+namespace CLI {
+class App;
+class Validator;
+}  // namespace CLI
 
 namespace vlp {
 

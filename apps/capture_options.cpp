@@ -2,26 +2,96 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture_options.h"
 
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "detection/image_file.h"
+#include "progress.h"
+#include "step_outcome.h"
+
 namespace vlp {
 
-void add_capture_options(CLI::App& app, DetectOptions& options, const CaptureTexts& texts) {
-  app.add_option("images", options.folder, texts.images)->required();
+void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTexts& texts) {
+  app.add_option("images", options.images, texts.images)->required();
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
   app.add_option("--calibration", options.calibration, texts.calibration)->required();
   app.add_option("-o,--output", options.output, texts.output)->required();
   add_detect_options(app, options);
 }
 
-CaptureInput read_captures_of(const DetectOptions& options) {
-  CaptureInput input{read_lamp_map(options.lamps), read_calibration(options.calibration), {}};
-  input.frames = frames_of(options, input.lamps, input.calibration);
-  return input;
+void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {
+  static const std::map<std::string, Readout> names{{"rows", Readout::rows},
+                                                    {"columns", Readout::columns}};
+  app.add_option_function<std::string>(
+         "--readout", [&readout](const std::string& name) { readout = names.at(name); },
+         "Along what the shutter reads and stripes lie (default: as the calibration says, or else "
+         "as the images show)")
+      ->check(CLI::IsMember({"rows", "columns"}))
+      ->option_text("rows|columns");
 }
 
-Calibration camera_alone(const Calibration& calibration) {
-  Calibration alone;
-  alone.camera = calibration.camera;
-  return alone;
+void add_detect_options(CLI::App& app, CaptureOptions& options) {
+  app.add_option("--classifier", options.classifier,
+                 "Lamp classifier by vlp-train, instead of the map's frequencies");
+  app.add_option("--annotate", options.annotate,
+                 "Folder for pictures of the lights found, with outlines, centres and lamps");
+  add_readout_option(app, options.readout);
+  app.add_option("--exposure-s", options.exposure_s,
+                 "Exposure of the images, for the check of the lamp map (default: short)")
+      ->check(finite_positive());
+  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
+}
+
+std::vector<std::string> inputs_of(const CaptureOptions& options) {
+  return {options.images, options.lamps, options.calibration, options.classifier};
+}
+
+SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
+                    const std::optional<Calibration>& calibration) {
+  for (const auto& image : images_in(options.images)) {
+    check_output(options.output, {image.string()});
+  }
+  const LampImages images{options.images,      lamps,
+                          options.lamps,       calibration,
+                          options.calibration, options.row_time_s,
+                          options.classifier,  options.readout,
+                          options.exposure_s,  options.annotate,
+                          options.threads};
+  SeenLamps seen;
+  {
+    Progress progress("images");
+    seen = see_lamps(images,
+                     [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+  }
+  tell(seen);
+  require(seen);
+  return seen;
+}
+
+LampCaptures read_captures_of(const CaptureOptions& options) {
+  LampCaptures captures{
+      {}, read_lamp_map(options.lamps), options.lamps, read_calibration(options.calibration)};
+  if (std::filesystem::is_directory(options.images)) {
+    captures.frames = std::move(see_lamps(options, captures.lamps, captures.calibration).frames);
+    return captures;
+  }
+  const std::array<std::pair<const char*, bool>, 4> of_images{
+      {{"--classifier", !options.classifier.empty()},
+       {"--annotate", !options.annotate.empty()},
+       {"--readout", options.readout.has_value()},
+       {"--exposure-s", options.exposure_s.has_value()}}};
+  for (const auto& [name, given] : of_images) {
+    if (!given) continue;
+    throw std::invalid_argument(fmt::format("{}: {} is no folder of images", name, options.images));
+  }
+  captures.frames = read_detections(options.images);
+  return captures;
 }
 
 }  // namespace vlp

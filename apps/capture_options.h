@@ -2,13 +2,32 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "detect_folder.h"
+#include "app.h"
+#include "session/lamp_images.h"
+#include "session/rotation_step.h"
 
 namespace vlp {
+
+/// How to find the lamps in captures. Names of files are for messages, too.
+struct CaptureOptions {
+  /// A folder of images, or a detections.csv.
+  std::string images;
+  std::string lamps, calibration, output;
+  /// Empty: lamps are told apart by the map's frequencies.
+  std::string classifier;
+  /// Where pictures of what was found go; empty: none are made.
+  std::string annotate;
+  std::optional<Readout> readout;
+  /// Of a camera without a calibration.
+  std::optional<double> row_time_s;
+  std::optional<double> exposure_s;
+  int threads = all_cores();
+};
 
 /// What --help says of the options that every program has which takes captures of lamps.
 struct CaptureTexts {
@@ -18,19 +37,26 @@ struct CaptureTexts {
 };
 
 /// Adds images, --lamps, --calibration, --output, and those of add_detect_options().
-void add_capture_options(CLI::App& app, DetectOptions& options, const CaptureTexts& texts);
+void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTexts& texts);
 
-/// What such a program reads.
-struct CaptureInput {
-  LampMap lamps;
-  Calibration calibration;
-  std::vector<Frame> frames;
-};
+/// Adds --readout rows|columns.
+void add_readout_option(CLI::App& app, std::optional<Readout>& readout);
 
-/// Throws what frames_of() and the files' readers throw.
-CaptureInput read_captures_of(const DetectOptions& options);
+/// Adds --classifier, --annotate, --readout, --exposure-s and --threads.
+void add_detect_options(CLI::App& app, CaptureOptions& options);
 
-/// Without rotation centre and dispersion.
-Calibration camera_alone(const Calibration& calibration);
+/// What the result depends on: captures, lamp map, calibration, classifier; an empty name is an
+/// input that was not given.
+std::vector<std::string> inputs_of(const CaptureOptions& options);
+
+/// The lamps in a folder of images, with progress, and with what there is to say of it. `output`
+/// must not be one of the images. Throws as see_lamps(), and when that fails.
+SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
+                    const std::optional<Calibration>& calibration);
+
+/// Lamp map, calibration, and the captures of a detections.csv or of a folder of images. Throws
+/// what see_lamps() and the files' readers throw, and std::invalid_argument when options for images
+/// are given with a table.
+LampCaptures read_captures_of(const CaptureOptions& options);
 
 }  // namespace vlp

@@ -2,22 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "history.h"
 
-#include <fmt/core.h>
-
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <string_view>
 
-#include "detection/image_file.h"
+#include "session/step_history.h"
 
 namespace vlp {
 namespace {
-
-/// Without the folders, which are another on each machine; "." has a name, too.
-std::string last_name(const std::string& path) {
-  const std::filesystem::path whole = std::filesystem::weakly_canonical(path);
-  return whole.filename().string();
-}
 
 bool changes_the_result(const CLI::Option& option) {
   constexpr std::array<std::string_view, 13> others = {
@@ -46,23 +39,10 @@ std::string options_of(const CLI::App& app, const std::vector<std::string>& inpu
 
 }  // namespace
 
-std::string sha256_of_images(const std::filesystem::path& folder) {
-  std::string digests;
-  for (const auto& image : images_in(folder)) {
-    digests += fmt::format("{}  {}\n", sha256_of_file(image), image.filename().string());
-  }
-  return sha256_of_text(digests);
-}
-
 HistoryEntry history_entry(const CLI::App& app, const std::vector<std::string>& inputs) {
-  HistoryEntry entry{"", app.get_name(), VLP_VERSION, options_of(app, inputs), {}};
-  for (const std::string& input : inputs) {
-    if (input.empty()) continue;
-    entry.inputs.push_back({last_name(input), std::filesystem::is_directory(input)
-                                                  ? sha256_of_images(input)
-                                                  : sha256_of_file(input)});
-  }
-  return entry;
+  InputDigests digests;
+  return history_of({app.get_name(), VLP_VERSION}, options_of(app, inputs),
+                    {inputs.begin(), inputs.end()}, digests);
 }
 
 }  // namespace vlp

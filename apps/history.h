@@ -2,19 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "captures/digest.h"
 #include "rig/calibration.h"
 
-namespace vlp {
+namespace CLI {
+class App;
+}
 
-/// Of a folder of images: what `sha256sum *.png | sha256sum` says there, the images being those
-/// that images_in() finds, in its order. Throws InputError.
-std::string sha256_of_images(const std::filesystem::path& folder);
+namespace vlp {
 
 /// How a part came to be, but for the part's name (rig/stage.h): program and version, the options
 /// that were given, in the order of --help, and a digest of each input, a file or a folder of

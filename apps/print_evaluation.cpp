@@ -129,10 +129,6 @@ void print_evaluation(const Evaluation& evaluation, const std::vector<GateResult
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
   for (const GateResult& gate : gates) {
-    if (gate.is_text()) {
-      fmt::print("NOT MET gate {}\n", gate.name);
-      continue;
-    }
     fmt::print("{:6} gate {:16} {:>10.4g} {:3} at most {:.4g}\n", gate.passed ? "met" : "NOT MET",
                gate.name, gate.value, gate.unit, gate.limit);
   }

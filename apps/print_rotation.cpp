@@ -3,7 +3,6 @@
 #include "print_rotation.h"
 
 #include <fmt/core.h>
-#include <spdlog/spdlog.h>
 
 #include <optional>
 #include <string>
@@ -26,23 +25,12 @@ std::string metres(double z_m) {
   return text == "-0.000" ? "0.000" : text;
 }
 
-void print_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
+void print_lever_arm(const RotationCenter& center) {
   if (const auto& arm_m = center.lever_arm_m) {
     fmt::print("lever arm   {:.3f} {:.3f} mm{}\n", 1e3 * arm_m->x(), 1e3 * arm_m->y(),
                sd_of(center.lever_arm_covariance, 1e3, "mm"));
-  } else if (spot.heights.size() == 1) {
-    fmt::print("lever arm   taken as zero\n");
-    spdlog::warn(
-        "at one height, under lamps that hang much alike, a lever arm cannot be told from a tilt; "
-        "it is taken as zero, and fixes at z = {} m will be of the axis of rotation: add captures "
-        "at a second height",
-        metres(spot.heights.front().z_m));
   } else {
     fmt::print("lever arm   taken as zero\n");
-    spdlog::warn(
-        "this method takes the lever arm as zero, and the centre is a mean over {} heights: axis "
-        "estimates both",
-        spot.heights.size());
   }
 }
 
@@ -81,7 +69,7 @@ void print_summary(const RotationFit& fit, const SpotCaptures& spot, const Circl
   }
   fmt::print("lamps       {}\n", spot.lamps.size());
   print_center(fit.center, camera);
-  print_lever_arm(fit.center, spot);
+  print_lever_arm(fit.center);
   fmt::print("circles     {}, their centres spread by {:.3f} px\n", circles.circles.size(),
              circles.spread_px);
   print_residuals(fit, spot);

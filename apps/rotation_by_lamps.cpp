@@ -8,10 +8,10 @@
 #include "app.h"
 #include "calibration/levelling/levelling.h"
 #include "capture_options.h"
-#include "check_map.h"
 #include "history.h"
 #include "print_rotation.h"
 #include "rig/stage.h"
+#include "step_outcome.h"
 
 namespace vlp {
 namespace {
@@ -44,28 +44,30 @@ void report(const Levelling& result, const Camera& camera) {
 
 }  // namespace
 
-void rotate_by_lamps(const CLI::App& app, const DetectOptions& detect,
+void rotate_by_lamps(const CLI::App& app, const CaptureOptions& images,
                      const std::string& refined_map) {
-  const std::vector<std::string> inputs = inputs_of(detect);
-  check_output(detect.output, inputs);
+  const std::vector<std::string> inputs = inputs_of(images);
+  check_output(images.output, inputs);
   if (!refined_map.empty()) check_output(refined_map, inputs);
-  if (refined_map == detect.output) {
+  if (refined_map == images.output) {
     throw std::invalid_argument("--output and --refine-map name one file");
   }
-  const CaptureInput input = read_captures_of(detect);
-  const auto& [lamps, calibration, frames] = input;
-  check_lamps(frames, lamps, detect.lamps);
-  check_map(input, camera_alone(calibration), detect);
+  const LampCaptures input = read_captures_of(images);
+  const auto& [frames, lamps, lamps_file, calibration] = input;
+  check_lamps(frames, lamps, lamps_file);
+  StepResult step;
+  if (doubts_map(input, camera_alone(calibration), step)) require(step);
   LevellingOptions options;
   options.refine_map = !refined_map.empty();
   const Levelling result = level_by_lamps(frames, lamps, calibration.camera, options);
   if (!result.undetermined.empty()) {
-    check_map_of_failure(input, camera_alone(calibration), detect);
-    throw Undetermined(result.undetermined);
+    step.fail(StepFailure::undetermined, result.undetermined);
+    blame_map(input, camera_alone(calibration), step);
+    require(step);
   }
   HistoryEntry entry = history_entry(app, inputs);
   if (options.refine_map) write_lamp_map(refined_map, result.map);
-  write_calibration(detect.output,
+  write_calibration(images.output,
                     with_rotation_center(calibration, result.center, std::move(entry)));
   report(result, calibration.camera);
 }

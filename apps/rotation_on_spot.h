@@ -2,16 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
-#include "detect_folder.h"
+#include "capture_options.h"
 
 namespace vlp {
 
 /// vlp-rotation --method axis|joint|circle: captures of a turn on the spot
 /// (calibration/rotation/spot_captures.h). `plot` is empty when there is to be no picture.
-void rotate_on_spot(const CLI::App& app, const DetectOptions& detect, const std::string& method,
+void rotate_on_spot(const CLI::App& app, const CaptureOptions& images, const std::string& method,
                     const std::string& plot);
 
 }  // namespace vlp

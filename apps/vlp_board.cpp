@@ -3,6 +3,7 @@
 /// vlp-board: a board of AprilTags to print.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <optional>
 #include <string>

@@ -3,17 +3,19 @@
 /// vlp-detect: where the lamps are in images, and which they are.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <optional>
 #include <stdexcept>
 
 #include "app.h"
-#include "detect_folder.h"
+#include "capture_options.h"
+#include "captures/detections_table.h"
 
 namespace vlp {
 namespace {
 
-void run(const DetectOptions& options) {
+void run(const CaptureOptions& options) {
   check_output(options.output, {options.lamps, options.calibration, options.classifier});
   std::optional<Calibration> calibration;
   if (!options.calibration.empty()) {
@@ -21,12 +23,12 @@ void run(const DetectOptions& options) {
   } else if (!options.row_time_s && options.classifier.empty()) {
     throw std::invalid_argument("--calibration, --row-time-s or --classifier has to tell lamps");
   }
-  const CaptureDetections found = detect_folder(options, read_lamp_map(options.lamps), calibration);
+  const SeenLamps found = see_lamps(options, read_lamp_map(options.lamps), calibration);
   write_detections(options.output, found.frames);
   const auto empty = std::count_if(found.frames.begin(), found.frames.end(),
                                    [](const Frame& frame) { return frame.detections.empty(); });
   const auto [identified, cut, unknown, steady] = found.lights;
-  fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images, found.refused.size(),
+  fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images, found.skipped.size(),
              empty);
   fmt::print("lamps       {}\n", identified);
   fmt::print("left out    {} cut by the image's edge, {} unknown, {} steady\n", cut, unknown,
@@ -45,8 +47,8 @@ int main(int argc, char** argv) {
       "    --lamps datasets/paper-rig/rendered/lamps.yaml \\\n"
       "    --calibration datasets/paper-rig/rendered/true_calibration.yaml -o detections.csv\n",
       "vlp-detect");
-  vlp::DetectOptions options;
-  app.add_option("images", options.folder, "Folder of images: PNG, JPEG, BMP, TIFF or PGM")
+  vlp::CaptureOptions options;
+  app.add_option("images", options.images, "Folder of images: PNG, JPEG, BMP, TIFF or PGM")
       ->required();
   app.add_option("--lamps", options.lamps,
                  "Lamp map, lamps.yaml, with frequencies unless there is a classifier")

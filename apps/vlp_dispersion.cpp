@@ -4,18 +4,23 @@
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
+#include <CLI/CLI.hpp>
+#include <array>
 #include <cmath>
+#include <filesystem>
 #include <map>
+#include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "app.h"
-#include "calibration/dispersion/dispersion.h"
-#include "calibration/plots/calibration_plots.h"
 #include "capture_options.h"
-#include "check_map.h"
+#include "evaluation/gnuplot.h"
 #include "history.h"
-#include "rig/stage.h"
-#include "station_captures.h"
+#include "rig/input_error.h"
+#include "session/dispersion_step.h"
+#include "session/session_folder.h"
+#include "step_outcome.h"
 
 namespace vlp {
 namespace {
@@ -26,24 +31,47 @@ const std::map<std::string, DispersionCircle> kCircles{{"mean", DispersionCircle
                                                        {"enclosing", DispersionCircle::enclosing}};
 
 struct Options {
-  DetectOptions detect;
-  StationOptions station;
+  CaptureOptions images;
+  std::optional<std::array<double, 2>> station_m;
+  /// captures.csv; empty: that of the folder.
+  std::string captures;
   std::string plot;
   std::string method = "camera", circle = "mean";
 };
 
-void check(const DispersionFit& fit) {
-  switch (fit.status) {
-    case DispersionStatus::ok:
-      return;
-    case DispersionStatus::no_fix:
-      throw Undetermined(fmt::format("{}; the first: {}", explanation_of(fit.status),
-                                     explanation_of(fit.no_fix_status)));
-    case DispersionStatus::station_far:
-      throw std::invalid_argument(std::string(explanation_of(fit.status)));
-    default:
-      throw Undetermined(std::string(explanation_of(fit.status)));
+/// What is known of the captures besides their images; without their places where --station says
+/// them.
+CapturesTable captures_of(const Options& options) {
+  CapturesTable captures;
+  if (!options.captures.empty()) {
+    captures = read_captures(options.captures);
+  } else if (std::filesystem::is_directory(options.images.images)) {
+    captures = captures_in(options.images.images);
   }
+  if (!options.station_m) return captures;
+  for (auto& [image, capture] : captures) capture.x_m = capture.y_m = std::nullopt;
+  return captures;
+}
+
+KnownPlaces places_of(const Options& options, const std::vector<Frame>& frames,
+                      const CapturesTable& captures) {
+  std::optional<Eigen::Vector2d> station_m;
+  if (options.station_m) station_m = Eigen::Vector2d(options.station_m->data());
+  KnownPlaces places = at_known_places(frames, captures, station_m);
+  if (places.captures.empty() && captures.empty()) {
+    throw std::invalid_argument("where is the station? Give --station or --captures");
+  }
+  const std::string table = options.captures.empty() ? options.images.images : options.captures;
+  if (places.captures.empty()) {
+    throw InputError(table,
+                     "tells no place of these captures: it needs x_m and y_m, and the names of the "
+                     "images; or give --station");
+  }
+  if (places.without > 0) {
+    spdlog::warn("{} of {} captures left out: {} does not tell their place", places.without,
+                 frames.size(), table);
+  }
+  return places;
 }
 
 void print_circle(const char* name, const Circle& circle) {
@@ -76,32 +104,25 @@ void print_summary(const DispersionFit& fit, std::size_t captures) {
 }
 
 void run(const CLI::App& app, const Options& options) {
-  const std::string table = captures_file(options.station, options.detect.folder);
-  std::vector<std::string> inputs = inputs_of(options.detect);
-  inputs.push_back(table);
-  check_output(options.detect.output, inputs);
-  check_plot(options.plot, options.detect.output, inputs);
-  const CaptureInput input = read_captures_of(options.detect);
-  const auto& [lamps, calibration, frames] = input;
-  check_lamps(frames, lamps, options.detect.lamps);
-  Calibration levelled = calibration;
-  levelled.dispersion.reset();
-  check_map(input, levelled, options.detect);
-  const auto captures = at_station(frames, options.station, table);
-  const DispersionFit fit = fit_dispersion(
-      captures, lamps, calibration, kMethods.at(options.method), kCircles.at(options.circle));
-  if (fit.status == DispersionStatus::no_fix) check_map_of_failure(input, levelled, options.detect);
-  check(fit);
-  HistoryEntry entry = history_entry(app, inputs);
-  if (!options.plot.empty()) {
-    draw_dispersion_plot(options.plot, plot_of("Fixes at a known station", fit));
+  std::vector<std::string> inputs = inputs_of(options.images);
+  if (!options.captures.empty()) inputs.push_back(options.captures);
+  for (const char* table : {"captures.csv", "truth.csv"}) {
+    const auto beside = std::filesystem::path(options.images.images) / table;
+    if (options.captures.empty() && std::filesystem::exists(beside)) inputs.push_back(beside);
   }
-  write_calibration(options.detect.output,
-                    with_dispersion(calibration, fit.dispersion, std::move(entry)));
-  if (!calibration.rotation_center) {
-    spdlog::warn("the calibration has no rotation_center: run vlp-rotation first");
-  }
-  print_summary(fit, captures.size());
+  check_output(options.images.output, inputs);
+  check_plot(options.plot, options.images.output, inputs);
+  const LampCaptures input = read_captures_of(options.images);
+  check_lamps(input.frames, input.lamps, input.lamps_file);
+  const KnownPlaces places = places_of(options, input.frames, captures_of(options));
+  const DispersionResult found =
+      solve_dispersion(input, places, kMethods.at(options.method), kCircles.at(options.circle),
+                       history_entry(app, inputs));
+  require(found);
+  if (!options.plot.empty()) draw(options.plot, found.drawing());
+  write_calibration(options.images.output, found.calibration);
+  tell(found);
+  print_summary(found.fit, places.captures.size());
 }
 
 }  // namespace
@@ -117,11 +138,17 @@ int main(int argc, char** argv) {
       "    --station 0.1 0 -o calibration.yaml\n",
       "vlp-dispersion");
   vlp::Options options;
-  vlp::add_capture_options(app, options.detect,
+  vlp::add_capture_options(app, options.images,
                            {"A folder of images taken at the station, or their detections.csv",
                             "Calibration of the camera; its rotation_center is applied",
                             "Where to write the calibration with its dispersion"});
-  vlp::add_station_options(app, options.station);
+  auto* station = app.add_option("--station", options.station_m, "Where the camera is in the world")
+                      ->check(vlp::finite())
+                      ->option_text("X_M Y_M");
+  app.add_option("--captures", options.captures,
+                 "captures.csv: image, x_m, y_m (where the camera is) [, roll_rad, pitch_rad]; "
+                 "default: captures.csv and truth.csv in the folder")
+      ->excludes(station);
   app.add_option(
          "--method", options.method,
          "camera (default): captures at different yaws; paper: the circle's centre, captures "

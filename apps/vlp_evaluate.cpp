@@ -1,34 +1,143 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-evaluate: what fixes are worth, against a truth, a path or a commanded line.
-#include <fmt/core.h>
-#include <spdlog/spdlog.h>
-
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
 #include <future>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "app.h"
-#include "evaluate_options.h"
-#include "evaluation/cautions.h"
+#include "captures/csv_reader.h"
 #include "evaluation/check_gates.h"
 #include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
+#include "history.h"
 #include "print_evaluation.h"
 #include "rig/file.h"
+#include "session/evaluate_step.h"
+#include "step_outcome.h"
 
 namespace vlp {
 namespace {
 
-/// Where the camera turns about a lever arm, the places of one station are two of them apart.
-double station_m(const EvaluateOptions& options) {
-  constexpr double repeated_m = 1e-3;
-  if (options.station_mm) return 1e-3 * *options.station_mm;
-  if (options.calibration.empty()) return repeated_m;
-  const auto center = read_calibration(options.calibration).rotation_center;
-  return repeated_m + (center && center->lever_arm_m ? 2 * center->lever_arm_m->norm() : 0);
+/// The report that vlp-evaluate writes; none without a file.
+struct ReportOption {
+  std::string file;
+  std::vector<std::string> pictures;
+  /// Fixes of a drive and its commanded line.
+  std::vector<std::tuple<std::string, double, double, double, double>> tracks;
+};
+
+struct Options {
+  std::string fixes, truth, path, compare, lamps, calibration, gates_file, json, junit;
+  std::vector<double> line_m;  // X0 Y0 X1 Y1
+  std::vector<std::string> gates;
+  double noise_px = 0;
+  std::optional<double> station_mm;
+  int threads = all_cores();
+  ReportOption report;
+};
+
+/// X0, Y0, X1, Y1.
+void check_line(const std::string& option, const std::array<double, 4>& line_m) {
+  if (line_m[0] == line_m[2] && line_m[1] == line_m[3]) {
+    throw std::invalid_argument(option + ": the line begins where it ends");
+  }
+  for (const double value_m : line_m) {
+    if (std::abs(value_m) > kFarthest_m) {
+      throw std::invalid_argument(option + ": should be within 1,000 km, in metres");
+    }
+  }
 }
 
-EvaluationInput input_of(const EvaluateOptions& options) {
+/// Outputs, which need not exist; empty: none.
+bool same_file(const std::string& one, const std::string& other) {
+  const auto of = [](const std::string& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
+  };
+  return !one.empty() && !other.empty() && of(one) == of(other);
+}
+
+/// The gates of the file, and those of the command line, which hold where both say something.
+std::vector<Gate> gates_of(const Options& options) {
+  std::vector<Gate> gates;
+  if (!options.gates_file.empty()) gates = read_gates(options.gates_file);
+  const auto from_file = gates.size();
+  for (const std::string& text : options.gates) {
+    const Gate gate = gate_of(text);
+    const auto same = std::find_if(gates.begin(), gates.end(),
+                                   [&](const Gate& other) { return other.name == gate.name; });
+    if (same == gates.end()) {
+      gates.push_back(gate);
+    } else if (same < gates.begin() + static_cast<std::ptrdiff_t>(from_file)) {
+      same->limit = gate.limit;
+    } else {
+      throw std::invalid_argument("gate '" + gate.name + "' stands twice");
+    }
+  }
+  return gates;
+}
+
+/// The files that are read, without those of the report; some names may be empty.
+std::vector<std::string> inputs_of(const Options& options) {
+  return {options.fixes, options.truth,       options.path,      options.compare,
+          options.lamps, options.calibration, options.gates_file};
+}
+
+void check_options(const Options& options, const std::vector<Gate>& gates) {
+  const int references = (options.truth.empty() ? 0 : 1) + (options.path.empty() ? 0 : 1) +
+                         (options.line_m.empty() ? 0 : 1);
+  if (references != 1) {
+    throw std::invalid_argument(
+        "say what to hold the fixes against: one of --truth, --path, --line");
+  }
+  if (const auto& line_m = options.line_m; !line_m.empty()) {
+    check_line("--line", {line_m[0], line_m[1], line_m[2], line_m[3]});
+  }
+  if (!options.junit.empty() && gates.empty()) {
+    throw std::invalid_argument(
+        "--junit tells of gates, and there are none: add --gate or --gates");
+  }
+  if (options.noise_px == 0 && options.report.file.empty() && !options.lamps.empty()) {
+    throw std::invalid_argument("--lamps is for the theoretical limit, which needs --noise-px");
+  }
+  if (options.noise_px > 0 && options.truth.empty()) {
+    throw std::invalid_argument("--noise-px is for the theoretical limit, which needs --truth");
+  }
+  std::vector<std::string> inputs = inputs_of(options);
+  const ReportOption& report = options.report;
+  inputs.insert(inputs.end(), report.pictures.begin(), report.pictures.end());
+  for (const auto& track : report.tracks) {
+    const auto& [fixes, x0_m, y0_m, x1_m, y1_m] = track;
+    inputs.push_back(fixes);
+    check_line("--track " + fixes, {x0_m, y0_m, x1_m, y1_m});
+  }
+  check_output(options.json, inputs);
+  check_output(options.junit, inputs);
+  check_output(report.file, inputs);
+  if (same_file(options.json, options.junit)) {
+    throw std::invalid_argument("--json and --junit name one file");
+  }
+  if (same_file(report.file, options.json) || same_file(report.file, options.junit)) {
+    throw std::invalid_argument("--report and another output name one file");
+  }
+}
+
+double station_m(const Options& options) {
+  if (options.station_mm) return 1e-3 * *options.station_mm;
+  return place_radius_m(options.calibration.empty() ? Calibration{}
+                                                    : read_calibration(options.calibration));
+}
+
+EvaluationInput input_of(const Options& options) {
   EvaluationInput input;
   // The two large tables side by side; of two that are bad the fixes are told of.
   auto truth = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, [&] {
@@ -50,57 +159,104 @@ EvaluationInput input_of(const EvaluateOptions& options) {
   return input;
 }
 
-/// Those of stages before come first.
-std::vector<GateResult> results_of(const EvaluateOptions& options, const std::vector<Gate>& gates,
-                                   const Evaluation& evaluation) {
-  std::vector<GateResult> results;
-  for (const std::string& text : options.unmet) results.push_back(unmet_gate(text));
-  const auto checked = check_gates(gates, evaluation);
-  results.insert(results.end(), checked.begin(), checked.end());
-  return results;
+std::string report_of(const CLI::App& app, const Options& options, const EvaluationInput& input,
+                      const EvaluateResult& found) {
+  EvaluationReport report{input, found, found.gates, {}, {}, {}, {}, {}};
+  std::vector<std::string> inputs = inputs_of(options);
+  if (!options.lamps.empty()) report.lamps = read_lamp_map(options.lamps);
+  if (!options.calibration.empty()) report.calibration = read_calibration(options.calibration);
+  for (const auto& [fixes, x0_m, y0_m, x1_m, y1_m] : options.report.tracks) {
+    report.drives.push_back(
+        {{fixes, read_fixes(fixes)}, {Eigen::Vector2d{x0_m, y0_m}, Eigen::Vector2d{x1_m, y1_m}}});
+    inputs.push_back(fixes);
+  }
+  for (const std::string& picture : options.report.pictures) {
+    report.pictures.push_back(read_report_picture(picture));
+    inputs.push_back(picture);
+  }
+  report.history = history_entry(app, inputs);
+  return report_page(std::move(report));
 }
 
-void warn(const EvaluationInput& input, const Evaluation& evaluation, const std::string& missing) {
-  if (input.limit && !evaluation.limit) {
-    spdlog::warn("no theoretical limit: the truth has no z_m and yaw_rad, or sees no two lamps");
-  }
-  if (input.line_m && !evaluation.fit) {
-    spdlog::warn("no line is fitted: the fixes are spread in no direction");
-  }
-  if (!missing.empty()) spdlog::warn("{}", missing);
-  for (const std::string& caution : cautions_of_few(evaluation)) spdlog::info("{}", caution);
-}
-
-void run(const CLI::App& app, const EvaluateOptions& options) {
+void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = gates_of(options);
-  check_evaluate_options(options, gates);
+  check_options(options, gates);
   const EvaluationInput input = input_of(options);
-  const Evaluation evaluation = evaluate(input);
-  if (evaluation.fixes == 0) {
-    const auto& [status, count] =
-        *std::max_element(evaluation.missing.begin(), evaluation.missing.end(),
-                          [](const auto& a, const auto& b) { return a.second < b.second; });
-    throw Undetermined(fmt::format("{}: not one of {} captures has a fix ({} of them: {})",
-                                   options.fixes, evaluation.captures, count, status));
-  }
-  const std::vector<GateResult> results = results_of(options, gates, evaluation);
-  const std::string missing = unasked_missing(evaluation, results);
+  const EvaluateResult found = evaluate_fixes(input, gates);
+  require(found);
   std::string report;
-  if (!options.report.file.empty()) {
-    report = report_of(app, options.report,
-                       {input, evaluation, results, missing, options.lamps, options.calibration,
-                        inputs_of(options)});
-  }
-  if (!options.json.empty()) write_file(options.json, json_of(evaluation, results));
-  if (!options.junit.empty()) write_file(options.junit, junit_of(results));
+  if (!options.report.file.empty()) report = report_of(app, options, input, found);
+  if (!options.json.empty()) write_file(options.json, json_of(found.evaluation, found.gates));
+  if (!options.junit.empty()) write_file(options.junit, junit_of(found.gates));
   if (!report.empty()) write_file(options.report.file, report);
-  warn(input, evaluation, missing);
-  print_evaluation(evaluation, results);
+  tell(found);
+  print_evaluation(found.evaluation, found.gates);
   std::string failed;
-  for (const GateResult& gate : results) {
+  for (const GateResult& gate : found.gates) {
     if (!gate.passed) failed.append(failed.empty() ? "" : "; ").append(words_of(gate));
   }
   if (!failed.empty()) throw GateNotMet(failed);
+}
+
+void add_report_options(CLI::App& app, ReportOption& option) {
+  auto* report = app.add_option(
+      "--report", option.file,
+      "Write the report for people, one HTML file; with --lamps it shows them on the floor plan, "
+      "with --calibration what that says");
+  app.add_option("--picture", option.pictures,
+                 "A picture for the report, .svg of --plot of vlp-intrinsics, vlp-rotation or "
+                 "vlp-dispersion, or another; again for another")
+      ->needs(report)
+      ->allow_extra_args(false);
+  app.add_option("--track", option.tracks,
+                 "A drive for the report: fixes and the straight line commanded; again for another")
+      ->needs(report)
+      ->option_text("FIXES X0_M Y0_M X1_M Y1_M");
+}
+
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("fixes", options.fixes, "fixes.csv of vlp-locate")->required();
+  app.add_option("--truth", options.truth,
+                 "truth.csv: image, x_m, y_m [, z_m, yaw_rad]; a capture of it without a fix is "
+                 "missing");
+  app.add_option("--path", options.path,
+                 "The path driven: a CSV of waypoints, x_m, y_m [, z_m]; errors are distances from "
+                 "it");
+  app.add_option("--line", options.line_m,
+                 "The straight line commanded: errors are distances from it, of the fixes and, as "
+                 "in the paper, of a line fitted to them")
+      ->expected(4)
+      ->check(finite())
+      ->option_text("X0_M Y0_M X1_M Y1_M");
+  app.add_option(
+         "--station-mm", options.station_mm,
+         "Captures whose true places are within so much are of one station (default: 1, and "
+         "what a turn about the calibration's lever arm adds)")
+      ->check(finite_positive());
+  app.add_option("--compare", options.compare,
+                 "Other fixes of the same captures: are these better, worse, or is there no "
+                 "evidence?");
+  app.add_option("--gate", options.gates,
+                 "What a figure has to be at most; again for another, or with commas")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->option_text("NAME=VALUE");
+  app.add_option("--gates", options.gates_file, "Gates from a file, vlp-gates/1");
+  app.add_option("--json", options.json, "Write the figures for programs, evaluation.json");
+  app.add_option("--junit", options.junit, "Write the gates for a CI system, JUnit XML");
+  auto* lamps = app.add_option(
+      "--lamps", options.lamps,
+      "Lamp map, lamps.yaml, for the theoretical limit at the true places, and the report");
+  auto* calibration = app.add_option("--calibration", options.calibration,
+                                     "... the camera; the limit is that of a level one; its "
+                                     "lever arm is for --station-mm");
+  auto* noise = app.add_option("--noise-px", options.noise_px,
+                               "... and the standard deviation of each lamp's pixel, per axis")
+                    ->check(finite_positive());
+  noise->needs(lamps)->needs(calibration);
+  add_report_options(app, options.report);
+  app.add_option("--threads", options.threads, "For the intervals (default: one a core)")
+      ->check(CLI::Range(1, 1024));
 }
 
 }  // namespace
@@ -119,8 +275,8 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml --lamps datasets/example/lamps.yaml \\\n"
       "    --report report.html\n",
       "vlp-evaluate");
-  vlp::EvaluateOptions options;
-  vlp::add_evaluate_options(app, options);
+  vlp::Options options;
+  vlp::add_options(app, options);
   app.footer("Gates:\n" + vlp::gate_descriptions());
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

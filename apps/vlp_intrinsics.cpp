@@ -2,84 +2,56 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-intrinsics: the lens of a camera from images of a board.
 #include <fmt/core.h>
-#include <spdlog/spdlog.h>
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "app.h"
-#include "board_images.h"
-#include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/mrcal_files.h"
-#include "calibration/plots/calibration_plots.h"
+#include "capture_options.h"
+#include "evaluation/check_gates.h"
 #include "history.h"
-#include "intrinsics_options.h"
 #include "print_intrinsics.h"
+#include "progress.h"
 #include "rig/file.h"
-#include "rig/input_error.h"
-#include "rig/stage.h"
+#include "session/board_images.h"
+#include "session/lens_step.h"
+#include "step_outcome.h"
 
 namespace vlp {
 namespace {
 
-/// The views that can be used, apart from those that are held out.
-struct Sorted {
-  IntrinsicsInput solved, held_out;
-  std::vector<std::string> names;  // of the solved
+struct Options {
+  std::vector<std::string> images;
+  std::string board, output, cache, ros, kalibr, opencv, plot;
+  std::string camera_id = "camera", lens = "LENSMODEL_OPENCV8";
+  std::optional<Readout> readout;
+  std::optional<double> row_time_s, pixel_pitch_m;
+  int threads = all_cores();
+  int held_out = 0;
+  IntrinsicsGates gates;
 };
 
-Sorted sorted(const IntrinsicsOptions& options, const Board& board,
-              const std::vector<BoardView>& views) {
-  const auto model = lens_model_from_name(options.lens);
-  const IntrinsicsInput none{BoardLattice(board), {}, views.front().imager_px, *model};
-  Sorted sorted{none, none, {}};
-  int usable = 0;
-  for (const BoardView& view : views) {
-    if (!none.lattice.enough(view.seen)) {
-      spdlog::warn("{}: only {} tags of the board can be used; skipped", view.image,
-                   view.seen.tags.size());
-      continue;
-    }
-    const bool held_out = options.held_out > 0 && ++usable % options.held_out == 0;
-    auto& part = held_out ? sorted.held_out : sorted.solved;
-    part.views.push_back(none.lattice.corners(view.seen));
-    if (!held_out) sorted.names.push_back(view.image);
-  }
-  return sorted;
-}
-
-IntrinsicsSolution solved(const Sorted& views) {
-  const IntrinsicsSolution solution = solve_intrinsics(views.solved);
-  if (!solution.ok()) {
-    throw Undetermined(fmt::format("{} views with the board: {}", views.solved.views.size(),
-                                   explanation_of(solution.status)));
-  }
-  for (const auto& [view, rms_px] : solution.dropped) {
-    spdlog::warn(
-        "{}: fits no pose that goes with the other views ({:.1f} px are left over); dropped",
-        views.names[view], rms_px);
-  }
-  return solution;
-}
-
-IntrinsicsReport report_of(const IntrinsicsSolution& solution, const IntrinsicsInput& input,
-                           const CalibrationReport& report) {
-  const Eigen::Vector2d warp_m =
-      solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
-  return {static_cast<int>(solution.views.size()),
-          solution.corners,
-          solution.outliers,
-          solution.rms_px,
-          std::array{warp_m.x(), warp_m.y()},
-          report.uncertainty_worst_px};
-}
-
-Camera camera_of(const IntrinsicsOptions& options, const BoardProblem& problem) {
-  Camera camera{options.camera_id,     problem.imager_px,  problem.lens_model, problem.intrinsics,
-                options.pixel_pitch_m, options.row_time_s, options.readout};
+Camera known_camera(const Options& options) {
+  Camera camera;
+  camera.id = options.camera_id;
+  camera.lens_model = *lens_model_from_name(options.lens);
+  camera.pixel_pitch_m = options.pixel_pitch_m;
+  camera.row_time_s = options.row_time_s;
+  camera.readout = options.readout;
   return camera;
+}
+
+SeenBoards boards_in(const std::vector<std::filesystem::path>& images, const Board& board,
+                     const Options& options) {
+  Progress progress("images");
+  return see_boards({images, board, options.board, options.threads, options.cache},
+                    [&](std::size_t done, std::size_t total) { progress.update(done, total); });
 }
 
 /// camera.yaml and ".cameramodel" to camera.cameramodel.
@@ -87,13 +59,13 @@ std::string beside(const std::string& output, const char* ending) {
   return std::filesystem::path(output).replace_extension(ending).string();
 }
 
-void write_exports(const IntrinsicsOptions& options, const Camera& camera) {
+void write_exports(const Options& options, const Camera& camera) {
   if (!options.ros.empty()) write_file(options.ros, ros_camera_info(camera));
   if (!options.kalibr.empty()) write_file(options.kalibr, kalibr_camchain(camera));
   if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
 }
 
-void run(const CLI::App& app, const IntrinsicsOptions& options) {
+void run(const CLI::App& app, const Options& options) {
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
@@ -103,31 +75,97 @@ void run(const CLI::App& app, const IntrinsicsOptions& options) {
     check_output(output, inputs);
   }
   const Board board = read_board(options.board);
-  const auto views = board_views(images, board, options.board, options.threads, options.cache);
-  const Sorted input = sorted(options, board, views);
-  const IntrinsicsSolution solution = solved(input);
-  const BoardCheck check = check_board(board, views, solution.lens());
-  if (!check.problem.empty()) throw InputError(options.board, check.problem);
-
-  const CalibrationReport report = report_on(solution, input.solved);
-  const ViewCoverage coverage = coverage_of(solution, input.solved);
-  write_calibration(options.output, with_camera(camera_of(options, solution.problem),
-                                                report_of(solution, input.solved, report),
-                                                history_entry(app, inputs)));
-  write_exports(options, camera_of(options, solution.problem));
-  write_cameramodel(beside(options.output, ".cameramodel"), solution);
-  write_corners(beside(options.output, ".corners.vnl"), solution, input.names);
-  if (!options.plot.empty()) {
-    const std::string title = fmt::format("{}, {}", options.camera_id, options.lens);
-    draw_intrinsics_plot(options.plot, plot_of(title, solution));
+  const SeenBoards seen = boards_in(images, board, options);
+  tell(seen);
+  require(seen);
+  const LensResult lens =
+      solve_lens({seen.views, board, options.board, known_camera(options), options.held_out},
+                 history_entry(app, inputs));
+  tell(lens);
+  require(lens);
+  write_calibration(options.output, lens.calibration);
+  write_exports(options, lens.calibration.camera);
+  write_cameramodel(beside(options.output, ".cameramodel"), lens.solution);
+  write_corners(beside(options.output, ".corners.vnl"), lens.solution, lens.images);
+  if (!options.plot.empty()) draw(options.plot, lens.drawing());
+  print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
+  std::string failed;
+  for (const GateResult& gate : check_lens(options.gates, lens.metrics)) {
+    if (!gate.passed) failed.append(failed.empty() ? "" : "; ").append(words_of(gate));
   }
-  print_summary(solution, report, coverage, held_out_fit(solution, input.held_out));
-  const auto failed = gates_not_met(options.gates, solution, report);
-  std::string all;
-  for (const std::string& gate : failed) all += (all.empty() ? "" : "; ") + gate;
   if (!failed.empty()) {
-    throw GateNotMet(fmt::format("{}; add views, next {}", all, next_view(coverage)));
+    throw GateNotMet(fmt::format("{}; add views, next {}", failed, next_view(lens.coverage)));
   }
+}
+
+/// NAME=VALUE of a gate.
+std::string gate_problem(const std::string& text) {
+  const std::size_t sign = text.find('=');
+  const std::string name = text.substr(0, sign);
+  if (name != "rms_px" && name != "uncertainty_px" && name != "halves_px") {
+    return "the gates are rms_px, uncertainty_px and halves_px, not '" + name + "'";
+  }
+  if (sign == std::string::npos) return "a gate is NAME=VALUE";
+  std::string value = text.substr(sign + 1);
+  return finite_positive()(value);
+}
+
+/// Of a text without a problem.
+void set_gate(IntrinsicsGates& gates, const std::string& text) {
+  const std::size_t sign = text.find('=');
+  const std::string name = text.substr(0, sign);
+  const double value = std::stod(text.substr(sign + 1));
+  if (name == "rms_px") gates.rms_px = value;
+  if (name == "uncertainty_px") gates.uncertainty_px = value;
+  if (name == "halves_px") gates.halves_px = value;
+}
+
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("images", options.images, "Images of the board, or folders of them")->required();
+  app.add_option("--board", options.board, "The board, board.yaml")->required();
+  app.add_option("-o,--output", options.output,
+                 "Where to write the calibration with its camera part; mrcal's .cameramodel and "
+                 ".corners.vnl go beside it")
+      ->required();
+  app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
+  app.add_option("--lens", options.lens, "Lens model (default: LENSMODEL_OPENCV8)")
+      ->check([](const std::string& name) {
+        return lens_model_from_name(name) ? std::string() : "the models are: " + lens_model_names();
+      });
+  app.add_option("--row-time-s", options.row_time_s,
+                 "Time from one row of the read-out to the next, which every program that finds "
+                 "lamps needs; vlp-train --row-time finds it, too")
+      ->check(CLI::Range(1e-8, 1e-3));
+  add_readout_option(app, options.readout);
+  app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Width of a pixel")
+      ->check(CLI::Range(1e-7, 1e-4));
+  app.add_option("--held-out", options.held_out,
+                 "Keep every Nth view out of the solve, and say how well the lens fits it")
+      ->check(CLI::Range(2, 1000))
+      ->option_text("N");
+  app.add_option_function<std::vector<std::string>>(
+         "--gate",
+         [&options](const std::vector<std::string>& gates) {
+           for (const std::string& gate : gates) set_gate(options.gates, gate);
+         },
+         "Change a gate: rms_px=1, uncertainty_px=2 (worst over the image), halves_px=1 (rms, "
+         "between the lenses of two halves of the views)")
+      ->check([](const std::string& text) { return gate_problem(text); })
+      ->option_text("NAME=VALUE ...");
+  app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
+  app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");
+  app.add_option("--opencv", options.opencv, "Write the camera for OpenCV, too (FileStorage)");
+  app.add_option("--plot", options.plot,
+                 "Draw the corners, their residuals and the uncertainty over the image, .png or "
+                 ".svg")
+      ->check([](const std::string& name) {
+        const bool known = name.ends_with(".png") || name.ends_with(".svg");
+        return known ? std::string() : "a picture's name should end in .png or .svg";
+      });
+  app.add_option("--cache", options.cache,
+                 "Folder to keep the corners of each image in, for the next time");
+  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
 }
 
 }  // namespace
@@ -143,7 +181,7 @@ int main(int argc, char** argv) {
       "  build/bin/vlp-intrinsics out/rig/boards/*.png --board out/rig/board.yaml \\\n"
       "    --row-time-s 3e-5 --readout rows -o camera.yaml\n",
       "vlp-intrinsics");
-  vlp::IntrinsicsOptions options;
-  vlp::add_intrinsics_options(app, options);
+  vlp::Options options;
+  vlp::add_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

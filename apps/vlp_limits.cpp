@@ -3,6 +3,8 @@
 /// vlp-limits: what accuracy a room, a camera and their errors allow.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
+
 #include "app.h"
 #include "captures/csv_writer.h"
 #include "evaluation/floor_plot.h"

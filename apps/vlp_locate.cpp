@@ -2,24 +2,24 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-locate: identified lamps in images -> positions.
 #include <fmt/core.h>
-#include <spdlog/spdlog.h>
 
-#include <algorithm>
+#include <CLI/CLI.hpp>
+#include <array>
+#include <filesystem>
 #include <map>
+#include <optional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app.h"
 #include "capture_options.h"
-#include "captures/captures_table.h"
-#include "captures/detections_table.h"
-#include "captures/fixes_table.h"
-#include "evaluation/fix_summary.h"
 #include "geometry/angles.h"
-#include "locate_options.h"
-#include "locate_warnings.h"
-#include "positioning/positioner.h"
-#include "positioning/residual_noise.h"
+#include "rig/detection.h"
+#include "session/locate_step.h"
+#include "session/session_folder.h"
+#include "step_outcome.h"
 
 namespace vlp {
 namespace {
@@ -29,30 +29,16 @@ const std::map<std::string, Correction> kCorrections{{"none", Correction::none},
                                                      {"dispersion", Correction::dispersion},
                                                      {"all", Correction::all}};
 
-Sensors sensors_of(const std::string& image, const CapturesTable& captures,
-                   const LocateOptions& options) {
-  Sensors sensors;
-  const auto entry = captures.find(image);
-  if (entry == captures.end()) return sensors;
-  const Capture& capture = entry->second;
-  sensors.inclination = capture.inclination;
-  sensors.inclination_sigma_rad = rad_from_deg(options.inclination_sigma_deg.value_or(0));
-  if (options.one_lamp && capture.z_m && capture.yaw_rad) {
-    sensors.height_and_yaw = HeightAndYaw{*capture.z_m, *capture.yaw_rad};
-  }
-  return sensors;
-}
-
-std::vector<Fix> locate_all(const Positioner& positioner, const std::vector<Frame>& frames,
-                            const CapturesTable& captures, const LocateOptions& options) {
-  std::vector<Fix> fixes;
-  fixes.reserve(frames.size());
-  for (const Frame& frame : frames) {
-    fixes.push_back(
-        positioner.locate(frame.detections, sensors_of(frame.image, captures, options)));
-  }
-  return fixes;
-}
+struct Options {
+  CaptureOptions images;
+  /// captures.csv; empty: that of the folder, if it is there.
+  std::string captures;
+  std::string correction = "all";
+  std::optional<double> sigma_px;
+  std::optional<double> inclination_sigma_deg;
+  std::optional<std::array<double, 4>> camera_on_robot;
+  bool one_lamp = false;
+};
 
 void set_sigma(std::vector<Frame>& frames, double sigma_px) {
   for (Frame& frame : frames) {
@@ -60,17 +46,16 @@ void set_sigma(std::vector<Frame>& frames, double sigma_px) {
   }
 }
 
-bool states_sigma(const Frame& frame) {
-  return std::all_of(frame.detections.begin(), frame.detections.end(),
-                     [](const Detection& detection) { return detection.sigma_px.has_value(); });
-}
-
-FixRow row_of(const Frame& frame, const Fix& fix, bool noise_known) {
-  FixRow row{frame.image, std::string(name_of(fix.status)), {}, fix.lamps};
-  if (!fix.ok()) return row;
-  row.fix = {fix.estimate.pose, {}, fix.residual_px};
-  if (noise_known) row.fix->sd = fix.estimate.covariance.diagonal().cwiseSqrt();
-  return row;
+/// Of the file that is named, or of the folder of images.
+CapturesTable captures_of(const Options& options) {
+  if (!options.captures.empty()) return read_captures(options.captures);
+  const bool folder = std::filesystem::is_directory(options.images.images);
+  CapturesTable captures = folder ? captures_in(options.images.images) : CapturesTable{};
+  if (captures.empty() && (options.one_lamp || options.inclination_sigma_deg)) {
+    throw std::invalid_argument(
+        "--one-lamp and --inclination-sigma-deg need captures.csv: give --captures");
+  }
+  return captures;
 }
 
 void print_summary(const FixSummary& summary) {
@@ -91,49 +76,57 @@ void print_summary(const FixSummary& summary) {
   }
 }
 
-void run(const LocateOptions& options) {
-  check_output(options.detect.output,
-               {options.detect.folder, options.detect.lamps, options.detect.calibration,
-                options.detect.classifier, options.captures});
-  const CapturesTable captures =
-      options.captures.empty() ? CapturesTable{} : read_captures(options.captures);
-  auto [lamps, calibration, frames] = read_captures_of(options.detect);
-  if (options.sigma_px) set_sigma(frames, *options.sigma_px);
-  PositionerOptions how;
-  how.correction = kCorrections.at(options.correction);
+void run(const Options& options) {
+  std::vector<std::string> inputs = inputs_of(options.images);
+  inputs.push_back(options.captures);
+  check_output(options.images.output, inputs);
+  const CapturesTable captures = captures_of(options);
+  LampCaptures seen = read_captures_of(options.images);
+  if (options.sigma_px) set_sigma(seen.frames, *options.sigma_px);
+  LocateInput input{std::move(seen.frames), std::move(seen.lamps), std::move(seen.calibration),
+                    captures};
+  input.how.correction = kCorrections.at(options.correction);
   if (const auto& mount = options.camera_on_robot) {
-    how.mount = CameraMount{{(*mount)[0], (*mount)[1], (*mount)[2]}, rad_from_deg((*mount)[3])};
+    input.how.mount =
+        CameraMount{{(*mount)[0], (*mount)[1], (*mount)[2]}, rad_from_deg((*mount)[3])};
   }
+  input.inclination_sigma_rad = rad_from_deg(options.inclination_sigma_deg.value_or(0));
+  input.one_lamp = options.one_lamp;
+  const LocateResult found = locate_frames(input);
+  write_fixes(options.images.output, found.rows);
+  tell(found);
+  print_summary(found.summary);
+  require(found);
+}
 
-  std::vector<Fix> fixes = locate_all({lamps, calibration, how}, frames, captures, options);
-  const bool stated = std::all_of(frames.begin(), frames.end(), states_sigma);
-  bool noise_known = stated;
-  if (!noise_known) {
-    if (const auto noise_px = residual_noise_px(fixes)) {
-      spdlog::info("sigma_px is not stated: {:.3g} px taken from the residuals", *noise_px);
-      how.unstated_sigma_px = *noise_px;
-      noise_known = true;
-      fixes = locate_all({lamps, calibration, how}, frames, captures, options);
-    } else {
-      spdlog::warn("sigma_px is not stated and no residuals show it: sd columns are empty");
-    }
-  }
-  if (stated) warn_of_noise(frames, fixes);
-  std::vector<FixRow> rows;
-  rows.reserve(fixes.size());
-  for (std::size_t i = 0; i < fixes.size(); ++i) {
-    rows.push_back(row_of(frames[i], fixes[i], noise_known));
-  }
-  write_fixes(options.detect.output, rows);
-  warn_of_image(frames, calibration.camera);
-  warn_of_captures(frames, captures);
-  warn_of_lamps_left_out(frames, fixes);
-  const FixSummary summary = summarize(rows);
-  print_summary(summary);
-  if (summary.fixes == 0) {
-    throw Undetermined(
-        fmt::format("no frame has a fix; the first: {}", explanation_of(fixes.front().status)));
-  }
+void add_options(CLI::App& app, Options& options) {
+  add_capture_options(
+      app, options.images,
+      {"detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
+       "Calibration of the camera", "Where to write fixes.csv"});
+  app.add_option("--correction", options.correction,
+                 "Parts of the calibration to apply (default: all that it has)")
+      ->check(CLI::IsMember({"none", "rotation", "dispersion", "all"}))
+      ->option_text("none|rotation|dispersion|all");
+  app.add_option(
+         "--sigma-px", options.sigma_px,
+         "Standard deviation of the lamps' pixels; taken from the residuals when neither it "
+         "nor a column says it")
+      ->check(CLI::Range(kMinSigma_px, kMaxSigma_px));
+  app.add_option("--captures", options.captures,
+                 "captures.csv: image, roll_rad, pitch_rad (inclination of the robot, or of the "
+                 "camera when there is no --camera-on-robot), z_m, yaw_rad; default: captures.csv "
+                 "in the folder");
+  app.add_option("--inclination-sigma-deg", options.inclination_sigma_deg,
+                 "Standard deviation of the inclination sensor's angles (default: left out of sd)")
+      ->check(finite_not_negative());
+  app.add_option(
+         "--camera-on-robot", options.camera_on_robot,
+         "The camera's place and yaw on the robot: the fixes are then of the robot's centre")
+      ->check(finite())
+      ->option_text("X_M Y_M Z_M YAW_DEG");
+  app.add_flag("--one-lamp", options.one_lamp,
+               "Where one lamp is seen, take z_m and yaw_rad from captures.csv");
 }
 
 }  // namespace
@@ -149,7 +142,7 @@ int main(int argc, char** argv) {
       "\\\n"
       "    --calibration datasets/example/calibration.yaml -o fixes.csv\n",
       "vlp-locate");
-  vlp::LocateOptions options;
-  vlp::add_locate_options(app, options);
+  vlp::Options options;
+  vlp::add_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

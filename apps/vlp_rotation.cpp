@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-rotation: captures of a turn on the spot, or of a drive -> the rotation centre, the camera's
 /// tilt.
+#include <CLI/CLI.hpp>
 #include <stdexcept>
 #include <string>
 
@@ -14,7 +15,7 @@ namespace vlp {
 namespace {
 
 struct Options {
-  DetectOptions detect;
+  CaptureOptions images;
   std::string plot, refined_map;
   std::string method = "axis";
 };
@@ -22,12 +23,12 @@ struct Options {
 void run(const CLI::App& app, const Options& options) {
   if (options.method == "lamps") {
     if (!options.plot.empty()) throw std::invalid_argument("--plot is of a turn on the spot");
-    return rotate_by_lamps(app, options.detect, options.refined_map);
+    return rotate_by_lamps(app, options.images, options.refined_map);
   }
   if (!options.refined_map.empty()) {
     throw std::invalid_argument("--refine-map needs --method lamps");
   }
-  rotate_on_spot(app, options.detect, options.method, options.plot);
+  rotate_on_spot(app, options.images, options.method, options.plot);
 }
 
 }  // namespace
@@ -49,7 +50,7 @@ int main(int argc, char** argv) {
       "vlp-rotation");
   vlp::Options options;
   vlp::add_capture_options(
-      app, options.detect,
+      app, options.images,
       {"detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
        "Calibration of the camera; a rotation centre in it is replaced",
        "Where to write the calibration with its rotation centre"});

@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-station: a factory's calibration station: units to a verdict, and their records.
+#include <CLI/CLI.hpp>
+
 #include "app.h"
-#include "detect_folder.h"
 #include "station/watched_run.h"
 #include "station_records.h"
 #include "station_run.h"

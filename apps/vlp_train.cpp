@@ -1,21 +1,28 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-train: labelled captures -> the lamp classifier; captures -> the row time.
-#include <fmt/core.h>
-#include <spdlog/spdlog.h>
-
-#include <opencv2/core/utility.hpp>
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "app.h"
-#include "detect_folder.h"
+#include "capture_options.h"
+#include "captures/detections_table.h"
+#include "detection/image_file.h"
 #include "history.h"
-#include "labelled_folders.h"
-#include "readout_option.h"
+#include "progress.h"
 #include "rig/input_error.h"
+#include "session/row_time_step.h"
+#include "step_outcome.h"
 #include "train_report.h"
 
 namespace vlp {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct Options {
   std::vector<std::string> folders;
@@ -29,17 +36,21 @@ struct Options {
 struct Inputs {
   LampMap lamps;
   std::optional<Calibration> calibration;
-  std::vector<LabelledFolder> folders;
-  DetectorCamera camera;
-  std::vector<std::vector<ImageLights>> lights;
+  /// Of each folder; empty without a table.
+  std::vector<std::vector<Frame>> labels;
+  SeenLights seen;
 };
 
-std::vector<std::filesystem::path> images_of(const std::vector<LabelledFolder>& folders) {
-  std::vector<std::filesystem::path> images;
-  for (const LabelledFolder& folder : folders) {
-    images.insert(images.end(), folder.images.begin(), folder.images.end());
+/// The table beside the images of a folder: of that name, or, when none is named and labels are
+/// needed, detections.csv or true_detections.csv, the first that is there.
+std::vector<Frame> labels_in(const fs::path& folder, const std::string& table, bool needed) {
+  if (!table.empty()) return read_detections(folder / table);
+  if (!needed) return {};
+  for (const char* name : {"detections.csv", "true_detections.csv"}) {
+    if (fs::exists(folder / name)) return read_detections(folder / name);
   }
-  return images;
+  throw InputError(folder,
+                   "has no detections.csv that says which lamp is where (image, lamp, u_px, v_px)");
 }
 
 Inputs read_inputs(const Options& options) {
@@ -47,39 +58,35 @@ Inputs read_inputs(const Options& options) {
   Inputs inputs;
   inputs.lamps = read_lamp_map(options.lamps);
   if (!options.calibration.empty()) inputs.calibration = read_calibration(options.calibration);
-  inputs.folders = labelled_folders(options.folders, options.labels, !options.row_time);
-  const auto images = images_of(inputs.folders);
-  for (const auto& image : images) check_output(options.output, {image.string()});
-  cv::setNumThreads(1);  // the images themselves go in parallel
-  std::optional<std::array<int, 2>> imager_px;
-  std::optional<Readout> readout;
-  if (inputs.calibration) {
-    inputs.camera = detector_camera(*inputs.calibration);
-    imager_px = inputs.calibration->camera.imager_px;
-    readout = inputs.calibration->camera.readout;
+  for (const std::string& folder : options.folders) {
+    for (const fs::path& image : images_in(folder)) check_output(options.output, {image.string()});
+    inputs.labels.push_back(labels_in(folder, options.labels, !options.row_time));
   }
-  // What is looked for is not to depend on what is known of it.
-  if (options.row_time) inputs.camera.row_time_s.reset();
-  inputs.camera.readout = readout_for(options.readout, readout, images);
-  const LampDetector detector(inputs.lamps, inputs.camera);
-  inputs.lights = lights_of(detector, inputs.folders, imager_px, options.threads);
+  {
+    Progress progress("images");
+    inputs.seen =
+        see_lights({options.folders.begin(), options.folders.end()}, inputs.lamps,
+                   inputs.calibration, options.readout, !options.row_time, options.threads,
+                   [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+  }
+  tell(inputs.seen);
   return inputs;
 }
 
 void train(const Options& options) {
   const Inputs inputs = read_inputs(options);
   Labelled labelled;
-  for (std::size_t i = 0; i < inputs.folders.size(); ++i) {
-    add_labelled(inputs.lights[i], inputs.folders[i].labels, labelled);
+  for (std::size_t i = 0; i < inputs.labels.size(); ++i) {
+    add_labelled(inputs.seen.folders[i], inputs.labels[i], labelled);
   }
   if (labelled.labels == 0) {
-    throw InputError(inputs.folders.front().folder,
+    throw InputError(options.folders.front(),
                      "the table names none of the images that can be used: image names have to be "
                      "equal, with their endings");
   }
   check_examples(labelled.lights, inputs.lamps);
   LampClassifier classifier = trained(labelled.lights);
-  classifier.row_time_s = inputs.camera.row_time_s;
+  classifier.row_time_s = inputs.seen.camera.row_time_s;
   check_kept(classifier);
   write_lamp_classifier(options.output, classifier);
   print_labelled(labelled, classifier);
@@ -87,35 +94,20 @@ void train(const Options& options) {
   warn_of_inseparable(classifier);
 }
 
-void find_row_time(const CLI::App& app, const Options& options) {
+void train_row_time(const CLI::App& app, const Options& options) {
   if (!options.output.empty() && options.calibration.empty()) {
     throw std::invalid_argument("-o with --row-time: needs --calibration, which it completes");
   }
-  Inputs inputs = read_inputs(options);
-  check_frequencies(inputs.lamps, options.lamps);
-  std::vector<MeasuredPeriod> periods;
-  for (std::size_t i = 0; i < inputs.folders.size(); ++i) {
-    const auto more = measured_periods(inputs.lights[i], inputs.folders[i].labels);
-    periods.insert(periods.end(), more.begin(), more.end());
-  }
-  const RowTimeResult result = estimate_row_time(periods, inputs.lamps);
-  if (!result.found) throw Undetermined(result.problem);
-  if (!options.output.empty()) {
-    Camera& camera = inputs.calibration->camera;
-    camera.row_time_s = result.found->row_time_s;
-    camera.readout = inputs.camera.readout;
-    std::vector<std::string> files = options.folders;
-    files.push_back(options.lamps);
-    auto& history = inputs.calibration->history;
-    HistoryEntry entry = history_entry(app, files);
-    entry.part = "camera";
-    std::erase_if(history, [](const HistoryEntry& other) {
-      return other.part == "camera" && other.program == "vlp-train";
-    });
-    history.push_back(std::move(entry));
-    write_calibration(options.output, *inputs.calibration);
-  }
-  print_row_time(*result.found, inputs.camera.readout);
+  const Inputs inputs = read_inputs(options);
+  std::vector<std::string> files = options.folders;
+  files.push_back(options.lamps);
+  const RowTimeStepResult result =
+      find_row_time(inputs.seen, inputs.labels, inputs.lamps, options.lamps, inputs.calibration,
+                    history_entry(app, files));
+  tell(result);
+  require(result);
+  if (!options.output.empty()) write_calibration(options.output, result.calibration);
+  print_row_time(result.found, inputs.seen.camera.readout);
 }
 
 }  // namespace
@@ -157,7 +149,7 @@ int main(int argc, char** argv) {
   return vlp::run_app(app, argc, argv, [&] {
     if (row_time->count() == 0 && output->count() == 0) throw CLI::RequiredError("--output");
     if (options.row_time) {
-      vlp::find_row_time(app, options);
+      vlp::train_row_time(app, options);
     } else {
       vlp::train(options);
     }

@@ -19,14 +19,14 @@ then
   exit 1
 fi
 
-rig=datasets/paper-rig station=out/demo/paper-rig
-echo "Rendering a camera's captures to $station ..."
+rig=datasets/paper-rig session=out/demo/paper-rig
+echo "Rendering a camera's captures to $session ..."
 build/bin/vlp-simulate --quiet $rig/scene.yaml \
-  --only boards,rotation,dispersion,check,line-x,line-y -o $station
-cp $rig/gates.yaml $station/
-echo "Calibrating it, as scripts/calibrate.sh does with any folder of captures:"
+  --only boards,rotation,dispersion,check,line-x,line-y -o $session
+cp $rig/gates.yaml $session/
+echo "Calibrating it, as vlp-calibrate does with any folder of captures:"
 code=0
-scripts/calibrate.sh $station -o out/demo/results --camera-id paper-rig --row-time-s 3e-5 \
+build/bin/vlp-calibrate $session -o out/demo/results --camera-id paper-rig --row-time-s 3e-5 \
   --readout rows || code=$?
 echo
 report=out/demo/results/report.html calibration=out/demo/results/calibration.yaml

@@ -2,17 +2,17 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Runs the chain again over an archive of captures, and says what changed.
+# Runs vlp-calibrate again over an archive of captures, and says what changed.
 #
 #   scripts/reprocess.sh ARCHIVE RESULTS [--gates FILE] [--previous RESULTS] [--cores N]
 #                        [--profile slurm] [--session-gates FILE] [--row-time-s S]
 #                        [--readout rows|columns] [--shard-size N]
 #
-# ARCHIVE/CAMERA/SESSION/ is laid out as scripts/calibrate.sh has it, and only read. RESULTS gets
+# ARCHIVE/CAMERA/SESSION/ is laid out as vlp-calibrate has it, and only read. RESULTS gets
 #   summary.csv            a row per session: verdict, figures, reason, version, digests, cost
 #   overview.html          the same for people, with what changed since --previous
 #   changes.json           that comparison for programs, and the gates
-#   sessions/, failed/     per session its results, or why there are none, with what each stage said
+#   sessions/, failed/     per session its results, or why there are none: session.json
 # What is current is not run again; an interrupted run goes on. A session without a result does not stop
 # the others.
 #
@@ -20,7 +20,7 @@
 # --profile NAME   a profile of scripts/reprocess/profiles or a folder: slurm submits shards to a cluster
 # --previous       results of an earlier run to compare with
 # --gates          what the archive as a whole has to keep to, vlp-archive-gates/1
-# --session-gates  gates of vlp-evaluate for sessions that have no gates.yaml of their own
+# --session-gates  gates of the errors for sessions that have no gates.yaml of their own
 # --shard-size N   sessions in a job at most (default 50)
 #
 # Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 not all could be done.

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "captures/csv_writer.h"
@@ -107,17 +106,12 @@ std::vector<GateResult> check_gates(const std::vector<Gate>& gates, const Evalua
   return results;
 }
 
-GateResult unmet_gate(const std::string& text) {
-  constexpr double none = std::numeric_limits<double>::quiet_NaN();
-  return {text, "", none, none, false};
-}
-
 std::string words_of(const GateResult& gate) {
-  if (gate.is_text()) return gate.name;
   constexpr int digits = 4;
   const std::string unit = gate.unit.empty() ? "" : " " + gate.unit;
-  return gate.name + " is " + significant(gate.value, digits) + unit + ", at most " +
-         significant(gate.limit, digits) + unit + " is asked for";
+  const bool known = std::isfinite(gate.value);
+  return gate.name + " is " + (known ? significant(gate.value, digits) + unit : "not known") +
+         ", at most " + significant(gate.limit, digits) + unit + " is asked for";
 }
 
 }  // namespace vlp

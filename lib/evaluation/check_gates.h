@@ -34,10 +34,7 @@ std::vector<Gate> read_gates(const std::filesystem::path& file);
 /// what it needs is not there. Precondition: the names are known.
 std::vector<GateResult> check_gates(const std::vector<Gate>& gates, const Evaluation& evaluation);
 
-/// A gate of a stage before that was not met, as text: not passed.
-GateResult unmet_gate(const std::string& text);
-
-/// For example "mean_mm is 1.25 mm, at most 1 mm is asked for"; of text, that alone.
+/// For example "mean_mm is 1.25 mm, at most 1 mm is asked for".
 std::string words_of(const GateResult& gate);
 
 }  // namespace vlp

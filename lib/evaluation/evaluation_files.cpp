@@ -105,12 +105,11 @@ Json json_of(const Comparison& comparison) {
 Json json_of(const std::vector<GateResult>& gates) {
   Json list = Json::array();
   for (const GateResult& gate : gates) {
-    Json entry{{"name", gate.name}};
-    if (!gate.is_text()) {
-      entry.update({{"unit", gate.unit}, {"value", gate.value}, {"limit", gate.limit}});
-    }
-    entry["passed"] = gate.passed;
-    list.push_back(std::move(entry));
+    list.push_back({{"name", gate.name},
+                    {"unit", gate.unit},
+                    {"value", gate.value},
+                    {"limit", gate.limit},
+                    {"passed", gate.passed}});
   }
   return list;
 }

@@ -13,7 +13,7 @@ namespace vlp {
 /// `evaluation.json`, for programs: format "vlp-evaluation/1". Every key ends in the unit of its
 /// figure (_mm, _deg, _m); shares and ratios have none, counts are called after what they count.
 /// What there is not is left out. Errors have mean, median, p90, max and rms; intervals are of 95
-/// %. A gate of a stage before has its text for a name, and neither unit, value nor limit. A
+/// %. A
 /// comparison of too few units has a "why". Objects: horizontal (with intervals_95 and cdf), height
 /// and yaw (with bias), repeated (bias and scatter of stations with two fixes or more, and the
 /// list), fitted_line (of --line; jitter, angle, ends), stated_ratio (errors / stated sd), limit

@@ -49,8 +49,8 @@ std::vector<std::string> progress_of(const Unit& unit, StationStep step) {
 
 std::string next_of(const Unit& unit, StationStep step) {
   const UnitStep& state = unit.step(step);
-  if (state.result && !state.result->problem.empty()) {
-    return state.result->problem + "; add images, or empty the step's folder and take them anew";
+  if (state.result && !state.result->ok()) {
+    return state.result->why + "; add images, or empty the step's folder and take them anew";
   }
   switch (step) {
     case StationStep::boards:

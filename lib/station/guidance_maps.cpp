@@ -67,7 +67,7 @@ std::vector<std::string> board_map(const Unit& unit) {
 
 TurnMap turn_of(const Unit& unit) {
   const auto& lens = unit.step(StationStep::boards).result;
-  if (!lens || !lens->problem.empty()) return {};
+  if (!lens || !lens->ok()) return {};
   return turn_map(frames_of(unit.step(StationStep::rotation)), unit.config(), lens->calibration);
 }
 

@@ -57,6 +57,8 @@ constexpr std::array kFigures{
                "largest horizontal error at the known points"},
     FigureKind{"check_offset_mm", "mm", false, "the known points or the lamps have moved",
                "length of the mean horizontal error"},
+    FigureKind{"check_height_mm", "mm", false, "the heights at the known points are off",
+               "rms error of the height at the known points"},
     FigureKind{"check_residual_px", "px", false, "the lamps do not fit their map",
                "median residual of the fixes at the known points"},
 };
@@ -71,7 +73,7 @@ bool StationFigure::met() const {
   return at_least ? *value >= *limit : *value <= *limit;
 }
 
-std::vector<StationFigure> with_gates(std::span<const NamedValue> values,
+std::vector<StationFigure> with_gates(std::span<const Metric> values,
                                       std::span<const StationGate> gates) {
   std::vector<StationFigure> figures;
   for (const FigureKind& kind : kFigures) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "session/step_result.h"
 #include "station/station_config.h"
 
 namespace vlp {
@@ -39,11 +40,7 @@ struct StationFigure {
 };
 
 /// The figures in their order with the limits of the gates; `values` are by name.
-struct NamedValue {
-  std::string name;
-  double value;
-};
-std::vector<StationFigure> with_gates(std::span<const NamedValue> values,
+std::vector<StationFigure> with_gates(std::span<const Metric> values,
                                       std::span<const StationGate> gates);
 
 /// One line: what a gate that is not met means, its figure and limit.

@@ -31,19 +31,19 @@ void Unit::advance(bool all_in) {
     if (!calibration_before(step)) return;
     const auto waiting = std::exchange(state.waiting, {});
     if (!waiting.empty()) look(step, waiting);
-    if (state.result && (state.result->problem.empty() || !all_in)) continue;
+    if (state.result && (state.result->ok() || !all_in)) continue;
     state.enough = has_enough(step);
     if (!state.enough && !all_in) return;
     state.result = solve(step, all_in);
     state.picture = state.result->drawing ? draw_aside(state.result->drawing) : StepPicture{};
-    if (!state.result->problem.empty()) return;
+    if (!state.result->ok()) return;
   }
 }
 
 std::optional<Calibration> Unit::calibration_before(StationStep step) const {
   if (step == StationStep::boards) return Calibration{};
   const UnitStep& before = steps_[index(step) - 1];
-  if (!before.result || !before.result->problem.empty()) return std::nullopt;
+  if (!before.result || !before.result->ok()) return std::nullopt;
   return before.result->calibration;
 }
 
@@ -68,7 +68,7 @@ bool Unit::hopeless() const {
   if (!step) return false;
   const UnitStep& state = this->step(*step);
   if (state.refused_in_a_row >= config_.refuse.in_a_row) return true;
-  const bool stuck = state.enough && state.result && !state.result->problem.empty();
+  const bool stuck = state.enough && state.result && !state.result->ok();
   const auto known = calibration_before(*step);
   return stuck && *step != StationStep::boards &&
          !lamp_faults(frames_of(state), config_.lamps, *known).empty();

@@ -7,17 +7,15 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "session/step_history.h"
+#include "station/station_figures.h"
 #include "station/station_step.h"
 #include "station/unit_step.h"
 
 namespace vlp {
-
-/// Who makes a calibration, for its history.
-struct ProgramVersion {
-  std::string program, version;
-};
 
 /// A unit on its way through the station. Images are looked at as they come; a step is solved as
 /// soon as it has enough, and again when its images change, and with it those that rest on it. The
@@ -67,11 +65,11 @@ class Unit {
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
   void look(StationStep step, const std::vector<std::filesystem::path>& files);
   void take(StationStep step, UnitImage image);
-  std::string superfluity(StationStep step, const UnitImage& image) const;
+  std::pair<Superfluous, std::string> superfluity(StationStep step, const UnitImage& image) const;
   void drop(StationStep step, const std::string& name);
   void forget_after(StationStep step);
   bool has_enough(StationStep step) const;
-  StageResult solve(StationStep step, bool all_in) const;
+  StepResult solve(StationStep step, bool all_in) const;
   std::optional<Calibration> calibration_before(StationStep step) const;
   HistoryEntry history_of(StationStep step) const;
 

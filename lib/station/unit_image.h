@@ -14,6 +14,13 @@
 
 namespace vlp {
 
+/// Why an image that is good is not used.
+enum class Superfluous {
+  no,
+  same_pose,  // another one shows the same
+  enough      // the step is done without it
+};
+
 /// An image of a unit, and what the station makes of it.
 struct UnitImage {
   std::filesystem::path file;
@@ -21,7 +28,7 @@ struct UnitImage {
   /// Why it is not used, for people; empty when it is.
   std::string refused = {};
   /// Nothing is wrong with it, but others of its step show the same, or are enough.
-  bool superfluous = false;
+  Superfluous superfluous = Superfluous::no;
   /// The file is no more: a frame of a camera or a video that was refused.
   bool discarded = false;
   /// Of the step `boards`; there also when the image is refused, but for one that shows no board.

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// Unit: the images of a step as they come and go.
+#include <tuple>
+
 #include "captures/in_parallel.h"
 #include "station/unit.h"
 
@@ -37,11 +39,10 @@ void Unit::take(StationStep step, UnitImage image) {
   const std::string name = image.file.filename().string();
   drop(step, name);  // it was overwritten
   if (image.refused.empty()) {
-    image.refused = superfluity(step, image);
-    image.superfluous = !image.refused.empty();
+    std::tie(image.superfluous, image.refused) = superfluity(step, image);
   }
   const bool used = image.refused.empty();
-  const bool fault = !used && !image.superfluous && !state.done();
+  const bool fault = !used && image.superfluous == Superfluous::no && !state.done();
   if (used || fault) state.refused_in_a_row = fault ? state.refused_in_a_row + 1 : 0;
   state.images.emplace(name, std::move(image));
   if (!used) return;
@@ -49,8 +50,9 @@ void Unit::take(StationStep step, UnitImage image) {
   forget_after(step);
 }
 
-/// Why a good image is not needed; empty when it is.
-std::string Unit::superfluity(StationStep step, const UnitImage& image) const {
+/// Whether and why a good image is not needed.
+std::pair<Superfluous, std::string> Unit::superfluity(StationStep step,
+                                                      const UnitImage& image) const {
   const double near_px = config_.refuse.same_pose_share * config_.type.imager_px[0];
   for (const auto& [name, other] : this->step(step).images) {
     if (!other.refused.empty()) continue;
@@ -58,9 +60,10 @@ std::string Unit::superfluity(StationStep step, const UnitImage& image) const {
         step == StationStep::boards
             ? same_pose(image.view->seen, other.view->seen, near_px)
             : step == StationStep::rotation && same_lamps(image.lamps, other.lamps, near_px);
-    if (same) return "same pose as " + name;
+    if (same) return {Superfluous::same_pose, "same pose as " + name};
   }
-  return this->step(step).done() ? "not needed: the step has enough" : "";
+  if (!this->step(step).done()) return {Superfluous::no, ""};
+  return {Superfluous::enough, "not needed: the step has enough"};
 }
 
 /// Takes an image out of its step, and with it what rests on it; those that it stood in the way of
@@ -76,12 +79,13 @@ void Unit::drop(StationStep step, const std::string& name) {
   forget_after(step);
   std::vector<UnitImage> again;
   for (const auto& [other, known] : state.images) {
-    if (known.superfluous) again.push_back(known);
+    if (known.superfluous != Superfluous::no) again.push_back(known);
   }
-  std::erase_if(state.images, [](const auto& known) { return known.second.superfluous; });
+  std::erase_if(state.images,
+                [](const auto& known) { return known.second.superfluous != Superfluous::no; });
   for (UnitImage& known : again) {
     known.refused.clear();
-    known.superfluous = false;
+    known.superfluous = Superfluous::no;
     take(step, std::move(known));
   }
 }
@@ -98,7 +102,7 @@ void Unit::discard(StationStep step, const std::string& name) {
   const auto image = state.images.find(name);
   if (image == state.images.end() || image->second.refused.empty()) return;
   state.refused_in_a_row = 0;
-  if (image->second.superfluous) {
+  if (image->second.superfluous != Superfluous::no) {
     state.images.erase(image);
   } else {
     image->second.discarded = true;

@@ -5,7 +5,8 @@
 
 #include "captures/digest.h"
 #include "rig/input_error.h"
-#include "station/known_places.h"
+#include "session/session_folder.h"
+#include "station/station_steps.h"
 #include "station/turn_map.h"
 #include "station/unit.h"
 
@@ -28,11 +29,14 @@ bool Unit::has_enough(StationStep step) const {
   return false;
 }
 
-StageResult Unit::solve(StationStep step, bool all_in) const {
+StepResult Unit::solve(StationStep step, bool all_in) const {
   const UnitStep& state = this->step(step);
-  if (state.used() == 0) return {"no image can be used"};
+  StepResult result;
+  if (state.used() == 0) {
+    result.fail(StepFailure::undetermined, "no image can be used");
+    return result;
+  }
   const Calibration before = *calibration_before(step);
-  StageResult result;
   try {
     switch (step) {
       case StationStep::boards:
@@ -42,16 +46,17 @@ StageResult Unit::solve(StationStep step, bool all_in) const {
         result = solve_rotation(config_, before, frames_of(state));
         break;
       case StationStep::dispersion:
-        result = solve_dispersion(config_, before, frames_of(state), places_in(state.folder));
+        result = solve_dispersion(config_, before, frames_of(state), captures_in(state.folder));
         break;
       case StationStep::check:
-        return check_fixes(config_, before, frames_of(state), places_in(state.folder));
+        return check_fixes(config_, before, frames_of(state), captures_in(state.folder));
     }
   } catch (const InputError& error) {  // a table, maybe in the making
     if (all_in) throw;
-    return {error.what()};
+    result.fail(StepFailure::bad_input, error.what());
+    return result;
   }
-  if (result.problem.empty()) {
+  if (result.ok()) {
     HistoryEntry& entry = result.calibration.history.back();
     const std::string part = entry.part;
     entry = history_of(step);

@@ -9,9 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "captures/detections_table.h"
+#include "session/step_result.h"
 #include "station/step_picture.h"
 #include "station/unit_image.h"
-#include "station/unit_stages.h"
 
 namespace vlp {
 
@@ -26,7 +27,7 @@ struct UnitStep {
   /// There are as many as the station wants.
   bool enough = false;
   /// What the images come to, once there are enough of them.
-  std::optional<StageResult> result = {};
+  std::optional<StepResult> result = {};
   /// Of the result, if it has one.
   StepPicture picture = {};
   /// Of the images refused one after another, the last ones.
@@ -34,7 +35,7 @@ struct UnitStep {
   /// The image that came last.
   std::string last = {};
 
-  bool done() const { return enough && result && result->problem.empty(); }
+  bool done() const { return enough && result && result->ok(); }
   int used() const;
 };
 

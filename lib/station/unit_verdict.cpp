@@ -15,7 +15,7 @@ namespace {
 
 /// A reason in the plural, without figures and names.
 std::string kind_of(const UnitImage& image) {
-  if (image.refused.starts_with("same pose")) return "the same pose again";
+  if (image.superfluous == Superfluous::same_pose) return "the same pose again";
   return image.refused.substr(0, image.refused.find(':'));
 }
 
@@ -24,7 +24,7 @@ std::string refusals(const UnitStep& state) {
   std::map<std::string, int> reasons;
   int refused = 0;
   for (const auto& [name, image] : state.images) {
-    if (image.refused.empty() || image.refused.starts_with("not needed")) continue;
+    if (image.refused.empty() || image.superfluous == Superfluous::enough) continue;
     ++refused;
     ++reasons[kind_of(image)];
   }
@@ -44,8 +44,8 @@ void add_problems(const Unit& unit, StationStep step, std::vector<std::string>& 
   if (!refused.empty()) {
     causes.push_back(fmt::format("{} ({}): {}", name_of(step), count_of(unit, step), refused));
   }
-  if (state.result && !state.result->problem.empty() && state.used() > 0) {
-    causes.push_back(fmt::format("{}: {}", name_of(step), state.result->problem));
+  if (state.result && !state.result->ok() && state.used() > 0) {
+    causes.push_back(fmt::format("{}: {}", name_of(step), state.result->why));
   } else if (!state.enough && refused.empty()) {
     causes.push_back(fmt::format("{}: not enough images, or too much alike ({})", name_of(step),
                                  count_of(unit, step)));
@@ -60,8 +60,8 @@ bool other_board(const UnitStep& boards) {
   return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
 }
 
-bool has_value(const StageResult& result, const std::string& figure) {
-  return std::any_of(result.values.begin(), result.values.end(), [&](const NamedValue& value) {
+bool has_value(const StepResult& result, const std::string& figure) {
+  return std::any_of(result.metrics.begin(), result.metrics.end(), [&](const Metric& value) {
     return value.name == figure && std::isfinite(value.value);
   });
 }
@@ -83,19 +83,19 @@ std::vector<std::string> lamp_faults_of(const Unit& unit) {
 std::optional<Calibration> Unit::calibration() const {
   std::optional<Calibration> last;
   for (const UnitStep& state : steps_) {
-    if (state.result && state.result->problem.empty()) last = state.result->calibration;
+    if (state.result && state.result->ok()) last = state.result->calibration;
   }
   return last;
 }
 
 std::vector<StationFigure> Unit::figures() const {
-  std::vector<NamedValue> values;
+  std::vector<Metric> values;
   if (const auto blur_px = typical_blur_px(step(StationStep::boards))) {
     values.push_back({"blur_px", *blur_px});
   }
   for (const UnitStep& state : steps_) {
     if (!state.result) continue;
-    values.insert(values.end(), state.result->values.begin(), state.result->values.end());
+    values.insert(values.end(), state.result->metrics.begin(), state.result->metrics.end());
   }
   return with_gates(values, config_.gates);
 }
@@ -117,7 +117,7 @@ std::vector<std::string> Unit::causes() const {
   for (const StationStep each : kStationSteps) {
     add_problems(*this, each, causes);
     const auto& result = step(each).result;
-    if (!result || !result->problem.empty()) break;
+    if (!result || !result->ok()) break;
     for (const StationFigure& figure : figures) {
       if (has_value(*result, figure.name)) add_gate(figure);
     }

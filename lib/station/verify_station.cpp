@@ -7,8 +7,9 @@
 #include "captures/in_parallel.h"
 #include "detection/image_file.h"
 #include "rig/input_error.h"
-#include "station/known_places.h"
+#include "session/session_folder.h"
 #include "station/lamp_faults.h"
+#include "station/station_steps.h"
 
 namespace vlp {
 namespace {
@@ -53,7 +54,7 @@ class Verification {
     });
     const auto frames = frames_of(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
-    const auto places = places_in(step.folder);
+    const auto places = captures_in(step.folder);
     add(name_of(each), each == StationStep::check
                            ? check_fixes(config_, golden_.calibration, frames, places)
                            : solve_dispersion(config_, golden_.calibration, frames, places));
@@ -95,9 +96,9 @@ class Verification {
   }
 
  private:
-  void add(const char* step, const StageResult& result) {
-    if (!result.problem.empty()) causes_.push_back(fmt::format("{}: {}", step, result.problem));
-    values_.insert(values_.end(), result.values.begin(), result.values.end());
+  void add(const char* step, const StepResult& result) {
+    if (!result.ok()) causes_.push_back(fmt::format("{}: {}", step, result.why));
+    values_.insert(values_.end(), result.metrics.begin(), result.metrics.end());
     if (result.drawing) drawn_.push_back(draw_aside(result.drawing));
   }
   void note(StationStep each, const UnitStep& step) {
@@ -111,7 +112,7 @@ class Verification {
   fs::path folder_;
   int threads_;
   std::vector<Frame> frames_ = {};
-  std::vector<NamedValue> values_ = {};
+  std::vector<Metric> values_ = {};
   std::vector<StepPicture> drawn_ = {};
   std::vector<std::string> causes_ = {};
   std::vector<RunRecord::Image> images_ = {};

@@ -8,7 +8,9 @@ import json
 import os
 from pathlib import Path
 
-from station import INPUTS
+# What vlp-calibrate reads of a session (lib/session/session_folder.h), but for drives, which are for its report.
+INPUTS = ["board.yaml", "boards", "camera.yaml", "check", "classifier.yaml", "dispersion", "gates.yaml", "lamps.yaml"]
+INPUTS += ["rotation"]
 
 
 def write_whole(file, text):

@@ -3,22 +3,25 @@
 """Reprocesses the sessions of a shard that are not current, in RESULTS, and writes the shard's rows.
 
 A session's key is a digest of its inputs, the toolbox and the options. What a session gives stands in
-sessions/CAMERA/SESSION, or, when it has no result, in failed/CAMERA/SESSION, with session.json, which
-has the key, the verdict and the reason. A folder appears whole: it is made in .state/work and moved.
+sessions/CAMERA/SESSION, or, when it has no result, in failed/CAMERA/SESSION, with row.json, which has the
+key and the session's row. A folder appears whole: it is made in .state/work and moved.
 """
 import fcntl
 import json
 import os
+import resource
+import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 from files import digest, input_digest, json_text, table, write_whole
-from outcome import COLUMNS, KEPT, cost_of, outcome_of
+from outcome import COLUMNS, KEPT, outcome_of
 
 STATE = Path(".state")
 COSTS = STATE / "costs"
+LONGEST_S = 3600
 
 
 def place_of(name, verdict):
@@ -33,28 +36,35 @@ def current(name, key):
     """The session as it stands, when it is of this key; what crashed is tried again."""
     for place in (Path("sessions") / name, Path("failed") / name):
         try:
-            session = json.loads((place / "session.json").read_text())
+            row = json.loads((place / "row.json").read_text())
         except (FileNotFoundError, NotADirectoryError, ValueError):
             continue
-        if session["key"] == key and session["verdict"] != "crashed":
-            return session
+        if row["key"] == key and row["verdict"] != "crashed":
+            return row
     return None
 
 
-def run_chain(run, names, work, lock):
-    """The rule per stage of session.smk for sessions, one after another. Snakemake holds the lock, too: when
-    it is told to end it ends its stages first, and may outlive us."""
-    config = {key: run[key] for key in ("archive", "bin", "camera", "session_gates")}
-    write_whole(work / "config.json", json_text({**config, "sessions": names}))
-    subprocess.run(
-        [sys.executable, "-m", "snakemake", "--snakefile", Path(__file__).parent / "session.smk"]
-        + ["--configfile", "config.json", "--directory", work, "--cores", "1", "--scheduler", "greedy"]
-        + ["--keep-going", "--nolock", "--rerun-incomplete", "--rerun-triggers", "mtime", "--quiet", "all"]
-        + ["--latency-wait", "0"],
-        cwd=work,
-        pass_fds=[lock.fileno()],
-        check=False,  # the outcome of each session says what came of it
-    )
+def calibrate(run, name, work, lock):
+    """Runs vlp-calibrate on a session: what came of it, and its processor time. It holds the lock, too, and may
+    outlive us."""
+    folder = work / name
+    folder.mkdir(parents=True, exist_ok=True)
+    command = [Path(run["bin"]) / "vlp-calibrate", Path(run["archive"]) / name, "-o", folder, "--quiet", "--no-report"]
+    command += ["--threads", "1", f"--camera-id={name.split('/')[0]}", *shlex.split(run["camera"])]
+    if run["session_gates"]:
+        command += ["--gates", run["session_gates"]]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    try:
+        done = subprocess.run(
+            command, stderr=subprocess.PIPE, pass_fds=[lock.fileno()], timeout=LONGEST_S, check=False
+        )
+        ended, said = done.returncode, done.stderr
+    except subprocess.TimeoutExpired as late:
+        ended, said = None, late.stderr or b""
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    words = said.decode(errors="replace").replace(run["archive"] + "/", "")
+    return outcome_of(folder, name, ended, words), f"{seconds:.3f}"
 
 
 def same_file(source, target):
@@ -65,21 +75,18 @@ def same_file(source, target):
         shutil.copyfile(source, target)
 
 
-def publish(session, work):
+def publish(row, work):
     """Takes what a session gave to its place, and nothing else of it remains. The work is left as it is,
     so that this can be done again."""
-    name = f"{session['camera']}/{session['session']}"
+    name = f"{row['camera']}/{row['session']}"
     ready = STATE / "ready" / name
     shutil.rmtree(ready, ignore_errors=True)
-    (ready / "logs").mkdir(parents=True)
+    ready.mkdir(parents=True)
     for file in KEPT:
         if (work / name / file).is_file():
             same_file(work / name / file, ready / KEPT[file])
-    for log in sorted((work / name / "logs").glob("*.txt")):
-        if log.stat().st_size > 0:
-            same_file(log, ready / "logs" / log.name)
-    write_whole(ready / "session.json", json_text(session))
-    place = place_of(name, session["verdict"])
+    write_whole(ready / "row.json", json_text(row))
+    place = place_of(name, row["verdict"])
     place.parent.mkdir(parents=True, exist_ok=True)
     old = STATE / "old" / name
     shutil.rmtree(old, ignore_errors=True)
@@ -101,28 +108,22 @@ def stated_cost(name):
 
 def reprocess(run, shard, names, lock):
     work = (STATE / "work" / shard).absolute()
-    sessions, stale = {}, {}
+    rows, made = [], 0
     for name in names:
         inputs = input_digest(Path(run["archive"]) / name)
         key = key_of(inputs, run)
-        sessions[name] = current(name, key)
-        if sessions[name] is None:
-            stale[name] = {"key": key, "inputs": inputs}
-            begun = work / name
-            # A run that was interrupted goes on, if it is of the same key.
-            if begun.exists() and not (begun / key).exists():
-                shutil.rmtree(begun)
-            begun.mkdir(parents=True, exist_ok=True)
-            (begun / key).touch()
-    if stale:
-        run_chain(run, list(stale), work, lock)
-    for name, keys in stale.items():
-        sessions[name] = outcome_of(work / name, name, run) | keys | {"version": run["version"]}
-        write_whole(COSTS / name, cost_of(work / name))
-        publish(sessions[name], work)
+        row = current(name, key)
+        if row is None:
+            outcome, cost = calibrate(run, name, work, lock)
+            row = outcome | {"key": key, "inputs": inputs, "version": run["version"]}
+            write_whole(COSTS / name, cost)
+            publish(row, work)
+            shutil.rmtree(work / name)
+            made += 1
+        rows.append(row | {"cpu_s": stated_cost(name)})
     shutil.rmtree(work, ignore_errors=True)
-    print(f"{len(names)} sessions, {len(stale)} reprocessed")
-    return [sessions[name] | {"cpu_s": stated_cost(name)} for name in names]
+    print(f"{len(names)} sessions, {made} reprocessed")
+    return rows
 
 
 def main():

@@ -6,13 +6,12 @@ from pathlib import Path
 
 from files import digest, file_digest
 
-PROGRAMS = ["vlp-intrinsics", "vlp-train", "vlp-rotation", "vlp-dispersion", "vlp-locate", "vlp-evaluate"]
+PROGRAMS = ["vlp-calibrate", "vlp-evaluate"]  # the second compares captures for the overview
 
 
 def toolbox(folder):
-    """The version that the programs state, and a digest of them and of the chain."""
-    stated = subprocess.run([folder / PROGRAMS[0], "--version"], capture_output=True, text=True, check=True).stdout
-    here = Path(__file__).parent
-    chain = [here / name for name in ("session.smk", "stage.sh", "station.py", "outcome.py")]
-    files = [folder / program for program in PROGRAMS] + chain
+    """The version that vlp-calibrate states, and a digest of it and of what reads its results."""
+    program = folder / PROGRAMS[0]
+    stated = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    files = [program, Path(__file__).parent / "outcome.py"]
     return {"version": stated.split()[-1], "toolbox": digest("".join(file_digest(file) for file in files))}

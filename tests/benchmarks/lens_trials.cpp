@@ -55,7 +55,11 @@ void try_set(int set, Counts& counts) {
     return;
   }
   const CalibrationReport report = report_on(solution, input);
-  if (!gates_not_met({}, solution, report).empty()) {
+  const IntrinsicsGates gates;
+  const bool good = solution.rms_px <= gates.rms_px &&
+                    report.uncertainty_worst_px <= gates.uncertainty_px && report.halves &&
+                    report.halves->rms_px <= gates.halves_px;
+  if (!good) {
     ++counts.refused;
     return;
   }

@@ -73,25 +73,6 @@ TEST_F(Evaluate, EndsWithOneAndAllIsWrittenWhenAGateIsNotMet) {
   EXPECT_EQ(with_truth("--gate mean_mm=2.5 --gate p90_mm=4.5").exit_code, 0);
 }
 
-TEST_F(Evaluate, FailsForAGateThatWasNotMetBefore) {
-  const std::string text = "vlp-intrinsics: rms_px is 2, at most 1";
-  const auto result = with_truth("--gate mean_mm=2.5,missing=1 --unmet '" + text +
-                                 "' --unmet other --json e.json --junit j.xml --report r.html");
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, HasSubstr(text + "; other"));
-  EXPECT_THAT(result.output,
-              AllOf(HasSubstr("NOT MET gate " + text + "\n"), HasSubstr("met    gate mean_mm"),
-                    testing::Not(HasSubstr("nan"))));
-  EXPECT_THAT(content("e.json"), HasSubstr("\"passed\": false"));
-  EXPECT_THAT(content("j.xml"), HasSubstr("tests=\"4\" failures=\"2\""));
-  EXPECT_THAT(content("r.html"), HasSubstr("<strong>FAIL</strong>2 of 4 gates are not met."));
-  EXPECT_EQ(with_truth("--unmet a --junit j.xml").exit_code, 1);
-  EXPECT_EQ(with_truth("--unmet ''").exit_code, 2);
-  EXPECT_EQ(with_truth("--unmet '{}'").exit_code, 1);
-  EXPECT_EQ(with_truth("--unmet '[a,b]'").exit_code, 1);
-  EXPECT_EQ(with_truth("--unmet \"$(printf 'a\\nb')\"").exit_code, 2);
-}
-
 TEST_F(Evaluate, SaysThatNoGateAsksForWhatIsMissing) {
   const std::string words = "1 of 6 captures has no fix, and no gate 'missing' asks";
   const auto result = with_truth("--gate mean_mm=2.5 --report r.html");

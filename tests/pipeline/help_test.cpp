@@ -46,9 +46,9 @@ TEST_P(Help, NamesTheVersion) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Programs, Help,
-                         testing::Values("vlp-board", "vlp-detect", "vlp-dispersion",
-                                         "vlp-evaluate", "vlp-intrinsics", "vlp-limits",
-                                         "vlp-locate", "vlp-rotation", "vlp-simulate",
+                         testing::Values("vlp-board", "vlp-calibrate", "vlp-detect",
+                                         "vlp-dispersion", "vlp-evaluate", "vlp-intrinsics",
+                                         "vlp-limits", "vlp-locate", "vlp-rotation", "vlp-simulate",
                                          "vlp-station", "vlp-train"),
                          [](const auto& instance) {
                            return std::string(instance.param).substr(4);

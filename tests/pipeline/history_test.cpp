@@ -4,6 +4,10 @@
 
 #include <gmock/gmock.h>
 
+#include <CLI/CLI.hpp>
+
+#include "captures/digest.h"
+#include "session/step_history.h"
 #include "support/program.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
@@ -45,7 +49,7 @@ TEST(History, AFolderIsWhatSha256sumSaysOfItsImages) {
   folder.file("notes.txt", "no image");
   const auto oracle =
       run_program("cd '" + (folder / "").string() + "' && sha256sum *.png | sha256sum");
-  EXPECT_EQ(sha256_of_images(folder / ""), oracle.output.substr(0, 64));
+  EXPECT_EQ(InputDigests().of_images(folder / ""), oracle.output.substr(0, 64));
 }
 
 TEST(History, KeepsOptionsAndInputsButNothingOfTheMachine) {
@@ -63,7 +67,7 @@ TEST(History, KeepsOptionsAndInputsButNothingOfTheMachine) {
   EXPECT_EQ(entry.options, "--lamps lamps.yaml --method axis --numbers 1.5 -2 --refine-map");
   ASSERT_EQ(entry.inputs.size(), 2U);
   EXPECT_EQ(entry.inputs[0].file, "spot");
-  EXPECT_EQ(entry.inputs[0].sha256, sha256_of_images(images));
+  EXPECT_EQ(entry.inputs[0].sha256, InputDigests().of_images(images));
   EXPECT_EQ(entry.inputs[1].file, "lamps.yaml");
   EXPECT_EQ(entry.inputs[1].sha256, sha256_of_file(lamps));
 }

@@ -93,7 +93,7 @@ TEST_F(IntrinsicsRefusals, RefusesMixedSizesAndSkipsWhatIsNoImage) {
   EXPECT_THAT(bad.errors, HasSubstr("2.png: cannot be read as an image; skipped"));
   const auto only = calibrate((folder / "images/2.png").string(), kRig + "/board.yaml");
   EXPECT_EQ(only.exit_code, 2);
-  EXPECT_THAT(only.errors, HasSubstr("none of 1 images can be used"));
+  EXPECT_THAT(only.errors, HasSubstr("none of its 1 images can be used"));
   const cv::Mat image = cv::imread(kRig + "/sample-boards/0000.png", cv::IMREAD_GRAYSCALE);
   cv::imwrite((folder / "images/2.png").string(), image(cv::Rect(0, 0, 640, 480)));
   const auto mixed = calibrate(images, kRig + "/board.yaml");

@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The README's commands of our programs and of scripts/calibrate.sh work as typed, in the order in
-/// which they stand there.
+/// The README's commands of our programs work as typed, in the order in which they stand there.
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -13,8 +12,8 @@
 namespace vlp {
 namespace {
 
-/// The indented command lines that begin with one of our programs, scripts/calibrate.sh or cp,
-/// joined where a backslash says so.
+/// The indented command lines that begin with one of our programs or cp, joined where a backslash
+/// says so.
 std::vector<std::string> commands_in(const std::string& file) {
   std::vector<std::string> commands;
   std::ifstream readme(file);
@@ -22,8 +21,7 @@ std::vector<std::string> commands_in(const std::string& file) {
   for (std::string line; std::getline(readme, line);) {
     if (continues) {
       commands.back() += line;
-    } else if (line.starts_with("    build/bin/vlp-") ||
-               line.starts_with("    scripts/calibrate") || line.starts_with("    cp ")) {
+    } else if (line.starts_with("    build/bin/vlp-") || line.starts_with("    cp ")) {
       commands.push_back(line.substr(4));
     } else {
       continue;
@@ -49,9 +47,7 @@ TEST(Readme, ItsCommandsWorkAsTyped) {
                                               folder / name);
   }
   for (const auto& command : commands) {
-    const auto result =
-        run_program("cd '" + (folder / "").string() +
-                    "' && export VLP_PROGRAMS_DIR=" VLP_PROGRAMS_DIR " && " + command);
+    const auto result = run_program("cd '" + (folder / "").string() + "' && " + command);
     EXPECT_EQ(result.exit_code, 0) << command << "\n" << result.errors;
   }
 }

@@ -22,8 +22,9 @@ while IFS=, read -r camera session _ damage _; do
   name=$camera/$session
   if [ -n "$damage" ]; then
     [ ! -e "$baseline/sessions/$name" ] || fail "$name is damaged ($damage) and has a result"
-    grep -q '"reason": "vlp-[a-z]*: error: ' "$baseline/failed/$name/session.json" || fail "$name has no reason"
-    ls "$baseline/failed/$name/logs/"*.txt >/dev/null || fail "$name has no log"
+    grep -q '"reason": "[a-z]' "$baseline/failed/$name/row.json" || fail "$name has no reason"
+    grep -q '"verdict": "no result"' "$baseline/failed/$name/session.json" || fail "$name has no session.json"
+    if grep -rq "$scratch" "$baseline/failed/$name"; then fail "$name tells of a folder of this machine"; fi
   else
     [ ! -e "$baseline/failed/$name" ] || fail "$name is whole and has no result"
     for file in calibration.yaml camera.cameramodel fixes.csv evaluation.json session.json; do
@@ -31,11 +32,12 @@ while IFS=, read -r camera session _ damage _; do
     done
   fi
 done <"$archive/archive.csv"
-# What the chain gives is what calibrate.sh gives, byte for byte, and its report is of the same.
+# What reprocessing gives is what vlp-calibrate gives, byte for byte, and its report is of the same.
 name=camera-00001/session-01 alone=$scratch/alone
-"$source_dir/scripts/calibrate.sh" "$archive/$name" -o "$alone" --camera-id camera-00001 "${options[@]}" >"$said"
+"$bin/vlp-calibrate" "$archive/$name" -o "$alone" --camera-id camera-00001 "${options[@]}" >"$said"
 cmp "$alone/check-fixes.csv" "$baseline/sessions/$name/fixes.csv"
 cmp "$alone/lens.cameramodel" "$baseline/sessions/$name/camera.cameramodel"
 cmp "$alone/calibration.yaml" "$baseline/sessions/$name/calibration.yaml"
+cmp "$alone/session.json" "$baseline/sessions/$name/session.json"
 if grep -q 'src="http\|<script' "$baseline/overview.html"; then fail "the overview is not self-contained"; fi
 rm -rf "$alone"

@@ -34,9 +34,9 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   mv "$few/check/truth.csv" "$few/check/captures.csv"
   reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" >"$said"
   grep -q '^gates       2 with a result that misses a gate' "$said" || fail "$(cat "$said")"
-  grep -q '^camera.*vlp-evaluate: error: mean_mm is .* at most 0.0001 mm' "$scratch/gates-results/summary.csv" || fail "no reason"
-  grep -q '^unit 2,few boards,gate,12,.*vlp-evaluate: error: lens: ' "$scratch/gates-results/summary.csv" || fail "no reason"
-  grep -q '"passed": false' "$scratch/gates-results/sessions/unit 2/few boards/evaluation.json" || fail "passes without a lens"
+  grep -q '^camera.*mean_mm is .* at most 0.0001 mm' "$scratch/gates-results/summary.csv" || fail "no reason"
+  grep -q '^unit 2,few boards,gate,12,.*halves_px is ' "$scratch/gates-results/summary.csv" || fail "no reason"
+  grep -q '"verdict": "gate"' "$scratch/gates-results/sessions/unit 2/few boards/session.json" || fail "passes without a lens"
   grep -q 'id: "unit 2"' "$scratch/gates-results/sessions/unit 2/few boards/calibration.yaml" || fail "whose calibration?"
 )
 

@@ -10,10 +10,10 @@ good=camera-00001/session-01 broken=$(cd "$baseline/failed" && echo */* | cut -d
 sessions=("$good" camera-00002/session-01 "$broken")
 take "$results-archive" "${sessions[@]}"
 
-# Killed in a stage, between stages, and when the first session is done, the whole of it; then to its end.
+# Killed in a step, between steps, and when the first session is done, the whole of it; then to its end.
 count() { { find "$results" -path "$1" 2>/dev/null || true; } | wc -l; }
 another() { [ "$(count "$1")" -gt "$before" ]; }
-for moment in '*/work/*/logs/lens.txt' '*/work/*/rotated.yaml' '*/sessions/*/session.json'; do
+for moment in '*/work/*/steps/corners/*.csv' '*/work/*/rotated.yaml' '*/sessions/*/row.json'; do
   before=$(count "$moment")
   start_reprocess "$results" --shard-size 1 --cores 1
   patiently 60 another "$moment"
@@ -22,7 +22,7 @@ for moment in '*/work/*/logs/lens.txt' '*/work/*/rotated.yaml' '*/sessions/*/ses
   [ ! -e "$results/summary.csv" ] || fail "killed too late"
   # What stands there is whole.
   for session in "$results"/sessions/*/* "$results"/failed/*/*; do
-    [ ! -e "$session" ] || [ -s "$session/session.json" ] || fail "$session is not whole"
+    [ ! -e "$session" ] || [ -s "$session/row.json" ] || fail "$session is not whole"
   done
 done
 run() { reprocess "$results" --shard-size 1 --cores 2 >"$said"; }
@@ -31,7 +31,7 @@ expect_baseline "$results" "${sessions[@]:0:2}"
 cmp "$baseline/failed/$broken/session.json" "$results/failed/$broken/session.json"
 [ -z "$(ls "$results/.state/work")" ] || fail "something is left of the work"
 redone() {  # since the last time
-  find "$results/sessions" "$results/failed" -name session.json -newer "$results-mark" -printf '%P\n' | sort
+  find "$results/sessions" "$results/failed" -name row.json -newer "$results-mark" -printf '%P\n' | sort
   touch "$results-mark"
 }
 redone >/dev/null 2>&1 || true
@@ -46,7 +46,7 @@ sed -i '1a # changed' "$archive/$good/lamps.yaml"
 mv "$archive/$broken" "$results-broken"
 cp -r "$archive/$good" "$archive/$broken"
 run
-[ "$(redone)" = "$(printf '%s/session.json\n' "$good" "$broken" | sort)" ] || fail "another content is not seen, or too much"
+[ "$(redone)" = "$(printf '%s/row.json\n' "$good" "$broken" | sort)" ] || fail "another content is not seen, or too much"
 [ -e "$results/sessions/$broken" ] && [ ! -e "$results/failed/$broken" ] || fail "$broken is repaired"
 
 # And back. In the meantime another version of a program has come, which crashes with one session: it is
@@ -56,22 +56,22 @@ mv "$results-broken" "$archive/$broken"
 sed -i 2d "$archive/$good/lamps.yaml"
 mkdir "$results-bin"
 ln -s "$bin"/vlp-* "$results-bin"
-rm "$results-bin/vlp-locate"
-cat >"$results-bin/vlp-locate" <<PROGRAM
+rm "$results-bin/vlp-calibrate"
+cat >"$results-bin/vlp-calibrate" <<PROGRAM
 #!/bin/bash
 [ ! -e "$results-crash" ] || [[ \$1 != *$good* ]] || kill -9 \$\$
-exec "$bin/vlp-locate" "\$@"
+exec "$bin/vlp-calibrate" "\$@"
 PROGRAM
-chmod +x "$results-bin/vlp-locate"
+chmod +x "$results-bin/vlp-calibrate"
 touch "$results-crash"
 VLP_PROGRAMS_DIR=$results-bin run
 [ "$(redone | wc -l)" = 3 ] || fail "another program makes all stale"
 grep -q '^no result   1, and 1 that crashed' "$said" || fail "$(cat "$said")"
-grep -q '"reason": "locate ended with exit code 137"' "$results/failed/$good/session.json" || fail "no reason"
+grep -q '"reason": "vlp-calibrate ended with exit code -9"' "$results/failed/$good/row.json" || fail "no reason"
 rm "$results-crash"
 VLP_PROGRAMS_DIR=$results-bin run
 grep -q '^no result   1, and 0 that crashed' "$said" || fail "$(cat "$said")"
-[ "$(redone)" = "$good/session.json" ] && [ ! -e "$results/failed/$good" ] || fail "it has a result now"
+[ "$(redone)" = "$good/row.json" ] && [ ! -e "$results/failed/$good" ] || fail "it has a result now"
 
 # With .state gone what it knew is found out again, but for the costs.
 rm -r "$results/.state" "$results/.snakemake"

@@ -2,6 +2,7 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 """The parts of scripts/reprocess, whose folder is the argument."""
+import json
 import os
 import random
 import sys
@@ -22,7 +23,6 @@ import files
 import outcome
 import plan
 import shard
-import station
 
 
 def row(number, verdict, mean, inputs="same"):
@@ -111,58 +111,36 @@ class Outcome(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
-        self.archive, self.work = (Path(self.folder.name) / name for name in ("archive", "work"))
-        (self.archive / "c/s/check").mkdir(parents=True)
-        (self.work / "logs").mkdir(parents=True)
-        self.run = {"archive": str(self.archive)}
+        self.work = Path(self.folder.name)
 
-    def ends(self, stage, code, said=""):
-        (self.work / "logs" / f"{stage}.txt").write_text(said)
-        (self.work / "logs" / f"{stage}.txt.end").write_text(f"0.25 0.05\n{code}\n")
+    def session(self, verdict, reason="", metrics=()):
+        text = json.dumps({"verdict": verdict, "reason": reason, "metrics": list(metrics)})
+        (self.work / "session.json").write_text(text)
 
-    def outcome(self):
-        return outcome.outcome_of(self.work, "c/s", self.run)
+    def outcome(self, ended=0, said=""):
+        return outcome.outcome_of(self.work, "c/s", ended, said)
 
-    def test_passes_with_the_last_file(self):
-        self.ends("lens", 0)
-        self.ends("locate", 0)
-        (self.work / "fixes.csv").touch()
-        self.assertEqual(self.outcome()["verdict"], "pass")
-        self.assertEqual(outcome.cost_of(self.work), "0.600")
+    def test_is_what_session_json_says(self):
+        self.session("gate", "rms_px is 2 px", [{"name": "rms_px", "step": "lens", "value": 2.00000049}])
+        evaluation = {"captures": 3, "fixes": 2, "missing_share": 1 / 3}
+        evaluation["horizontal"] = {name: 0.25 for name in ("mean_mm", "median_mm", "p90_mm", "max_mm")}
+        (self.work / "evaluation.json").write_text(json.dumps(evaluation))
+        found = self.outcome(1)
+        self.assertEqual((found["camera"], found["session"]), ("c", "s"))
+        self.assertEqual((found["verdict"], found["reason"]), ("gate", "rms_px is 2 px"))
+        self.assertEqual((found["fixes"], found["mean_mm"], found["rms_px"]), (2, "0.25", "2"))
 
-    def test_tells_the_gate_in_the_words_of_the_program(self):
-        self.ends("lens", 1, "views 3\nvlp-intrinsics: warning: few views\nvlp-intrinsics: error: rms_px is 2\n")
-        (self.work / "fixes.csv").touch()
-        found = self.outcome()
-        self.assertEqual((found["verdict"], found["reason"]), ("gate", "vlp-intrinsics: error: rms_px is 2"))
+    def test_no_result_has_no_figures(self):
+        self.session("no result", "lens: boards: holds no image")
+        self.assertEqual(self.outcome(2)["verdict"], "no result")
+        self.assertNotIn("rms_px", self.outcome(2))
 
-    def test_tells_the_reason_without_the_folder_of_the_archive(self):
-        self.ends("lens", 0)
-        self.ends("rotation", 2, f"vlp-rotation: error: {self.archive}/c/s/rotation: is empty\n")
-        found = self.outcome()
-        self.assertEqual((found["verdict"], found["reason"]), ("no result", "vlp-rotation: error: c/s/rotation: is empty"))
-
-    def test_calls_a_crash_a_crash(self):
-        self.ends("rotation", 139)
-        end = self.work / "logs/rotation.txt.end"
-        end.write_text("stage.sh: line 12: 345 Killed\n" + end.read_text())
-        found = self.outcome()
-        self.assertEqual((found["verdict"], found["reason"]), ("crashed", "rotation ended with exit code 139"))
-
-    def test_a_full_disk_is_a_crash_that_is_tried_again(self):
-        self.ends("lens", 2, "vlp-intrinsics: error: c/s/lens.yaml: cannot be written: No space left on device\n")
-        self.assertEqual(self.outcome()["verdict"], "crashed")
-
-    def test_vlp_evaluate_tells_of_all_gates(self):
-        self.ends("lens", 1, "vlp-intrinsics: error: rms_px is 2\n")
-        self.ends("evaluate", 1, "vlp-evaluate: error: lens: rms_px is 2; mean_mm is 3\n")
-        (self.work / "fixes.csv").touch()
-        self.assertEqual(self.outcome()["reason"], "vlp-evaluate: error: lens: rms_px is 2; mean_mm is 3")
-
-    def test_a_stage_without_an_end_is_a_crash(self):
-        self.ends("lens", 0)
-        (self.work / "logs/rotation.txt").touch()
-        self.assertEqual(self.outcome()["verdict"], "crashed")
+    def test_without_session_json_it_crashed(self):
+        found = self.outcome(-9)
+        self.assertEqual((found["verdict"], found["reason"]), ("crashed", "vlp-calibrate ended with exit code -9"))
+        said = "vlp-calibrate: error: lens.yaml: cannot be written: No space left on device\n"
+        self.assertTrue(self.outcome(2, said)["reason"].endswith("No space left on device"))
+        self.assertIn("an hour", self.outcome(None)["reason"])
 
 
 class Shard(unittest.TestCase):
@@ -179,8 +157,7 @@ class Shard(unittest.TestCase):
             os.chdir(folder)
             session = {"camera": "c", "session": "s", "verdict": "pass"}
             work = Path("work")
-            (work / "c/s/logs").mkdir(parents=True)
-            (work / "c/s/logs/lens.txt").write_text("said")
+            (work / "c/s").mkdir(parents=True)
             for file in outcome.KEPT:
                 (work / "c/s" / file).write_text(file)
             former = Path("sessions/c/s")
@@ -190,7 +167,7 @@ class Shard(unittest.TestCase):
                     self.assertRaises(KeyboardInterrupt, shard.publish, session, work)
             shard.publish(session, work)
             found = sorted(str(file.relative_to(former)) for file in former.rglob("*") if file.is_file())
-            self.assertEqual(found, sorted([*outcome.KEPT.values(), "session.json", "logs/lens.txt"]))
+            self.assertEqual(found, sorted([*outcome.KEPT.values(), "row.json"]))
 
 
 class Plan(unittest.TestCase):
@@ -204,30 +181,6 @@ class Plan(unittest.TestCase):
         self.assertEqual(lengths(3, 50, 8), [1, 1, 1])
         self.assertEqual(lengths(10, 3, 1), [2, 3, 2, 3])
         self.assertEqual(lengths(810, 50, 2), [50] * 16 + [10])
-
-
-class Station(unittest.TestCase):
-    def test_knows_whether_there_is_a_row_time(self):
-        with tempfile.TemporaryDirectory() as folder:
-            known = [station.row_time_known(Path(folder), options) for options in ("", "--row-time-s 3e-5")]
-            (Path(folder) / "camera.yaml").write_text("camera:\n  id: a\n")
-            known.append(station.row_time_known(Path(folder), "--row-time-s 3e-5"))
-            (Path(folder) / "camera.yaml").write_text("camera:\n  id: a\n  row_time_s: 3e-5\n")
-            known.append(station.row_time_known(Path(folder), ""))
-            self.assertEqual(known, [False, True, False, True])
-
-    def test_knows_what_the_last_stage_makes(self):
-        with tempfile.TemporaryDirectory() as folder:
-            check = Path(folder) / "check"
-            self.assertEqual(station.last_file(Path(folder)), "calibration.yaml")
-            check.mkdir()
-            (check / "captures.csv").write_text("image,time_s\n")
-            self.assertEqual(station.last_file(Path(folder)), "fixes.csv")
-            (check / "captures.csv").write_text("image,x_m,y_m\n")
-            self.assertEqual(station.truth_of(Path(folder)), check / "captures.csv")
-            (check / "truth.csv").touch()
-            self.assertEqual(station.truth_of(Path(folder)), check / "truth.csv")
-            self.assertEqual(station.last_file(Path(folder)), "evaluation.json")
 
 
 class Files(unittest.TestCase):

@@ -35,7 +35,7 @@ TEST(StationFigures, AreMetUpToTheLimitOrFromItOn) {
 }
 
 TEST(StationFigures, OfAGateAreThereWithoutAValue) {
-  const std::vector<NamedValue> values{{"tilt_deg", 1},
+  const std::vector<Metric> values{{"tilt_deg", 1},
                                        {"rms_px", std::numeric_limits<double>::infinity()}};
   const std::vector<StationGate> gates{{"rms_px", 0.3}};
   const auto figures = with_gates(values, gates);

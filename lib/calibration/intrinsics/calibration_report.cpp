@@ -8,7 +8,6 @@
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/view_jackknife.h"
 #include "calibration/intrinsics/view_pose.h"
-#include "captures/csv_writer.h"
 
 namespace vlp {
 namespace {
@@ -55,25 +54,6 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
         [&](const Eigen::Vector2d& pixel) { return uncertainty.worst_px(pixel); });
   }
   return report;
-}
-
-std::vector<std::string> gates_not_met(const IntrinsicsGates& gates,
-                                       const IntrinsicsSolution& solution,
-                                       const CalibrationReport& report) {
-  std::vector<std::string> failed;
-  const auto check = [&](const char* name, double value, double limit) {
-    if (value <= limit) return;
-    failed.push_back(std::string(name) + " is " + significant(value, 3) + ", the gate is " +
-                     significant(limit, 3));
-  };
-  check("rms_px", solution.rms_px, gates.rms_px);
-  check("uncertainty_px", report.uncertainty_worst_px, gates.uncertainty_px);
-  if (report.halves) {
-    check("halves_px", report.halves->rms_px, gates.halves_px);
-  } else {
-    failed.emplace_back("halves_px: half of the views do not determine a lens");
-  }
-  return failed;
 }
 
 HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out) {

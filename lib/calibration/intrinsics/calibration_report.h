@@ -40,10 +40,6 @@ struct IntrinsicsGates {
   double uncertainty_px = 2;
   double halves_px = 1;
 };
-/// Each gate that is not met, in one line.
-std::vector<std::string> gates_not_met(const IntrinsicsGates& gates,
-                                       const IntrinsicsSolution& solution,
-                                       const CalibrationReport& report);
 
 /// What views that took no part in a solution say of its lens: their poses are fitted, nothing
 /// else.

@@ -35,8 +35,6 @@ TEST(CalibrationReport, HalvesAgreeAsTheUncertaintySays) {
   // Twice as far apart as a lens from the truth, by a factor that a few freedoms leave open.
   EXPECT_LT(report.halves->rms_px, 2.5 * 2 * report.expected_rms_px);
   EXPECT_GT(report.halves->rms_px, 0.3 * 2 * report.expected_rms_px);
-  EXPECT_TRUE(gates_not_met({}, solution, report).empty());
-  EXPECT_EQ(gates_not_met({0.01, 0.001, 0.001}, solution, report).size(), 3U);
 }
 
 TEST(CalibrationReport, HeldOutViewsFitAsWellAsTheOthers) {

@@ -23,12 +23,12 @@ TEST(Report, BeginsWithTheVerdictAndNamesTheGates) {
   EXPECT_LT(html.find("<h1>unit 7</h1>"), html.find("FAIL</strong>"));
 }
 
-TEST(Report, ShowsTheTextOfAGateOfAStageBefore) {
+TEST(Report, ShowsAGateOfWhatIsNotKnown) {
   const std::string html =
-      report_html({"unit 7", {{"lens: too few", "", NAN, NAN, false}}, {}, {}, {}, {}, {}});
+      report_html({"unit 7", {{"halves_px", "px", NAN, 1, false}}, {}, {}, {}, {}, {}});
   EXPECT_THAT(html, HasSubstr("<strong>FAIL</strong>1 of 1 gate is not met."));
-  EXPECT_THAT(html, HasSubstr("<th scope=\"row\">lens: too few</th><td></td><td></td>"
-                              "<td>NOT\u00a0MET</td>"));
+  EXPECT_THAT(html, HasSubstr("<th scope=\"row\">halves_px</th><td>none</td>"
+                              "<td>at most\u00a01\u00a0px</td><td>NOT\u00a0MET</td>"));
 }
 
 TEST(Report, SaysTheCautionInTheVerdictsBox) {

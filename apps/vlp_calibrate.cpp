@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-calibrate: a session's folder -> calibration, fixes, report: the whole procedure.
+#include <fmt/core.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app.h"
+#include "capture_options.h"
+#include "evaluation/check_gates.h"
+#include "progress.h"
+#include "session/session.h"
+#include "step_outcome.h"
+
+namespace vlp {
+namespace {
+
+struct Options {
+  std::string session, results, lens = "LENSMODEL_OPENCV8";
+  SessionOptions how;
+};
+
+/// Tells of each step as it ends.
+class Log {
+ public:
+  SessionObserver observer() {
+    return {[this](const std::string&) { begin_ = Clock::now(); },
+            [this](std::size_t done, std::size_t total) {
+              if (!progress_) progress_ = std::make_unique<Progress>("images");
+              progress_->update(done, total);
+            },
+            [this](const SessionStep& step) { ended(step); }};
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void ended(const SessionStep& step) {
+    progress_.reset();
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+    const bool missed = std::any_of(step.result.gates.begin(), step.result.gates.end(),
+                                    [](const GateResult& gate) { return !gate.passed; });
+    fmt::print("{:13} {}{}\n", step.name,
+               step.as_before ? "as before" : fmt::format("{:5.1f} s", seconds),
+               step.result.ok() ? missed ? ", a gate is not met" : "" : ", failed");
+    std::fflush(stdout);
+    tell(step.result);
+  }
+
+  Clock::time_point begin_;
+  std::unique_ptr<Progress> progress_;
+};
+
+const Metric* find(const SessionResult& result, const std::string& name) {
+  for (const SessionStep& step : result.steps) {
+    for (const Metric& metric : step.result.metrics) {
+      if (metric.name == name) return &metric;
+    }
+  }
+  return nullptr;
+}
+
+void print_summary(const SessionResult& result, const std::string& results) {
+  fmt::print("\n");
+  const std::vector<std::pair<const char*, const char*>> shown{{"lens", "rms_px"},
+                                                               {"tilt", "tilt_deg"},
+                                                               {"lever arm", "lever_arm_mm"},
+                                                               {"dispersion", "dispersion_mm"},
+                                                               {"mean", "mean_mm"},
+                                                               {"p90", "p90_mm"},
+                                                               {"max", "max_mm"},
+                                                               {"height", "height_rms_mm"},
+                                                               {"missing", "missing"}};
+  for (const auto& [label, name] : shown) {
+    const Metric* metric = find(result, name);
+    if (metric != nullptr) fmt::print("{:11} {:.4g} ({})\n", label, metric->value, name);
+  }
+  for (const GateResult& gate : result.gates) {
+    if (gate.passed) continue;
+    fmt::print("NOT MET     {}\n", words_of(gate));
+  }
+  fmt::print("verdict     {}; results are in {}\n", name_of(result.verdict), results);
+}
+
+void run(Options options) {
+  options.how.lens_model = *lens_model_from_name(options.lens);
+  options.how.program = {"vlp-calibrate", VLP_VERSION};
+  Log log;
+  const SessionResult result =
+      run_session(options.session, options.results, options.how, log.observer());
+  if (result.verdict == SessionVerdict::no_result) {
+    if (result.failure == StepFailure::undetermined) throw Undetermined(result.reason);
+    throw std::invalid_argument(result.reason);
+  }
+  print_summary(result, options.results);
+  if (result.verdict == SessionVerdict::gate) throw GateNotMet(result.reason);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Calibrates a camera from a folder of its captures, checks it, and writes a report: the\n"
+      "steps lens, row-time, rotation, dispersion, check, evaluate. A step whose inputs, options\n"
+      "and outputs are as before is not run again; killed, the same command goes on.\n\n"
+      "SESSION, which is only read, holds\n"
+      "  lamps.yaml            the lamps, with their frequencies\n"
+      "  boards/, board.yaml   images of the board, and what it is; or camera.yaml, the camera\n"
+      "                        part of a calibration\n"
+      "  rotation/             captures while the camera turns on the spot\n"
+      "  dispersion/           at known places, turning; captures.csv says where (optional)\n"
+      "  check/                to locate; with truth.csv, or places in captures.csv, also the\n"
+      "                        errors and the report (optional)\n"
+      "  line-*/               along a straight line each, with places (optional)\n"
+      "  classifier.yaml       of vlp-train, to tell the lamps apart (optional)\n"
+      "  gates.yaml            what the errors have to keep to (optional)\n\n"
+      "Example, from the project's folder:\n"
+      "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml \\\n"
+      "    --only boards,rotation,dispersion,check -o out/session\n"
+      "  build/bin/vlp-calibrate out/session --row-time-s 3e-5 --readout rows -o out/results\n",
+      "vlp-calibrate");
+  vlp::Options options;
+  auto& how = options.how;
+  how.threads = vlp::all_cores();
+  app.add_option("session", options.session, "Folder of the captures")->required();
+  app.add_option("-o,--output", options.results,
+                 "Folder for calibration.yaml, check-fixes.csv, evaluation.json, report.html, "
+                 "session.json and what each step wrote; made when it is not there")
+      ->required();
+  app.add_option("--camera-id", how.camera_id, "Name of the camera (default: camera)");
+  app.add_option("--lens", options.lens, "Lens model (default: LENSMODEL_OPENCV8)")
+      ->check([](const std::string& name) {
+        return vlp::lens_model_from_name(name) ? std::string()
+                                               : "the models are: " + vlp::lens_model_names();
+      });
+  app.add_option("--row-time-s", how.row_time_s,
+                 "Time from one row of the read-out to the next (default: found from rotation)")
+      ->check(CLI::Range(1e-8, 1e-3));
+  vlp::add_readout_option(app, how.readout);
+  app.add_option("--gates", how.gates_file,
+                 "Gates of the errors, vlp-gates/1, for a session that has no gates.yaml");
+  app.add_flag("--report,!--no-report", how.report,
+               "Draw pictures and write report.html (default), or not");
+  app.add_option("--redo", how.redo, "Run a step again though nothing has changed")
+      ->option_text("STEP ...");
+  app.add_option("--threads", how.threads, "Images at a time (default: one a core)")
+      ->check(CLI::Range(1, 1024));
+  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+}

@@ -1,0 +1,90 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/corner_cache.h"
+
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "captures/csv_reader.h"
+#include "captures/csv_writer.h"
+#include "captures/digest.h"
+#include "rig/input_error.h"
+#include "rig/yaml_text.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string settings_of(const Board& board) {
+  return fmt::format("{} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+                     board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
+                     board.border_bits, board.corner_squares, board.first_id,
+                     name_of(board.id_order));
+}
+
+/// A row per tag; the first row, with id -1, holds the image's size and the two counts.
+void write_view(const fs::path& file, const BoardView& view) {
+  CsvWriter csv(file, {"id", "u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"});
+  csv.row({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
+           std::to_string(view.seen.foreign), std::to_string(view.seen.unusable), "0", "0", "0",
+           "0"});
+  for (const SeenTag& tag : view.seen.tags) {
+    const auto& [a, b, c, d] = tag.corners_px;
+    csv.row({std::to_string(tag.id), shortest(a.x()), shortest(a.y()), shortest(b.x()),
+             shortest(b.y()), shortest(c.x()), shortest(c.y()), shortest(d.x()), shortest(d.y())});
+  }
+  csv.save();
+}
+
+BoardView read_view(const fs::path& file, const std::string& image) {
+  const CsvTable csv(file);
+  const auto at = [&](std::size_t row, const char* column) {
+    return csv.number(row, csv.required(column));
+  };
+  if (csv.rows() == 0 || at(0, "id") != -1) throw InputError(file, "is not of the cache");
+  BoardView view{image, {static_cast<int>(at(0, "u0")), static_cast<int>(at(0, "v0"))}, {}};
+  view.seen.foreign = static_cast<int>(at(0, "u1"));
+  view.seen.unusable = static_cast<int>(at(0, "v1"));
+  for (std::size_t row = 1; row < static_cast<std::size_t>(csv.rows()); ++row) {
+    view.seen.tags.push_back({static_cast<int>(at(row, "id")),
+                              {{{at(row, "u0"), at(row, "v0")},
+                                {at(row, "u1"), at(row, "v1")},
+                                {at(row, "u2"), at(row, "v2")},
+                                {at(row, "u3"), at(row, "v3")}}}});
+  }
+  return view;
+}
+
+}  // namespace
+
+BoardCache corner_cache(const fs::path& folder, const Board& board) {
+  if (folder.empty()) return {};
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw InputError(folder, "cannot be made: " + error.message());
+  const auto place_of = [folder, settings = settings_of(board)](const fs::path& image) {
+    return folder / (sha256_of_text(sha256_of_file(image) + " " + settings) + ".csv");
+  };
+  const auto find = [place_of](const fs::path& image) -> std::optional<BoardView> {
+    const fs::path file = place_of(image);
+    if (!fs::exists(file)) return {};
+    try {
+      return read_view(file, image.filename().string());
+    } catch (const InputError&) {
+      return {};
+    }
+  };
+  const auto keep = [place_of](const fs::path& image, const BoardView& view) {
+    try {
+      write_view(place_of(image), view);
+    } catch (const InputError&) {  // a full disk; the view itself is there
+    }
+  };
+  return {find, keep};
+}
+
+}  // namespace vlp

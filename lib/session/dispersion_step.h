@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calibration/dispersion/dispersion.h"
+#include "captures/captures_table.h"
+#include "session/rotation_step.h"
+
+namespace vlp {
+
+/// Captures at known places, and how many have none.
+struct KnownPlaces {
+  std::vector<StationCapture> captures;
+  std::size_t without = 0;
+};
+
+/// A capture is where the table says it is, or else at `place_m`, if that is given. The inclination
+/// is the table's.
+KnownPlaces at_known_places(std::span<const Frame> frames, const CapturesTable& table,
+                            const std::optional<Eigen::Vector2d>& place_m = {});
+
+struct DispersionResult : StepResult {
+  DispersionFit fit;
+};
+
+/// What fixes at known places still lack. Metrics: dispersion_mm, dispersion_offset_px, and where
+/// it is known world_mm. Throws InputError when the map has none of the lamps seen. wrong_map,
+/// wrong_place, undetermined. Precondition: there is a capture.
+DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,
+                                  DispersionMethod method, DispersionCircle circle,
+                                  HistoryEntry entry);
+
+}  // namespace vlp

@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "evaluation/check_gates.h"
+#include "evaluation/evaluation.h"
+#include "evaluation/report/report_picture.h"
+#include "session/step_result.h"
+
+namespace vlp {
+
+struct EvaluateResult : StepResult {
+  Evaluation evaluation;
+  /// Of captures without a fix that no gate asks for, to be said beside the verdict; may be empty.
+  std::string caution;
+};
+
+/// The distance within which captures are of one place: 1 mm, and what a turn about the
+/// calibration's lever arm adds.
+double place_radius_m(const Calibration& calibration);
+
+/// What fixes are worth. Metrics: those that can be gates. undetermined: no capture has a fix.
+/// Throws InputError when image names do not match, std::invalid_argument for a gate of what is not
+/// there.
+EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Gate>& gates);
+
+/// A drive along a commanded line.
+struct Drive {
+  FromFile<FixRow> fixes;
+  CommandedLine commanded_m;
+};
+
+/// What a report of fixes shows. References are to what outlives it.
+struct EvaluationReport {
+  const EvaluationInput& input;
+  const EvaluateResult& result;
+  /// All gates, of the steps before, too.
+  std::vector<GateResult> gates;
+  LampMap lamps;
+  std::optional<Calibration> calibration;
+  std::vector<Drive> drives;
+  std::vector<ReportPicture> pictures;
+  HistoryEntry history;
+};
+
+/// The report's page, report_html(). Throws InputError when no line can be fitted to a drive.
+std::string report_page(EvaluationReport report);
+
+}  // namespace vlp

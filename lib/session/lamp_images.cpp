@@ -1,0 +1,208 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/lamp_images.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core/utility.hpp>
+#include <utility>
+
+#include "detection/detect_captures.h"
+#include "detection/identity/lamp_map_check.h"
+#include "detection/image_file.h"
+#include "detection/readout.h"
+#include "rig/find_lamp.h"
+#include "rig/input_error.h"
+#include "session/skipped_images.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Nothing for what is no image: it is reported when the lights are looked for.
+cv::Mat image_or_nothing(const fs::path& file) {
+  try {
+    return read_image(file);
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
+void check_row_time(const LampImages& input, const DetectorCamera& camera) {
+  if (!camera.row_time_s) {
+    throw InputError(
+        input.camera_file,
+        "camera.row_time_s is missing: without it no stripe tells its lamp; --row-time-s of "
+        "vlp-intrinsics states it, vlp-train --row-time finds it");
+  }
+}
+
+LampClassifier classifier_for(const LampImages& input, const DetectorCamera& camera,
+                              std::vector<std::string>& warnings) {
+  LampClassifier classifier = read_lamp_classifier(input.classifier_file);
+  for (const auto& lamp : classifier.lamps) {
+    if (find_lamp(input.lamps.lamps, lamp.lamp) != nullptr) continue;
+    throw InputError(input.classifier_file,
+                     fmt::format("lamp {} is not in {}", lamp.lamp, input.lamps_file.string()));
+  }
+  for (const Lamp& lamp : input.lamps.lamps) {
+    const bool known = std::any_of(classifier.lamps.begin(), classifier.lamps.end(),
+                                   [&](const auto& other) { return other.lamp == lamp.id; });
+    if (known) continue;
+    warnings.push_back(
+        fmt::format("lamp {} is unknown to {}", lamp.id, input.classifier_file.string()));
+  }
+  constexpr double same = 0.005;
+  if (classifier.row_time_s && camera.row_time_s &&
+      std::abs(*classifier.row_time_s / *camera.row_time_s - 1) > same) {
+    throw InputError(
+        input.classifier_file,
+        fmt::format("row_time_s is {:.4g}, that of {} is {:.4g}: train it for this camera",
+                    *classifier.row_time_s,
+                    input.camera_file.empty() ? "--row-time-s" : input.camera_file.string(),
+                    *camera.row_time_s));
+  }
+  return classifier;
+}
+
+constexpr std::size_t kMostLines = 5;
+
+void warn_of_rest(std::size_t count, const char* what, std::vector<std::string>& warnings) {
+  if (count > kMostLines) {
+    warnings.push_back(fmt::format("and {} more {}", count - kMostLines, what));
+  }
+}
+
+/// Of lamps of the map that cannot be told apart for certain, or whose stripes can hardly be seen.
+void warn_of_map(const LampImages& input, const DetectorCamera& detector,
+                 std::vector<std::string>& warnings) {
+  std::optional<double> focal_px;
+  if (input.camera) {
+    focal_px = input.camera->camera.intrinsics[detector.readout == Readout::rows ? 1 : 0];
+  }
+  const StripeConditions conditions{*detector.row_time_s, focal_px, 0, input.exposure_s};
+  const auto alike = lamps_alike(input.lamps, conditions);
+  for (std::size_t i = 0; i < std::min(alike.size(), kMostLines); ++i) {
+    const auto& [first, second, gap, needed] = alike[i];
+    warnings.push_back(fmt::format(
+        "lamps {} and {} may be left unknown, seen from z = 0: their frequencies differ by {:.1f} "
+        "%, {:.1f} % would be enough; change one of the two frequencies, or a duty by 0.3",
+        first, second, 100 * gap, 100 * needed));
+  }
+  warn_of_rest(alike.size(), "pairs of lamps with frequencies that are too near", warnings);
+  const auto unreadable = lamps_unreadable(input.lamps, conditions);
+  for (std::size_t i = 0; i < std::min(unreadable.size(), kMostLines); ++i) {
+    const auto& [lamp, period_lines, periods, contrast] = unreadable[i];
+    if (period_lines < kShortestPeriod_lines) {
+      warnings.push_back(fmt::format(
+          "lamp {} has stripes of {:.2g} lines, too fine to be seen: a lower frequency shows them",
+          lamp, period_lines));
+    } else if (periods < kLeastPeriods) {
+      warnings.push_back(fmt::format(
+          "lamp {} shows only {:.1f} stripes, seen from z = 0: a higher frequency, a larger lamp "
+          "or a camera nearer to it shows more",
+          lamp, periods));
+    } else {
+      warnings.push_back(fmt::format(
+          "lamp {} has {:.0f} % of its stripes left after an exposure of {:.3g} us: expose shorter",
+          lamp, 100 * contrast, 1e6 * *input.exposure_s));
+    }
+  }
+  warn_of_rest(unreadable.size(), "lamps with stripes that can hardly be seen", warnings);
+}
+
+/// Made when it is not there.
+fs::path picture_folder(const LampImages& input) {
+  std::error_code error;
+  fs::create_directories(input.annotate, error);
+  if (error) throw InputError(input.annotate, "cannot be made: " + error.message());
+  if (fs::equivalent(input.annotate, input.folder, error)) {
+    throw InputError(input.annotate, "holds the images: the pictures go into another folder");
+  }
+  return input.annotate;
+}
+
+}  // namespace
+
+void check_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
+  const bool frequencies =
+      std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
+                  [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); });
+  if (!frequencies) {
+    throw InputError(lamps_file, "no lamp has a frequency_hz: none could be told from another");
+  }
+}
+
+void check_lamps(std::span<const Frame> frames, const LampMap& lamps, const fs::path& lamps_file) {
+  for (const Frame& frame : frames) {
+    for (const Detection& detection : frame.detections) {
+      if (find_lamp(lamps.lamps, detection.lamp) != nullptr) return;
+    }
+  }
+  throw InputError(lamps_file, "has none of the lamps that the captures show");
+}
+
+Readout readout_of(std::span<const fs::path> images, const std::optional<Readout>& stated,
+                   StepResult& result) {
+  if (stated) return *stated;
+  const auto found =
+      find_readout(images.size(), [&](std::size_t i) { return image_or_nothing(images[i]); });
+  if (!found) {
+    result.warnings.emplace_back(
+        "the read-out is not stated and the images do not show it: rows are taken; --readout "
+        "tells it");
+    return Readout::rows;
+  }
+  result.notes.push_back(fmt::format("the read-out is not stated: the images show stripes along {}",
+                                     *found == Readout::rows ? "rows" : "columns"));
+  return *found;
+}
+
+SeenLamps see_lamps(const LampImages& input, const StepProgress& progress) {
+  SeenLamps seen;
+  DetectorCamera camera = input.camera ? detector_camera(*input.camera)
+                                       : DetectorCamera{Readout::rows, input.row_time_s, {}};
+  std::optional<LampClassifier> classifier;
+  if (input.classifier_file.empty()) {
+    check_frequencies(input.lamps, input.lamps_file);
+    check_row_time(input, camera);
+  } else {
+    classifier = classifier_for(input, camera, seen.warnings);
+  }
+  const auto images = images_in(input.folder);
+  cv::setNumThreads(1);  // the images themselves go in parallel
+  DetectRun run{input.threads};
+  std::optional<Readout> stated = input.readout;
+  if (input.camera) {
+    run.imager_px = input.camera->camera.imager_px;
+    if (!stated) stated = input.camera->camera.readout;
+  }
+  camera.readout = readout_of(images, stated, seen);
+  if (!classifier) warn_of_map(input, camera, seen.warnings);
+  if (!input.annotate.empty()) run.annotate = picture_folder(input);
+  CaptureDetections found = detect_captures(
+      LampDetector(input.lamps, camera, std::move(classifier)), images, run, [&](std::size_t done) {
+        if (progress) progress(done, images.size());
+      });
+  seen.images = found.images;
+  seen.lights = found.lights;
+  seen.frames = std::move(found.frames);
+  seen.skipped = skipped_images(images, found.refused);
+  if (seen.frames.empty()) throw nothing_usable(input.folder, images.size(), seen);
+  const auto [identified, cut, unknown, steady] = seen.lights;
+  if (identified == 0) {
+    seen.fail(
+        StepFailure::undetermined,
+        fmt::format("no lamp was identified wholly in view in {} images ({} skipped; {} lamps "
+                    "are cut by the image's edge, {} lights flicker unlike any lamp of the "
+                    "map, {} are steady): are lamp map, row time and read-out (or "
+                    "classifier) right, and is the exposure short?",
+                    seen.images, seen.skipped.size(), cut, unknown, steady));
+  }
+  return seen;
+}
+
+}  // namespace vlp

@@ -1,0 +1,66 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "captures/detections_table.h"
+#include "detection/detect_lights.h"
+#include "rig/calibration.h"
+#include "rig/lamp_map.h"
+#include "session/step_result.h"
+
+namespace vlp {
+
+/// A folder of images, to look for lamps.
+struct LampImages {
+  std::filesystem::path folder;
+  LampMap lamps;
+  std::filesystem::path lamps_file;
+  /// Without one centres are those of ellipses in the image.
+  std::optional<Calibration> camera;
+  std::filesystem::path camera_file = {};
+  /// Of a camera without a calibration.
+  std::optional<double> row_time_s = {};
+  /// By vlp-train; empty: lamps are told apart by the map's frequencies.
+  std::filesystem::path classifier_file = {};
+  /// Goes before what the calibration says; without either the images tell it.
+  std::optional<Readout> readout = {};
+  /// For the check of the lamp map; short when it is not known.
+  std::optional<double> exposure_s = {};
+  /// Folder for pictures of what was found; made when it is not there. Empty: none.
+  std::filesystem::path annotate = {};
+  /// Images at a time.
+  int threads = 1;
+};
+
+/// The lamps in each image that can be used.
+struct SeenLamps : StepResult {
+  std::vector<Frame> frames;
+  /// Lights of each LightKind, in its order.
+  std::array<int, 4> lights{};
+  int images = 0;
+};
+
+/// Throws InputError: no row time, no frequency, no image or none that can be used, a classifier of
+/// other lamps or of another row time. undetermined: no lamp is identified. Warns of lamps of the
+/// map that are too much alike.
+SeenLamps see_lamps(const LampImages& input, const StepProgress& progress = {});
+
+/// Along what the shutter reads: as `stated`, or else as the images show; a note, or a warning when
+/// not even they tell and rows are taken, goes to `result`.
+Readout readout_of(std::span<const std::filesystem::path> images,
+                   const std::optional<Readout>& stated, StepResult& result);
+
+/// Throws InputError when no lamp has a frequency.
+void check_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);
+
+/// Throws InputError when the map has none of the lamps that the captures show.
+void check_lamps(std::span<const Frame> frames, const LampMap& lamps,
+                 const std::filesystem::path& lamps_file);
+
+}  // namespace vlp

@@ -1,0 +1,149 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/locate_step.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <map>
+
+#include "captures/outside_image.h"
+#include "positioning/residual_noise.h"
+
+namespace vlp {
+namespace {
+
+Sensors sensors_of(const std::string& image, const LocateInput& input) {
+  Sensors sensors;
+  const auto entry = input.captures.find(image);
+  if (entry == input.captures.end()) return sensors;
+  const Capture& capture = entry->second;
+  sensors.inclination = capture.inclination;
+  sensors.inclination_sigma_rad = input.inclination_sigma_rad;
+  if (input.one_lamp && capture.z_m && capture.yaw_rad) {
+    sensors.height_and_yaw = HeightAndYaw{*capture.z_m, *capture.yaw_rad};
+  }
+  return sensors;
+}
+
+std::vector<Fix> locate_all(const LocateInput& input, const PositionerOptions& how) {
+  const Positioner positioner(input.lamps, input.calibration, how);
+  std::vector<Fix> fixes;
+  fixes.reserve(input.frames.size());
+  for (const Frame& frame : input.frames) {
+    fixes.push_back(positioner.locate(frame.detections, sensors_of(frame.image, input)));
+  }
+  return fixes;
+}
+
+bool states_sigma(const Frame& frame) {
+  return std::all_of(frame.detections.begin(), frame.detections.end(),
+                     [](const Detection& detection) { return detection.sigma_px.has_value(); });
+}
+
+FixRow row_of(const Frame& frame, const Fix& fix, bool noise_known) {
+  FixRow row{frame.image, std::string(name_of(fix.status)), {}, fix.lamps};
+  if (!fix.ok()) return row;
+  row.fix = {fix.estimate.pose, {}, fix.residual_px};
+  if (noise_known) row.fix->sd = fix.estimate.covariance.diagonal().cwiseSqrt();
+  return row;
+}
+
+void warn_of_noise(LocateResult& result, const std::vector<Frame>& frames) {
+  double stated_px = 0;
+  for (const Frame& frame : frames) {
+    for (const Detection& detection : frame.detections) {
+      stated_px = std::max(stated_px, detection.sigma_px.value_or(0));
+    }
+  }
+  constexpr double too_noisy = 3;
+  const auto shown_px = residual_noise_px(result.fixes);
+  if (!shown_px || *shown_px <= too_noisy * stated_px) return;
+  result.warnings.push_back(fmt::format(
+      "the residuals show {:.2g} px of noise, {:.2g} px are stated: sd is too small; are "
+      "calibration and lamp map right and complete?",
+      *shown_px, stated_px));
+}
+
+void warn_of_image(LocateResult& result, const LocateInput& input) {
+  const auto& [width, height] = input.calibration.camera.imager_px;
+  const std::size_t outside = count_far_outside(input.frames, {width, height});
+  if (outside == 0) return;
+  result.warnings.push_back(fmt::format(
+      "{} detections far outside the camera's {} x {} px: is the calibration this camera's?",
+      outside, width, height));
+}
+
+void warn_of_captures(LocateResult& result, const LocateInput& input) {
+  const auto& captures = input.captures;
+  const auto without = std::count_if(
+      input.frames.begin(), input.frames.end(),
+      [&](const Frame& frame) { return captures.find(frame.image) == captures.end(); });
+  if (captures.empty() || without == 0) return;
+  result.warnings.push_back(fmt::format(
+      "{} of {} images are not in captures.csv: image names have to be equal (here '{}', "
+      "there '{}')",
+      without, input.frames.size(), input.frames.front().image, captures.begin()->first));
+}
+
+void tell_of_lamps_left_out(LocateResult& result, const std::vector<Frame>& frames) {
+  int unknown = 0, rejected = 0;
+  std::map<int, int> captures;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Fix& fix = result.fixes[i];
+    unknown += fix.unknown_lamps;
+    rejected += fix.rejected_lamps;
+    if (fix.rejected_lamps == 0) continue;
+    ++captures[fix.rejected_lamp_id];
+    result.details.push_back(fmt::format("{}: lamp {} contradicts the others and is left out",
+                                         frames[i].image, fix.rejected_lamp_id));
+  }
+  for (const auto& [lamp, count] : captures) result.lamps_left_out.push_back({lamp, count});
+  if (unknown > 0) {
+    result.warnings.push_back(
+        fmt::format("{} detections of lamps that are not in the map, left out", unknown));
+  }
+  if (rejected > 0) {
+    result.warnings.push_back(
+        fmt::format("{} detections that contradict the others, left out", rejected));
+  }
+}
+
+}  // namespace
+
+LocateResult locate_frames(const LocateInput& input) {
+  LocateResult result;
+  PositionerOptions how = input.how;
+  result.fixes = locate_all(input, how);
+  const bool stated = std::all_of(input.frames.begin(), input.frames.end(), states_sigma);
+  bool noise_known = stated;
+  if (!stated) {
+    if (const auto noise_px = residual_noise_px(result.fixes)) {
+      result.notes.push_back(
+          fmt::format("sigma_px is not stated: {:.3g} px taken from the residuals", *noise_px));
+      how.unstated_sigma_px = *noise_px;
+      noise_known = true;
+      result.fixes = locate_all(input, how);
+    } else {
+      result.warnings.emplace_back(
+          "sigma_px is not stated and no residuals show it: sd columns are empty");
+    }
+  }
+  if (stated) warn_of_noise(result, input.frames);
+  result.rows.reserve(result.fixes.size());
+  for (std::size_t i = 0; i < result.fixes.size(); ++i) {
+    result.rows.push_back(row_of(input.frames[i], result.fixes[i], noise_known));
+  }
+  warn_of_image(result, input);
+  warn_of_captures(result, input);
+  tell_of_lamps_left_out(result, input.frames);
+  result.summary = summarize(result.rows);
+  if (result.summary.fixes == 0) {
+    result.fail(StepFailure::undetermined,
+                fmt::format("no frame has a fix; the first: {}",
+                            explanation_of(result.fixes.front().status)));
+  }
+  return result;
+}
+
+}  // namespace vlp

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "captures/captures_table.h"
+#include "captures/detections_table.h"
+#include "captures/fixes_table.h"
+#include "evaluation/fix_summary.h"
+#include "positioning/positioner.h"
+#include "session/step_result.h"
+
+namespace vlp {
+
+/// Captures to locate, and how.
+struct LocateInput {
+  std::vector<Frame> frames;
+  LampMap lamps;
+  Calibration calibration;
+  /// What is known of them besides their images; inclinations count, wherever there are some.
+  CapturesTable captures = {};
+  PositionerOptions how = {};
+  /// Standard deviation of the inclination's angles; 0 leaves it out.
+  double inclination_sigma_rad = 0;
+  /// Where one lamp is seen, take height and yaw from `captures`.
+  bool one_lamp = false;
+};
+
+struct LocateResult : StepResult {
+  /// Of each frame.
+  std::vector<Fix> fixes;
+  std::vector<FixRow> rows;
+  FixSummary summary;
+};
+
+/// The fix of each frame. Where not every detection states its sigma_px, one is taken from the
+/// residuals, if they show it. Warns of residuals that the stated noise does not explain, of
+/// detections outside the image, of images that `captures` lacks, of lamps left out. undetermined:
+/// no frame has a fix.
+LocateResult locate_frames(const LocateInput& input);
+
+}  // namespace vlp

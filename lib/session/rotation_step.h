@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "calibration/rotation/circle_center.h"
+#include "captures/detections_table.h"
+#include "rig/lamp_map.h"
+#include "session/step_result.h"
+
+namespace vlp {
+
+/// Captures of lamps, and what is known of both.
+struct LampCaptures {
+  std::vector<Frame> frames;
+  LampMap lamps;
+  std::filesystem::path lamps_file;
+  Calibration calibration;
+};
+
+/// Without rotation centre and dispersion.
+Calibration camera_alone(const Calibration& calibration);
+
+/// Whether the captures, seen by this calibration, say in particular what is wrong with the lamp
+/// map (calibration/levelling/map_doubt.h); then the step fails: wrong_map.
+bool doubts_map(const LampCaptures& input, const Calibration& calibration, StepResult& result);
+
+/// Of a step that failed: the map is to blame when the captures contradict it, in particular or
+/// mostly.
+void blame_map(const LampCaptures& input, const Calibration& calibration, StepResult& result);
+
+enum class RotationMethod {
+  axis,   // fit_turning_axis()
+  joint,  // fit_joint_center()
+  circle  // fit_circle_centers()
+};
+
+struct RotationResult : StepResult {
+  SpotCaptures spot;
+  RotationFit fit;
+  CircleCenters circles;
+};
+
+/// Rotation centre and tilt from captures of a turn on the spot. Metrics: rotation_px,
+/// rotation_spread_px, tilt_deg, and where they are known rotation_sd_px, lever_arm_mm. Throws
+/// InputError when the map has none of the lamps seen. wrong_map, undetermined.
+RotationResult solve_rotation(const LampCaptures& input, RotationMethod method, HistoryEntry entry);
+
+}  // namespace vlp

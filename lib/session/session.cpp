@@ -1,0 +1,640 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/session.h"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "calibration/intrinsics/mrcal_files.h"
+#include "captures/digest.h"
+#include "evaluation/evaluation_files.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "session/board_images.h"
+#include "session/dispersion_step.h"
+#include "session/evaluate_step.h"
+#include "session/lamp_images.h"
+#include "session/lens_step.h"
+#include "session/locate_step.h"
+#include "session/rotation_step.h"
+#include "session/row_time_step.h"
+#include "session/session_file.h"
+#include "session/step_file.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Held while a run is at work in a folder of results; the system lets go of it when the run ends,
+/// however it does.
+class ResultsLock {
+ public:
+  explicit ResultsLock(const fs::path& results)
+      : descriptor_(::open((results / "steps/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+    if (descriptor_ < 0) throw InputError(results, "cannot be written to");
+    if (::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
+    ::close(descriptor_);
+    throw InputError(results, "another run is at work there");
+  }
+  ~ResultsLock() { ::close(descriptor_); }
+  ResultsLock(const ResultsLock&) = delete;
+  ResultsLock& operator=(const ResultsLock&) = delete;
+
+ private:
+  int descriptor_;
+};
+
+/// Which program this is: another build need not give the same results.
+std::string build_of(const ProgramVersion& program) {
+  std::error_code unknown;
+  const fs::path file = fs::read_symlink("/proc/self/exe", unknown);
+  const auto changed = fs::last_write_time(file, unknown).time_since_epoch().count();
+  return fmt::format("{} {} {} {}", program.program, program.version, fs::file_size(file, unknown),
+                     changed);
+}
+
+/// What the session's folder is called is of no interest in its results.
+std::string without_folder(std::string text, const fs::path& session) {
+  const std::string folder = session.string() + "/";
+  for (auto at = text.find(folder); at != std::string::npos; at = text.find(folder, at)) {
+    text.erase(at, folder.size());
+  }
+  return text;
+}
+
+/// What a run may have written, but for the fixes of drives.
+constexpr std::array kResults{
+    "lens.yaml",    "lens.cameramodel", "lens.svg",       "camera.yaml",     "rotated.yaml",
+    "rotation.svg", "calibration.yaml", "dispersion.svg", "check-fixes.csv", "evaluation.json",
+    "gates.xml",    "report.html",      "session.json"};
+
+void forget_all(const fs::path& results) {
+  for (const char* name : kResults) fs::remove(results / name);
+  for (const auto& entry : fs::directory_iterator(results / "steps")) {
+    if (entry.path().extension() == ".json") fs::remove(entry.path());
+  }
+}
+
+/// What a step comes to, and how it is written once it is known.
+struct Work {
+  StepResult result;
+  std::function<void()> write = [] {};
+};
+
+class SessionRun {
+ public:
+  SessionRun(const SessionFolder& session, fs::path results, const SessionOptions& options,
+             const SessionObserver& observer)
+      : session_(session),
+        results_(std::move(results)),
+        options_(options),
+        observer_(observer),
+        build_(build_of(options.program)) {}
+
+  SessionResult run() {
+    check_redo();
+    forget_other_steps();
+    if (calibrate() && locate()) evaluate();
+    conclude();
+    return std::move(result_);
+  }
+
+ private:
+  void check_redo() const {
+    const auto steps = outputs();
+    for (const std::string& name : options_.redo) {
+      std::string names;
+      bool known = false;
+      for (const auto& [step, files] : steps) {
+        names += (names.empty() ? "" : ", ") + step;
+        known = known || step == name;
+      }
+      if (known) continue;
+      throw std::invalid_argument("there is no step " + name + " here; the steps are: " + names);
+    }
+  }
+
+  fs::path out(const std::string& name) const { return results_ / name; }
+  fs::path lamps_file() const { return session_.lamps(); }
+
+  std::string without_folder(std::string text) const {
+    return vlp::without_folder(vlp::without_folder(std::move(text), session_.path()), results_);
+  }
+
+  void remove(const std::string& name) const {
+    std::error_code ignored;
+    fs::remove(out(name), ignored);
+  }
+
+  std::vector<fs::path> lines() const {
+    return options_.report ? session_.lines() : std::vector<fs::path>();
+  }
+
+  /// The steps of this session, and what each writes.
+  std::vector<std::pair<std::string, std::vector<std::string>>> outputs() const {
+    const auto with_picture = [&](std::vector<std::string> names, const char* picture) {
+      if (options_.report) names.emplace_back(picture);
+      return names;
+    };
+    std::vector<std::pair<std::string, std::vector<std::string>>> steps;
+    steps.emplace_back("lens", session_.camera()
+                                   ? std::vector<std::string>()
+                                   : with_picture({"lens.yaml", "lens.cameramodel"}, "lens.svg"));
+    steps.emplace_back("row-time", std::vector<std::string>{"camera.yaml"});
+    steps.emplace_back("rotation", with_picture({"rotated.yaml"}, "rotation.svg"));
+    steps.emplace_back("dispersion", with_picture({"calibration.yaml"}, "dispersion.svg"));
+    if (session_.check()) steps.emplace_back("check", std::vector<std::string>{"check-fixes.csv"});
+    for (const fs::path& line : lines()) {
+      const std::string name = line.filename().string();
+      steps.emplace_back(name, std::vector<std::string>{name + "-fixes.csv"});
+    }
+    std::vector<std::string> evaluation{"evaluation.json", "gates.xml"};
+    if (options_.report) evaluation.emplace_back("report.html");
+    steps.emplace_back("evaluate", evaluation);
+    return steps;
+  }
+
+  /// Results of an earlier run that this one does not make.
+  void forget_other_steps() const {
+    std::set<std::string> wanted, steps;
+    for (const auto& [step, files] : outputs()) {
+      wanted.insert(files.begin(), files.end());
+      steps.insert(step);
+    }
+    for (const char* name : kResults) {
+      if (!wanted.contains(name)) remove(name);
+    }
+    for (const auto& entry : fs::directory_iterator(results_)) {
+      const std::string name = entry.path().filename().string();
+      const bool drive = name.starts_with("line-") && name.ends_with("-fixes.csv");
+      if (drive && !wanted.contains(name)) remove(name);
+    }
+    for (const auto& entry : fs::directory_iterator(results_ / "steps")) {
+      const bool step = entry.path().extension() == ".json";
+      if (step && !steps.contains(entry.path().stem().string())) fs::remove(entry.path());
+    }
+  }
+
+  void forget(const std::string& name) const {
+    std::error_code ignored;
+    fs::remove(results_ / "steps" / (name + ".json"), ignored);
+    for (const auto& [step, files] : outputs()) {
+      if (step != name) continue;
+      for (const std::string& file : files) remove(file);
+    }
+  }
+
+  std::string digest_of_outputs(const std::string& name) const {
+    std::string digests;
+    for (const auto& [step, files] : outputs()) {
+      if (step != name) continue;
+      for (const std::string& file : files) {
+        const bool there = fs::exists(out(file));
+        digests += file + " " + (there ? sha256_of_file(out(file)) : "") + "\n";
+      }
+    }
+    return sha256_of_text(digests);
+  }
+
+  std::string key_of(const std::vector<fs::path>& inputs, const std::string& options) {
+    std::string text = build_ + "\n" + options + "\n";
+    for (const fs::path& input : inputs) {
+      if (input.empty()) continue;
+      text += input.filename().string() + " ";
+      text += fs::is_directory(input) ? digests_.of_all(input)
+              : fs::exists(input)     ? sha256_of_file(input)
+                                      : "missing";
+      text += "\n";
+    }
+    return sha256_of_text(text);
+  }
+
+  /// Does a step, unless inputs, options, program and outputs are as when it last ended. False when
+  /// it fails.
+  bool step(const std::string& name, const std::vector<fs::path>& inputs,
+            const std::string& options, const std::function<Work()>& work) {
+    if (observer_.begins) observer_.begins(name);
+    const fs::path kept_file = results_ / "steps" / (name + ".json");
+    const std::string key = key_of(inputs, options);
+    const bool redo =
+        std::find(options_.redo.begin(), options_.redo.end(), name) != options_.redo.end();
+    const auto kept = read_step(kept_file);
+    SessionStep done{name, false, {}};
+    if (!redo && kept && kept->key == key && kept->outputs == digest_of_outputs(name)) {
+      done.as_before = true;
+      done.result = kept->result;
+    } else {
+      forget(name);
+      done.result = attempt(work);
+      write_step(kept_file, {key, digest_of_outputs(name), done.result});
+    }
+    result_.gates.insert(result_.gates.end(), done.result.gates.begin(), done.result.gates.end());
+    result_.steps.push_back(std::move(done));
+    if (observer_.ends) observer_.ends(result_.steps.back());
+    return result_.steps.back().result.ok();
+  }
+
+  /// A bad file is the session's; what cannot be written is not.
+  StepResult attempt(const std::function<Work()>& work) const {
+    Work done;
+    try {
+      done = work();
+    } catch (const InputError& error) {
+      done.result.fail(StepFailure::bad_input, error.what());
+    } catch (const std::invalid_argument& error) {
+      done.result.fail(StepFailure::bad_input, error.what());
+    }
+    StepResult& result = done.result;
+    result.fail(result.failure, without_folder(message_of(result)));
+    for (std::string& warning : result.warnings) warning = without_folder(std::move(warning));
+    for (auto& [image, reason] : result.skipped) reason = without_folder(std::move(reason));
+    if (result.ok()) done.write();
+    return std::move(result);
+  }
+
+  HistoryEntry history(const std::string& options, const std::vector<fs::path>& inputs) {
+    return vlp::history_of(options_.program, options, inputs, digests_);
+  }
+
+  void write_picture(const StepResult& result, const std::string& name) const {
+    if (options_.report && result.drawing) draw(out(name), result.drawing());
+  }
+
+  /// How the camera's options stand in the history.
+  std::string camera_options() const {
+    std::string text = "--camera-id " + options_.camera_id;
+    if (options_.row_time_s) text += fmt::format(" --row-time-s {}", *options_.row_time_s);
+    if (options_.readout) {
+      text += options_.readout == Readout::rows ? " --readout rows" : " --readout columns";
+    }
+    return text + " --lens " + std::string(name_of(options_.lens_model));
+  }
+
+  bool find_lens() {
+    const auto& gates = options_.lens_gates;
+    const std::string settings =
+        fmt::format("{} {} {} {} {}", camera_options(), gates.rms_px, gates.uncertainty_px,
+                    gates.halves_px, options_.report);
+    return step("lens", {session_.boards(), session_.board()}, settings, [&] {
+      const Board board = read_board(session_.board());
+      const auto images = image_files({session_.boards().string()});
+      SeenBoards seen = see_boards(
+          {images, board, session_.board(), options_.threads, results_ / "steps/corners"},
+          observer_.progress);
+      if (!seen.ok()) return Work{seen};
+      Camera camera;
+      camera.id = options_.camera_id;
+      camera.lens_model = options_.lens_model;
+      camera.row_time_s = options_.row_time_s;
+      camera.readout = options_.readout;
+      LensResult lens =
+          solve_lens({std::move(seen.views), board, session_.board(), camera},
+                     history(camera_options(), {session_.board(), session_.boards()}));
+      lens.skipped.insert(lens.skipped.begin(), seen.skipped.begin(), seen.skipped.end());
+      lens.gates = check_lens(gates, lens.metrics);
+      return Work{lens, [this, lens] {
+                    write_cameramodel(out("lens.cameramodel"), lens.solution);
+                    write_picture(lens, "lens.svg");
+                    write_calibration(out("lens.yaml"), lens.calibration);
+                  }};
+    });
+  }
+
+  bool find_row_time(const fs::path& camera_file) {
+    return step("row-time", {session_.rotation(), lamps_file(), camera_file}, "", [&] {
+      const LampMap lamps = read_lamp_map(lamps_file());
+      const Calibration camera = read_calibration(camera_file);
+      const SeenLights seen = see_lights({session_.rotation()}, lamps, camera, {}, false,
+                                         options_.threads, observer_.progress);
+      RowTimeStepResult found =
+          vlp::find_row_time(seen, {{}}, lamps, lamps_file(), camera,
+                             history("--row-time", {session_.rotation(), lamps_file()}));
+      found.skipped = seen.skipped;
+      found.notes = seen.notes;
+      found.warnings.insert(found.warnings.begin(), seen.warnings.begin(), seen.warnings.end());
+      return Work{found,
+                  [this, found] { write_calibration(out("camera.yaml"), found.calibration); }};
+    });
+  }
+
+  SeenLamps see(const fs::path& folder, const LampMap& lamps, const Calibration& calibration,
+                const fs::path& calibration_file) const {
+    LampImages images{folder, lamps, lamps_file(), calibration, calibration_file};
+    if (const auto classifier = session_.classifier()) images.classifier_file = *classifier;
+    images.threads = options_.threads;
+    return see_lamps(images, observer_.progress);
+  }
+
+  /// What looking for the lamps had to say goes with what came of them.
+  template <typename Result>
+  static void take_over(const SeenLamps& seen, Result& result) {
+    result.skipped = seen.skipped;
+    result.notes.insert(result.notes.begin(), seen.notes.begin(), seen.notes.end());
+    result.warnings.insert(result.warnings.begin(), seen.warnings.begin(), seen.warnings.end());
+  }
+
+  std::vector<fs::path> lamp_inputs(const fs::path& folder, const fs::path& calibration) const {
+    return {folder, lamps_file(), calibration, session_.classifier().value_or("")};
+  }
+
+  std::string picture_setting() const { return options_.report ? "picture" : ""; }
+
+  bool find_rotation(const fs::path& camera_file) {
+    const auto inputs = lamp_inputs(session_.rotation(), camera_file);
+    return step("rotation", inputs, picture_setting(), [&] {
+      LampCaptures captures{
+          {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(camera_file)};
+      SeenLamps seen = see(session_.rotation(), captures.lamps, captures.calibration, camera_file);
+      if (!seen.ok()) return Work{seen};
+      captures.frames = std::move(seen.frames);
+      RotationResult found = solve_rotation(captures, RotationMethod::axis, history("", inputs));
+      take_over(seen, found);
+      return Work{found, [this, found] {
+                    write_picture(found, "rotation.svg");
+                    write_calibration(out("rotated.yaml"), found.calibration);
+                  }};
+    });
+  }
+
+  bool find_dispersion() {
+    const fs::path folder = *session_.dispersion(), rotated = out("rotated.yaml");
+    const auto inputs = lamp_inputs(folder, rotated);
+    return step("dispersion", inputs, picture_setting(), [&] {
+      LampCaptures captures{
+          {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(rotated)};
+      SeenLamps seen = see(folder, captures.lamps, captures.calibration, rotated);
+      if (!seen.ok()) return Work{seen};
+      captures.frames = std::move(seen.frames);
+      const KnownPlaces places = at_known_places(captures.frames, captures_in(folder));
+      if (places.captures.empty()) {
+        throw InputError(folder,
+                         "nothing tells where its captures were taken: captures.csv should, with "
+                         "x_m and y_m, and the names of the images");
+      }
+      DispersionResult found =
+          solve_dispersion(captures, places, DispersionMethod::camera, DispersionCircle::mean,
+                           history("", with_tables(inputs, folder)));
+      take_over(seen, found);
+      if (places.without > 0) {
+        found.warnings.push_back(
+            fmt::format("{} of {} captures left out: nothing tells their place", places.without,
+                        captures.frames.size()));
+      }
+      return Work{found, [this, found] {
+                    write_picture(found, "dispersion.svg");
+                    write_calibration(out("calibration.yaml"), found.calibration);
+                  }};
+    });
+  }
+
+  static std::vector<fs::path> with_tables(std::vector<fs::path> inputs, const fs::path& folder) {
+    for (const char* table : {"captures.csv", "truth.csv"}) {
+      if (fs::exists(folder / table)) inputs.push_back(folder / table);
+    }
+    return inputs;
+  }
+
+  bool calibrate() {
+    fs::path camera = out("lens.yaml");
+    if (const auto known = session_.camera()) {
+      camera = *known;
+      if (!readable(camera)) return false;
+    } else if (!find_lens()) {
+      return false;
+    }
+    result_.calibration = read_calibration(camera);
+    if (result_.calibration->camera.row_time_s || session_.classifier()) {
+      forget("row-time");
+    } else if (!find_row_time(camera)) {
+      return false;
+    } else {
+      camera = out("camera.yaml");
+    }
+    if (!find_rotation(camera)) return false;
+    result_.calibration = read_calibration(out("rotated.yaml"));
+    if (!session_.dispersion()) {
+      forget("dispersion");
+      write_calibration(out("calibration.yaml"), *result_.calibration);
+      return true;
+    }
+    if (!find_dispersion()) return false;
+    result_.calibration = read_calibration(out("calibration.yaml"));
+    return true;
+  }
+
+  /// A camera.yaml that cannot be read is a step that failed.
+  bool readable(const fs::path& camera) {
+    const bool told = options_.row_time_s || options_.readout;
+    return step("lens", {camera}, told ? "told" : "", [&] {
+      read_calibration(camera);
+      Work work;
+      if (told) {
+        work.result.warnings.emplace_back(
+            "camera.yaml says what the camera is: row time and read-out that were stated are not "
+            "used");
+      }
+      return work;
+    });
+  }
+
+  bool locate() {
+    if (const auto check = session_.check(); check && !locate(*check)) return false;
+    for (const fs::path& line : lines()) {
+      if (!locate(line)) return false;
+    }
+    return true;
+  }
+
+  bool locate(const fs::path& folder) {
+    const std::string name = folder.filename().string();
+    const fs::path calibration = out("calibration.yaml");
+    return step(name, lamp_inputs(folder, calibration), "", [&] {
+      LocateInput input{
+          {}, read_lamp_map(lamps_file()), read_calibration(calibration), captures_in(folder)};
+      SeenLamps seen = see(folder, input.lamps, input.calibration, calibration);
+      if (!seen.ok()) return Work{seen};
+      input.frames = std::move(seen.frames);
+      LocateResult found = locate_frames(input);
+      take_over(seen, found);
+      return Work{found,
+                  [this, name, found] { write_fixes(out(name + "-fixes.csv"), found.rows); }};
+    });
+  }
+
+  fs::path gates_file() const { return session_.gates().value_or(options_.gates_file); }
+
+  void evaluate() {
+    std::optional<fs::path> truth;
+    std::vector<fs::path> inputs{out("check-fixes.csv"), lamps_file(), out("calibration.yaml"),
+                                 gates_file()};
+    if (const auto check = session_.check()) {
+      for (const fs::path& table : with_tables({}, *check)) inputs.push_back(table);
+    }
+    for (const char* picture : {"lens.svg", "rotation.svg", "dispersion.svg"}) {
+      if (options_.report && fs::exists(out(picture))) inputs.push_back(out(picture));
+    }
+    for (const fs::path& line : lines()) {
+      inputs.push_back(out(line.filename().string() + "-fixes.csv"));
+      for (const fs::path& table : with_tables({}, line)) inputs.push_back(table);
+    }
+    std::string lens_gates;
+    for (const GateResult& gate : result_.gates) lens_gates += words_of(gate) + "\n";
+    step("evaluate", inputs, picture_setting() + lens_gates, [&] {
+      const auto check = session_.check();
+      if (check) truth = truth_file(*check);
+      if (truth) return evaluate_check(*truth, inputs);
+      Work nothing;
+      nothing.result.notes.emplace_back(
+          check ? "no errors and no report: check has no truth.csv, and no places in captures.csv"
+                : "no errors and no report: there is no check");
+      if (!gates_file().empty()) {
+        nothing.result.warnings.emplace_back("the gates ask for errors, and there are none");
+      }
+      return nothing;
+    });
+  }
+
+  Work evaluate_check(const fs::path& truth, const std::vector<fs::path>& inputs) {
+    std::vector<Gate> gates;
+    if (!gates_file().empty()) gates = read_gates(gates_file());
+    auto input = std::make_shared<EvaluationInput>();
+    input->fixes = {out("check-fixes.csv"), read_fixes(out("check-fixes.csv"))};
+    input->truth = {truth, read_truth(truth)};
+    input->station_m = place_radius_m(*result_.calibration);
+    input->threads = options_.threads;
+    EvaluateResult found = evaluate_fixes(*input, gates);
+    std::vector<Drive> drives;
+    for (const fs::path& line : lines()) {
+      const fs::path places = *truth_file(line),
+                     fixes = out(line.filename().string() + "-fixes.csv");
+      drives.push_back({{fixes, read_fixes(fixes)}, ends_of(places, read_truth(places))});
+    }
+    if (!found.ok()) return {found};
+    std::string page;
+    std::vector<GateResult> all = result_.gates;
+    all.insert(all.end(), found.gates.begin(), found.gates.end());
+    if (options_.report) {
+      page = report_page({*input, found, all, read_lamp_map(lamps_file()), result_.calibration,
+                          std::move(drives), pictures(), history("", inputs)});
+    }
+    return {found, [this, found, all, page] {
+              write_file(out("evaluation.json"), json_of(found.evaluation, found.gates));
+              if (!all.empty()) write_file(out("gates.xml"), junit_of(all));
+              if (options_.report) write_file(out("report.html"), page);
+            }};
+  }
+
+  std::vector<ReportPicture> pictures() const {
+    std::vector<ReportPicture> pictures;
+    for (const char* name : {"lens.svg", "rotation.svg", "dispersion.svg"}) {
+      if (fs::exists(out(name))) pictures.push_back(read_report_picture(out(name)));
+    }
+    return pictures;
+  }
+
+  /// Verdict, what is left of a run that failed, and session.json.
+  void conclude() {
+    const SessionStep& last = result_.steps.back();
+    if (!last.result.ok()) {
+      result_.verdict = SessionVerdict::no_result;
+      result_.failure = last.result.failure;
+      result_.reason = last.name + ": " + last.result.why;
+      forget_from(last.name);
+    }
+    std::string missed;
+    for (const GateResult& gate : result_.gates) {
+      if (!gate.passed) missed.append(missed.empty() ? "" : "; ").append(words_of(gate));
+    }
+    if (!missed.empty() && last.result.ok()) {
+      result_.verdict = SessionVerdict::gate;
+      result_.reason = missed;
+    }
+    write_file(out("session.json"), session_json(result_, options_));
+  }
+
+  /// Of a step that failed and of those behind it nothing stays.
+  void forget_from(const std::string& failed) const {
+    bool behind = false;
+    for (const auto& [name, files] : outputs()) {
+      if (behind) forget(name);
+      behind = behind || name == failed;
+    }
+    if (failed == "lens" || failed == "row-time" || failed == "rotation")
+      remove("calibration.yaml");
+  }
+
+  const SessionFolder& session_;
+  fs::path results_;
+  const SessionOptions& options_;
+  const SessionObserver& observer_;
+  std::string build_;
+  InputDigests digests_;
+  SessionResult result_;
+};
+
+/// That no other session has its results there.
+void claim(const fs::path& results, const fs::path& session) {
+  const fs::path mark = results / "steps/session";
+  const std::string name = fs::weakly_canonical(session).string() + "\n";
+  constexpr std::size_t most_bytes = 1 << 16;
+  if (fs::exists(mark) && read_text_file(mark, most_bytes) != name) {
+    throw InputError(results,
+                     "holds the results of another session; give this one a folder of its "
+                     "own");
+  }
+  if (!fs::exists(mark)) write_file(mark, name);
+}
+
+}  // namespace
+
+std::string name_of(SessionVerdict verdict) {
+  switch (verdict) {
+    case SessionVerdict::pass:
+      return "pass";
+    case SessionVerdict::gate:
+      return "gate";
+    case SessionVerdict::no_result:
+      return "no result";
+  }
+  return "";
+}
+
+SessionResult run_session(const fs::path& session, const fs::path& results,
+                          const SessionOptions& options, const SessionObserver& observer) {
+  if (!fs::is_directory(session)) throw InputError(session, "is not a folder of captures");
+  if (!options.gates_file.empty()) read_gates(options.gates_file);
+  if (holds_captures(session, results)) {
+    throw InputError(results, "holds captures: results go to a folder of their own");
+  }
+  std::error_code error;
+  fs::create_directories(results / "steps", error);
+  if (error) throw InputError(results, "cannot be made: " + error.message());
+  const ResultsLock lock(results);
+  claim(results, session);
+  std::optional<SessionFolder> folder;
+  try {
+    folder.emplace(session);
+  } catch (const InputError& incomplete) {
+    SessionResult result;
+    result.verdict = SessionVerdict::no_result;
+    result.failure = StepFailure::bad_input;
+    result.reason = without_folder(incomplete.what(), session);
+    forget_all(results);
+    write_file(results / "session.json", session_json(result, options));
+    return result;
+  }
+  return SessionRun(*folder, results, options, observer).run();
+}
+
+}  // namespace vlp

@@ -1,0 +1,113 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/session_file.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "calibration/rotation/rotation_fit.h"
+#include "geometry/angles.h"
+#include "session/step_file.h"
+
+namespace vlp {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kMillimetres = 1e3;
+
+Json sd_of(const std::optional<Matrix2>& covariance, double factor) {
+  if (!covariance) return nullptr;
+  return {factor * std::sqrt((*covariance)(0, 0)), factor * std::sqrt((*covariance)(1, 1))};
+}
+
+Json calibration_of(const Calibration& calibration) {
+  const auto& in = calibration.camera.intrinsics;
+  Json json{{"lens_model", name_of(calibration.camera.lens_model)},
+            {"focal_px", {in[0], in[1]}},
+            {"center_px", {in[2], in[3]}}};
+  if (const auto& row_time_s = calibration.camera.row_time_s) json["row_time_s"] = *row_time_s;
+  if (const auto& center = calibration.rotation_center) {
+    const auto [angle_rad, azimuth_rad] = tilt_of(*center);
+    json["rotation_center_px"] = {center->center_px.x(), center->center_px.y()};
+    json["rotation_center_sd_px"] = sd_of(center->covariance, 1);
+    json["tilt_deg"] = deg_from_rad(angle_rad);
+    json["tilt_azimuth_deg"] = deg_from_rad(azimuth_rad);
+    if (const auto& arm_m = center->lever_arm_m) {
+      json["lever_arm_mm"] = {kMillimetres * arm_m->x(), kMillimetres * arm_m->y()};
+      json["lever_arm_sd_mm"] = sd_of(center->lever_arm_covariance, kMillimetres);
+    }
+  }
+  if (const auto& dispersion = calibration.dispersion) {
+    json["dispersion_offset_px"] = {dispersion->offset_px.x(), dispersion->offset_px.y()};
+    json["dispersion_offset_sd_px"] = sd_of(dispersion->covariance, 1);
+    json["dispersion_radius_mm"] = kMillimetres * dispersion->radius_m;
+  }
+  return json;
+}
+
+Json history_of(const Calibration& calibration) {
+  Json history = Json::array();
+  for (const HistoryEntry& entry : calibration.history) {
+    Json inputs = Json::array();
+    for (const auto& [file, sha256] : entry.inputs) {
+      inputs.push_back({{"file", file}, {"sha256", sha256}});
+    }
+    history.push_back({{"part", entry.part},
+                       {"program", entry.program},
+                       {"version", entry.version},
+                       {"options", entry.options},
+                       {"inputs", std::move(inputs)}});
+  }
+  return history;
+}
+
+/// Each with its gate, where it has one.
+Json metrics_of(const SessionResult& result) {
+  Json metrics = Json::array();
+  for (const SessionStep& step : result.steps) {
+    const Json of_step = json_of(step.result);
+    for (Json metric : of_step.at("metrics")) {
+      metric["step"] = step.name;
+      for (const Json& gate : of_step.at("gates")) {
+        if (gate.at("name") != metric.at("name")) continue;
+        metric["unit"] = gate.at("unit");
+        metric["limit"] = gate.at("limit");
+        metric["met"] = gate.at("met");
+      }
+      metrics.push_back(std::move(metric));
+    }
+  }
+  return metrics;
+}
+
+}  // namespace
+
+std::string session_json(const SessionResult& result, const SessionOptions& options) {
+  const bool known = result.calibration.has_value();
+  Json json{{"format", "vlp-session/1"},
+            {"verdict", name_of(result.verdict)},
+            {"reason", result.reason},
+            {"failure", name_of(result.failure)},
+            {"camera", known ? result.calibration->camera.id : options.camera_id},
+            {"version", options.program.version},
+            {"metrics", metrics_of(result)},
+            {"gates", Json::array()},
+            {"steps", Json::array()}};
+  for (const GateResult& gate : result.gates) json["gates"].push_back(json_of(gate));
+  for (const SessionStep& step : result.steps) {
+    const Json of_step = json_of(step.result);
+    Json entry{{"name", step.name}, {"failure", of_step.at("failure")}};
+    for (const char* key : {"why", "warnings", "notes", "skipped", "lamps_left_out"}) {
+      if (!of_step.at(key).empty() && of_step.at(key) != "") entry[key] = of_step.at(key);
+    }
+    json["steps"].push_back(std::move(entry));
+  }
+  if (known) {
+    json["calibration"] = calibration_of(*result.calibration);
+    json["history"] = history_of(*result.calibration);
+  }
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace vlp

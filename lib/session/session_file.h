@@ -1,0 +1,19 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "session/session.h"
+
+namespace vlp {
+
+/// `session.json`, for programs: format "vlp-session/1". Objects: verdict ("pass", "gate",
+/// "no result"), reason, failure ("none", "bad_input", "undetermined", ...), camera, version,
+/// metrics (each with name, value and, where it is gated, unit, limit, met), steps (each with name,
+/// warnings, notes, skipped images with reasons, lamps left out with their numbers of captures),
+/// calibration (focal length, centre, tilt, lever arm, dispersion, in the unit that the key ends
+/// in), history (inputs with their digests). The same run gives the same bytes.
+std::string session_json(const SessionResult& result, const SessionOptions& options);
+
+}  // namespace vlp

@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/skipped_images.h"
+
+#include <fmt/core.h>
+
+namespace vlp {
+
+std::vector<SkippedImage> skipped_images(const std::vector<std::filesystem::path>& images,
+                                         const std::vector<std::string>& refused) {
+  std::vector<SkippedImage> skipped;
+  auto image = images.begin();
+  for (const std::string& line : refused) {  // in the order of the images
+    while (image != images.end() && !line.starts_with(image->string() + ": ")) ++image;
+    if (image == images.end()) {
+      skipped.push_back({"", line});
+      image = images.begin();
+      continue;
+    }
+    skipped.push_back({image->filename().string(), line.substr(image->string().size() + 2)});
+    ++image;
+  }
+  return skipped;
+}
+
+InputError nothing_usable(const std::filesystem::path& where, std::size_t images,
+                          const StepResult& result) {
+  std::string words = fmt::format("none of its {} images can be used", images);
+  if (!result.skipped.empty()) {
+    const auto& [image, reason] = result.skipped.front();
+    words += "; the first, " + image + ": " + reason;
+  }
+  return {where, words};
+}
+
+}  // namespace vlp

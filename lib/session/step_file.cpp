@@ -1,0 +1,103 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/step_file.h"
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "rig/file.h"
+
+namespace vlp {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormat = "vlp-step/1";
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+double number_of(const Json& json) {
+  return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
+}
+
+StepResult result_of(const Json& json) {
+  StepResult result;
+  const auto failure = step_failure_from_name(json.at("failure").get<std::string>());
+  result.fail(failure.value_or(StepFailure::bad_input), json.at("why").get<std::string>(),
+              json.at("subject").get<std::string>());
+  for (const Json& metric : json.at("metrics")) {
+    result.metrics.push_back({metric.at("name").get<std::string>(), number_of(metric.at("value"))});
+  }
+  for (const Json& gate : json.at("gates")) {
+    result.gates.push_back({gate.at("name").get<std::string>(), gate.at("unit").get<std::string>(),
+                            number_of(gate.at("value")), number_of(gate.at("limit")),
+                            gate.at("met").get<bool>()});
+  }
+  json.at("warnings").get_to(result.warnings);
+  json.at("notes").get_to(result.notes);
+  for (const Json& image : json.at("skipped")) {
+    result.skipped.push_back(
+        {image.at("image").get<std::string>(), image.at("reason").get<std::string>()});
+  }
+  for (const Json& lamp : json.at("lamps_left_out")) {
+    result.lamps_left_out.push_back({lamp.at("lamp").get<int>(), lamp.at("captures").get<int>()});
+  }
+  return result;
+}
+
+}  // namespace
+
+Json json_of(const GateResult& gate) {
+  return {{"name", gate.name},
+          {"unit", gate.unit},
+          {"value", number_or_null(gate.value)},
+          {"limit", number_or_null(gate.limit)},
+          {"met", gate.passed}};
+}
+
+Json json_of(const StepResult& result) {
+  Json json{{"failure", name_of(result.failure)},
+            {"why", result.why},
+            {"subject", result.subject.string()},
+            {"metrics", Json::array()},
+            {"gates", Json::array()},
+            {"warnings", result.warnings},
+            {"notes", result.notes},
+            {"skipped", Json::array()},
+            {"lamps_left_out", Json::array()}};
+  for (const auto& [name, value] : result.metrics) {
+    json["metrics"].push_back({{"name", name}, {"value", number_or_null(value)}});
+  }
+  for (const GateResult& gate : result.gates) json["gates"].push_back(json_of(gate));
+  for (const auto& [image, reason] : result.skipped) {
+    json["skipped"].push_back({{"image", image}, {"reason", reason}});
+  }
+  for (const auto& [lamp, captures] : result.lamps_left_out) {
+    json["lamps_left_out"].push_back({{"lamp", lamp}, {"captures", captures}});
+  }
+  return json;
+}
+
+std::optional<KeptStep> read_step(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  const Json json = Json::parse(stream, nullptr, false);
+  if (!json.is_object()) return std::nullopt;
+  try {
+    if (json.at("format") != kFormat) return std::nullopt;
+    return KeptStep{json.at("key").get<std::string>(), json.at("outputs").get<std::string>(),
+                    result_of(json.at("result"))};
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+}
+
+void write_step(const std::filesystem::path& file, const KeptStep& step) {
+  const Json json{{"format", kFormat},
+                  {"key", step.key},
+                  {"outputs", step.outputs},
+                  {"result", json_of(step.result)}};
+  write_file(file, json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace vlp

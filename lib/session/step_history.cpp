@@ -1,0 +1,62 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/step_history.h"
+
+#include <fmt/core.h>
+
+#include "captures/digest.h"
+#include "detection/image_file.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+
+std::string last_name(const std::filesystem::path& path) {
+  return std::filesystem::weakly_canonical(path).filename().string();
+}
+
+const std::string& InputDigests::of_file(const std::filesystem::path& file) {
+  const auto known = known_.find(file);
+  return known != known_.end() ? known->second
+                               : known_.emplace(file, sha256_of_file(file)).first->second;
+}
+
+std::string InputDigests::of_images(const std::filesystem::path& folder) {
+  std::string digests;
+  for (const auto& image : images_in(folder)) {
+    digests += fmt::format("{}  {}\n", of_file(image), image.filename().string());
+  }
+  return sha256_of_text(digests);
+}
+
+std::string InputDigests::of_all(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> digests;
+  std::error_code error;
+  for (std::filesystem::recursive_directory_iterator entry(folder, error), end;
+       !error && entry != end; entry.increment(error)) {
+    std::error_code no_file;
+    if (!entry->is_regular_file(no_file)) continue;
+    std::string& digest = digests[entry->path().lexically_relative(folder).string()];
+    try {
+      digest = of_file(entry->path());
+    } catch (const InputError&) {
+      digest = "cannot be read";
+    }
+  }
+  std::string text;
+  for (const auto& [name, digest] : digests) text += fmt::format("{}  {}\n", digest, name);
+  return sha256_of_text(text);
+}
+
+HistoryEntry history_of(const ProgramVersion& program, const std::string& options,
+                        const std::vector<std::filesystem::path>& inputs, InputDigests& digests) {
+  HistoryEntry entry{"", program.program, program.version, options, {}};
+  for (const auto& input : inputs) {
+    if (input.empty()) continue;
+    entry.inputs.push_back({last_name(input), std::filesystem::is_directory(input)
+                                                  ? digests.of_images(input)
+                                                  : digests.of_file(input)});
+  }
+  return entry;
+}
+
+}  // namespace vlp

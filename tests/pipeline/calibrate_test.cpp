@@ -1,0 +1,304 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-calibrate: the whole procedure, from a folder of images to a verdict.
+#include <fmt/core.h>
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "captures/truth_table.h"
+#include "support/program.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ContainsRegex;
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kDatasets = VLP_SOURCE_DIR "/datasets/";
+
+class Calibrate : public testing::Test {
+ protected:
+  void SetUp() override {
+#ifdef __SANITIZE_ADDRESS__
+    GTEST_SKIP() << "hundreds of images; the programs' own tests run under the sanitizers";
+#endif
+  }
+  std::string path(const std::string& name) const { return (folder / name).string(); }
+  /// Captures as a scene describes them, in the folder that is calibrated.
+  void render(const std::string& scene, const std::string& folders) const {
+    const auto result = run_program("vlp-simulate -q " + scene + " --only " + folders + " -o '" +
+                                    path("a session") + "'");
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+  }
+  ProgramResult calibrate(const std::string& options = "--row-time-s 3e-5 --readout rows") const {
+    return run_program("vlp-calibrate '" + path("a session") + "' -o '" + path("results") + "' " +
+                       options);
+  }
+  std::string result(const std::string& name) const {
+    return TemporaryFolder::content_of(folder / ("results/" + name));
+  }
+  const TemporaryFolder folder;
+};
+
+class Accuracy : public Calibrate, public testing::WithParamInterface<const char*> {};
+
+/// The gates are 1.5 times what was measured when they were written.
+TEST_P(Accuracy, KeepsToItsGates) {
+  const std::string rig = kDatasets + GetParam();
+  render(rig + "/scene.yaml", "boards,rotation,dispersion,check");
+  fs::copy(rig + "/gates.yaml", folder / "a session/gates.yaml");
+  const auto run = calibrate();
+  EXPECT_EQ(run.exit_code, 0) << run.output << run.errors;
+  EXPECT_THAT(result("evaluation.json"), HasSubstr("vlp-evaluation/1"));
+  EXPECT_THAT(result("report.html"), HasSubstr("PASS"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Rigs, Accuracy, testing::Values("paper-rig", "paper-rig-faulty"));
+
+/// Fewer check captures, so that it is quick; a line of the paper's.
+class SmallSession : public Calibrate {
+ protected:
+  void SetUp() override {
+    Calibrate::SetUp();
+    if (IsSkipped()) return;
+    std::string scene = TemporaryFolder::content_of(kDatasets + "paper-rig/scene.yaml");
+    const std::string grid = "columns: 6, rows: 6}\n    heights_m: [0, 0.1, 0.2, 0.3]";
+    ASSERT_NE(scene.find(grid), std::string::npos);
+    scene.replace(scene.find(grid), grid.size(), "columns: 3, rows: 2}\n    heights_m: [0]");
+    render(folder.file("scene.yaml", scene).string(), "boards,rotation,dispersion,check,line-x");
+  }
+};
+
+TEST_F(SmallSession, RunsOnlyWhatIsNotAsBefore) {
+  const auto first = calibrate("--readout rows");  // and finds the row time
+  ASSERT_EQ(first.exit_code, 0) << first.output << first.errors;
+  EXPECT_THAT(first.output, Not(HasSubstr("as before")));
+  EXPECT_THAT(first.output, HasSubstr("row-time"));
+  EXPECT_THAT(result("report.html"), HasSubstr("line-x-fixes.csv"));
+  const std::string calibration = result("calibration.yaml"), report = result("report.html");
+
+  const auto again = calibrate("--readout rows");
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_THAT(again.output, Not(ContainsRegex("[0-9] s\n"))) << "a step was run again";
+  EXPECT_EQ(result("report.html"), report);
+
+  // A step that something ended in the middle left nothing that says how it ended.
+  fs::remove(folder / "results/steps/rotation.json");
+  // And a capture less in check.
+  fs::remove(folder / "a session/check/0000.png");
+  const auto changed = calibrate("--readout rows");
+  EXPECT_EQ(changed.exit_code, 0) << changed.output << changed.errors;
+  EXPECT_THAT(changed.output, HasSubstr("lens          as before"));
+  EXPECT_THAT(changed.output, Not(HasSubstr("rotation      as before")));
+  EXPECT_THAT(changed.output,
+              HasSubstr("dispersion    as before"));  // its input has the same bytes
+  EXPECT_THAT(changed.output, Not(HasSubstr("check         as before")));
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+  EXPECT_THAT(result("evaluation.json"), HasSubstr("\"missing\""));
+}
+
+TEST_F(SmallSession, EndsWithTheVerdictOfTheGatesEachTime) {
+  folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  mean_mm: 1e-6\n");
+  for (int run = 0; run < 2; ++run) {
+    const auto result = calibrate();
+    EXPECT_EQ(result.exit_code, 1) << result.output << result.errors;
+    EXPECT_THAT(result.output, HasSubstr("a gate is not met"));
+    EXPECT_THAT(result.output, HasSubstr("mean_mm"));
+  }
+  EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
+  EXPECT_THAT(result("gates.xml"), HasSubstr("<failure"));
+}
+
+TEST_F(SmallSession, FollowsWhatIsInItsFolder) {
+  ASSERT_EQ(calibrate().exit_code, 0);
+  const std::string calibration = result("calibration.yaml");
+  // Without the dispersion nothing of it is left, and with it again all is as it was.
+  fs::rename(folder / "a session/dispersion", folder / "kept");
+  ASSERT_EQ(calibrate().exit_code, 0);
+  EXPECT_EQ(result("calibration.yaml"), result("rotated.yaml"));
+  EXPECT_FALSE(fs::exists(folder / "results/dispersion.svg"));
+  fs::rename(folder / "kept", folder / "a session/dispersion");
+  ASSERT_EQ(calibrate().exit_code, 0);
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+  // A camera that is known already, and then is not.
+  fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
+  const auto known = calibrate();
+  ASSERT_EQ(known.exit_code, 0) << known.errors;
+  EXPECT_THAT(known.errors, HasSubstr("camera.yaml says what the camera is"));
+  EXPECT_THAT(calibrate("").errors, Not(HasSubstr("camera.yaml says")));
+  EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: \"paper-rig\""));
+  EXPECT_FALSE(fs::exists(folder / "results/lens.yaml"));
+  fs::remove(folder / "a session/camera.yaml");
+  ASSERT_EQ(calibrate().exit_code, 0);
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+  // A result that somebody changed, or took away, is made again.
+  folder.file("results/rotated.yaml", "changed\n");
+  EXPECT_THAT(calibrate().output, Not(HasSubstr("rotation      as before")));
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+  fs::remove(folder / "results/rotation.svg");
+  fs::remove(folder / "results/evaluation.json");
+  ASSERT_EQ(calibrate().exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder / "results/rotation.svg"));
+  EXPECT_TRUE(fs::exists(folder / "results/evaluation.json"));
+  // A drive that cannot be taken costs the report, not the calibration.
+  folder.file("a session/line-x/truth.csv", "image,x_m,y_m\n0000.png,0,0\n");
+  const auto bad_line = calibrate();
+  EXPECT_EQ(bad_line.exit_code, 2);
+  EXPECT_THAT(bad_line.errors, HasSubstr("line-x/truth.csv: the drive ends where it begins"));
+  EXPECT_EQ(result("calibration.yaml"), calibration);
+  EXPECT_FALSE(fs::exists(folder / "results/report.html"));
+}
+
+TEST_F(SmallSession, FailsWithTheLensWhoseGatesAreNotMet) {
+  std::size_t views = 0;
+  for (const auto& image : fs::directory_iterator(folder / "a session/boards")) {
+    if (image.path().extension() == ".png" && ++views > 5) fs::remove(image.path());
+  }
+  const auto run = calibrate();
+  EXPECT_EQ(run.exit_code, 1) << run.output << run.errors;
+  EXPECT_THAT(run.output, HasSubstr("a gate is not met"));
+  EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
+}
+
+TEST_F(SmallSession, EndsWhereAStageCannotGoOn) {
+  ASSERT_EQ(calibrate().exit_code, 0);
+  for (const auto& image : fs::directory_iterator(folder / "a session/rotation")) {
+    if (image.path().filename() != "0000.png") fs::remove(image.path());
+  }
+  const auto run = calibrate();
+  EXPECT_EQ(run.exit_code, 3) << run.output;
+  EXPECT_THAT(run.errors, HasSubstr("vlp-calibrate: error: rotation: "));
+  EXPECT_THAT(result("session.json"), HasSubstr("\"verdict\": \"no result\""));
+  EXPECT_THAT(result("session.json"), HasSubstr("\"failure\": \"undetermined\""));
+  EXPECT_TRUE(fs::exists(folder / "results/lens.yaml"));
+  EXPECT_FALSE(fs::exists(folder / "results/report.html")) << "of the captures before";
+  EXPECT_FALSE(fs::exists(folder / "results/calibration.yaml"));
+}
+
+/// The same session through the programs of single steps, by hand.
+TEST_F(SmallSession, GivesWhatTheSingleProgramsGive) {
+  // An inclination sensor that reads a little, and a table of places without truth.csv.
+  std::string captures = "image,x_m,y_m,z_m,roll_rad,pitch_rad\n";
+  for (const TruthRow& row : read_truth(folder / "a session/check/truth.csv")) {
+    captures +=
+        fmt::format("{},{},{},{},0.001,-0.002\n", row.image, row.xy_m.x(), row.xy_m.y(), *row.z_m);
+  }
+  fs::remove(folder / "a session/check/truth.csv");
+  folder.file("a session/check/captures.csv", captures);
+  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows --camera-id unit").exit_code,
+            0);
+  const std::string in = "'" + path("a session") + "/", out = "'" + path("");
+  const std::string lamps = " --lamps " + in + "lamps.yaml' --calibration " + out;
+  for (const std::string& command :
+       {"vlp-intrinsics " + in + "boards' --board " + in + "board.yaml' --row-time-s 3e-5 " +
+            "--readout rows --camera-id unit -o " + out + "lens.yaml'",
+        "vlp-rotation " + in + "rotation'" + lamps + "lens.yaml' -o " + out + "rotated.yaml'",
+        "vlp-dispersion " + in + "dispersion'" + lamps + "rotated.yaml' -o " + out +
+            "calibration.yaml'",
+        "vlp-locate " + in + "check'" + lamps + "calibration.yaml' -o " + out + "fixes.csv'",
+        "vlp-evaluate " + out + "fixes.csv' --truth " + in + "check/captures.csv' --calibration " +
+            out + "calibration.yaml' --json " + out + "evaluation.json'"}) {
+    const auto run = run_program(command);
+    ASSERT_EQ(run.exit_code, 0) << command << run.errors;
+  }
+  const auto by_hand = [&](const char* name) { return TemporaryFolder::content_of(folder / name); };
+  EXPECT_EQ(by_hand("fixes.csv"), result("check-fixes.csv"));
+  EXPECT_EQ(by_hand("evaluation.json"), result("evaluation.json"));
+  EXPECT_EQ(by_hand("lens.cameramodel"), result("lens.cameramodel"));
+  const auto without_history = [](const std::string& calibration) {
+    return calibration.substr(calibration.find("\ncamera:"));
+  };
+  EXPECT_EQ(without_history(by_hand("calibration.yaml")),
+            without_history(result("calibration.yaml")));
+  // The inclination counts: without it the fixes are others.
+  folder.file("a session/check/captures.csv",
+              std::regex_replace(captures, std::regex("0.001,-0.002"), "0,0"));
+  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows --camera-id unit").exit_code,
+            0);
+  EXPECT_NE(by_hand("fixes.csv"), result("check-fixes.csv"));
+}
+
+TEST_F(SmallSession, RunsAStepAgainThatIsAskedFor) {
+  ASSERT_EQ(calibrate().exit_code, 0);
+  const std::string session = result("session.json");
+  const auto again = calibrate("--row-time-s 3e-5 --readout rows --redo check");
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_THAT(again.output, HasSubstr("dispersion    as before"));
+  EXPECT_THAT(again.output, Not(HasSubstr("check         as before")));
+  EXPECT_THAT(again.output, HasSubstr("evaluate      as before"));
+  EXPECT_EQ(result("session.json"), session) << "whatever was as before";
+  const auto unknown = calibrate("--redo checks");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.errors, HasSubstr("there is no step checks here; the steps are: lens, "));
+}
+
+TEST_F(SmallSession, GoesOnWhereItWasKilled) {
+  ASSERT_EQ(calibrate().exit_code, 0);
+  const std::string session = result("session.json"), report = result("report.html");
+  for (const char* moment : {"lens.yaml", "rotated.yaml", "check-fixes.csv", "evaluation.json"}) {
+    fs::remove_all(folder / "results");
+    // Killed as soon as the file is there.
+    run_program("vlp-calibrate '" + path("a session") + "' -o '" + path("results") +
+                "' --row-time-s 3e-5 --readout rows & until [ -e '" + path("results/") + moment +
+                "' ]; do sleep 0.01; done; kill -9 $!; wait");
+    const auto on = calibrate();
+    EXPECT_EQ(on.exit_code, 0) << moment << on.errors;
+    EXPECT_EQ(result("session.json"), session) << moment;
+    EXPECT_EQ(result("report.html"), report) << moment;
+  }
+}
+
+TEST_F(SmallSession, TellsOfImagesThatAreDamaged) {
+  folder.file("a session/rotation/0003.png", "no image");
+  fs::resize_file(folder / "a session/check/0001.png", 100);
+  const auto run = calibrate("--no-report --row-time-s 3e-5 --readout rows");
+  EXPECT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_THAT(run.errors, HasSubstr("0003.png: cannot be read as an image; skipped"));
+  const auto json = nlohmann::json::parse(result("session.json"));
+  for (const auto& step : json["steps"]) {
+    if (step["name"] == "rotation") EXPECT_EQ(step["skipped"][0]["image"], "0003.png");
+    if (step["name"] == "check") EXPECT_EQ(step["skipped"][0]["image"], "0001.png");
+  }
+  EXPECT_THAT(result("session.json"), Not(HasSubstr(path("")))) << "of no use elsewhere";
+}
+
+TEST_F(SmallSession, KeepsTwoSessionsApart) {
+  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
+  fs::copy(folder / "a session", folder / "another", fs::copy_options::recursive);
+  const auto other = run_program("vlp-calibrate '" + path("another") + "' -o '" + path("results") +
+                                 "' --row-time-s 3e-5 --readout rows");
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.errors, HasSubstr("holds the results of another session"));
+  EXPECT_EQ(std::count(other.errors.begin(), other.errors.end(), '\n'), 1);
+  const auto inside =
+      run_program("vlp-calibrate '" + path("another") + "' -o '" + path("another/check") + "'");
+  EXPECT_EQ(inside.exit_code, 2);
+  EXPECT_THAT(inside.errors, HasSubstr("holds captures: results go to a folder of their own"));
+}
+
+TEST_F(Calibrate, SaysWhatIsMissing) {
+  EXPECT_EQ(run_program("vlp-calibrate").exit_code, 2);
+  const auto nowhere = calibrate();
+  EXPECT_EQ(nowhere.exit_code, 2);
+  EXPECT_THAT(nowhere.errors, HasSubstr("a session: is not a folder of captures"));
+  EXPECT_FALSE(fs::exists(folder / "results"));
+  fs::create_directory(folder / "a session");
+  const auto empty = calibrate();
+  EXPECT_EQ(empty.exit_code, 2);
+  EXPECT_THAT(empty.errors, HasSubstr("lamps.yaml: is missing"));
+  EXPECT_THAT(result("session.json"), HasSubstr("\"failure\": \"bad_input\""));
+  EXPECT_THAT(calibrate("--nonsense").errors, HasSubstr("unknown: --nonsense"));
+  EXPECT_EQ(calibrate("--row-time-s").exit_code, 2);
+  folder.file("gates.yaml", "format: vlp-gates/1\ngates: {odd_mm: 1}\n");
+  EXPECT_THAT(calibrate("--gates '" + path("gates.yaml") + "'").errors, HasSubstr("'odd_mm'"));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,100 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/session_folder.h"
+
+#include <gmock/gmock.h>
+
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+TEST(CapturesIn, AreThoseOfBothTablesAndTheTruthHolds) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(captures_in(folder / ""), SizeIs(0));
+  folder.file("captures.csv",
+              "image,x_m,y_m,roll_rad,pitch_rad\na.png,1,2,0.1,0.2\nb.png,3,4,0,0\n");
+  folder.file("truth.csv", "image,x_m,y_m,z_m,yaw_rad\na.png,1.5,2.5,0.5,1\nc.png,5,6,0,0\n");
+  const CapturesTable captures = captures_in(folder / "");
+  ASSERT_THAT(captures, SizeIs(3));
+  const Capture& both = captures.at("a.png");
+  EXPECT_EQ(both.x_m, 1.5);
+  EXPECT_EQ(both.y_m, 2.5);
+  EXPECT_EQ(both.z_m, 0.5);
+  EXPECT_EQ(both.yaw_rad, 1);
+  EXPECT_EQ(both.inclination->roll_rad, 0.1);
+  EXPECT_EQ(captures.at("b.png").x_m, 3);
+  EXPECT_FALSE(captures.at("c.png").inclination);
+}
+
+TEST(CapturesIn, SayWhereATableIsWrong) {
+  const TemporaryFolder folder;
+  folder.file("captures.csv", "image,x_m,y_m\na.png,1,2\nb.png,1");
+  EXPECT_THAT(refusal_of([&] { captures_in(folder / ""); }), HasSubstr("captures.csv:3"));
+}
+
+TEST(TruthFile, IsTheTruthOrElseCapturesWithPlaces) {
+  const TemporaryFolder folder;
+  EXPECT_FALSE(truth_file(folder / ""));
+  folder.file("captures.csv", "image,time_s\na.png,1\n");
+  EXPECT_FALSE(truth_file(folder / "")) << "captures.csv tells no place";
+  folder.file("captures.csv", "image,x_m,y_m\na.png,1,2\n");
+  EXPECT_EQ(truth_file(folder / "")->filename(), "captures.csv");
+  folder.file("truth.csv", "image,x_m,y_m\na.png,1,2\n");
+  EXPECT_EQ(truth_file(folder / "")->filename(), "truth.csv");
+}
+
+TEST(SessionFolder, SaysWhatIsMissing) {
+  const TemporaryFolder folder;
+  const auto refusal = [&] { return refusal_of([&] { SessionFolder(folder / "unit"); }); };
+  EXPECT_THAT(refusal(), HasSubstr("unit: is not a folder of captures"));
+  fs::create_directories(folder / "unit");
+  EXPECT_THAT(refusal(), HasSubstr("unit/lamps.yaml: is missing"));
+  folder.file("unit/lamps.yaml", "\n");
+  EXPECT_THAT(refusal(), HasSubstr("unit/rotation: is missing"));
+  fs::create_directories(folder / "unit/rotation");
+  EXPECT_THAT(refusal(), HasSubstr("unit: has neither boards with board.yaml nor camera.yaml"));
+  fs::create_directories(folder / "unit/boards");
+  EXPECT_THAT(refusal(), HasSubstr("unit/board.yaml: is missing"));
+  folder.file("unit/camera.yaml", "\n");
+  const SessionFolder known(folder / "unit");
+  EXPECT_TRUE(known.camera());
+  EXPECT_FALSE(known.check());
+}
+
+TEST(SessionFolder, KnowsDrivesByTheirPlaces) {
+  const TemporaryFolder folder;
+  for (const char* name : {"unit/rotation", "unit/line-y", "unit/line-x", "unit/line-z"}) {
+    fs::create_directories(folder / name);
+  }
+  folder.file("unit/lamps.yaml", "\n");
+  folder.file("unit/camera.yaml", "\n");
+  folder.file("unit/line-x/truth.csv", "image,x_m,y_m\na.png,1,2\n");
+  folder.file("unit/line-y/captures.csv", "image,x_m,y_m\na.png,1,2\n");
+  folder.file("unit/line-z/captures.csv", "image,time_s\na.png,1\n");
+  const auto lines = SessionFolder(folder / "unit").lines();
+  ASSERT_THAT(lines, SizeIs(2));
+  EXPECT_EQ(lines[0].filename(), "line-x");
+  EXPECT_EQ(lines[1].filename(), "line-y");
+  EXPECT_TRUE(holds_captures(folder / "unit", folder / "unit"));
+  EXPECT_TRUE(holds_captures(folder / "unit", folder / "unit/line-x"));
+  EXPECT_FALSE(holds_captures(folder / "unit", folder / "unit/results"));
+}
+
+TEST(EndsOf, AreTheFirstAndTheLastPlace) {
+  const std::vector<TruthRow> drive{
+      {"a", {0, 1}, {}, {}}, {"b", {2, 1}, {}, {}}, {"c", {3, 1}, {}, {}}};
+  EXPECT_EQ(ends_of("t.csv", drive)[1].x(), 3);
+  EXPECT_THAT(refusal_of([&] {
+                ends_of("t.csv", {drive[0], drive[0]});
+              }),
+              HasSubstr("t.csv: the drive ends where it begins"));
+}
+
+}  // namespace
+}  // namespace vlp

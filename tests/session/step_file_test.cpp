@@ -1,0 +1,70 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/step_file.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+StepResult sample() {
+  StepResult result;
+  result.metrics = {{"rms_px", 0.1 + 0.2},
+                    {"uncertainty_px", std::numeric_limits<double>::infinity()}};
+  result.gates = {{"rms_px", "px", 0.1 + 0.2, 1, true}};
+  result.warnings = {"one \"lamp\""};
+  result.notes = {"note"};
+  result.skipped = {{"a.png", "is empty"}};
+  result.lamps_left_out = {{2, 12}};
+  result.fail(StepFailure::wrong_map, "look swapped", "lamps.yaml");
+  return result;
+}
+
+TEST(StepFile, GivesBackWhatWasKept) {
+  const TemporaryFolder folder;
+  write_step(folder / "s.json", {"key", "outputs", sample()});
+  const auto kept = read_step(folder / "s.json");
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->key, "key");
+  EXPECT_EQ(kept->outputs, "outputs");
+  const StepResult& result = kept->result;
+  EXPECT_EQ(result.metrics[0].value, 0.1 + 0.2);
+  EXPECT_FALSE(std::isfinite(result.metrics[1].value));
+  EXPECT_EQ(result.gates[0].limit, 1);
+  EXPECT_EQ(result.warnings, sample().warnings);
+  EXPECT_EQ(result.skipped[0].reason, "is empty");
+  EXPECT_EQ(result.lamps_left_out[0].captures, 12);
+  EXPECT_EQ(result.failure, StepFailure::wrong_map);
+  EXPECT_EQ(message_of(result), "lamps.yaml: look swapped");
+}
+
+TEST(StepFile, IsNothingWhenItIsCutOrOfAnotherVersion) {
+  const TemporaryFolder folder;
+  EXPECT_FALSE(read_step(folder / "none.json"));
+  write_step(folder / "s.json", {"key", "outputs", sample()});
+  const std::string text = TemporaryFolder::content_of(folder / "s.json");
+  for (std::size_t length = 0; length + 2 < text.size(); ++length) {
+    EXPECT_FALSE(read_step(folder.file("cut.json", text.substr(0, length)))) << length;
+  }
+  std::string other = text;
+  other.replace(other.find("vlp-step/1"), 10, "vlp-step/2");
+  EXPECT_FALSE(read_step(folder.file("other.json", other)));
+}
+
+TEST(StepFailure, HasANameEach) {
+  for (const auto failure :
+       {StepFailure::none, StepFailure::bad_input, StepFailure::undetermined,
+        StepFailure::wrong_board, StepFailure::wrong_map, StepFailure::wrong_place}) {
+    EXPECT_EQ(step_failure_from_name(name_of(failure)), failure);
+  }
+  EXPECT_FALSE(step_failure_from_name("odd"));
+}
+
+}  // namespace
+}  // namespace vlp
