@@ -77,7 +77,7 @@ void StationKilled::expect_all_there() const {
     for (const auto& image : run["images"]) {
       const auto file = folder / "station/captures" / ("b." + name) / std::string(image["step"]) /
                         std::string(image["image"]);
-      EXPECT_EQ(sha256_of_file(file), image["sha256"]) << file;
+      EXPECT_EQ(sha256_of_file(file), image["sha256"].get<std::string>()) << file;
     }
     const auto results = folder / "station/results/b" / name;
     EXPECT_EQ(TemporaryFolder::content_of(results / "calibration.yaml"), calibration);
