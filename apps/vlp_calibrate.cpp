@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <memory>
 #include <string>
@@ -67,23 +68,25 @@ const Metric* find(const SessionResult& result, const std::string& name) {
 }
 
 void print_summary(const SessionResult& result, const std::string& results) {
+  struct Shown {
+    const char *label, *metric, *unit;
+  };
+  constexpr std::array shown{Shown{"residuals", "rms_px", "px rms, of the board's corners"},
+                             Shown{"tilt", "tilt_deg", "degrees"},
+                             Shown{"lever arm", "lever_arm_mm", "mm"},
+                             Shown{"dispersion", "dispersion_mm", "mm, before it is taken off"},
+                             Shown{"mean error", "mean_mm", "mm, horizontal"},
+                             Shown{"p90", "p90_mm", "mm"},
+                             Shown{"max", "max_mm", "mm"},
+                             Shown{"height", "height_rms_mm", "mm rms"},
+                             Shown{"missing", "missing", "of the captures, as a share"}};
   fmt::print("\n");
-  const std::vector<std::pair<const char*, const char*>> shown{{"lens", "rms_px"},
-                                                               {"tilt", "tilt_deg"},
-                                                               {"lever arm", "lever_arm_mm"},
-                                                               {"dispersion", "dispersion_mm"},
-                                                               {"mean", "mean_mm"},
-                                                               {"p90", "p90_mm"},
-                                                               {"max", "max_mm"},
-                                                               {"height", "height_rms_mm"},
-                                                               {"missing", "missing"}};
-  for (const auto& [label, name] : shown) {
+  for (const auto& [label, name, unit] : shown) {
     const Metric* metric = find(result, name);
-    if (metric != nullptr) fmt::print("{:11} {:.4g} ({})\n", label, metric->value, name);
+    if (metric != nullptr) fmt::print("{:11} {:.4g} {}\n", label, metric->value, unit);
   }
   for (const GateResult& gate : result.gates) {
-    if (gate.passed) continue;
-    fmt::print("NOT MET     {}\n", words_of(gate));
+    if (!gate.passed) fmt::print("NOT MET     {}\n", words_of(gate));
   }
   fmt::print("verdict     {}; results are in {}\n", name_of(result.verdict), results);
 }

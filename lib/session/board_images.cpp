@@ -84,7 +84,7 @@ std::vector<fs::path> image_files(const std::vector<std::string>& names) {
 SeenBoards see_boards(const BoardImages& input, const StepProgress& progress) {
   cv::setNumThreads(1);  // the images themselves go in parallel
   const BoardDetector detector(input.board);
-  BoardViews found = detect_boards(detector, input.images, input.threads,
+  FoundBoards found = detect_boards(detector, input.images, input.threads,
                                    corner_cache(input.cache, input.board), [&](std::size_t done) {
                                      if (progress) progress(done, input.images.size());
                                    });

@@ -13,7 +13,8 @@ namespace vlp {
 /// metrics (each with name, value and, where it is gated, unit, limit, met), steps (each with name,
 /// warnings, notes, skipped images with reasons, lamps left out with their numbers of captures),
 /// calibration (focal length, centre, tilt, lever arm, dispersion, in the unit that the key ends
-/// in), history (inputs with their digests). The same run gives the same bytes.
+/// in), history (inputs with their digests). It is written
+/// last: without it the results are of a run that was killed. The same run gives the same bytes.
 std::string session_json(const SessionResult& result, const SessionOptions& options);
 
 }  // namespace vlp

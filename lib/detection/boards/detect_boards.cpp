@@ -46,7 +46,7 @@ Outcome outcome_of(const BoardDetector& detector, const std::filesystem::path& f
 
 }  // namespace
 
-BoardViews detect_boards(const BoardDetector& detector,
+FoundBoards detect_boards(const BoardDetector& detector,
                          const std::vector<std::filesystem::path>& images, int threads,
                          const BoardCache& cache,
                          const std::function<void(std::size_t done)>& progress) {
@@ -58,7 +58,7 @@ BoardViews detect_boards(const BoardDetector& detector,
     const std::lock_guard lock(counting);
     progress(++done);
   });
-  BoardViews result;
+  FoundBoards result;
   for (Outcome& outcome : outcomes) {
     if (outcome.view) {
       result.views.push_back(std::move(*outcome.view));

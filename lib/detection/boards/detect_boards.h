@@ -27,7 +27,7 @@ struct BoardCache {
   std::function<void(const std::filesystem::path& image, const BoardView& view)> keep;
 };
 
-struct BoardViews {
+struct FoundBoards {
   /// In the order of the images.
   std::vector<BoardView> views;
   /// Images that could not be used, and why, in one line each.
@@ -37,7 +37,7 @@ struct BoardViews {
 /// Detects the board in each image, so many at a time. An image that cannot be read is refused and
 /// does not end it. The result does not depend on the threads. `progress` gets the images done so
 /// far; its calls do not overlap, while those of `cache`, whose functions may be empty, do.
-BoardViews detect_boards(const BoardDetector& detector,
+FoundBoards detect_boards(const BoardDetector& detector,
                          const std::vector<std::filesystem::path>& images, int threads,
                          const BoardCache& cache,
                          const std::function<void(std::size_t done)>& progress);
