@@ -28,10 +28,10 @@ void rotate_on_spot(const CLI::App& app, const CaptureOptions& images, const std
   const LampCaptures input = read_captures_of(images);
   const RotationResult found =
       solve_rotation(input, kMethods.at(method), history_entry(app, inputs));
+  tell(found);
   require(found);
   if (!plot.empty()) draw(plot, found.drawing());
   write_calibration(images.output, found.calibration);
-  tell(found);
   print_summary(found.fit, found.spot, found.circles, input.calibration.camera);
 }
 

@@ -118,10 +118,10 @@ void run(const CLI::App& app, const Options& options) {
   const DispersionResult found =
       solve_dispersion(input, places, kMethods.at(options.method), kCircles.at(options.circle),
                        history_entry(app, inputs));
+  tell(found);
   require(found);
   if (!options.plot.empty()) draw(options.plot, found.drawing());
   write_calibration(options.images.output, found.calibration);
-  tell(found);
   print_summary(found.fit, places.captures.size());
 }
 

@@ -50,7 +50,7 @@ void set_sigma(std::vector<Frame>& frames, double sigma_px) {
 CapturesTable captures_of(const Options& options) {
   if (!options.captures.empty()) return read_captures(options.captures);
   const bool folder = std::filesystem::is_directory(options.images.images);
-  CapturesTable captures = folder ? captures_in(options.images.images) : CapturesTable{};
+  CapturesTable captures = folder ? captures_table(options.images.images) : CapturesTable{};
   if (captures.empty() && (options.one_lamp || options.inclination_sigma_deg)) {
     throw std::invalid_argument(
         "--one-lamp and --inclination-sigma-deg need captures.csv: give --captures");

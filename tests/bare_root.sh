@@ -47,35 +47,45 @@ unshare --mount true 2>/dev/null || refuse $no_root "this machine lets nobody mo
 
 seconds_since() { echo $(((${EPOCHREALTIME//[!0-9]/} - $1) / 1000000)); }
 
+child='' temporary=''
+clean_up() {
+  [ -z "$child" ] || kill -9 "$child" 2>/dev/null || true
+  wait
+  rm -f "$root.log"
+  [ -z "$temporary" ] || rm -rf --one-file-system "$root"
+}
+trap clean_up EXIT
+trap 'exit 143' TERM INT
 if [ -z "$root" ]; then
-  root=$(mktemp --directory --tmpdir "bare-$release-XXXXXX")
-  trap 'rm -rf --one-file-system "$root"' EXIT
+  root=$(mktemp --directory --tmpdir "bare-$release-XXXXXX") temporary=yes
+  chmod 755 "$root"  # apt and PostgreSQL are not the superuser's there
 fi
 mkdir -p "$root" ${ccache:+"$ccache"}
 root=$(realpath "$root")
-if [ ! -e "$root/made" ]; then
+if [ -e "$root/made" ]; then
+  [ "$(<"$root/made")" = "$release" ] || refuse 2 "$root: is of another release than $release"
+else
   begin=${EPOCHREALTIME//[!0-9]/}
   if ! debootstrap --include=git,ca-certificates "$release" "$root" >"$root.log" 2>&1; then
     tail -n 5 "$root.log" >&2
-    rm -f "$root.log"
     refuse $no_root "no root of $release could be made; see above"
   fi
-  rm -f "$root.log"
-  touch "$root/made"
+  echo "$release" >"$root/made"
   echo "bare_root.sh: $release, made in $(seconds_since "$begin") s"
 fi
 rm -rf "$root/vlp.git"
 git clone --quiet --bare --no-hardlinks "$project" "$root/vlp.git"
 begin=${EPOCHREALTIME//[!0-9]/} code=0
 unshare --mount --pid --fork --kill-child "$BASH" -euo pipefail -s \
-  "$root" "${ccache:+$(realpath "$ccache")}" "$command" "${CI:-}" <<'INSIDE' || code=$?
+  "$root" "${ccache:+$(realpath "$ccache")}" "$command" "${CI:-}" <<'INSIDE' &
 # Mounts and processes are of a namespace that ends with the command.
 root=$1 ccache=$2 command=$3 ci=$4
 mount --make-rprivate /
 mount -t proc proc "$root/proc"
 mount --rbind /sys "$root/sys"
 mount --rbind /dev "$root/dev"
-settings=(HOME=/root LANG=C.UTF-8 TERM=dumb ${ci:+CI="$ci"}
+settings=(${http_proxy:+http_proxy="$http_proxy"} ${https_proxy:+https_proxy="$https_proxy"}
+          HOME=/root LANG=C.UTF-8 TERM=dumb ${ci:+CI="$ci"}
           PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin)
 if [ -n "$ccache" ]; then
   mkdir -p "$root/ccache"
@@ -87,12 +97,16 @@ fi
 exec chroot "$root" /usr/bin/env -i "${settings[@]}" /bin/bash -euo pipefail -c '
   if [ -d /vlp ]; then
     cd /vlp
-    git fetch --quiet origin HEAD && git reset --quiet --hard FETCH_HEAD
+    git fetch --quiet origin HEAD
+    git reset --quiet --hard FETCH_HEAD
   else
     git clone --quiet /vlp.git /vlp
     cd /vlp
   fi
   eval "$1"' bash "$command" </dev/null
 INSIDE
+child=$!
+wait "$child" || code=$?
+child=''
 echo "bare_root.sh: $release, '$command' ended with exit code $code after $(seconds_since "$begin") s"
 exit "$code"

@@ -85,13 +85,14 @@ SeenBoards see_boards(const BoardImages& input, const StepProgress& progress) {
   cv::setNumThreads(1);  // the images themselves go in parallel
   const BoardDetector detector(input.board);
   FoundBoards found = detect_boards(detector, input.images, input.threads,
-                                   corner_cache(input.cache, input.board), [&](std::size_t done) {
-                                     if (progress) progress(done, input.images.size());
-                                   });
+                                    corner_cache(input.cache, input.board), [&](std::size_t done) {
+                                      if (progress) progress(done, input.images.size());
+                                    });
   SeenBoards seen;
   seen.skipped = skipped_images(input.images, found.refused);
   seen.views = std::move(found.views);
-  if (seen.views.empty()) throw nothing_usable(input.images.front(), input.images.size(), seen);
+  if (seen.views.empty())
+    throw nothing_usable(input.images.front().parent_path(), input.images.size(), seen);
   check_sizes(seen.views);
   const bool any = std::any_of(seen.views.begin(), seen.views.end(),
                                [](const BoardView& view) { return !view.seen.tags.empty(); });

@@ -29,7 +29,7 @@ struct DispersionResult : StepResult {
 };
 
 /// What fixes at known places still lack. Metrics: dispersion_mm, dispersion_offset_px, and where
-/// it is known world_mm. Throws InputError when the map has none of the lamps seen. wrong_map,
+/// it is known world_mm. wrong_map,
 /// wrong_place, undetermined. Precondition: there is a capture.
 DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,
                                   DispersionMethod method, DispersionCircle circle,

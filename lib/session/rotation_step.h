@@ -44,8 +44,8 @@ struct RotationResult : StepResult {
 };
 
 /// Rotation centre and tilt from captures of a turn on the spot. Metrics: rotation_px,
-/// rotation_spread_px, tilt_deg, and where they are known rotation_sd_px, lever_arm_mm. Throws
-/// InputError when the map has none of the lamps seen. wrong_map, undetermined.
+/// rotation_spread_px, tilt_deg, and where they are known rotation_sd_px, lever_arm_mm. wrong_map,
+/// undetermined.
 RotationResult solve_rotation(const LampCaptures& input, RotationMethod method, HistoryEntry entry);
 
 }  // namespace vlp

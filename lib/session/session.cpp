@@ -64,11 +64,16 @@ std::string build_of(const ProgramVersion& program) {
                      changed);
 }
 
-/// What the session's folder is called is of no interest in its results.
-std::string without_folder(std::string text, const fs::path& session) {
-  const std::string folder = session.string() + "/";
+/// What a folder is called is of no interest in the results; where a name begins with it.
+std::string without_folder(std::string text, const fs::path& named) {
+  const std::string folder = (named / "").string();
   for (auto at = text.find(folder); at != std::string::npos; at = text.find(folder, at)) {
-    text.erase(at, folder.size());
+    const bool begins = at == 0 || text[at - 1] == ' ' || text[at - 1] == '\'';
+    if (begins) {
+      text.erase(at, folder.size());
+    } else {
+      ++at;
+    }
   }
   return text;
 }
@@ -79,8 +84,18 @@ constexpr std::array kResults{
     "rotation.svg", "calibration.yaml", "dispersion.svg", "check-fixes.csv", "evaluation.json",
     "gates.xml",    "report.html",      "session.json"};
 
+/// Fixes of drives, but for those that are wanted.
+void forget_drives(const fs::path& results, const std::set<std::string>& wanted) {
+  for (const auto& entry : fs::directory_iterator(results)) {
+    const std::string name = entry.path().filename().string();
+    const bool drive = name.starts_with("line-") && name.ends_with("-fixes.csv");
+    if (drive && !wanted.contains(name)) fs::remove(entry.path());
+  }
+}
+
 void forget_all(const fs::path& results) {
   for (const char* name : kResults) fs::remove(results / name);
+  forget_drives(results, {});
   for (const auto& entry : fs::directory_iterator(results / "steps")) {
     if (entry.path().extension() == ".json") fs::remove(entry.path());
   }
@@ -175,11 +190,7 @@ class SessionRun {
     for (const char* name : kResults) {
       if (!wanted.contains(name)) remove(name);
     }
-    for (const auto& entry : fs::directory_iterator(results_)) {
-      const std::string name = entry.path().filename().string();
-      const bool drive = name.starts_with("line-") && name.ends_with("-fixes.csv");
-      if (drive && !wanted.contains(name)) remove(name);
-    }
+    forget_drives(results_, wanted);
     for (const auto& entry : fs::directory_iterator(results_ / "steps")) {
       const bool step = entry.path().extension() == ".json";
       if (step && !steps.contains(entry.path().stem().string())) fs::remove(entry.path());
@@ -212,9 +223,11 @@ class SessionRun {
     for (const fs::path& input : inputs) {
       if (input.empty()) continue;
       text += input.filename().string() + " ";
-      text += fs::is_directory(input) ? digests_.of_all(input)
-              : fs::exists(input)     ? sha256_of_file(input)
-                                      : "missing";
+      try {
+        text += fs::is_directory(input) ? digests_.of_all(input) : sha256_of_file(input);
+      } catch (const InputError&) {
+        text += "cannot be read";
+      }
       text += "\n";
     }
     return sha256_of_text(text);
@@ -231,7 +244,9 @@ class SessionRun {
         std::find(options_.redo.begin(), options_.redo.end(), name) != options_.redo.end();
     const auto kept = read_step(kept_file);
     SessionStep done{name, false, {}};
-    if (!redo && kept && kept->key == key && kept->outputs == digest_of_outputs(name)) {
+    // What could not be read may be there now.
+    const bool again = redo || !kept || kept->result.failure == StepFailure::bad_input;
+    if (!again && kept->key == key && kept->outputs == digest_of_outputs(name)) {
       done.as_before = true;
       done.result = kept->result;
     } else {
@@ -437,8 +452,9 @@ class SessionRun {
   bool readable(const fs::path& camera) {
     const bool told = options_.row_time_s || options_.readout;
     return step("lens", {camera}, told ? "told" : "", [&] {
-      read_calibration(camera);
+      const auto report = read_calibration(camera).intrinsics_report;
       Work work;
+      if (report) work.result.metrics = {{"rms_px", report->rms_px}};
       if (told) {
         work.result.warnings.emplace_back(
             "camera.yaml says what the camera is: row time and read-out that were stated are not "
@@ -461,7 +477,7 @@ class SessionRun {
     const fs::path calibration = out("calibration.yaml");
     return step(name, lamp_inputs(folder, calibration), "", [&] {
       LocateInput input{
-          {}, read_lamp_map(lamps_file()), read_calibration(calibration), captures_in(folder)};
+          {}, read_lamp_map(lamps_file()), read_calibration(calibration), captures_table(folder)};
       SeenLamps seen = see(folder, input.lamps, input.calibration, calibration);
       if (!seen.ok()) return Work{seen};
       input.frames = std::move(seen.frames);
@@ -510,7 +526,7 @@ class SessionRun {
     if (!gates_file().empty()) gates = read_gates(gates_file());
     auto input = std::make_shared<EvaluationInput>();
     input->fixes = {out("check-fixes.csv"), read_fixes(out("check-fixes.csv"))};
-    input->truth = {truth, read_truth(truth)};
+    input->truth = {truth, truth_in(truth.parent_path())};
     input->station_m = place_radius_m(*result_.calibration);
     input->threads = options_.threads;
     EvaluateResult found = evaluate_fixes(*input, gates);
@@ -518,20 +534,21 @@ class SessionRun {
     for (const fs::path& line : lines()) {
       const fs::path places = *truth_file(line),
                      fixes = out(line.filename().string() + "-fixes.csv");
-      drives.push_back({{fixes, read_fixes(fixes)}, ends_of(places, read_truth(places))});
+      drives.push_back({{fixes, read_fixes(fixes)}, ends_of(places, truth_in(line))});
+      if (fit_line(drives.back().fixes.rows, drives.back().commanded_m)) continue;
+      throw InputError(fixes, "no line can be fitted to its fixes: they have no direction");
     }
     if (!found.ok()) return {found};
-    std::string page;
     std::vector<GateResult> all = result_.gates;
     all.insert(all.end(), found.gates.begin(), found.gates.end());
-    if (options_.report) {
-      page = report_page({*input, found, all, read_lamp_map(lamps_file()), result_.calibration,
-                          std::move(drives), pictures(), history("", inputs)});
-    }
-    return {found, [this, found, all, page] {
+    return {found, [=, this] {
               write_file(out("evaluation.json"), json_of(found.evaluation, found.gates));
               if (!all.empty()) write_file(out("gates.xml"), junit_of(all));
-              if (options_.report) write_file(out("report.html"), page);
+              if (!options_.report) return;
+              write_file(
+                  out("report.html"),
+                  report_page({*input, found, all, read_lamp_map(lamps_file()), result_.calibration,
+                               drives, pictures(), history("", inputs)}));
             }};
   }
 
@@ -570,8 +587,6 @@ class SessionRun {
       if (behind) forget(name);
       behind = behind || name == failed;
     }
-    if (failed == "lens" || failed == "row-time" || failed == "rotation")
-      remove("calibration.yaml");
   }
 
   const SessionFolder& session_;
@@ -583,17 +598,31 @@ class SessionRun {
   SessionResult result_;
 };
 
-/// That no other session has its results there.
-void claim(const fs::path& results, const fs::path& session) {
-  const fs::path mark = results / "steps/session";
-  const std::string name = fs::weakly_canonical(session).string() + "\n";
+/// Says whose results they are.
+fs::path mark_of(const fs::path& results) { return results / "steps/session"; }
+
+std::string mark_text(const fs::path& session) {
+  return fs::weakly_canonical(session / "").string() + "\n";
+}
+
+/// That neither another session's results are there, nor what is not of this program.
+void check_results(const fs::path& results, const fs::path& session) {
+  const fs::path mark = mark_of(results);
+  const std::string name = mark_text(session);
   constexpr std::size_t most_bytes = 1 << 16;
-  if (fs::exists(mark) && read_text_file(mark, most_bytes) != name) {
+  if (fs::exists(mark)) {
+    if (read_text_file(mark, most_bytes) == name) return;
     throw InputError(results,
-                     "holds the results of another session; give this one a folder of its "
-                     "own");
+                     "holds the results of another session; give this one a folder of its own");
   }
-  if (!fs::exists(mark)) write_file(mark, name);
+  std::vector<const char*> others(kResults.begin(), kResults.end());
+  others.insert(others.end(), {"lamps.yaml", "board.yaml", "boards", "rotation"});
+  for (const char* other : others) {
+    if (!fs::exists(results / other)) continue;
+    throw InputError(results, fmt::format("holds {}, which is not of vlp-calibrate; give the "
+                                          "results a folder of their own",
+                                          other));
+  }
 }
 
 }  // namespace
@@ -617,11 +646,12 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
   if (holds_captures(session, results)) {
     throw InputError(results, "holds captures: results go to a folder of their own");
   }
+  check_results(results, session);
   std::error_code error;
   fs::create_directories(results / "steps", error);
   if (error) throw InputError(results, "cannot be made: " + error.message());
   const ResultsLock lock(results);
-  claim(results, session);
+  if (!fs::exists(mark_of(results))) write_file(mark_of(results), mark_text(session));
   std::optional<SessionFolder> folder;
   try {
     folder.emplace(session);

@@ -16,16 +16,18 @@
 
 namespace vlp {
 
+// clang-format off
 /// The steps of the procedure, in their order. A drive along a line, "line-x", is a step of its own
 /// between check and evaluate.
 ///
 ///   lens        boards -> lens.yaml, lens.cameramodel, lens.svg      unless there is camera.yaml
 ///   row-time    rotation -> camera.yaml                              unless the row time is known
 ///   rotation    rotation -> rotated.yaml, rotation.svg
-///   dispersion  dispersion -> calibration.yaml, dispersion.svg       unless there is no
-///   dispersion/ check       check -> check-fixes.csv                             unless there is
-///   no check/ line-x      line-x -> line-x-fixes.csv evaluate    -> evaluation.json, gates.xml,
-///   report.html           unless no places are known
+///   dispersion  dispersion -> calibration.yaml, dispersion.svg       unless there is no dispersion/
+///   check       check -> check-fixes.csv                             unless there is no check/
+///   line-x      line-x -> line-x-fixes.csv
+///   evaluate    -> evaluation.json (with the gates of the errors), gates.xml (with all), report.html
+// clang-format on
 struct SessionOptions {
   ProgramVersion program;
   std::string camera_id = "camera";

@@ -10,9 +10,13 @@ namespace vlp {
 
 namespace fs = std::filesystem;
 
+CapturesTable captures_table(const fs::path& folder) {
+  const fs::path file = folder / "captures.csv";
+  return fs::exists(file) ? read_captures(file) : CapturesTable{};
+}
+
 CapturesTable captures_in(const fs::path& folder) {
-  CapturesTable captures;
-  if (fs::exists(folder / "captures.csv")) captures = read_captures(folder / "captures.csv");
+  CapturesTable captures = captures_table(folder);
   if (!fs::exists(folder / "truth.csv")) return captures;
   for (const TruthRow& row : read_truth(folder / "truth.csv")) {
     Capture& capture = captures[row.image];
@@ -34,6 +38,29 @@ std::optional<fs::path> truth_file(const fs::path& folder) {
   return places ? std::optional(folder / "captures.csv") : std::nullopt;
 }
 
+std::vector<TruthRow> truth_in(const fs::path& folder) {
+  if (fs::exists(folder / "truth.csv")) return read_truth(folder / "truth.csv");
+  std::vector<TruthRow> rows;
+  for (const auto& [image, capture] : captures_table(folder)) {
+    if (!capture.x_m || !capture.y_m) continue;
+    rows.push_back({image, {*capture.x_m, *capture.y_m}, capture.z_m, capture.yaw_rad});
+  }
+  return rows;
+}
+
+namespace {
+
+bool is_drive(const fs::path& folder) {
+  if (!folder.filename().string().starts_with("line-") || !fs::is_directory(folder)) return false;
+  try {
+    return truth_file(folder).has_value();
+  } catch (const InputError&) {
+    return true;
+  }
+}
+
+}  // namespace
+
 SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   if (!fs::is_directory(folder)) throw InputError(folder, "is not a folder of captures");
   const auto need = [&](const char* name) {
@@ -41,26 +68,21 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   };
   need("lamps.yaml");
   need("rotation");
-  if (camera()) return;
-  if (!fs::exists(board()) && !fs::exists(boards())) {
+  if (!camera() && !fs::exists(board()) && !fs::exists(boards())) {
     throw InputError(folder, "has neither boards with board.yaml nor camera.yaml");
   }
-  need("board.yaml");
-  need("boards");
+  if (!camera()) {
+    need("board.yaml");
+    need("boards");
+  }
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    if (is_drive(entry.path())) lines_.push_back(entry.path());
+  }
+  std::sort(lines_.begin(), lines_.end());
 }
 
 std::optional<fs::path> SessionFolder::if_there(const char* name) const {
   return fs::exists(folder_ / name) ? std::optional(folder_ / name) : std::nullopt;
-}
-
-std::vector<fs::path> SessionFolder::lines() const {
-  std::vector<fs::path> lines;
-  for (const auto& entry : fs::directory_iterator(folder_)) {
-    const bool line = entry.path().filename().string().starts_with("line-");
-    if (line && entry.is_directory() && truth_file(entry.path())) lines.push_back(entry.path());
-  }
-  std::sort(lines.begin(), lines.end());
-  return lines;
 }
 
 bool holds_captures(const fs::path& session, const fs::path& results) {

@@ -21,18 +21,23 @@ namespace vlp {
 ///
 /// Each throws InputError for a table that cannot be read.
 
+/// captures.csv alone; empty without.
+CapturesTable captures_table(const std::filesystem::path& folder);
 /// captures.csv, with the places of truth.csv; empty without either.
 CapturesTable captures_in(const std::filesystem::path& folder);
 /// The table that fixes of the folder are held against: truth.csv, or captures.csv when that tells
 /// places; nothing without.
 std::optional<std::filesystem::path> truth_file(const std::filesystem::path& folder);
+/// The places in it, in its order; captures.csv need not tell one of every image, and is in the
+/// order of the images. Precondition: there is one.
+std::vector<TruthRow> truth_in(const std::filesystem::path& folder);
 
+// clang-format off
 /// The folder of a camera's captures, which is only read:
 ///
 ///   lamps.yaml            the lamps, with their frequencies or with classifier.yaml
-///   boards/, board.yaml   images of the board, and what it is; or camera.yaml, the camera part of
-///   a
-///                         calibration that is there already, which goes before
+///   boards/, board.yaml   images of the board, and what it is; or
+///   camera.yaml           the camera part of a calibration, which goes before them
 ///   rotation/             captures while the camera turns on the spot
 ///   dispersion/           at known places, turning (optional)
 ///   check/                to locate, and with places to evaluate (optional)
@@ -41,6 +46,7 @@ std::optional<std::filesystem::path> truth_file(const std::filesystem::path& fol
 ///   gates.yaml            what the errors have to keep to (optional)
 ///
 /// Other files and folders are left alone.
+// clang-format on
 class SessionFolder {
  public:
   /// Throws InputError when something is missing.
@@ -56,13 +62,15 @@ class SessionFolder {
   std::optional<std::filesystem::path> check() const { return if_there("check"); }
   std::optional<std::filesystem::path> classifier() const { return if_there("classifier.yaml"); }
   std::optional<std::filesystem::path> gates() const { return if_there("gates.yaml"); }
-  /// Drives along a line whose places are known, by name.
-  std::vector<std::filesystem::path> lines() const;
+  /// Drives along a line whose places are known, by name; one whose table cannot be read is there,
+  /// for its step to say so.
+  const std::vector<std::filesystem::path>& lines() const { return lines_; }
 
  private:
   std::optional<std::filesystem::path> if_there(const char* name) const;
 
   std::filesystem::path folder_;
+  std::vector<std::filesystem::path> lines_;
 };
 
 /// Whether a folder is a session's, or one of the captures in it: no place for results.

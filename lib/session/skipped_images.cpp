@@ -4,11 +4,16 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 namespace vlp {
 
 std::vector<SkippedImage> skipped_images(const std::vector<std::filesystem::path>& images,
                                          const std::vector<std::string>& refused) {
   std::vector<SkippedImage> skipped;
+  const bool one_folder = std::all_of(images.begin(), images.end(), [&](const auto& other) {
+    return other.parent_path() == images.front().parent_path();
+  });
   auto image = images.begin();
   for (const std::string& line : refused) {  // in the order of the images
     while (image != images.end() && !line.starts_with(image->string() + ": ")) ++image;
@@ -17,7 +22,8 @@ std::vector<SkippedImage> skipped_images(const std::vector<std::filesystem::path
       image = images.begin();
       continue;
     }
-    skipped.push_back({image->filename().string(), line.substr(image->string().size() + 2)});
+    const auto name = one_folder ? image->filename() : *image;
+    skipped.push_back({name.string(), line.substr(image->string().size() + 2)});
     ++image;
   }
   return skipped;

@@ -11,7 +11,8 @@
 
 namespace vlp {
 
-/// Lines "FILE: why" of images that were refused, by their names. A line of another form keeps its
+/// Lines "FILE: why" of images that were refused, by their names, with their folders where there
+/// are several. A line of another form keeps its
 /// words.
 std::vector<SkippedImage> skipped_images(const std::vector<std::filesystem::path>& images,
                                          const std::vector<std::string>& refused);

@@ -5,6 +5,7 @@ import json
 
 FIGURES = ["captures", "fixes", "missing_share", "mean_mm", "median_mm", "p90_mm", "max_mm", "rms_px"]
 COLUMNS = ["camera", "session", "verdict", *FIGURES, "reason", "version", "inputs", "key", "cpu_s"]
+TOOK_TOO_LONG = (124, 137)  # exit codes of timeout
 # Files of vlp-calibrate that are kept, and their names there.
 KEPT = {
     "calibration.yaml": "calibration.yaml",
@@ -30,13 +31,13 @@ def figures_of(folder, session):
 
 def outcome_of(folder, name, ended, said):
     """The verdict: "pass", "gate" or "no result", as session.json says; "crashed", when vlp-calibrate ended
-    without one. ended: its exit code, or None when it took too long; said: what it said at the end."""
+    without one. ended: its exit code, of timeout when it took too long; said: what it said at the end."""
     camera, name_of_session = name.split("/")
     outcome = {"camera": camera, "session": name_of_session}
     try:
         session = json.loads((folder / "session.json").read_text())
     except FileNotFoundError:
-        words = "ran for more than an hour" if ended is None else f"ended with exit code {ended}"
+        words = "ran for more than an hour" if ended in TOOK_TOO_LONG else f"ended with exit code {ended}"
         last = said.strip().splitlines()[-1:]
         return outcome | {"verdict": "crashed", "reason": ": ".join([f"vlp-calibrate {words}", *last])}
     outcome |= {"verdict": session["verdict"], "reason": session["reason"]}

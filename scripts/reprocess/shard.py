@@ -49,22 +49,17 @@ def calibrate(run, name, work, lock):
     outlive us."""
     folder = work / name
     folder.mkdir(parents=True, exist_ok=True)
-    command = [Path(run["bin"]) / "vlp-calibrate", Path(run["archive"]) / name, "-o", folder, "--quiet", "--no-report"]
+    (folder / "session.json").unlink(missing_ok=True)  # of a run that was interrupted
+    command = ["timeout", "--foreground", "--kill-after=60", str(LONGEST_S), Path(run["bin"]) / "vlp-calibrate", Path(run["archive"]) / name, "-o", folder, "--quiet", "--no-report"]
     command += ["--threads", "1", f"--camera-id={name.split('/')[0]}", *shlex.split(run["camera"])]
     if run["session_gates"]:
         command += ["--gates", run["session_gates"]]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    try:
-        done = subprocess.run(
-            command, stderr=subprocess.PIPE, pass_fds=[lock.fileno()], timeout=LONGEST_S, check=False
-        )
-        ended, said = done.returncode, done.stderr
-    except subprocess.TimeoutExpired as late:
-        ended, said = None, late.stderr or b""
+    done = subprocess.run(command, stderr=subprocess.PIPE, pass_fds=[lock.fileno()], check=False)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    words = said.decode(errors="replace").replace(run["archive"] + "/", "")
-    return outcome_of(folder, name, ended, words), f"{seconds:.3f}"
+    words = done.stderr.decode(errors="replace").replace(run["archive"] + "/", "")
+    return outcome_of(folder, name, done.returncode, words), f"{seconds:.3f}"
 
 
 def same_file(source, target):

@@ -58,7 +58,7 @@ measured() {  # NAME COMMAND...
       $2 + $3, 100 * ($2 + $3) / $1 / cores, $4, 100 * ($6 - $5 - $2 - $3) / $1 / cores }' "$folder/measured/$name"
 }
 
-by_hand() {  # SESSION: as session.smk has it
+by_hand() {  # SESSION
   local station=$1 work
   work=$folder/hand/$(basename "$(dirname "$station")")/$(basename "$station")
   mkdir -p "$work"

@@ -243,17 +243,51 @@ TEST_F(SmallSession, RunsAStepAgainThatIsAskedFor) {
 TEST_F(SmallSession, GoesOnWhereItWasKilled) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string session = result("session.json"), report = result("report.html");
-  for (const char* moment : {"lens.yaml", "rotated.yaml", "check-fixes.csv", "evaluation.json"}) {
+  for (const char* moment : {"lens.yaml", "rotated.yaml", "check-fixes.csv"}) {
     fs::remove_all(folder / "results");
     // Killed as soon as the file is there.
-    run_program("vlp-calibrate '" + path("a session") + "' -o '" + path("results") +
-                "' --row-time-s 3e-5 --readout rows & until [ -e '" + path("results/") + moment +
-                "' ]; do sleep 0.01; done; kill -9 $!; wait");
+    const auto killed =
+        run_program("vlp-calibrate '" + path("a session") + "' -o '" + path("results") +
+                    "' --row-time-s 3e-5 --readout rows & until [ -e '" + path("results/") +
+                    moment + "' ] || ! kill -0 $!; do sleep 0.002; done; kill -9 $!; wait $!");
+    ASSERT_FALSE(fs::exists(folder / "results/session.json")) << moment << killed.errors;
     const auto on = calibrate();
     EXPECT_EQ(on.exit_code, 0) << moment << on.errors;
+    EXPECT_THAT(on.output, HasSubstr("lens          as before")) << moment;
     EXPECT_EQ(result("session.json"), session) << moment;
     EXPECT_EQ(result("report.html"), report) << moment;
   }
+}
+
+TEST_F(SmallSession, TouchesNothingThatIsNotItsOwn) {
+  folder.file("mine/calibration.yaml", "of somebody\n");
+  const auto run =
+      run_program("vlp-calibrate '" + path("a session") + "' -o '" + path("mine") + "'");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.errors, HasSubstr("mine: holds calibration.yaml, which is not of vlp-calibrate"));
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "mine/calibration.yaml"), "of somebody\n");
+  EXPECT_FALSE(fs::exists(folder / "mine/steps"));
+}
+
+TEST_F(SmallSession, LeavesNothingOfBeforeBesideAFailure) {
+  ASSERT_EQ(calibrate().exit_code, 0);
+  const std::string lamps = TemporaryFolder::content_of(folder / "a session/lamps.yaml");
+  fs::remove(folder / "a session/lamps.yaml");
+  EXPECT_EQ(calibrate().exit_code, 2);
+  for (const char* name : {"calibration.yaml", "report.html", "line-x-fixes.csv", "lens.yaml"}) {
+    EXPECT_FALSE(fs::exists(folder / "results" / name)) << name;
+  }
+  EXPECT_THAT(result("session.json"), HasSubstr("\"reason\": \"lamps.yaml: is missing\""));
+  folder.file("a session/lamps.yaml", lamps);
+  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
+  // A drive's table that is cut costs the report, and is said.
+  folder.file("a session/line-x/captures.csv", "image,x_m,y_m\n0000.png,1");
+  fs::remove(folder / "a session/line-x/truth.csv");
+  const auto cut = calibrate();
+  EXPECT_EQ(cut.exit_code, 2);
+  EXPECT_THAT(cut.errors, HasSubstr("line-x: line-x/captures.csv:2"));
+  EXPECT_TRUE(fs::exists(folder / "results/calibration.yaml"));
+  EXPECT_THAT(result("session.json"), HasSubstr("\"verdict\": \"no result\""));
 }
 
 TEST_F(SmallSession, TellsOfImagesThatAreDamaged) {

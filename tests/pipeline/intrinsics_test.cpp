@@ -68,7 +68,8 @@ TEST_P(RenderedRig, GivesItsLensWhateverTheThreads) {
   const auto gated = calibrate(rig + "/boards", board,
                                "--gate uncertainty_px=0.001 --held-out 6 --cache " + cache);
   EXPECT_EQ(gated.exit_code, 1);
-  EXPECT_THAT(gated.errors, HasSubstr("at most 0.001 px is asked for; add views, next the board in the "));
+  EXPECT_THAT(gated.errors,
+              HasSubstr("at most 0.001 px is asked for; add views, next the board in the "));
   EXPECT_THAT(gated.output, HasSubstr("held out      6 views"));
   EXPECT_EQ(read_calibration(folder / "camera.yaml").intrinsics_report->views, 30);
 

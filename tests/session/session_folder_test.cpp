@@ -49,6 +49,17 @@ TEST(TruthFile, IsTheTruthOrElseCapturesWithPlaces) {
   EXPECT_EQ(truth_file(folder / "")->filename(), "truth.csv");
 }
 
+TEST(TruthIn, TakesThePlacesThatCapturesTell) {
+  const TemporaryFolder folder;
+  folder.file("captures.csv", "image,x_m,y_m\nb.png,3,4\na.png,1,2\nc.png,,\n");
+  const auto places = truth_in(folder / "");
+  ASSERT_THAT(places, SizeIs(2));
+  EXPECT_EQ(places[0].image, "a.png");
+  EXPECT_EQ(places[1].xy_m.y(), 4);
+  folder.file("truth.csv", "image,x_m,y_m\nd.png,5,6\n");
+  EXPECT_EQ(truth_in(folder / "")[0].image, "d.png");
+}
+
 TEST(SessionFolder, SaysWhatIsMissing) {
   const TemporaryFolder folder;
   const auto refusal = [&] { return refusal_of([&] { SessionFolder(folder / "unit"); }); };

@@ -16,6 +16,11 @@ TEST(SkippedImages, AreNamedWithoutTheirFolder) {
   EXPECT_EQ(skipped[1].reason, "is 3: large");
 }
 
+TEST(SkippedImages, OfSeveralFoldersKeepTheirs) {
+  const auto skipped = skipped_images({"f/a.png", "g/a.png"}, {"g/a.png: is empty"});
+  EXPECT_EQ(skipped[0].image, "g/a.png");
+}
+
 TEST(NothingUsable, TellsTheFirstReason) {
   StepResult result;
   result.skipped = {{"a.png", "is cut short"}, {"b.png", "is empty"}};

@@ -36,7 +36,7 @@ TEST(StationFigures, AreMetUpToTheLimitOrFromItOn) {
 
 TEST(StationFigures, OfAGateAreThereWithoutAValue) {
   const std::vector<Metric> values{{"tilt_deg", 1},
-                                       {"rms_px", std::numeric_limits<double>::infinity()}};
+                                   {"rms_px", std::numeric_limits<double>::infinity()}};
   const std::vector<StationGate> gates{{"rms_px", 0.3}};
   const auto figures = with_gates(values, gates);
   ASSERT_THAT(figures, SizeIs(2));

@@ -47,9 +47,9 @@ Outcome outcome_of(const BoardDetector& detector, const std::filesystem::path& f
 }  // namespace
 
 FoundBoards detect_boards(const BoardDetector& detector,
-                         const std::vector<std::filesystem::path>& images, int threads,
-                         const BoardCache& cache,
-                         const std::function<void(std::size_t done)>& progress) {
+                          const std::vector<std::filesystem::path>& images, int threads,
+                          const BoardCache& cache,
+                          const std::function<void(std::size_t done)>& progress) {
   std::vector<Outcome> outcomes(images.size());
   std::mutex counting;
   std::size_t done = 0;

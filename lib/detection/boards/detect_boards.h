@@ -38,8 +38,8 @@ struct FoundBoards {
 /// does not end it. The result does not depend on the threads. `progress` gets the images done so
 /// far; its calls do not overlap, while those of `cache`, whose functions may be empty, do.
 FoundBoards detect_boards(const BoardDetector& detector,
-                         const std::vector<std::filesystem::path>& images, int threads,
-                         const BoardCache& cache,
-                         const std::function<void(std::size_t done)>& progress);
+                          const std::vector<std::filesystem::path>& images, int threads,
+                          const BoardCache& cache,
+                          const std::function<void(std::size_t done)>& progress);
 
 }  // namespace vlp
