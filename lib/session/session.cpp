@@ -132,7 +132,7 @@ class SessionRun {
       std::string names;
       bool known = false;
       for (const auto& [step, files] : steps) {
-        names += (names.empty() ? "" : ", ") + step;
+        names.append(names.empty() ? "" : ", ").append(step);
         known = known || step == name;
       }
       if (known) continue;

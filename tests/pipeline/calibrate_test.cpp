@@ -260,6 +260,7 @@ TEST_F(SmallSession, GoesOnWhereItWasKilled) {
 }
 
 TEST_F(SmallSession, TouchesNothingThatIsNotItsOwn) {
+  fs::create_directory(folder / "mine");
   folder.file("mine/calibration.yaml", "of somebody\n");
   const auto run =
       run_program("vlp-calibrate '" + path("a session") + "' -o '" + path("mine") + "'");
