@@ -12,16 +12,16 @@
 namespace vlp {
 namespace {
 
-struct Outcome {
+struct CaptureOutcome {
   std::vector<Detection> lamps;
   std::array<int, 4> lights{};
   std::string refused;
 };
 
-Outcome outcome_of(const LampDetector& detector, const std::filesystem::path& file,
-                   const DetectRun& run) {
+CaptureOutcome outcome_of(const LampDetector& detector, const std::filesystem::path& file,
+                          const DetectRun& run) {
   const ImageLights found = detect_image(detector, file, run.imager_px);
-  Outcome outcome;
+  CaptureOutcome outcome;
   outcome.refused = found.refused;
   if (!outcome.refused.empty()) return outcome;
   if (run.annotate) {
@@ -41,7 +41,7 @@ CaptureDetections detect_captures(const LampDetector& detector,
                                   const std::vector<std::filesystem::path>& images,
                                   const DetectRun& run,
                                   const std::function<void(std::size_t done)>& progress) {
-  std::vector<Outcome> outcomes(images.size());
+  std::vector<CaptureOutcome> outcomes(images.size());
   std::mutex counting;
   std::size_t done = 0;
   in_parallel(images.size(), run.threads, [&](std::size_t i) {
@@ -53,7 +53,7 @@ CaptureDetections detect_captures(const LampDetector& detector,
   CaptureDetections result;
   result.images = static_cast<int>(images.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
-    Outcome& outcome = outcomes[i];
+    CaptureOutcome& outcome = outcomes[i];
     if (!outcome.refused.empty()) {
       result.refused.push_back(std::move(outcome.refused));
       continue;

@@ -16,14 +16,14 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// Figures in the unit that their keys end in.
-struct Unit {
+struct KeyUnit {
   const char* ending;
   double of_one;
 };
-const Unit kMm{"_mm", 1e3};
-const Unit kDeg{"_deg", deg_from_rad(1)};
+const KeyUnit kMmKeys{"_mm", 1e3};
+const KeyUnit kDegKeys{"_deg", deg_from_rad(1)};
 
-Json json_of(const ErrorFigures& figures, const Unit& unit) {
+Json json_of(const ErrorFigures& figures, const KeyUnit& unit) {
   const auto key = [&](const char* name) { return name + std::string(unit.ending); };
   return {{key("mean"), unit.of_one * figures.mean},
           {key("median"), unit.of_one * figures.median},
@@ -32,7 +32,7 @@ Json json_of(const ErrorFigures& figures, const Unit& unit) {
           {key("rms"), unit.of_one * figures.rms}};
 }
 
-Json json_of(const SignedFigures& figures, const Unit& unit) {
+Json json_of(const SignedFigures& figures, const KeyUnit& unit) {
   Json json = json_of(figures.sizes, unit);
   json["bias" + std::string(unit.ending)] = unit.of_one * figures.bias;
   json["fixes"] = figures.sizes.count;
@@ -40,13 +40,13 @@ Json json_of(const SignedFigures& figures, const Unit& unit) {
 }
 
 Json json_of(const Interval& interval_m) {
-  return {kMm.of_one * interval_m.low, kMm.of_one * interval_m.high};
+  return {kMmKeys.of_one * interval_m.low, kMmKeys.of_one * interval_m.high};
 }
 
 Json json_of(const std::vector<std::pair<double, double>>& distribution_m) {
   Json points = Json::array();
   for (const auto& [share, error_m] : distribution_m) {
-    points.push_back({{"share", share}, {"error_mm", kMm.of_one * error_m}});
+    points.push_back({{"share", share}, {"error_mm", kMmKeys.of_one * error_m}});
   }
   return points;
 }
@@ -57,20 +57,20 @@ Json json_of(const StationFigures& figures) {
     list.push_back({{"x_m", station.xy_m.x()},
                     {"y_m", station.xy_m.y()},
                     {"fixes", station.fixes},
-                    {"bias_x_mm", kMm.of_one * station.bias_m.x()},
-                    {"bias_y_mm", kMm.of_one * station.bias_m.y()},
-                    {"sd_mm", kMm.of_one * station.sd_m}});
+                    {"bias_x_mm", kMmKeys.of_one * station.bias_m.x()},
+                    {"bias_y_mm", kMmKeys.of_one * station.bias_m.y()},
+                    {"sd_mm", kMmKeys.of_one * station.sd_m}});
   }
   return {{"stations", figures.stations.size()},
           {"fixes", figures.fixes},
-          {"bias_mm", kMm.of_one * figures.bias_m},
-          {"scatter_mm", kMm.of_one * figures.scatter_m},
+          {"bias_mm", kMmKeys.of_one * figures.bias_m},
+          {"scatter_mm", kMmKeys.of_one * figures.scatter_m},
           {"list", list}};
 }
 
 Json json_of(const LineFit& fit) {
-  Json json = json_of(fit.distances_m, kMm);
-  json["jitter_mm"] = kMm.of_one * fit.jitter_m;
+  Json json = json_of(fit.distances_m, kMmKeys);
+  json["jitter_mm"] = kMmKeys.of_one * fit.jitter_m;
   json["angle_deg"] = deg_from_rad(fit.angle_rad);
   for (const auto& [key, end] : {std::pair("begin", fit.line_m[0]), {"end", fit.line_m[1]}}) {
     json[key] = {{"x_m", end.x()}, {"y_m", end.y()}};
@@ -95,7 +95,7 @@ Json json_of(const Comparison& comparison) {
             {"smaller_errors", comparison.smaller},
             {"larger_errors", comparison.larger}};
   if (comparison.pairs > 0) {
-    json["mean_difference_mm"] = kMm.of_one * comparison.mean_difference_m;
+    json["mean_difference_mm"] = kMmKeys.of_one * comparison.mean_difference_m;
   }
   if (comparison.too_few()) json["why"] = "too few";
   if (comparison.interval_m) json["interval_95_mm"] = json_of(*comparison.interval_m);
@@ -125,7 +125,7 @@ std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>&
             {"fixes", evaluation.fixes},
             {"missing_share", evaluation.missing_share()},
             {"missing", evaluation.missing},
-            {"horizontal", json_of(evaluation.horizontal_m, kMm)}};
+            {"horizontal", json_of(evaluation.horizontal_m, kMmKeys)}};
   if (const auto& intervals = evaluation.intervals_m) {
     json["horizontal"]["intervals_95"] = {{"drawn", evaluation.drawn},
                                           {"units", intervals->units},
@@ -136,14 +136,14 @@ std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>&
     json_of_intervals["rms_mm"] = json_of(intervals->rms);
   }
   json["horizontal"]["cdf"] = json_of(evaluation.distribution_m);
-  if (evaluation.height_m) json["height"] = json_of(*evaluation.height_m, kMm);
-  if (evaluation.yaw_rad) json["yaw"] = json_of(*evaluation.yaw_rad, kDeg);
+  if (evaluation.height_m) json["height"] = json_of(*evaluation.height_m, kMmKeys);
+  if (evaluation.yaw_rad) json["yaw"] = json_of(*evaluation.yaw_rad, kDegKeys);
   if (evaluation.stations) json["repeated"] = json_of(*evaluation.stations);
   if (evaluation.fit) json["fitted_line"] = json_of(*evaluation.fit);
   if (evaluation.stated) json["stated_ratio"] = json_of(*evaluation.stated);
   if (evaluation.limit) {
     json["limit"] = {{"ratio", evaluation.limit->horizontal},
-                     {"limit_rms_mm", kMm.of_one * evaluation.limit->limit_m},
+                     {"limit_rms_mm", kMmKeys.of_one * evaluation.limit->limit_m},
                      {"fixes", evaluation.limit->fixes}};
   }
   if (evaluation.comparison) json["comparison"] = json_of(*evaluation.comparison);

@@ -13,8 +13,6 @@
 namespace vlp {
 namespace {
 
-constexpr int kDigits = 7;
-
 /// The data, in blocks: corners and outliers as u v du dv, and the map as u v sd.
 std::string data_of(const IntrinsicsPlot& plot) {
   std::string corners, outliers, map;
@@ -31,7 +29,7 @@ std::string data_of(const IntrinsicsPlot& plot) {
       const double sd_px = plot.sd_px[row * cols + col];
       map += std::isfinite(sd_px)
                  ? data_row({u, v, sd_px})
-                 : significant(u, kDigits) + " " + significant(v, kDigits) + " NaN\n";
+                 : significant(u, kPlotDigits) + " " + significant(v, kPlotDigits) + " NaN\n";
     }
     map += "\n";
   }
@@ -83,7 +81,7 @@ std::string map_of(const IntrinsicsPlot& plot) {
   const auto levels = round_numbers(least, most);
   std::string tics, lines;
   for (const double level : levels) {
-    const std::string text = significant(level, kDigits);
+    const std::string text = significant(level, kPlotDigits);
     tics.append(tics.empty() ? "" : ",").append(text);
     if (level > least && level < most) lines.append(lines.empty() ? "" : ",").append(text);
   }
@@ -93,10 +91,12 @@ std::string map_of(const IntrinsicsPlot& plot) {
                "\nset table $lines\nsplot $map using 1:2:3\nunset table\nunset contour\n";
   }
   const auto rows = plot.sd_px.size() / static_cast<std::size_t>(plot.cols);
-  const std::string half_u = significant((plot.imager_px[0] - 1) / 2.0 / (plot.cols - 1), kDigits),
-                    half_v = significant((plot.imager_px[1] - 1) / 2.0 / double(rows - 1), kDigits);
-  commands += "set cbrange [" + significant(levels.front(), kDigits) + ":" +
-              significant(levels.back(), kDigits) + "]\nset cbtics (" + tics +
+  const std::string half_u =
+                        significant((plot.imager_px[0] - 1) / 2.0 / (plot.cols - 1), kPlotDigits),
+                    half_v =
+                        significant((plot.imager_px[1] - 1) / 2.0 / double(rows - 1), kPlotDigits);
+  commands += "set cbrange [" + significant(levels.front(), kPlotDigits) + ":" +
+              significant(levels.back(), kPlotDigits) + "]\nset cbtics (" + tics +
               ")\nset logscale cb\nset cblabel 'standard deviation (px)'\n"
               "plot $map using 1:2:(" +
               half_u + "):(" + half_v +
@@ -125,7 +125,7 @@ double residual_magnification(double rms_px, int width_px) {
 Drawing drawing_of(const IntrinsicsPlot& plot) {
   assert(plot.cols >= 2 && plot.sd_px.size() >= 2 * static_cast<std::size_t>(plot.cols));
   const auto [width, height] = plot.imager_px;
-  const std::string times = significant(residual_magnification(rms_px(plot), width), kDigits);
+  const std::string times = significant(residual_magnification(rms_px(plot), width), kPlotDigits);
   const std::string arrows =
       "using 1:2:($3 * " + times + "):($4 * " + times + ") with vectors nohead ";
   const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.18";
@@ -133,10 +133,10 @@ Drawing drawing_of(const IntrinsicsPlot& plot) {
       data_of(plot) + plot_settings() +
       "set size ratio -1\n"
       "set xrange [-0.5:" +
-      significant(width - 0.5, kDigits) +
+      significant(width - 0.5, kPlotDigits) +
       "]\n"
       "set yrange [" +
-      significant(height - 0.5, kDigits) +
+      significant(height - 0.5, kPlotDigits) +
       ":-0.5]\n"  // as in the image
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"

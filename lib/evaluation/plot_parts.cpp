@@ -5,11 +5,7 @@
 #include "captures/csv_writer.h"
 
 namespace vlp {
-namespace {
-
-constexpr int kDigits = 7;
-
-}  // namespace
+namespace {}  // namespace
 
 std::string gnuplot_quoted(const std::string& text) {
   std::string quoted = "'";
@@ -27,7 +23,7 @@ std::string gnuplot_quoted(const std::string& text) {
 
 std::string data_row(std::initializer_list<double> values) {
   std::string row;
-  for (const double value : values) row.append(significant(value, kDigits)).append(" ");
+  for (const double value : values) row.append(significant(value, kPlotDigits)).append(" ");
   return row + "\n";
 }
 
@@ -45,7 +41,7 @@ std::string plot_settings() {
 }
 
 std::string plot_range(double from, double to) {
-  return "[" + significant(from, kDigits) + ":" + significant(to, kDigits) + "]";
+  return "[" + significant(from, kPlotDigits) + ":" + significant(to, kPlotDigits) + "]";
 }
 
 }  // namespace vlp

@@ -20,7 +20,10 @@ constexpr const char* grey = "#666666";
 /// `text` as a gnuplot string, with nothing in it interpreted; lines stay lines.
 std::string gnuplot_quoted(const std::string& text);
 
-/// A line of numbers with seven digits.
+/// Digits of the numbers in a plot.
+constexpr int kPlotDigits = 7;
+
+/// A line of numbers.
 std::string data_row(std::initializer_list<double> values);
 
 /// Rows as the data block `$name`.

@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-constexpr const char* kFormat = "vlp-board/1";
+constexpr const char* kBoardFormat = "vlp-board/1";
 constexpr std::array kFamilies{"tag36h11",         "tag25h9",         "tag16h5",
                                "tagCircle21h7",    "tagCircle49h12",  "tagCustom48h12",
                                "tagStandard41h12", "tagStandard52h13"};
@@ -62,7 +62,7 @@ Board read_board(YamlMap& map) {
 }
 
 Board read_board(const std::filesystem::path& file) {
-  YamlMap document = read_yaml(file, kFormat);
+  YamlMap document = read_yaml(file, kBoardFormat);
   Board board = read_board(document);
   document.finish();
   return board;
@@ -71,7 +71,7 @@ Board read_board(const std::filesystem::path& file) {
 void write_board(const std::filesystem::path& file, const Board& board) {
   YAML::Emitter out;
   out << YAML::BeginMap;
-  emit_word(out, "format", kFormat);
+  emit_word(out, "format", kBoardFormat);
   emit_word(out, "family", board.family);
   emit_integer(out, "cols", board.cols);
   emit_integer(out, "rows", board.rows);

@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-constexpr const char* kFormat = "vlp-lamps/1";
+constexpr const char* kLampsFormat = "vlp-lamps/1";
 constexpr double kTooHigh_m = 200;  // a ceiling above this was given in millimetres
 constexpr double kCoincident_m = 1e-3;
 
@@ -56,7 +56,7 @@ const Lamp* find_lamp(std::span<const Lamp> lamps, int id) {
 }
 
 LampMap read_lamp_map(const std::filesystem::path& file) {
-  YamlMap document = read_yaml(file, kFormat);
+  YamlMap document = read_yaml(file, kLampsFormat);
   const YamlValue list = document.required("lamps");
   document.finish();
   LampMap map;
@@ -74,7 +74,7 @@ LampMap read_lamp_map(const std::filesystem::path& file) {
 void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {
   YAML::Emitter out;
   out << YAML::BeginMap;
-  emit_word(out, "format", kFormat);
+  emit_word(out, "format", kLampsFormat);
   out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
   for (const Lamp& lamp : map.lamps) {
     out << YAML::Flow << YAML::BeginMap;

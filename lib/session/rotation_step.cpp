@@ -18,8 +18,6 @@
 namespace vlp {
 namespace {
 
-constexpr double kMillimetres = 1e3;
-
 std::string name_of(RotationMethod method) {
   switch (method) {
     case RotationMethod::axis:
@@ -84,7 +82,7 @@ void add_metrics(RotationResult& result) {
     result.metrics.push_back({"rotation_sd_px", std::sqrt(covariance->trace())});
   }
   if (const auto& arm_m = center.lever_arm_m) {
-    result.metrics.push_back({"lever_arm_mm", kMillimetres * arm_m->norm()});
+    result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});
   }
 }
 

@@ -128,14 +128,11 @@ class SessionRun {
  private:
   void check_redo() const {
     const auto steps = outputs();
+    std::string names;
+    for (const auto& [step, files] : steps) names.append(names.empty() ? "" : ", ").append(step);
     for (const std::string& name : options_.redo) {
-      std::string names;
-      bool known = false;
-      for (const auto& [step, files] : steps) {
-        names.append(names.empty() ? "" : ", ").append(step);
-        known = known || step == name;
-      }
-      if (known) continue;
+      const auto known = [&](const auto& step) { return step.first == name; };
+      if (std::any_of(steps.begin(), steps.end(), known)) continue;
       throw std::invalid_argument("there is no step " + name + " here; the steps are: " + names);
     }
   }

@@ -6,8 +6,8 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <limits>
 
+#include "camera/random_lens.h"
 #include "support/near.h"
 #include "support/random.h"
 
@@ -15,8 +15,6 @@ namespace vlp {
 namespace {
 
 using Eigen::Vector2d;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// A distortion of one coefficient: an index into k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
 Distortion only(std::size_t index, double value) {

@@ -9,22 +9,22 @@
 namespace vlp {
 namespace {
 
-constexpr int kCameras = 100;
-constexpr std::size_t kPoints = 50;
+constexpr int kMrcalCameras = 100;
+constexpr std::size_t kMrcalPoints = 50;
 
 class LensBesideMrcal : public testing::TestWithParam<LensModel> {
  protected:
   Random random_{11};
 
   std::vector<Eigen::Vector3d> random_points() {
-    std::vector<Eigen::Vector3d> points(kPoints);
+    std::vector<Eigen::Vector3d> points(kMrcalPoints);
     for (auto& point : points) point = random_point(random_);
     return points;
   }
 };
 
 TEST_P(LensBesideMrcal, ProjectsToTheSamePixels) {
-  for (int camera = 0; camera < kCameras; ++camera) {
+  for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
     const auto points = random_points();
@@ -38,7 +38,7 @@ TEST_P(LensBesideMrcal, ProjectsToTheSamePixels) {
 }
 
 TEST_P(LensBesideMrcal, HasTheSameGradients) {
-  for (int camera = 0; camera < kCameras; ++camera) {
+  for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
     const MrcalOracle oracle = oracle_of(GetParam(), parameters);
@@ -65,7 +65,7 @@ TEST_P(LensBesideMrcal, HasTheSameGradients) {
 // points that made them.
 TEST_P(LensBesideMrcal, UnprojectsToTheSameRays) {
   int compared = 0;
-  for (int camera = 0; camera < kCameras; ++camera) {
+  for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
     const MrcalOracle oracle = oracle_of(GetParam(), parameters);
@@ -82,7 +82,7 @@ TEST_P(LensBesideMrcal, UnprojectsToTheSameRays) {
       ASSERT_LT(angle_rad(ray->direction, rays[i]), 1e-9) << pixels[i].transpose();
     }
   }
-  EXPECT_GT(compared, 0.95 * kCameras * static_cast<int>(kPoints));
+  EXPECT_GT(compared, 0.95 * kMrcalCameras * static_cast<int>(kMrcalPoints));
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, LensBesideMrcal, testing::ValuesIn(kEveryModel),

@@ -3,7 +3,6 @@
 // Bad parameters, pixels and points.
 #include <gmock/gmock.h>
 
-#include <limits>
 #include <stdexcept>
 
 #include "camera/random_lens.h"
@@ -12,11 +11,6 @@ namespace vlp {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-Lens plain_lens(LensModel model) { return {model, parameters_with(model, {})}; }
 
 class LensRefusal : public testing::TestWithParam<LensModel> {};
 

@@ -13,8 +13,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-Lens plain_lens(LensModel model) { return {model, parameters_with(model, {})}; }
-
 class EveryLens : public testing::TestWithParam<LensModel> {};
 
 TEST_P(EveryLens, GivesBackItsParameters) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -13,6 +14,9 @@
 namespace vlp {
 
 // For GoogleTest, which looks for it next to the type.
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 inline void PrintTo(LensModel model, std::ostream* out) { *out << name_of(model); }
 
 inline constexpr LensModel kEveryModel[] = {LensModel::pinhole, LensModel::stereographic,
@@ -34,6 +38,9 @@ inline MrcalOracle oracle_of(LensModel model, const std::vector<double>& paramet
 
 /// A lens of 520 px focal length for an imager of 800 x 600 with these distortions.
 std::vector<double> parameters_with(LensModel model, const std::vector<double>& distortion);
+
+/// Without distortion.
+inline Lens plain_lens(LensModel model) { return {model, parameters_with(model, {})}; }
 
 /// The angle between two directions of any length; exact for small ones too.
 double angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b);

@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-const cv::Size kSize(300, 300);
+const cv::Size kTouchingSize(300, 300);
 constexpr double kPeriods_lines[] = {9.4, 13.1};
 
 struct Touching {
@@ -31,8 +31,8 @@ void expect_both(const Touching& touching) {
                         .radius_px = small_px,
                         .stripes = {.period_lines = kPeriods_lines[1], .phase = 0.8}};
   const LampMap map{{drawn_lamp(1, kPeriods_lines[0]), drawn_lamp(2, kPeriods_lines[1])}};
-  const LampDetector detector(map, drawn_camera(kSize));
-  const auto lights = detector.detect(drawn({one, other}, kSize, touching.depth, 0.5));
+  const LampDetector detector(map, drawn_camera(kTouchingSize));
+  const auto lights = detector.detect(drawn({one, other}, kTouchingSize, touching.depth, 0.5));
   int lamps = 0;
   for (const Light& light : lights) {
     if (light.kind != LightKind::lamp) continue;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -13,8 +14,6 @@ namespace vlp {
 namespace {
 
 using testing::HasSubstr;
-
-const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 
 struct Bad {
   std::string name;     // of the test

@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "captures/csv_reader.h"
+#include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -17,8 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-
-const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
 
 class Detect : public testing::Test {
  protected:

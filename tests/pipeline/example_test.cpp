@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "captures/csv_reader.h"
+#include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
 namespace {
 
-const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 const std::string kLocate = "vlp-locate " + kExample + "detections.csv --lamps " + kExample +
                             "lamps.yaml --calibration " + kExample + "calibration.yaml -o ";
 

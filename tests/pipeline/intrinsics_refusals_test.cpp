@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "pipeline/intrinsics_program.h"
+#include "support/datasets.h"
 
 namespace vlp {
 namespace {
@@ -15,7 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
 const std::string kFaulty = VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered";
 
 class IntrinsicsRefusals : public IntrinsicsProgram {

@@ -6,6 +6,7 @@
 
 #include "evaluation/cdf_plot.h"
 #include "evaluation/intrinsics_plot.h"
+#include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -15,7 +16,6 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 const std::string kCheck = VLP_SOURCE_DIR "/tests/support/browser_check.py";
 constexpr int kNoBrowser = 77;
 

@@ -10,12 +10,11 @@
 
 #include "captures/detections_table.h"
 #include "rig/calibration.h"
+#include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
-
-inline const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 
 /// Tests of vlp-rotation on the turn of the example, as it is or changed.
 class Rotation : public testing::Test {

@@ -8,6 +8,7 @@
 
 #include "captures/csv_reader.h"
 #include "rig/calibration.h"
+#include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -17,7 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
 const std::string kLamps = " --lamps " + kRig + "/lamps.yaml";
 const std::string kCalibration = " --calibration " + kRig + "/true_calibration.yaml";
 

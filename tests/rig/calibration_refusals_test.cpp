@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string refusal_of(const std::string& yaml) {
+std::string calibration_refusal(const std::string& yaml) {
   const TemporaryFolder folder;
   return refusal(read_calibration, folder.file("calibration.yaml", yaml));
 }
@@ -33,7 +33,7 @@ struct Case {
 void expect_refused(const std::vector<Case>& cases) {
   for (const Case& c : cases) {
     SCOPED_TRACE(c.from + " -> " + c.to);
-    EXPECT_THAT(refusal_of(changed(kCalibrationYaml, c.from, c.to)),
+    EXPECT_THAT(calibration_refusal(changed(kCalibrationYaml, c.from, c.to)),
                 testing::StartsWith(place_of(c.at.empty() ? c.from : c.at) + c.problem));
   }
 }
@@ -133,16 +133,17 @@ TEST(CalibrationRefusals, NameEachPartsMissingKeys) {
                                 "id", "imager_px", "lens_model", "intrinsics"}) {
     const std::size_t begin = kCalibrationYaml.find("\n  " + key + ":") + 1;
     const std::size_t end = kCalibrationYaml.find('\n', begin) + 1;
-    EXPECT_THAT(
-        refusal_of(changed(kCalibrationYaml, kCalibrationYaml.substr(begin, end - begin), "")),
-        HasSubstr(": key '" + key + "' is missing"));
+    EXPECT_THAT(calibration_refusal(
+                    changed(kCalibrationYaml, kCalibrationYaml.substr(begin, end - begin), "")),
+                HasSubstr(": key '" + key + "' is missing"));
   }
 }
 
 TEST(CalibrationRefusals, NameThePartThatTheHistoryTellsOf) {
   const std::size_t begin = kCalibrationYaml.find("dispersion:\n");
   const std::size_t end = kCalibrationYaml.find("camera:\n");
-  EXPECT_EQ(refusal_of(changed(kCalibrationYaml, kCalibrationYaml.substr(begin, end - begin), "")),
+  EXPECT_EQ(calibration_refusal(
+                changed(kCalibrationYaml, kCalibrationYaml.substr(begin, end - begin), "")),
             "calibration.yaml:10: history[1]: says that there is a part 'dispersion': is the file "
             "cut short?");
 }

@@ -13,13 +13,8 @@ using testing::HasSubstr;
 const std::string kHead = "format: vlp-lamps/1\nlamps: ";
 constexpr std::size_t kMostBytes = 1 << 20;
 
-std::string refusal_of(const std::string& content) {
-  const TemporaryFolder folder;
-  return refusal(read_lamp_map, folder.file("lamps.yaml", content));
-}
-
 /// For a map whose lamps are `value`.
-std::string refusal_of_lamps(const std::string& value) { return refusal_of(kHead + value + "\n"); }
+std::string refusal_of_lamps(const std::string& value) { return map_refusal(kHead + value + "\n"); }
 
 std::string repeated(const std::string& text, std::size_t count) {
   std::string all;
@@ -34,12 +29,12 @@ TEST(HostileYaml, OfAHundredThousandLevelsIsRefused) {
     SCOPED_TRACE(open);
     const std::string nest = repeated(open, levels);
     EXPECT_EQ(refusal_of_lamps("\n  " + nest), "lamps.yaml:3" + deep);
-    EXPECT_EQ(refusal_of(nest + "\n"), "lamps.yaml:1" + deep);
+    EXPECT_EQ(map_refusal(nest + "\n"), "lamps.yaml:1" + deep);
   }
   EXPECT_EQ(refusal_of_lamps(repeated("[", levels) + repeated("]", levels)), "lamps.yaml:2" + deep);
   std::string indented = kHead + "\n";
   for (std::size_t level = 1; level < 1000; ++level) indented += std::string(level, ' ') + "a:\n";
-  EXPECT_THAT(refusal_of(indented), HasSubstr(deep));
+  EXPECT_THAT(map_refusal(indented), HasSubstr(deep));
 }
 
 TEST(HostileYaml, OfABillionLaughsIsRefused) {
@@ -50,7 +45,7 @@ TEST(HostileYaml, OfABillionLaughsIsRefused) {
     bomb.append(name).append(": &").append(name).append(" [").append(alias);
     bomb.append(repeated(", " + alias, 8)).append("]\n");
   }
-  EXPECT_THAT(refusal_of("format: vlp-lamps/1\n" + bomb + "lamps: *a9\n"),
+  EXPECT_THAT(map_refusal("format: vlp-lamps/1\n" + bomb + "lamps: *a9\n"),
               HasSubstr("lamps.yaml:3: an alias (*) is not read here"));
 }
 
@@ -70,9 +65,9 @@ TEST(HostileYaml, LongerThanAMebibyteIsRefused) {
   std::string content = kLampsYaml + "#";
   content += std::string(kMostBytes - content.size() - 1, 'x') + "\n";
   ASSERT_EQ(content.size(), kMostBytes);
-  EXPECT_EQ(refusal_of(content), "");
+  EXPECT_EQ(map_refusal(content), "");
   const std::string refused = "lamps.yaml: is longer than 1 MiB: is it the right file?";
-  EXPECT_EQ(refusal_of(content + "\n"), refused);
+  EXPECT_EQ(map_refusal(content + "\n"), refused);
 
   const TemporaryFolder folder;
   const auto file = folder.file("lamps.yaml", kLampsYaml);

@@ -9,14 +9,9 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string refusal_of(const std::string& yaml) {
-  const TemporaryFolder folder;
-  return refusal(read_lamp_map, folder.file("lamps.yaml", yaml));
-}
-
 /// For a map of one lamp, in the third line.
 std::string refusal_of_lamp(const std::string& keys) {
-  return refusal_of("format: vlp-lamps/1\nlamps:\n  - {" + keys + "}\n");
+  return map_refusal("format: vlp-lamps/1\nlamps:\n  - {" + keys + "}\n");
 }
 
 TEST(LampMapRefusals, NameLineAndKeyOfAMissingKey) {
@@ -26,10 +21,10 @@ TEST(LampMapRefusals, NameLineAndKeyOfAMissingKey) {
             "lamps.yaml:3: lamps[0]: key 'position_m' is missing; there are: id, position_mm");
   EXPECT_EQ(refusal_of_lamp("position_m: [0, 0, 2]"),
             "lamps.yaml:3: lamps[0]: key 'id' is missing; there are: position_m");
-  EXPECT_EQ(refusal_of("format: vlp-lamps/1\n"),
+  EXPECT_EQ(map_refusal("format: vlp-lamps/1\n"),
             "lamps.yaml:1: key 'lamps' is missing; there are: format");
   EXPECT_EQ(
-      refusal_of("lamps: []\n"),
+      map_refusal("lamps: []\n"),
       "lamps.yaml:1: key 'format' is missing: the file should begin with 'format: vlp-lamps/1'");
 }
 
@@ -37,26 +32,26 @@ TEST(LampMapRefusals, NameLineAndKeyOfAnUnknownKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], position_mm: [0, 0, 2000]"),
             "lamps.yaml:3: lamps[0]: key 'position_mm' is unknown here; the keys are: id, "
             "position_m, diameter_m, frequency_hz, duty");
-  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nunits: mm\nlamps: []\n"),
+  EXPECT_EQ(map_refusal("format: vlp-lamps/1\nunits: mm\nlamps: []\n"),
             "lamps.yaml:2: key 'units' is unknown here; the keys are: format, lamps");
 }
 
 TEST(LampMapRefusals, NameLineAndKeyOfAKeyThatStandsTwice) {
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], id: 2"),
             "lamps.yaml:3: lamps[0]: key 'id' stands twice");
-  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nlamps: []\nlamps: []\n"),
+  EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\nlamps: []\n"),
             "lamps.yaml:3: key 'lamps' stands twice");
 }
 
 TEST(LampMapRefusals, NameTheLineOfAnIdThatStandsTwice) {
-  EXPECT_EQ(refusal_of(changed(kLampsYaml, "id: 7", "id: 1")),
+  EXPECT_EQ(map_refusal(changed(kLampsYaml, "id: 7", "id: 1")),
             "lamps.yaml:4: lamps[1]: id 1 stands twice");
 }
 
 TEST(LampMapRefusals, NameBothOfTwoLampsInOnePlace) {
-  EXPECT_EQ(refusal_of(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.1009]")),
+  EXPECT_EQ(map_refusal(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.1009]")),
             "lamps.yaml:4: lamps[1]: lamp 7 is where lamp 1 is");
-  EXPECT_EQ(refusal_of(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.102]")), "");
+  EXPECT_EQ(map_refusal(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.102]")), "");
 }
 
 TEST(LampMapRefusals, NameAnIdThatIsNoWholeNumber) {
@@ -114,12 +109,12 @@ TEST(LampMapRefusals, AskForTheUnitWhenAFigureCannotBeInIt) {
 }
 
 TEST(LampMapRefusals, NameAnotherShape) {
-  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nlamps: []\n"), "lamps.yaml:2: lamps: holds no lamp");
-  EXPECT_EQ(refusal_of("format: vlp-lamps/1\n\nlamps:\n\n# none\n"),
+  EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\n"), "lamps.yaml:2: lamps: holds no lamp");
+  EXPECT_EQ(map_refusal("format: vlp-lamps/1\n\nlamps:\n\n# none\n"),
             "lamps.yaml:3: lamps: should be a list, not nothing");
-  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nlamps:\n  id: 1\n"),
+  EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps:\n  id: 1\n"),
             "lamps.yaml:3: lamps: should be a list, not a mapping");
-  EXPECT_EQ(refusal_of("format: vlp-lamps/1\nlamps:\n  - 1\n"),
+  EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps:\n  - 1\n"),
             "lamps.yaml:3: lamps[0]: should be a mapping of keys to values, not '1'");
 }
 

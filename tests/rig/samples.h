@@ -50,4 +50,10 @@ std::string refusal(Read read, const std::filesystem::path& file) {
   return "";
 }
 
+/// That of `yaml` as lamps.yaml.
+inline std::string map_refusal(const std::string& yaml) {
+  const TemporaryFolder folder;
+  return refusal(read_lamp_map, folder.file("lamps.yaml", yaml));
+}
+
 }  // namespace vlp

@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ElementsAre;
 
-std::string refusal_of(const fs::path& file) {
+std::string write_refusal(const fs::path& file) {
   return refusal([](const fs::path& path) { write_file(path, "new\n"); }, file);
 }
 
@@ -67,13 +67,13 @@ TEST(WriteFile, LeavesNothingWhereItCannotWrite) {
   const auto file = folder.file("file", "old\n");
   fs::create_directory(folder / "folder");
   const std::string cannot = " cannot be written: ";
-  EXPECT_EQ(refusal_of(folder / "missing" / "a.yaml"),
+  EXPECT_EQ(write_refusal(folder / "missing" / "a.yaml"),
             "a.yaml:" + cannot + "No such file or directory");
-  EXPECT_EQ(refusal_of(folder / "folder"), "folder:" + cannot + "Is a directory");
-  EXPECT_EQ(refusal_of(file / "a.yaml"), "a.yaml:" + cannot + "Not a directory");
+  EXPECT_EQ(write_refusal(folder / "folder"), "folder:" + cannot + "Is a directory");
+  EXPECT_EQ(write_refusal(file / "a.yaml"), "a.yaml:" + cannot + "Not a directory");
   const std::string too_long(256, 'x');
-  EXPECT_EQ(refusal_of(folder / too_long), too_long + ":" + cannot + "File name too long");
-  EXPECT_NE(refusal_of(""), "");
+  EXPECT_EQ(write_refusal(folder / too_long), too_long + ":" + cannot + "File name too long");
+  EXPECT_NE(write_refusal(""), "");
   EXPECT_THAT(names_in(folder / ""), ElementsAre("file", "folder"));
   EXPECT_THAT(names_in(folder / "folder"), ElementsAre());
   EXPECT_EQ(folder.content_of(file), "old\n");
@@ -111,14 +111,14 @@ TEST(WriteFile, RefusesALinkToItself) {
   const TemporaryFolder folder;
   fs::create_symlink("b", folder / "a");
   fs::create_symlink("a", folder / "b");
-  EXPECT_EQ(refusal_of(folder / "a"), "a: is a link that leads to itself");
+  EXPECT_EQ(write_refusal(folder / "a"), "a: is a link that leads to itself");
   EXPECT_TRUE(fs::is_symlink(folder / "a") && fs::is_symlink(folder / "b"));
 }
 
 TEST(WriteFile, WritesToDevicesAsTheyAre) {
   write_file("/dev/null", "new\n");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
-  EXPECT_EQ(refusal_of("/dev/full"), "full: cannot be written: No space left on device");
+  EXPECT_EQ(write_refusal("/dev/full"), "full: cannot be written: No space left on device");
   EXPECT_TRUE(fs::is_character_file("/dev/full"));
 }
 

@@ -4,14 +4,14 @@
 
 #include <gmock/gmock.h>
 
+#include "support/datasets.h"
+
 namespace vlp {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 
 LocateInput example() {
   return {read_detections(kExample + "detections.csv"), read_lamp_map(kExample + "lamps.yaml"),

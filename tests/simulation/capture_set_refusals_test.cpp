@@ -8,10 +8,6 @@
 namespace vlp {
 namespace {
 
-std::string refusal_with(const std::string& from, const std::string& to) {
-  return scene_refusal(scene_with(from, to));
-}
-
 std::string without_board() {
   std::string yaml = kSceneYaml;
   const auto begin = yaml.find("board:\n");

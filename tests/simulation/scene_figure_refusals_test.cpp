@@ -8,10 +8,6 @@
 namespace vlp {
 namespace {
 
-std::string refusal_with(const std::string& from, const std::string& to) {
-  return scene_refusal(scene_with(from, to));
-}
-
 TEST(SceneFigures, AskForTheUnitOfARadiance) {
   const std::string range =
       " electrons per second is not within 0 and 1.0e+12 electrons per second: is it in the right "

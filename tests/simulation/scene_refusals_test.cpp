@@ -10,10 +10,6 @@ namespace {
 using testing::HasSubstr;
 
 /// Of the sample with one change.
-std::string refusal_with(const std::string& from, const std::string& to) {
-  return scene_refusal(scene_with(from, to));
-}
-
 TEST(SceneRefusals, NoneIsOfTheSample) { EXPECT_EQ(scene_refusal(kSceneYaml), ""); }
 
 TEST(SceneRefusals, NameAnUnknownKeyWhereverItStands) {

@@ -58,4 +58,8 @@ std::string scene_refusal(const std::string& yaml) {
   return message.starts_with(parent) ? message.substr(parent.size()) : message;
 }
 
+std::string refusal_with(const std::string& from, const std::string& to) {
+  return scene_refusal(scene_with(from, to));
+}
+
 }  // namespace vlp

@@ -21,4 +21,7 @@ Scene scene_of(const std::string& yaml);
 /// The message with which a scene is refused, as of scene.yaml in no folder; "" when it is not.
 std::string scene_refusal(const std::string& yaml);
 
+/// That of scene_with(from, to).
+std::string refusal_with(const std::string& from, const std::string& to);
+
 }  // namespace vlp

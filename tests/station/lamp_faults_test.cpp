@@ -7,6 +7,7 @@
 #include "captures/detections_table.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
+#include "support/datasets.h"
 
 namespace vlp {
 namespace {
@@ -14,8 +15,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 
 /// The example: five lamps seen from 36 places with 0.05 px of noise.
 struct LampFaults : testing::Test {

@@ -3,13 +3,12 @@
 #include <gmock/gmock.h>
 
 #include "station/station_steps.h"
+#include "support/datasets.h"
 
 namespace vlp {
 namespace {
 
 using testing::HasSubstr;
-
-const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 
 /// The example: 36 captures at known points.
 struct StationSteps : testing::Test {

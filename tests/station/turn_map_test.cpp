@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <numbers>
 
+#include "support/datasets.h"
+
 namespace vlp {
 namespace {
 
 using testing::Each;
 using testing::SizeIs;
-
-const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 
 /// The example's turn: 12 captures at each of two heights, 30 degrees apart.
 struct TurnMapTest : testing::Test {

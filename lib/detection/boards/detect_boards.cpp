@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-struct Outcome {
+struct ViewOutcome {
   std::optional<BoardView> view;
   std::string refused;
 };
@@ -31,8 +31,8 @@ BoardView view_of(const BoardDetector& detector, const std::filesystem::path& fi
 }
 
 /// One bad image does not end a run, whatever is bad about it.
-Outcome outcome_of(const BoardDetector& detector, const std::filesystem::path& file,
-                   const BoardCache& cache) {
+ViewOutcome outcome_of(const BoardDetector& detector, const std::filesystem::path& file,
+                       const BoardCache& cache) {
   try {
     return {view_of(detector, file, cache), ""};
   } catch (const InputError& error) {
@@ -50,7 +50,7 @@ FoundBoards detect_boards(const BoardDetector& detector,
                           const std::vector<std::filesystem::path>& images, int threads,
                           const BoardCache& cache,
                           const std::function<void(std::size_t done)>& progress) {
-  std::vector<Outcome> outcomes(images.size());
+  std::vector<ViewOutcome> outcomes(images.size());
   std::mutex counting;
   std::size_t done = 0;
   in_parallel(images.size(), threads, [&](std::size_t i) {
@@ -59,7 +59,7 @@ FoundBoards detect_boards(const BoardDetector& detector,
     progress(++done);
   });
   FoundBoards result;
-  for (Outcome& outcome : outcomes) {
+  for (ViewOutcome& outcome : outcomes) {
     if (outcome.view) {
       result.views.push_back(std::move(*outcome.view));
     } else {

@@ -11,13 +11,13 @@
 namespace vlp {
 namespace {
 
-std::string number(double value) { return significant(value, 6); }
+std::string six_digits(double value) { return significant(value, 6); }
 
 /// Of a standard deviation.
 std::string rough(double value) { return significant(value, 2); }
 
 std::string pair(const Eigen::Vector2d& values, const std::string& unit) {
-  return number(values.x()) + ", " + number(values.y()) + " " + unit;
+  return six_digits(values.x()) + ", " + six_digits(values.y()) + " " + unit;
 }
 
 /// ", standard deviation 0.1, 0.2 px" of a pair; nothing without a covariance.
@@ -44,11 +44,11 @@ std::string camera_table(const Camera& camera) {
   line("principal point", pair({k[2], k[3]}, "px"));
   std::string distortion;
   for (std::size_t i = 4; i < k.size(); ++i) {
-    distortion.append(i > 4 ? ", " : "").append(number(k[i]));
+    distortion.append(i > 4 ? ", " : "").append(six_digits(k[i]));
   }
   if (!distortion.empty()) line("distortion", distortion);
-  if (camera.pixel_pitch_m) line("pixel pitch", number(1e6 * *camera.pixel_pitch_m) + " um");
-  if (camera.row_time_s) line("row time", number(1e6 * *camera.row_time_s) + " us");
+  if (camera.pixel_pitch_m) line("pixel pitch", six_digits(1e6 * *camera.pixel_pitch_m) + " um");
+  if (camera.row_time_s) line("row time", six_digits(1e6 * *camera.row_time_s) + " us");
   if (camera.readout) line("read-out", *camera.readout == Readout::rows ? "rows" : "columns");
   return html_table(table);
 }

@@ -9,8 +9,8 @@
 namespace vlp {
 namespace {
 
-constexpr int kDraws = 600;
-constexpr double kTolerance = 0.09;
+constexpr int kStations = 600;
+constexpr double kStationTolerance = 0.09;
 
 void expect_consistent(const Station& station, const std::vector<StationCapture>& exact,
                        DispersionMethod method, bool stated) {
@@ -18,7 +18,7 @@ void expect_consistent(const Station& station, const std::vector<StationCapture>
   const auto reference = fit_dispersion(exact, station.rig.map, station.believed, method);
   Eigen::Array4d scatter = Eigen::Array4d::Zero(), reported = scatter;
   const bool world = method == DispersionMethod::camera;
-  for (int i = 0; i < kDraws; ++i) {
+  for (int i = 0; i < kStations; ++i) {
     auto captures = exact;
     for (auto& capture : captures) {
       capture.detections = with_noise(capture.detections, random);
@@ -35,11 +35,11 @@ void expect_consistent(const Station& station, const std::vector<StationCapture>
       error.tail<2>() = *fit.world_offset_m - *reference.world_offset_m;
       variance.tail<2>() = fit.world_covariance.diagonal();
     }
-    scatter += error.square() / kDraws;
-    reported += variance / kDraws;
+    scatter += error.square() / kStations;
+    reported += variance / kStations;
   }
   for (Eigen::Index i = 0; i < (world ? 4 : 2); ++i) {
-    EXPECT_NEAR(std::sqrt(scatter[i] / reported[i]), 1, kTolerance) << i;
+    EXPECT_NEAR(std::sqrt(scatter[i] / reported[i]), 1, kStationTolerance) << i;
   }
 }
 

@@ -10,8 +10,6 @@
 namespace vlp {
 namespace {
 
-double even(const Eigen::Vector2d&) { return 1; }
-
 ProjectionDifference difference(const IntrinsicsSolution& solution, const SyntheticViews& views) {
   return *projection_difference(views.lens, solution.lens(), views.imager_px, even);
 }

@@ -9,8 +9,6 @@
 namespace vlp {
 namespace {
 
-double even(const Eigen::Vector2d&) { return 1; }
-
 TEST(ProjectionDifference, OfALensFromItselfIsNone) {
   const Lens lens = synthetic_lens();
   EXPECT_LT(projection_difference(lens, lens, {800, 600}, even)->worst_px, 1e-6);

@@ -12,8 +12,8 @@
 namespace vlp {
 namespace {
 
-constexpr int kDraws = 1000;
-constexpr double kTolerance = 0.08;
+constexpr int kDrives = 1000;
+constexpr double kDriveTolerance = 0.08;
 
 void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
                        const LampMap& surveyed, bool refine_map, bool stated) {
@@ -24,7 +24,7 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
   ASSERT_EQ(reference.undetermined, "");
   Matrix2 scatter = Matrix2::Zero(), reported = Matrix2::Zero();
   Eigen::ArrayXd lamp_scatter = Eigen::ArrayXd::Zero(24), lamp_reported = lamp_scatter;
-  for (int i = 0; i < kDraws; ++i) {
+  for (int i = 0; i < kDrives; ++i) {
     auto frames = with_noise(exact, random);
     for (Frame& frame : frames) {
       for (auto& detection : frame.detections) {
@@ -34,25 +34,25 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
     const auto result = level_by_lamps(frames, surveyed, rig.calibration.camera, options);
     ASSERT_EQ(result.undetermined, "");
     const Eigen::Vector2d error = result.center.center_px - reference.center.center_px;
-    scatter += error * error.transpose() / kDraws;
-    reported += *result.center.covariance / kDraws;
+    scatter += error * error.transpose() / kDrives;
+    reported += *result.center.covariance / kDrives;
     for (std::size_t k = 0; k < result.corrections.size(); ++k) {
       const auto at = static_cast<Eigen::Index>(3 * k);
       lamp_scatter.segment<3>(at) +=
           (result.corrections[k].correction_m - reference.corrections[k].correction_m)
               .array()
               .square() /
-          kDraws;
-      lamp_reported.segment<3>(at) += result.corrections[k].sd_m.array().square() / kDraws;
+          kDrives;
+      lamp_reported.segment<3>(at) += result.corrections[k].sd_m.array().square() / kDrives;
     }
   }
   const Eigen::Array2d ratio = (scatter.diagonal().array() / reported.diagonal().array()).sqrt();
-  EXPECT_LT((ratio - 1).abs().maxCoeff(), kTolerance) << ratio.transpose();
+  EXPECT_LT((ratio - 1).abs().maxCoeff(), kDriveTolerance) << ratio.transpose();
   const double correlation = scatter(0, 1) / std::sqrt(scatter(0, 0) * scatter(1, 1));
   EXPECT_NEAR(correlation, reported(0, 1) / std::sqrt(reported(0, 0) * reported(1, 1)), 0.1);
   if (!refine_map) return;
   const Eigen::ArrayXd lamp_ratio = (lamp_scatter / lamp_reported).sqrt();
-  EXPECT_LT((lamp_ratio - 1).abs().maxCoeff(), kTolerance + 0.02) << lamp_ratio.transpose();
+  EXPECT_LT((lamp_ratio - 1).abs().maxCoeff(), kDriveTolerance + 0.02) << lamp_ratio.transpose();
 }
 
 TEST(LevellingScatter, IsTheReportedCovariance) {

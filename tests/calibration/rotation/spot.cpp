@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/rotation/spot.h"
 
+#include <gtest/gtest.h>
 #include <Eigen/Geometry>
+
 #include <cmath>
 
 namespace vlp {
@@ -31,6 +33,20 @@ std::vector<Frame> SpotScene::frames(double sigma_px) const {
     }
   }
   return frames;
+}
+
+SpotScene tilted_scene(const Eigen::Vector2d& lever_arm_m, const std::vector<double>& heights_m) {
+  SpotScene scene;
+  scene.tilt_rad = rad_from_deg(1.5);
+  scene.lever_arm_m = lever_arm_m;
+  scene.heights_m = heights_m;
+  return scene;
+}
+
+RotationFit fit_of(const SpotScene& scene, const std::vector<Frame>& frames) {
+  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
+  EXPECT_EQ(spot.status, SpotStatus::ok) << explanation_of(spot.status);
+  return spot.status == SpotStatus::ok ? fit_turning_axis(spot, scene.camera) : RotationFit();
 }
 
 std::vector<Frame> with_noise(std::vector<Frame> frames, Random& random) {

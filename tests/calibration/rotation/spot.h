@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "calibration/rotation/turning_axis.h"
 #include "captures/detections_table.h"
 #include "support/synthetic_rig.h"
 
@@ -29,6 +30,13 @@ struct SpotScene {
   /// What it sees, computed forwards and without noise, and stated to have this noise.
   std::vector<Frame> frames(double sigma_px = 1) const;
 };
+
+/// Tilted by 1.5 degrees.
+SpotScene tilted_scene(const Eigen::Vector2d& lever_arm_m = {0.012, -0.009},
+                       const std::vector<double>& heights_m = {0});
+
+/// The axis found in such frames; fails the test when they are refused.
+RotationFit fit_of(const SpotScene& scene, const std::vector<Frame>& frames);
 
 std::vector<Frame> with_noise(std::vector<Frame> frames, Random& random);
 

@@ -14,20 +14,6 @@
 namespace vlp {
 namespace {
 
-SpotScene tilted_scene() {
-  SpotScene scene;
-  scene.tilt_rad = rad_from_deg(1.5);
-  scene.lever_arm_m = {0.012, -0.009};
-  scene.heights_m = {0, 0.3};
-  return scene;
-}
-
-RotationFit fit(const SpotScene& scene, const std::vector<Frame>& frames) {
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(spot.status, SpotStatus::ok) << explanation_of(spot.status);
-  return spot.status == SpotStatus::ok ? fit_turning_axis(spot, scene.camera) : RotationFit();
-}
-
 void expect_axis(const RotationFit& found, const SpotScene& scene, double within_deg) {
   ASSERT_TRUE(found.converged);
   EXPECT_LT(
@@ -36,7 +22,7 @@ void expect_axis(const RotationFit& found, const SpotScene& scene, double within
 }
 
 TEST(SpotCaptures, TellsHeightsYawsAndAxes) {
-  const SpotScene scene = tilted_scene();
+  const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   const SpotCaptures spot = spot_captures(scene.frames(), scene.map, scene.camera);
   ASSERT_EQ(spot.status, SpotStatus::ok);
   ASSERT_EQ(spot.captures.size(), 24U);
@@ -60,24 +46,24 @@ TEST(SpotCaptures, TakesTwoLampsAndThreeCaptures) {
   scene.map = lamp_map_of({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
   scene.captures = 3;
   scene.arc_rad = 4;
-  expect_axis(fit(scene, scene.frames()), scene, 1e-6);
+  expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
 }
 
 TEST(SpotCaptures, TakesLampsAtSeveralHeights) {
-  SpotScene scene = tilted_scene();
+  SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.map =
       lamp_map_of({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
-  expect_axis(fit(scene, scene.frames()), scene, 1e-6);
+  expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
 }
 
 TEST(SpotCaptures, TakesAQuarterTurn) {
-  SpotScene scene = tilted_scene();
+  SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = rad_from_deg(105);  // less what unevenness takes at the ends
-  expect_axis(fit(scene, scene.frames()), scene, 1e-6);
+  expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
 }
 
 TEST(SpotCaptures, LeavesOutAHeightWithTooFewCapturesAndSaysSo) {
-  const SpotScene scene = tilted_scene();
+  const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   auto frames = scene.frames();
   frames.resize(14);
   const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
@@ -89,7 +75,7 @@ TEST(SpotCaptures, LeavesOutAHeightWithTooFewCapturesAndSaysSo) {
 
 /// A third of the captures with a lamp far off and the noise of a poor detector.
 TEST(SpotCaptures, OutliersAreFoundAndChangeLittle) {
-  const SpotScene scene = tilted_scene();
+  const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   Random random(5);
   auto frames = with_noise(scene.frames(0.05), random);
   std::vector<std::pair<std::string, int>> wrong;
@@ -128,7 +114,7 @@ TEST(SpotCaptures, AMisidentifiedLampAmongTwoCostsItsCapture) {
 
 /// The heights are the map's, the places on the ceiling are not trusted.
 TEST(SpotCaptures, ErrorsOfTheMapAlongTheCeilingDoNotMatter) {
-  SpotScene scene = tilted_scene();
+  SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = 2.5;
   const auto frames = scene.frames();
   Random random(6);
@@ -136,7 +122,7 @@ TEST(SpotCaptures, ErrorsOfTheMapAlongTheCeilingDoNotMatter) {
     lamp.position_m.head<2>() +=
         Eigen::Vector2d(random.uniform(-5e-3, 5e-3), random.uniform(-5e-3, 5e-3));
   }
-  expect_axis(fit(scene, frames), scene, 0.01);
+  expect_axis(fit_of(scene, frames), scene, 0.01);
 }
 
 }  // namespace

@@ -14,13 +14,6 @@ namespace {
 
 constexpr int kSeeds = 20;
 
-SpotScene tilted_scene() {
-  SpotScene scene;
-  scene.tilt_rad = rad_from_deg(1.5);
-  scene.lever_arm_m = {0.012, -0.009};
-  return scene;
-}
-
 /// A ceiling of 2.6 m, where 10 cm are less than 4 % of the distance from the lamps.
 SpotScene high_scene() {
   SpotScene scene = tilted_scene();

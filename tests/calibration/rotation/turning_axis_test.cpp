@@ -15,15 +15,8 @@ namespace {
 
 constexpr double kExact_rad = rad_from_deg(1e-6);
 
-RotationFit fit(const SpotScene& scene, const std::vector<Frame>& frames) {
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(spot.status, SpotStatus::ok) << explanation_of(spot.status);
-  if (spot.status != SpotStatus::ok) return {};
-  return fit_turning_axis(spot, scene.camera);
-}
-
 void expect_exact(const SpotScene& scene) {
-  const RotationFit found = fit(scene, scene.frames());
+  const RotationFit found = fit_of(scene, scene.frames());
   ASSERT_TRUE(found.converged);
   EXPECT_LT(angle_between(found.center.zenith_in_camera, scene.truth().zenith_in_camera),
             kExact_rad);

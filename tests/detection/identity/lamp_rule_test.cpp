@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kRowTime_s = 3e-5;
 
-Lamp lamp(int id, double frequency_hz, std::optional<double> duty = {}) {
+Lamp rule_lamp(int id, double frequency_hz, std::optional<double> duty = {}) {
   return {id, {double(id), 0, 2}, {}, frequency_hz, duty};
 }
 
@@ -28,7 +28,7 @@ std::optional<int> identified(const std::vector<Lamp>& lamps, const Stripes& str
 }
 
 TEST(LampRule, TakesTheLampOfThatFrequency) {
-  const std::vector<Lamp> lamps{lamp(1, 2000), lamp(2, 2500)};
+  const std::vector<Lamp> lamps{rule_lamp(1, 2000), rule_lamp(2, 2500)};
   EXPECT_EQ(identified(lamps, stripes(2000)), 1);
   EXPECT_EQ(identified(lamps, stripes(2080)), 1);
   EXPECT_EQ(identified(lamps, stripes(2400)), 2);
@@ -37,7 +37,7 @@ TEST(LampRule, TakesTheLampOfThatFrequency) {
 }
 
 TEST(LampRule, AsksMoreOfStripesThatAreFewOrUnclear) {
-  const std::vector<Lamp> lamps{lamp(1, 2000)};
+  const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes few = stripes(2080), unclear = few;
   few.periods = 2;
   unclear.clarity = 0.6;
@@ -48,7 +48,7 @@ TEST(LampRule, AsksMoreOfStripesThatAreFewOrUnclear) {
 }
 
 TEST(LampRule, LeavesUnclearStripesUnknownThatAreNotRegular) {
-  const std::vector<Lamp> lamps{lamp(1, 2000)};
+  const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes unclear = stripes(2000);
   unclear.clarity = 0.6;
   unclear.regular = false;
@@ -58,21 +58,22 @@ TEST(LampRule, LeavesUnclearStripesUnknownThatAreNotRegular) {
 }
 
 TEST(LampRule, TellsLampsOfOneFrequencyApartByTheirDuties) {
-  const std::vector<Lamp> lamps{lamp(1, 2000, 0.3), lamp(2, 2010, 0.7)};
+  const std::vector<Lamp> lamps{rule_lamp(1, 2000, 0.3), rule_lamp(2, 2010, 0.7)};
   EXPECT_EQ(identified(lamps, stripes(2005, 0.33)), 1);
   EXPECT_EQ(identified(lamps, stripes(2005, 0.64)), 2);
   EXPECT_EQ(identified(lamps, stripes(2005, 0.5)), std::nullopt);
-  EXPECT_EQ(identified({lamp(1, 2000, 0.3), lamp(2, 2010)}, stripes(2000, 0.3)), std::nullopt)
+  EXPECT_EQ(identified({rule_lamp(1, 2000, 0.3), rule_lamp(2, 2010)}, stripes(2000, 0.3)),
+            std::nullopt)
       << "the other's duty is not known";
 }
 
 TEST(LampRule, TrustsAClearFrequencyMoreThanADuty) {
-  const std::vector<Lamp> lamps{lamp(1, 2000, 0.3), lamp(2, 2500, 0.7)};
+  const std::vector<Lamp> lamps{rule_lamp(1, 2000, 0.3), rule_lamp(2, 2500, 0.7)};
   EXPECT_EQ(identified(lamps, stripes(2000, 0.7)), 1);
 }
 
 TEST(LampRule, KnowsNoLampWithoutAPeriodOrAFrequency) {
-  EXPECT_EQ(identified({lamp(1, 2000)}, Stripes{}), std::nullopt);
+  EXPECT_EQ(identified({rule_lamp(1, 2000)}, Stripes{}), std::nullopt);
   EXPECT_EQ(identified({{1, {0, 0, 2}, {}, {}, {}}}, stripes(2000)), std::nullopt);
 }
 

@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-constexpr double kDark = 10, kBright = 200;
+constexpr double kDarkCounts = 10, kBrightCounts = 200;
 
 /// Share of the line from `begin` to `begin` + `exposure` (lines) during which a square wave is on.
 double lit_share(double begin, double exposure, double period, double duty) {
@@ -29,7 +29,7 @@ std::vector<double> square_wave(int lines, double period, double duty, double ph
   std::vector<double> signal;
   for (int line = 0; line < lines; ++line) {
     const double share = lit_share(line + phase * period, exposure, period, duty);
-    signal.push_back(kDark + (kBright - kDark) * share);
+    signal.push_back(kDarkCounts + (kBrightCounts - kDarkCounts) * share);
   }
   return signal;
 }
@@ -49,7 +49,7 @@ TEST_P(SquareWaves, HaveTheirPeriodAndDuty) {
         const Stripes stripes = stripes_of(square_wave(lines, period, duty, phase));
         EXPECT_NEAR(stripes.period_lines, period, 0.01 * period);
         EXPECT_NEAR(stripes.duty, duty, 0.05);
-        EXPECT_NEAR(stripes.contrast, 1 - kDark / kBright, 1e-9);
+        EXPECT_NEAR(stripes.contrast, 1 - kDarkCounts / kBrightCounts, 1e-9);
         EXPECT_NEAR(stripes.periods, lines / stripes.period_lines, 1e-9);
         EXPECT_GT(stripes.clarity, 0.5);
         EXPECT_LE(stripes.clarity, 1);

@@ -1,0 +1,13 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+namespace vlp {
+
+/// Folders of the project's data, for tests that know its place (VLP_SOURCE_DIR).
+inline const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
+inline const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
+
+}  // namespace vlp
