@@ -7,6 +7,7 @@
 #include "evaluation/plot_parts.h"
 
 namespace vlp {
+
 void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
                      const LampMap& lamps) {
   std::string places, on_floor;
@@ -16,7 +17,7 @@ void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot
   for (const Lamp& lamp : lamps.lamps) {
     on_floor += data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
   }
-  const std::string half = significant(plot.step_m / 2, 6);
+  const std::string half = significant(plot.step_m / 2, kPlotDigits);
   const std::string commands =
       data_block("places", places) + data_block("lamps", on_floor) + plot_settings() +
       "set title " + gnuplot_quoted(plot.title) +

@@ -5,7 +5,6 @@
 #include "captures/csv_writer.h"
 
 namespace vlp {
-namespace {}  // namespace
 
 std::string gnuplot_quoted(const std::string& text) {
   std::string quoted = "'";

@@ -13,10 +13,10 @@
 
 namespace vlp {
 
-// For GoogleTest, which looks for it next to the type.
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// For GoogleTest, which looks for it next to the type.
 inline void PrintTo(LensModel model, std::ostream* out) { *out << name_of(model); }
 
 inline constexpr LensModel kEveryModel[] = {LensModel::pinhole, LensModel::stereographic,

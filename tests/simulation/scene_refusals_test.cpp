@@ -9,7 +9,6 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Of the sample with one change.
 TEST(SceneRefusals, NoneIsOfTheSample) { EXPECT_EQ(scene_refusal(kSceneYaml), ""); }
 
 TEST(SceneRefusals, NameAnUnknownKeyWhereverItStands) {

@@ -23,10 +23,10 @@ inline Board synthetic_board(bool kalibr) {
           {false, BoardCorner::bottom_left}};
 }
 
-/// 800 x 600, with a lens that distorts strongly.
 /// The weight of a point in a difference of lenses, where all weigh the same.
 inline double even(const Eigen::Vector2d&) { return 1; }
 
+/// 800 x 600, with a lens that distorts strongly.
 inline Lens synthetic_lens() {
   const std::array parameters{520.0,  521.0,   402.0,  297.0, -0.25, 0.08,
                               0.0002, -0.0001, -0.012, 0.01,  0.002, 0.0001};

@@ -3,8 +3,8 @@
 #include "calibration/rotation/spot.h"
 
 #include <gtest/gtest.h>
-#include <Eigen/Geometry>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 namespace vlp {
