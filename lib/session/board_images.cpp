@@ -91,8 +91,9 @@ SeenBoards see_boards(const BoardImages& input, const StepProgress& progress) {
   SeenBoards seen;
   seen.skipped = skipped_images(input.images, found.refused);
   seen.views = std::move(found.views);
-  if (seen.views.empty())
+  if (seen.views.empty()) {
     throw nothing_usable(input.images.front().parent_path(), input.images.size(), seen);
+  }
   check_sizes(seen.views);
   const bool any = std::any_of(seen.views.begin(), seen.views.end(),
                                [](const BoardView& view) { return !view.seen.tags.empty(); });

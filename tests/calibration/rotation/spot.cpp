@@ -7,6 +7,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "geometry/angles.h"
+
 namespace vlp {
 
 std::vector<Frame> SpotScene::frames(double sigma_px) const {
