@@ -133,7 +133,8 @@ class SessionRun {
     for (const std::string& name : options_.redo) {
       const auto known = [&](const auto& step) { return step.first == name; };
       if (std::any_of(steps.begin(), steps.end(), known)) continue;
-      throw std::invalid_argument("there is no step " + name + " here; the steps are: " + names);
+      std::string reason = "there is no step " + name + " here; the steps are: ";
+      throw std::invalid_argument(reason.append(names));
     }
   }
 
