@@ -115,7 +115,7 @@ void print_comparison(const Comparison& comparison) {
 
 }  // namespace
 
-void print_evaluation(const Evaluation& evaluation, const std::vector<GateResult>& gates) {
+void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
   fmt::print("captures    {}\nfixes       {}\nmissing     {:.3g} %\n", evaluation.captures,
              evaluation.fixes, 100 * evaluation.missing_share());
   for (const auto& [status, count] : evaluation.missing) {
@@ -128,9 +128,9 @@ void print_evaluation(const Evaluation& evaluation, const std::vector<GateResult
   print_ratios(evaluation);
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
-  for (const GateResult& gate : gates) {
-    fmt::print("{:6} gate {:16} {:>10.4g} {:3} at most {:.4g}\n", gate.passed ? "met" : "NOT MET",
-               gate.name, gate.value, gate.unit, gate.limit);
+  for (const CheckedMetric& gate : gates) {
+    fmt::print("{:6} gate {:16} {:>10.4g} {:3} {} {:.4g}\n", gate.met() ? "met" : "NOT MET",
+               gate.name, gate.value.value(), gate.unit, words_of(gate.asked), gate.limit.value());
   }
 }
 

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "evaluation/evaluation.h"
-#include "evaluation/gates.h"
+#include "evaluation/gate.h"
 
 namespace vlp {
 
 /// To stdout, for people: millimetres and degrees.
-void print_evaluation(const Evaluation& evaluation, const std::vector<GateResult>& gates);
+void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
 }  // namespace vlp

@@ -12,6 +12,7 @@
 #include "rig/input_error.h"
 #include "station/control_chart.h"
 #include "station/export_runs.h"
+#include "station/station_config.h"
 #include "station/station_screen.h"
 
 namespace vlp {
@@ -62,16 +63,16 @@ void show_run(const StationRecordsOptions& options) {
   const RunRecord record = run_of(records, options);
   for (const ScreenLine& line : verdict_screen(record)) fmt::print("{}\n", line.text);
   fmt::print("\nfigures without a gate\n");
-  for (const StationFigure& figure : record.figures) {
+  for (const CheckedMetric& figure : record.figures) {
     if (!figure.limit && figure.value) fmt::print("{:<24}{:>12.4g}\n", figure.name, *figure.value);
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
-  fmt::print(
-      "\nrun        {}\nbegun      {}\nended      {}\nprogram    {}\nlibraries  {}\n"
-      "station    {}, configuration {}\nimages     {}, {} used\n",
-      record.run, begun_utc(record.run), record.ended_utc, record.program, record.libraries,
-      record.station, record.config_sha256, record.images.size(), used);
+  fmt::print("\n");
+  for (const RunField& field : run_fields()) {
+    if (field.label != nullptr) fmt::print("{:<11}{}\n", field.label, record.*field.text);
+  }
+  fmt::print("images     {}, {} used\n", record.images.size(), used);
 }
 
 void export_runs(const StationRecordsOptions& options) {
@@ -85,11 +86,11 @@ void export_runs(const StationRecordsOptions& options) {
 }
 
 void show_trend(const StationRecordsOptions& options) {
-  const auto kinds = station_figures();
+  const auto kinds = unit_metrics();
   if (std::none_of(kinds.begin(), kinds.end(),
                    [&](const auto& kind) { return kind.name == options.figure; })) {
     std::string names;
-    for (const FigureKind& kind : kinds)
+    for (const MetricKind& kind : kinds)
       names += (names.empty() ? "" : ", ") + std::string(kind.name);
     throw std::invalid_argument("there is no figure " + options.figure + "; there are: " + names);
   }

@@ -5,16 +5,16 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "app.h"
 #include "capture_options.h"
-#include "evaluation/check_gates.h"
+#include "evaluation/gate.h"
 #include "progress.h"
 #include "session/session.h"
 #include "step_outcome.h"
@@ -45,8 +45,7 @@ class Log {
   void ended(const SessionStep& step) {
     progress_.reset();
     const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
-    const bool missed = std::any_of(step.result.gates.begin(), step.result.gates.end(),
-                                    [](const GateResult& gate) { return !gate.passed; });
+    const bool missed = !words_of_missed(step.result.gates).empty();
     fmt::print("{:13} {}{}\n", step.name,
                step.as_before ? "as before" : fmt::format("{:5.1f} s", seconds),
                step.result.ok() ? missed ? ", a gate is not met" : "" : ", failed");
@@ -58,13 +57,11 @@ class Log {
   std::unique_ptr<Progress> progress_;
 };
 
-const Metric* find(const SessionResult& result, const std::string& name) {
+std::optional<double> find(const SessionResult& result, const std::string& name) {
   for (const SessionStep& step : result.steps) {
-    for (const Metric& metric : step.result.metrics) {
-      if (metric.name == name) return &metric;
-    }
+    if (const auto value = value_of(step.result.metrics, name)) return value;
   }
-  return nullptr;
+  return std::nullopt;
 }
 
 void print_summary(const SessionResult& result, const std::string& results) {
@@ -82,11 +79,10 @@ void print_summary(const SessionResult& result, const std::string& results) {
                              Shown{"missing", "missing", "of the captures, as a share"}};
   fmt::print("\n");
   for (const auto& [label, name, unit] : shown) {
-    const Metric* metric = find(result, name);
-    if (metric != nullptr) fmt::print("{:11} {:.4g} {}\n", label, metric->value, unit);
+    if (const auto value = find(result, name)) fmt::print("{:11} {:.4g} {}\n", label, *value, unit);
   }
-  for (const GateResult& gate : result.gates) {
-    if (!gate.passed) fmt::print("NOT MET     {}\n", words_of(gate));
+  for (const CheckedMetric& gate : result.gates) {
+    if (!gate.met()) fmt::print("NOT MET     {}\n", words_of(gate));
   }
   fmt::print("verdict     {}; results are in {}\n", name_of(result.verdict), results);
 }
@@ -123,7 +119,7 @@ int main(int argc, char** argv) {
       "                        errors and the report (optional)\n"
       "  line-*/               along a straight line each, with places (optional)\n"
       "  classifier.yaml       of vlp-train, to tell the lamps apart (optional)\n"
-      "  gates.yaml            what the errors have to keep to (optional)\n\n"
+      "  gates.yaml            what the figures have to keep to (optional)\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml \\\n"
       "    --only boards,rotation,dispersion,check -o out/session\n"
@@ -148,12 +144,14 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1e-8, 1e-3));
   vlp::add_readout_option(app, how.readout);
   app.add_option("--gates", how.gates_file,
-                 "Gates of the errors, vlp-gates/1, for a session that has no gates.yaml");
+                 "Gates, vlp-gates/1, for a session that has no gates.yaml; of the lens there are "
+                 "some in any case");
   app.add_flag("--report,!--no-report", how.report,
                "Draw pictures and write report.html (default), or not");
   app.add_option("--redo", how.redo, "Run a step again though nothing has changed")
       ->option_text("STEP ...");
   app.add_option("--threads", how.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
+  app.footer("Gates:\n" + vlp::gate_descriptions(vlp::session_metrics()));
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

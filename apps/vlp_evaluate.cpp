@@ -16,9 +16,9 @@
 
 #include "app.h"
 #include "captures/csv_reader.h"
-#include "evaluation/check_gates.h"
 #include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
+#include "evaluation/gate.h"
 #include "history.h"
 #include "print_evaluation.h"
 #include "rig/file.h"
@@ -66,24 +66,15 @@ bool same_file(const std::string& one, const std::string& other) {
   return !one.empty() && !other.empty() && of(one) == of(other);
 }
 
+std::vector<MetricKind> known_metrics() {
+  return metric_kinds({MetricSource::evaluation, MetricSource::reference});
+}
+
 /// The gates of the file, and those of the command line, which hold where both say something.
 std::vector<Gate> gates_of(const Options& options) {
   std::vector<Gate> gates;
-  if (!options.gates_file.empty()) gates = read_gates(options.gates_file);
-  const auto from_file = gates.size();
-  for (const std::string& text : options.gates) {
-    const Gate gate = gate_of(text);
-    const auto same = std::find_if(gates.begin(), gates.end(),
-                                   [&](const Gate& other) { return other.name == gate.name; });
-    if (same == gates.end()) {
-      gates.push_back(gate);
-    } else if (same < gates.begin() + static_cast<std::ptrdiff_t>(from_file)) {
-      same->limit = gate.limit;
-    } else {
-      throw std::invalid_argument("gate '" + gate.name + "' stands twice");
-    }
-  }
-  return gates;
+  if (!options.gates_file.empty()) gates = read_gates(options.gates_file, known_metrics());
+  return with_changes(std::move(gates), gates_of(options.gates, known_metrics()));
 }
 
 /// The files that are read, without those of the report; some names may be empty.
@@ -184,6 +175,11 @@ void run(const CLI::App& app, const Options& options) {
   const EvaluationInput input = input_of(options);
   const EvaluateResult found = evaluate_fixes(input, gates);
   require(found);
+  for (const CheckedMetric& gate : found.gates) {
+    if (gate.value) continue;
+    throw std::invalid_argument("gate '" + gate.name + "': there is no such figure here: " +
+                                metric_kind(gate.name)->meaning);
+  }
   std::string report;
   if (!options.report.file.empty()) report = report_of(app, options, input, found);
   if (!options.json.empty()) write_file(options.json, json_of(found.evaluation, found.gates));
@@ -191,10 +187,7 @@ void run(const CLI::App& app, const Options& options) {
   if (!report.empty()) write_file(options.report.file, report);
   tell(found);
   print_evaluation(found.evaluation, found.gates);
-  std::string failed;
-  for (const GateResult& gate : found.gates) {
-    if (!gate.passed) failed.append(failed.empty() ? "" : "; ").append(words_of(gate));
-  }
+  const std::string failed = words_of_missed(found.gates);
   if (!failed.empty()) throw GateNotMet(failed);
 }
 
@@ -277,6 +270,6 @@ int main(int argc, char** argv) {
       "vlp-evaluate");
   vlp::Options options;
   vlp::add_options(app, options);
-  app.footer("Gates:\n" + vlp::gate_descriptions());
+  app.footer("Gates:\n" + vlp::gate_descriptions(vlp::known_metrics()));
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -14,7 +14,7 @@
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/mrcal_files.h"
 #include "capture_options.h"
-#include "evaluation/check_gates.h"
+#include "evaluation/gate.h"
 #include "history.h"
 #include "print_intrinsics.h"
 #include "progress.h"
@@ -34,7 +34,7 @@ struct Options {
   std::optional<double> row_time_s, pixel_pitch_m;
   int threads = all_cores();
   int held_out = 0;
-  IntrinsicsGates gates;
+  std::vector<std::string> gates;
 };
 
 Camera known_camera(const Options& options) {
@@ -65,7 +65,13 @@ void write_exports(const Options& options, const Camera& camera) {
   if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
 }
 
+/// Those that there are in any case, with the limits of the command line.
+std::vector<Gate> gates_of(const Options& options) {
+  return with_changes(lens_gates(), gates_of(options.gates, metric_kinds({MetricSource::lens})));
+}
+
 void run(const CLI::App& app, const Options& options) {
+  const std::vector<Gate> gates = gates_of(options);
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
@@ -89,35 +95,10 @@ void run(const CLI::App& app, const Options& options) {
   write_corners(beside(options.output, ".corners.vnl"), lens.solution, lens.images);
   if (!options.plot.empty()) draw(options.plot, lens.drawing());
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
-  std::string failed;
-  for (const GateResult& gate : check_lens(options.gates, lens.metrics)) {
-    if (!gate.passed) failed.append(failed.empty() ? "" : "; ").append(words_of(gate));
-  }
+  const std::string failed = words_of_missed(check_gates(gates, lens.metrics));
   if (!failed.empty()) {
     throw GateNotMet(fmt::format("{}; add views, next {}", failed, next_view(lens.coverage)));
   }
-}
-
-/// NAME=VALUE of a gate.
-std::string gate_problem(const std::string& text) {
-  const std::size_t sign = text.find('=');
-  const std::string name = text.substr(0, sign);
-  if (name != "rms_px" && name != "uncertainty_px" && name != "halves_px") {
-    return "the gates are rms_px, uncertainty_px and halves_px, not '" + name + "'";
-  }
-  if (sign == std::string::npos) return "a gate is NAME=VALUE";
-  std::string value = text.substr(sign + 1);
-  return finite_positive()(value);
-}
-
-/// Of a text without a problem.
-void set_gate(IntrinsicsGates& gates, const std::string& text) {
-  const std::size_t sign = text.find('=');
-  const std::string name = text.substr(0, sign);
-  const double value = std::stod(text.substr(sign + 1));
-  if (name == "rms_px") gates.rms_px = value;
-  if (name == "uncertainty_px") gates.uncertainty_px = value;
-  if (name == "halves_px") gates.halves_px = value;
 }
 
 void add_options(CLI::App& app, Options& options) {
@@ -143,14 +124,9 @@ void add_options(CLI::App& app, Options& options) {
                  "Keep every Nth view out of the solve, and say how well the lens fits it")
       ->check(CLI::Range(2, 1000))
       ->option_text("N");
-  app.add_option_function<std::vector<std::string>>(
-         "--gate",
-         [&options](const std::vector<std::string>& gates) {
-           for (const std::string& gate : gates) set_gate(options.gates, gate);
-         },
-         "Change a gate: rms_px=1, uncertainty_px=2 (worst over the image), halves_px=1 (rms, "
-         "between the lenses of two halves of the views)")
-      ->check([](const std::string& text) { return gate_problem(text); })
+  app.add_option("--gate", options.gates,
+                 "Change a gate: rms_px=1, uncertainty_px=2 (worst over the image), halves_px=1 "
+                 "(rms, between the lenses of two halves of the views); or ask for coverage")
       ->option_text("NAME=VALUE ...");
   app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
   app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");

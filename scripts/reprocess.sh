@@ -20,7 +20,7 @@
 # --profile NAME   a profile of scripts/reprocess/profiles or a folder: slurm submits shards to a cluster
 # --previous       results of an earlier run to compare with
 # --gates          what the archive as a whole has to keep to, vlp-archive-gates/1
-# --session-gates  gates of the errors for sessions that have no gates.yaml of their own
+# --session-gates  gates (vlp-gates/1) for sessions that have no gates.yaml of their own
 # --shard-size N   sessions in a job at most (default 50)
 #
 # Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 not all could be done.

@@ -16,10 +16,10 @@ std::string so_few(std::size_t units, const std::string& drawn) {
 
 }  // namespace
 
-std::string unasked_missing(const Evaluation& evaluation, const std::vector<GateResult>& gates) {
+std::string unasked_missing(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
   const std::size_t missing = evaluation.captures - evaluation.fixes;
   const bool asked = std::any_of(gates.begin(), gates.end(),
-                                 [](const GateResult& gate) { return gate.name == "missing"; });
+                                 [](const CheckedMetric& gate) { return gate.name == "missing"; });
   if (gates.empty() || missing == 0 || asked) return "";
   return std::to_string(missing) + " of " + std::to_string(evaluation.captures) +
          (missing == 1 ? " captures has" : " captures have") +

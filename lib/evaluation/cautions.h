@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "evaluation/evaluation.h"
-#include "evaluation/gates.h"
+#include "evaluation/gate.h"
 
 namespace vlp {
 
 /// For example "393 of 432 captures have no fix, and no gate 'missing' asks"; empty when every
 /// capture has a fix, when such a gate asks, and without gates, as nothing passes then.
-std::string unasked_missing(const Evaluation& evaluation, const std::vector<GateResult>& gates);
+std::string unasked_missing(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
 /// What so few stations or captures (or, of a comparison, pairs' ones) mean for the intervals and
 /// the verdict, a line each without a full stop; none when there are 50 or more.

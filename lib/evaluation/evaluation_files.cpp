@@ -7,7 +7,7 @@
 #include <pugixml.hpp>
 #include <sstream>
 
-#include "evaluation/check_gates.h"
+#include "evaluation/gate.h"
 #include "geometry/angles.h"
 
 namespace vlp {
@@ -102,23 +102,24 @@ Json json_of(const Comparison& comparison) {
   return json;
 }
 
-Json json_of(const std::vector<GateResult>& gates) {
+Json json_of(const std::vector<CheckedMetric>& gates) {
   Json list = Json::array();
-  for (const GateResult& gate : gates) {
+  for (const CheckedMetric& gate : gates) {
     list.push_back({{"name", gate.name},
                     {"unit", gate.unit},
-                    {"value", gate.value},
-                    {"limit", gate.limit},
-                    {"passed", gate.passed}});
+                    {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
+                    {"limit", gate.limit.value()},
+                    {"asked", words_of(gate.asked)},
+                    {"passed", gate.met()}});
   }
   return list;
 }
 
-bool failed(const GateResult& gate) { return !gate.passed; }
+bool failed(const CheckedMetric& gate) { return !gate.met(); }
 
 }  // namespace
 
-std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>& gates) {
+std::string json_of(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
   Json json{{"format", "vlp-evaluation/1"},
             {"against", evaluation.against},
             {"captures", evaluation.captures},
@@ -152,18 +153,18 @@ std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>&
   return json.dump(2) + "\n";
 }
 
-std::string junit_of(const std::vector<GateResult>& gates) {
+std::string junit_of(const std::vector<CheckedMetric>& gates) {
   const auto failures = std::count_if(gates.begin(), gates.end(), failed);
   pugi::xml_document document;
   pugi::xml_node suite = document.append_child("testsuites").append_child("testsuite");
   suite.append_attribute("name") = "vlp-evaluate";
   suite.append_attribute("tests") = static_cast<unsigned long>(gates.size());
   suite.append_attribute("failures") = static_cast<long>(failures);
-  for (const GateResult& gate : gates) {
+  for (const CheckedMetric& gate : gates) {
     pugi::xml_node test = suite.append_child("testcase");
     test.append_attribute("classname") = "vlp-evaluate";
     test.append_attribute("name") = gate.name.c_str();
-    if (gate.passed) continue;
+    if (gate.met()) continue;
     test.append_child("failure").append_attribute("message") = words_of(gate).c_str();
   }
   std::ostringstream text;

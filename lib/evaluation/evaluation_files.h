@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "evaluation/evaluation.h"
-#include "evaluation/gates.h"
+#include "evaluation/gate.h"
 
 namespace vlp {
 
@@ -17,10 +17,11 @@ namespace vlp {
 /// comparison of too few units has a "why". Objects: horizontal (with intervals_95 and cdf), height
 /// and yaw (with bias), repeated (bias and scatter of stations with two fixes or more, and the
 /// list), fitted_line (of --line; jitter, angle, ends), stated_ratio (errors / stated sd), limit
-/// (errors / theoretical limit), comparison (verdict, pairs, difference), gates, passed.
-std::string json_of(const Evaluation& evaluation, const std::vector<GateResult>& gates);
+/// (errors / theoretical limit), comparison (verdict, pairs, difference), gates (name, unit, value,
+/// limit, asked: "at most" or "at least", passed), passed.
+std::string json_of(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
 /// JUnit XML, for CI systems: a test case for each gate, failed with words_of() it.
-std::string junit_of(const std::vector<GateResult>& gates);
+std::string junit_of(const std::vector<CheckedMetric>& gates);
 
 }  // namespace vlp

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "evaluation/cautions.h"
-#include "evaluation/known_gates.h"
+#include "evaluation/evaluation_metrics.h"
 #include "evaluation/report/evaluation_figures.h"
 #include "evaluation/report/evaluation_pictures.h"
 #include "evaluation/report/report.h"
@@ -65,10 +65,8 @@ EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Ga
                 input.fixes.file);
     return result;
   }
-  for (const KnownGate& known : known_gates()) {
-    if (const auto value = known.figure(evaluation)) result.metrics.push_back({known.name, *value});
-  }
-  result.gates = check_gates(gates, evaluation);
+  result.metrics = metrics_of(evaluation);
+  result.gates = check_gates(gates, result.metrics);
   result.caution = unasked_missing(evaluation, result.gates);
   add_warnings(result, input);
   return result;

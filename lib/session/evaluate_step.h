@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "evaluation/check_gates.h"
 #include "evaluation/evaluation.h"
+#include "evaluation/gate.h"
 #include "evaluation/report/report_picture.h"
 #include "session/step_result.h"
 
@@ -24,8 +24,7 @@ struct EvaluateResult : StepResult {
 double place_radius_m(const Calibration& calibration);
 
 /// What fixes are worth. Metrics: those that can be gates. undetermined: no capture has a fix.
-/// Throws InputError when image names do not match, std::invalid_argument for a gate of what is not
-/// there.
+/// Throws InputError when image names do not match.
 EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Gate>& gates);
 
 /// A drive along a commanded line.
@@ -39,7 +38,7 @@ struct EvaluationReport {
   const EvaluationInput& input;
   const EvaluateResult& result;
   /// All gates, of the steps before, too.
-  std::vector<GateResult> gates;
+  std::vector<CheckedMetric> gates;
   LampMap lamps;
   std::optional<Calibration> calibration;
   std::vector<Drive> drives;

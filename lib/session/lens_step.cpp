@@ -4,8 +4,6 @@
 
 #include <fmt/core.h>
 
-#include <cmath>
-#include <limits>
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
@@ -100,17 +98,6 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
   return result;
 }
 
-std::vector<GateResult> check_lens(const IntrinsicsGates& gates,
-                                   const std::vector<Metric>& metrics) {
-  const auto check = [&](const char* name, double limit) {
-    double value = std::numeric_limits<double>::quiet_NaN();
-    for (const Metric& metric : metrics) {
-      if (metric.name == name) value = metric.value;
-    }
-    return GateResult{name, "px", value, limit, value <= limit};
-  };
-  return {check("rms_px", gates.rms_px), check("uncertainty_px", gates.uncertainty_px),
-          check("halves_px", gates.halves_px)};
-}
+std::vector<Gate> lens_gates() { return {{"rms_px", 1}, {"uncertainty_px", 2}, {"halves_px", 1}}; }
 
 }  // namespace vlp

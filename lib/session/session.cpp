@@ -101,6 +101,39 @@ void forget_all(const fs::path& results) {
   }
 }
 
+const char* step_of(MetricSource source) {
+  switch (source) {
+    case MetricSource::lens:
+      return "lens";
+    case MetricSource::rotation:
+      return "rotation";
+    case MetricSource::dispersion:
+      return "dispersion";
+    case MetricSource::evaluation:
+    case MetricSource::reference:
+      return "evaluate";
+    case MetricSource::station:
+      break;
+  }
+  return "";
+}
+
+/// Those of a lens that is found here, and those that the session asks for.
+std::vector<Gate> gates_for(const SessionFolder& session, const SessionOptions& options) {
+  std::vector<Gate> gates;
+  if (!session.camera()) gates = lens_gates();
+  const fs::path file = session.gates().value_or(options.gates_file);
+  if (file.empty()) return gates;
+  return with_changes(std::move(gates), read_gates(file, session_metrics()));
+}
+
+/// What the last step writes, which gates are a part of.
+void forget_evaluation(const fs::path& results) {
+  for (const char* name : {"evaluation.json", "gates.xml", "report.html", "steps/evaluate.json"}) {
+    fs::remove(results / name);
+  }
+}
+
 /// What a step comes to, and how it is written once it is known.
 struct Work {
   StepResult result;
@@ -109,18 +142,22 @@ struct Work {
 
 class SessionRun {
  public:
-  SessionRun(const SessionFolder& session, fs::path results, const SessionOptions& options,
-             const SessionObserver& observer)
+  SessionRun(const SessionFolder& session, std::vector<Gate> gates, fs::path results,
+             const SessionOptions& options, const SessionObserver& observer)
       : session_(session),
         results_(std::move(results)),
         options_(options),
         observer_(observer),
-        build_(build_of(options.program)) {}
+        build_(build_of(options.program)),
+        gates_(std::move(gates)) {}
 
   SessionResult run() {
     check_redo();
     forget_other_steps();
-    if (calibrate() && locate()) evaluate();
+    if (calibrate() && locate()) {
+      add_gates_of_no_step();
+      evaluate();
+    }
     conclude();
     return std::move(result_);
   }
@@ -252,10 +289,31 @@ class SessionRun {
       done.result = attempt(work);
       write_step(kept_file, {key, digest_of_outputs(name), done.result});
     }
+    if (done.result.ok()) done.result.gates = check_gates(gates_of(name), done.result.metrics);
     result_.gates.insert(result_.gates.end(), done.result.gates.begin(), done.result.gates.end());
     result_.steps.push_back(std::move(done));
     if (observer_.ends) observer_.ends(result_.steps.back());
     return result_.steps.back().result.ok();
+  }
+
+  /// What a session without the step measures of it is nothing, and its gates are not met.
+  void add_gates_of_no_step() {
+    for (const char* name : {"lens", "rotation", "dispersion"}) {
+      const bool there = std::any_of(result_.steps.begin(), result_.steps.end(),
+                                     [&](const SessionStep& step) { return step.name == name; });
+      if (there) continue;
+      const auto gates = check_gates(gates_of(name), {});
+      result_.gates.insert(result_.gates.end(), gates.begin(), gates.end());
+    }
+  }
+
+  /// Those of what a step measures.
+  std::vector<Gate> gates_of(const std::string& step) const {
+    std::vector<Gate> gates;
+    for (const Gate& gate : gates_) {
+      if (step_of(metric_kind(gate.metric)->source) == step) gates.push_back(gate);
+    }
+    return gates;
   }
 
   /// A bad file is the session's; what cannot be written is not.
@@ -295,10 +353,7 @@ class SessionRun {
   }
 
   bool find_lens() {
-    const auto& gates = options_.lens_gates;
-    const std::string settings =
-        fmt::format("{} {} {} {} {}", camera_options(), gates.rms_px, gates.uncertainty_px,
-                    gates.halves_px, options_.report);
+    const std::string settings = fmt::format("{} {}", camera_options(), options_.report);
     return step("lens", {session_.boards(), session_.board()}, settings, [&] {
       const Board board = read_board(session_.board());
       const auto images = image_files({session_.boards().string()});
@@ -315,7 +370,6 @@ class SessionRun {
           solve_lens({std::move(seen.views), board, session_.board(), camera},
                      history(camera_options(), {session_.board(), session_.boards()}));
       lens.skipped.insert(lens.skipped.begin(), seen.skipped.begin(), seen.skipped.end());
-      lens.gates = check_lens(gates, lens.metrics);
       return Work{lens, [this, lens] {
                     write_cameramodel(out("lens.cameramodel"), lens.solution);
                     write_picture(lens, "lens.svg");
@@ -486,12 +540,9 @@ class SessionRun {
     });
   }
 
-  fs::path gates_file() const { return session_.gates().value_or(options_.gates_file); }
-
   void evaluate() {
     std::optional<fs::path> truth;
-    std::vector<fs::path> inputs{out("check-fixes.csv"), lamps_file(), out("calibration.yaml"),
-                                 gates_file()};
+    std::vector<fs::path> inputs{out("check-fixes.csv"), lamps_file(), out("calibration.yaml")};
     if (const auto check = session_.check()) {
       for (const fs::path& table : with_tables({}, *check)) inputs.push_back(table);
     }
@@ -502,26 +553,23 @@ class SessionRun {
       inputs.push_back(out(line.filename().string() + "-fixes.csv"));
       for (const fs::path& table : with_tables({}, line)) inputs.push_back(table);
     }
-    std::string lens_gates;
-    for (const GateResult& gate : result_.gates) lens_gates += words_of(gate) + "\n";
-    step("evaluate", inputs, picture_setting() + lens_gates, [&] {
+    const std::vector<Gate> gates = gates_of("evaluate");
+    std::string limits;
+    for (const auto& [metric, limit] : gates_) limits += fmt::format("{} {}\n", metric, limit);
+    step("evaluate", inputs, picture_setting() + limits, [&] {
       const auto check = session_.check();
       if (check) truth = truth_file(*check);
-      if (truth) return evaluate_check(*truth, inputs);
+      if (truth) return evaluate_check(*truth, inputs, gates);
       Work nothing;
       nothing.result.notes.emplace_back(
           check ? "no errors and no report: check has no truth.csv, and no places in captures.csv"
                 : "no errors and no report: there is no check");
-      if (!gates_file().empty()) {
-        nothing.result.warnings.emplace_back("the gates ask for errors, and there are none");
-      }
       return nothing;
     });
   }
 
-  Work evaluate_check(const fs::path& truth, const std::vector<fs::path>& inputs) {
-    std::vector<Gate> gates;
-    if (!gates_file().empty()) gates = read_gates(gates_file());
+  Work evaluate_check(const fs::path& truth, const std::vector<fs::path>& inputs,
+                      const std::vector<Gate>& gates) {
     auto input = std::make_shared<EvaluationInput>();
     input->fixes = {out("check-fixes.csv"), read_fixes(out("check-fixes.csv"))};
     input->truth = {truth, truth_in(truth.parent_path())};
@@ -537,7 +585,7 @@ class SessionRun {
       throw InputError(fixes, "no line can be fitted to its fixes: they have no direction");
     }
     if (!found.ok()) return {found};
-    std::vector<GateResult> all = result_.gates;
+    std::vector<CheckedMetric> all = result_.gates;
     all.insert(all.end(), found.gates.begin(), found.gates.end());
     return {found, [=, this] {
               write_file(out("evaluation.json"), json_of(found.evaluation, found.gates));
@@ -567,10 +615,7 @@ class SessionRun {
       result_.reason = last.name + ": " + last.result.why;
       forget_from(last.name);
     }
-    std::string missed;
-    for (const GateResult& gate : result_.gates) {
-      if (!gate.passed) missed.append(missed.empty() ? "" : "; ").append(words_of(gate));
-    }
+    const std::string missed = words_of_missed(result_.gates);
     if (!missed.empty() && last.result.ok()) {
       result_.verdict = SessionVerdict::gate;
       result_.reason = missed;
@@ -592,6 +637,7 @@ class SessionRun {
   const SessionOptions& options_;
   const SessionObserver& observer_;
   std::string build_;
+  std::vector<Gate> gates_;
   InputDigests digests_;
   SessionResult result_;
 };
@@ -637,32 +683,43 @@ std::string name_of(SessionVerdict verdict) {
   return "";
 }
 
+std::vector<MetricKind> session_metrics() {
+  return metric_kinds({MetricSource::lens, MetricSource::rotation, MetricSource::dispersion,
+                       MetricSource::evaluation});
+}
+
 SessionResult run_session(const fs::path& session, const fs::path& results,
                           const SessionOptions& options, const SessionObserver& observer) {
+  if (!options.gates_file.empty()) read_gates(options.gates_file, session_metrics());
   if (!fs::is_directory(session)) throw InputError(session, "is not a folder of captures");
-  if (!options.gates_file.empty()) read_gates(options.gates_file);
   if (holds_captures(session, results)) {
     throw InputError(results, "holds captures: results go to a folder of their own");
   }
   check_results(results, session);
-  std::error_code error;
-  fs::create_directories(results / "steps", error);
-  if (error) throw InputError(results, "cannot be made: " + error.message());
+  std::error_code not_made;
+  fs::create_directories(results / "steps", not_made);
+  if (not_made) throw InputError(results, "cannot be made: " + not_made.message());
   const ResultsLock lock(results);
   if (!fs::exists(mark_of(results))) write_file(mark_of(results), mark_text(session));
   std::optional<SessionFolder> folder;
+  std::vector<Gate> gates;
   try {
     folder.emplace(session);
-  } catch (const InputError& incomplete) {
+    gates = gates_for(*folder, options);
+  } catch (const InputError& error) {
     SessionResult result;
     result.verdict = SessionVerdict::no_result;
     result.failure = StepFailure::bad_input;
-    result.reason = without_folder(incomplete.what(), session);
-    forget_all(results);
+    result.reason = without_folder(error.what(), session);
+    if (folder) {
+      forget_evaluation(results);  // the rest is as good as before
+    } else {
+      forget_all(results);
+    }
     write_file(results / "session.json", session_json(result, options));
     return result;
   }
-  return SessionRun(*folder, results, options, observer).run();
+  return SessionRun(*folder, std::move(gates), results, options, observer).run();
 }
 
 }  // namespace vlp

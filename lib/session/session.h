@@ -8,8 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "calibration/intrinsics/calibration_report.h"
-#include "evaluation/check_gates.h"
+#include "evaluation/gate.h"
 #include "session/session_folder.h"
 #include "session/step_history.h"
 #include "session/step_result.h"
@@ -34,9 +33,9 @@ struct SessionOptions {
   LensModel lens_model = LensModel::opencv8;
   std::optional<double> row_time_s = {};
   std::optional<Readout> readout = {};
-  /// Of a session that has no gates.yaml of its own; may be empty.
+  /// vlp-gates/1 of session_metrics(), for a session that has no gates.yaml of its own; may be
+  /// empty. They hold beside lens_gates(), and in their place where they are of the same metric.
   std::filesystem::path gates_file = {};
-  IntrinsicsGates lens_gates = {};
   /// Pictures, drives along lines and report.html, which take longer than the rest.
   bool report = true;
   int threads = 1;
@@ -68,8 +67,8 @@ struct SessionResult {
   /// Of the step that failed, or bad_input of a session that is not whole.
   StepFailure failure = StepFailure::none;
   std::vector<SessionStep> steps;
-  /// Of lens and errors, met and not.
-  std::vector<GateResult> gates;
+  /// Met and not; those of what was not measured are not met.
+  std::vector<CheckedMetric> gates;
   /// As far as it came.
   std::optional<Calibration> calibration;
 };
@@ -80,6 +79,9 @@ struct SessionObserver {
   StepProgress progress = {};
   std::function<void(const SessionStep& step)> ends = {};
 };
+
+/// What the procedure measures, and what its gates can be of.
+std::vector<MetricKind> session_metrics();
 
 /// The whole procedure: calibrates a camera from a session's folder, checks it, and writes a
 /// report, all into `results`, which is made when it is not there. A step whose inputs, options and

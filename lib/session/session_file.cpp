@@ -69,11 +69,13 @@ Json metrics_of(const SessionResult& result) {
     const Json of_step = json_of(step.result);
     for (Json metric : of_step.at("metrics")) {
       metric["step"] = step.name;
-      for (const Json& gate : of_step.at("gates")) {
-        if (gate.at("name") != metric.at("name")) continue;
-        metric["unit"] = gate.at("unit");
-        metric["limit"] = gate.at("limit");
-        metric["met"] = gate.at("met");
+      if (const auto kind = metric_kind(metric.at("name").get<std::string>())) {
+        metric["unit"] = kind->unit;
+      }
+      for (const CheckedMetric& gate : step.result.gates) {
+        if (gate.name != metric.at("name")) continue;
+        const Json of_gate = json_of(gate);
+        for (const char* key : {"limit", "asked", "met"}) metric[key] = of_gate.at(key);
       }
       metrics.push_back(std::move(metric));
     }
@@ -94,7 +96,7 @@ std::string session_json(const SessionResult& result, const SessionOptions& opti
             {"metrics", metrics_of(result)},
             {"gates", Json::array()},
             {"steps", Json::array()}};
-  for (const GateResult& gate : result.gates) json["gates"].push_back(json_of(gate));
+  for (const CheckedMetric& gate : result.gates) json["gates"].push_back(json_of(gate));
   for (const SessionStep& step : result.steps) {
     const Json of_step = json_of(step.result);
     Json entry{{"name", step.name}, {"failure", of_step.at("failure")}};

@@ -10,11 +10,11 @@ namespace vlp {
 
 /// `session.json`, for programs: format "vlp-session/1". Objects: verdict ("pass", "gate",
 /// "no result"), reason, failure ("none", "bad_input", "undetermined", ...), camera, version,
-/// metrics (each with name, value and, where it is gated, unit, limit, met), steps (each with name,
-/// warnings, notes, skipped images with reasons, lamps left out with their numbers of captures),
-/// calibration (focal length, centre, tilt, lever arm, dispersion, in the unit that the key ends
-/// in), history (inputs with their digests). It is written
-/// last: without it the results are of a run that was killed. The same run gives the same bytes.
+/// metrics (each with step, name, value, unit, and where it is a gate limit, asked, met), steps
+/// (each with name, warnings, notes, skipped images with reasons, lamps left out with their numbers
+/// of captures), calibration (focal length, centre, tilt, lever arm, dispersion, in the unit that
+/// the key ends in), history (inputs with their digests). It is written last: without it the
+/// results are of a run that was killed. The same run gives the same bytes.
 std::string session_json(const SessionResult& result, const SessionOptions& options);
 
 }  // namespace vlp

@@ -43,7 +43,7 @@ std::vector<TruthRow> truth_in(const std::filesystem::path& folder);
 ///   check/                to locate, and with places to evaluate (optional)
 ///   line-*/               each along a straight line, with places (optional)
 ///   classifier.yaml       what tells the lamps apart, by vlp-train (optional)
-///   gates.yaml            what the errors have to keep to (optional)
+///   gates.yaml            what the figures have to keep to (optional)
 ///
 /// Other files and folders are left alone.
 // clang-format on

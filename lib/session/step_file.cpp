@@ -29,11 +29,6 @@ StepResult result_of(const Json& json) {
   for (const Json& metric : json.at("metrics")) {
     result.metrics.push_back({metric.at("name").get<std::string>(), number_of(metric.at("value"))});
   }
-  for (const Json& gate : json.at("gates")) {
-    result.gates.push_back({gate.at("name").get<std::string>(), gate.at("unit").get<std::string>(),
-                            number_of(gate.at("value")), number_of(gate.at("limit")),
-                            gate.at("met").get<bool>()});
-  }
   json.at("warnings").get_to(result.warnings);
   json.at("notes").get_to(result.notes);
   for (const Json& image : json.at("skipped")) {
@@ -48,28 +43,23 @@ StepResult result_of(const Json& json) {
 
 }  // namespace
 
-Json json_of(const GateResult& gate) {
+Json json_of(const CheckedMetric& gate) {
   return {{"name", gate.name},
           {"unit", gate.unit},
-          {"value", number_or_null(gate.value)},
-          {"limit", number_or_null(gate.limit)},
-          {"met", gate.passed}};
+          {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
+          {"limit", gate.limit ? Json(*gate.limit) : Json(nullptr)},
+          {"asked", words_of(gate.asked)},
+          {"met", gate.met()}};
 }
 
 Json json_of(const StepResult& result) {
-  Json json{{"failure", name_of(result.failure)},
-            {"why", result.why},
-            {"subject", result.subject.string()},
-            {"metrics", Json::array()},
-            {"gates", Json::array()},
-            {"warnings", result.warnings},
-            {"notes", result.notes},
-            {"skipped", Json::array()},
-            {"lamps_left_out", Json::array()}};
+  Json json{{"failure", name_of(result.failure)}, {"why", result.why},
+            {"subject", result.subject.string()}, {"metrics", Json::array()},
+            {"warnings", result.warnings},        {"notes", result.notes},
+            {"skipped", Json::array()},           {"lamps_left_out", Json::array()}};
   for (const auto& [name, value] : result.metrics) {
     json["metrics"].push_back({{"name", name}, {"value", number_or_null(value)}});
   }
-  for (const GateResult& gate : result.gates) json["gates"].push_back(json_of(gate));
   for (const auto& [image, reason] : result.skipped) {
     json["skipped"].push_back({{"image", image}, {"reason", reason}});
   }

@@ -26,6 +26,6 @@ void write_step(const std::filesystem::path& file, const KeptStep& step);
 
 /// A result as it stands there and in session.json. Figures that are not finite are null.
 nlohmann::ordered_json json_of(const StepResult& result);
-nlohmann::ordered_json json_of(const GateResult& gate);
+nlohmann::ordered_json json_of(const CheckedMetric& gate);
 
 }  // namespace vlp

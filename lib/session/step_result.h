@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/gates.h"
+#include "evaluation/gate.h"
 #include "evaluation/gnuplot.h"
 #include "rig/calibration.h"
 
@@ -24,12 +24,6 @@ enum class StepFailure {
   wrong_board,   // the images show another board than board.yaml says
   wrong_map,     // the captures contradict the lamp map
   wrong_place    // the captures were taken elsewhere than is said
-};
-
-/// A figure that was measured; its unit is the end of its name.
-struct Metric {
-  std::string name;
-  double value;
 };
 
 /// An image that was not used, and why.
@@ -54,7 +48,7 @@ struct StepResult {
 
   std::vector<Metric> metrics = {};
   /// Of some of them, met and not.
-  std::vector<GateResult> gates = {};
+  std::vector<CheckedMetric> gates = {};
   /// What may be wrong though there is a result; what was decided; what is of interest to those who
   /// look closely.
   std::vector<std::string> warnings = {}, notes = {}, details = {};

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "captures/csv_writer.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "station/station_config.h"
 
 namespace vlp {
 namespace {
@@ -22,15 +24,18 @@ std::string one_line(std::string text) {
 }
 
 void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
-  std::vector<std::string> header{"run",       "kind",    "station", "camera",  "begun_utc",
-                                  "ended_utc", "verdict", "causes",  "program", "config_sha256"};
-  for (const FigureKind& kind : station_figures()) header.emplace_back(kind.name);
+  std::vector<std::string> header;
+  for (const RunField& field : run_fields()) {
+    if (field.in_csv) header.emplace_back(field.name);
+  }
+  for (const MetricKind& kind : unit_metrics()) header.emplace_back(kind.name);
   CsvWriter csv(file, header);
   for (const RunRecord& run : runs) {
-    std::vector<std::string> row{
-        run.run,       run.kind,    run.station,          run.camera,  begun_utc(run.run),
-        run.ended_utc, run.verdict, one_line(run.causes), run.program, run.config_sha256};
-    for (const FigureKind& kind : station_figures()) {
+    std::vector<std::string> row;
+    for (const RunField& field : run_fields()) {
+      if (field.in_csv) row.push_back(one_line(run.*field.text));
+    }
+    for (const MetricKind& kind : unit_metrics()) {
       const auto figure = std::find_if(run.figures.begin(), run.figures.end(),
                                        [&](const auto& f) { return f.name == kind.name; });
       const bool there = figure != run.figures.end() && figure->value;
@@ -47,30 +52,24 @@ nlohmann::json optional_number(const std::optional<double>& value) {
 
 nlohmann::ordered_json json_of(const RunRecord& run) {
   nlohmann::ordered_json figures = nlohmann::ordered_json::object();
-  for (const StationFigure& figure : run.figures) {
+  for (const CheckedMetric& figure : run.figures) {
     figures[figure.name] = {{"value", optional_number(figure.value)},
+                            {"unit", figure.unit},
                             {"gate", optional_number(figure.limit)},
-                            {"at_least", figure.at_least},
+                            {"at_least", figure.asked == Direction::at_least},
                             {"met", figure.met()}};
   }
   nlohmann::ordered_json images = nlohmann::ordered_json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {
     images.push_back({{"step", step}, {"image", name}, {"sha256", sha256}, {"refused", refused}});
   }
-  return {{"run", run.run},
-          {"kind", run.kind},
-          {"station", run.station},
-          {"camera", run.camera},
-          {"begun_utc", begun_utc(run.run)},
-          {"ended_utc", run.ended_utc},
-          {"verdict", run.verdict},
-          {"causes", one_line(run.causes)},
-          {"program", run.program},
-          {"libraries", run.libraries},
-          {"config_sha256", run.config_sha256},
-          {"figures", figures},
-          {"calibration", run.calibration},
-          {"images", images}};
+  nlohmann::ordered_json json;
+  for (const RunField& field : run_fields()) {
+    json[field.name] = field.in_csv ? one_line(run.*field.text) : run.*field.text;
+  }
+  json["figures"] = std::move(figures);
+  json["images"] = std::move(images);
+  return json;
 }
 
 }  // namespace

@@ -5,13 +5,55 @@
 #include <soci/postgresql/soci-postgresql.h>
 #include <soci/sqlite3/soci-sqlite3.h>
 
+#include <algorithm>
 #include <chrono>
+#include <string>
 #include <thread>
 
+#include "rig/input_error.h"
 #include "station/record_tables.h"
-#include "station/records_database.h"
 
 namespace vlp {
+
+struct Records::Database {
+  std::string where;
+  soci::session sql;
+
+  /// Tables are there; from then on a connection that was lost is made again.
+  bool ready = false;
+
+  /// Errors name the database. The action may be done twice.
+  template <typename Action>
+  auto run(const Action& action) {
+    try {
+      try {
+        return action();
+      } catch (const soci::soci_error&) {
+        if (!ready || sql.is_connected()) throw;
+      }
+      // A unit takes its minutes: meanwhile the server was started anew, or the network fell
+      // asleep.
+      sql.reconnect();
+      return action();
+    } catch (const InputError&) {
+      throw;
+    } catch (const std::exception& error) {
+      std::string what = error.what();
+      std::replace_if(
+          what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+      throw InputError(shown(), "the records: " + what);
+    }
+  }
+
+  /// Password and user are nobody's business in a message.
+  std::string shown() const {
+    const auto at = where.find('@');
+    return where.starts_with("postgresql://") && at != std::string::npos
+               ? "postgresql://" + where.substr(at + 1)
+               : where;
+  }
+};
+
 namespace {
 
 /// In seconds. Others that write a run need some milliseconds each.
@@ -31,16 +73,17 @@ void open(soci::session& sql, const std::string& where) {
 
 void put_figures(soci::session& sql, const RunRecord& record) {
   int place = 0;
-  for (const StationFigure& figure : record.figures) {
+  for (const CheckedMetric& figure : record.figures) {
     const double value = figure.value.value_or(0), gate = figure.limit.value_or(0);
     soci::indicator has_value = figure.value ? soci::i_ok : soci::i_null;
     soci::indicator has_gate = figure.limit ? soci::i_ok : soci::i_null;
-    const int at_least = figure.at_least ? 1 : 0, met = figure.met() ? 1 : 0;
+    const int at_least = figure.asked == Direction::at_least ? 1 : 0, met = figure.met() ? 1 : 0;
     ++place;
-    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met) VALUES (:run, "
-           ":place, :name, :value, :gate, :at_least, :met)",
+    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit) VALUES "
+           "(:run, :place, :name, :value, :gate, :at_least, :met, :unit)",
         soci::use(record.run), soci::use(place), soci::use(figure.name),
-        soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least), soci::use(met);
+        soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least), soci::use(met),
+        soci::use(figure.unit);
   }
 }
 
@@ -51,6 +94,31 @@ void put_images(soci::session& sql, const RunRecord& record) {
         soci::use(record.run), soci::use(step), soci::use(name), soci::use(sha256),
         soci::use(refused);
   }
+}
+
+std::string condition(const RunFilter& filter) {
+  std::string text = "WHERE 1 = 1";
+  if (!filter.camera.empty()) text += " AND runs.camera = :camera";
+  if (!filter.station.empty()) text += " AND runs.station = :station";
+  if (!filter.verdict.empty()) text += " AND runs.verdict = :verdict";
+  if (!filter.kind.empty()) text += " AND runs.kind = :kind";
+  return text;
+}
+
+void bind(soci::statement& statement, const RunFilter& filter) {
+  for (const std::string* value :
+       {&filter.camera, &filter.station, &filter.verdict, &filter.kind}) {
+    if (!value->empty()) statement.exchange(soci::use(*value));
+  }
+}
+
+template <typename Row>
+std::vector<Row> last_of(std::vector<Row> rows, int last) {
+  const auto kept = static_cast<std::size_t>(last);
+  if (last > 0 && rows.size() > kept) {
+    rows.erase(rows.begin(), rows.end() - static_cast<std::ptrdiff_t>(kept));
+  }
+  return rows;
 }
 
 }  // namespace
@@ -78,20 +146,19 @@ Records::~Records() = default;
 void Records::keep(const RunRecord& record) {
   database_->run([&] {
     soci::session& sql = database_->sql;
-    const std::string begun = begun_utc(record.run);
     soci::transaction transaction(sql);
     // Writes first, so that it waits for others before it has read anything.
-    soci::statement insert =
-        (sql.prepare << "INSERT INTO runs (run, kind, station, camera, begun_utc, ended_utc, "
-                        "verdict, causes, program, libraries, config_sha256, calibration) "
-                        "VALUES (:run, :kind, :station, :camera, :begun, :ended, :verdict, "
-                        ":causes, :program, :libraries, :config, :calibration) "
-                        "ON CONFLICT (run) DO NOTHING",
-         soci::use(record.run), soci::use(record.kind), soci::use(record.station),
-         soci::use(record.camera), soci::use(begun), soci::use(record.ended_utc),
-         soci::use(record.verdict), soci::use(record.causes), soci::use(record.program),
-         soci::use(record.libraries), soci::use(record.config_sha256),
-         soci::use(record.calibration));
+    soci::statement insert(sql);
+    std::string columns, places;
+    for (const auto& [name, text, label, in_csv] : run_fields()) {
+      columns.append(columns.empty() ? "" : ", ").append(name);
+      places.append(places.empty() ? ":" : ", :").append(name);
+      insert.exchange(soci::use(record.*text, name));
+    }
+    insert.alloc();
+    insert.prepare("INSERT INTO runs (" + columns + ") VALUES (" + places +
+                   ") ON CONFLICT (run) DO NOTHING");
+    insert.define_and_bind();
     insert.execute(true);
     if (insert.get_affected_rows() > 0) {
       put_figures(sql, record);
@@ -107,6 +174,98 @@ bool Records::has(const std::string& run) {
     database_->sql << "SELECT COUNT(*) FROM runs WHERE run = :run", soci::into(count),
         soci::use(run);
     return count > 0;
+  });
+}
+
+std::vector<RunSummary> Records::list(const RunFilter& filter) {
+  return database_->run([&] {
+    RunSummary row;
+    std::vector<RunSummary> rows;
+    soci::statement statement(database_->sql);
+    statement.exchange(soci::into(row.run));
+    statement.exchange(soci::into(row.kind));
+    statement.exchange(soci::into(row.station));
+    statement.exchange(soci::into(row.camera));
+    statement.exchange(soci::into(row.ended_utc));
+    statement.exchange(soci::into(row.verdict));
+    statement.exchange(soci::into(row.causes));
+    bind(statement, filter);
+    statement.alloc();
+    statement.prepare("SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
+                      condition(filter) + " ORDER BY ended_utc, run");
+    statement.define_and_bind();
+    statement.execute();
+    while (statement.fetch()) rows.push_back(row);
+    return last_of(std::move(rows), filter.last);
+  });
+}
+
+std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilter& filter) {
+  return database_->run([&] {
+    TrendPoint row;
+    std::vector<TrendPoint> rows;
+    soci::statement statement(database_->sql);
+    statement.exchange(soci::into(row.run));
+    statement.exchange(soci::into(row.camera));
+    statement.exchange(soci::into(row.verdict));
+    statement.exchange(soci::into(row.value));
+    bind(statement, filter);
+    statement.exchange(soci::use(figure));
+    statement.alloc();
+    statement.prepare(
+        "SELECT runs.run, runs.camera, runs.verdict, figures.value FROM runs JOIN figures ON "
+        "figures.run = runs.run " +
+        condition(filter) +
+        " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, "
+        "runs.run");
+    statement.define_and_bind();
+    statement.execute();
+    while (statement.fetch()) rows.push_back(row);
+    return last_of(std::move(rows), filter.last);
+  });
+}
+
+std::optional<RunRecord> Records::find(const std::string& run) {
+  return database_->run([&]() -> std::optional<RunRecord> {
+    soci::session& sql = database_->sql;
+    RunRecord record;
+    soci::statement select(sql);
+    std::string columns;
+    for (const auto& [name, text, label, in_csv] : run_fields()) {
+      columns.append(columns.empty() ? "" : ", ").append(name);
+      select.exchange(soci::into(record.*text));
+    }
+    select.exchange(soci::use(run, "key"));
+    select.alloc();
+    select.prepare("SELECT " + columns + " FROM runs WHERE run = :key");
+    select.define_and_bind();
+    if (!select.execute(true)) return std::nullopt;
+    CheckedMetric figure;
+    double value = 0, gate = 0;
+    int at_least = 0;
+    soci::indicator has_value = soci::i_null, has_gate = soci::i_null;
+    soci::statement figures =
+        (sql.prepare
+             << "SELECT name, value, gate, at_least, unit FROM figures WHERE run = :run ORDER "
+                "BY place",
+         soci::into(figure.name), soci::into(value, has_value), soci::into(gate, has_gate),
+         soci::into(at_least), soci::into(figure.unit), soci::use(run));
+    figures.execute();
+    while (figures.fetch()) {
+      figure.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
+      figure.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
+      figure.asked = at_least != 0 ? Direction::at_least : Direction::at_most;
+      record.figures.push_back(figure);
+    }
+    RunRecord::Image image;
+    soci::statement images =
+        (sql.prepare << "SELECT step, image, sha256, refused FROM images WHERE run = :run ORDER "
+                        "BY step, image",
+         soci::into(image.step), soci::into(image.name), soci::into(image.sha256),
+         soci::into(image.refused), soci::use(run));
+    images.execute();
+    while (images.fetch()) record.images.push_back(image);
+    return record;
   });
 }
 

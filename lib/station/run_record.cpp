@@ -5,6 +5,7 @@
 #include <ceres/version.h>
 #include <fmt/core.h>
 #include <unistd.h>
+#include <array>
 
 #include <Eigen/Core>
 #include <chrono>
@@ -73,6 +74,23 @@ std::string calibration_text(const Calibration& calibration) {
   return text;
 }
 
+std::span<const RunField> run_fields() {
+  static constexpr std::array fields{
+      RunField{"run", &RunRecord::run, "run"},
+      RunField{"kind", &RunRecord::kind},
+      RunField{"station", &RunRecord::station, "station"},
+      RunField{"camera", &RunRecord::camera},
+      RunField{"begun_utc", &RunRecord::begun_utc, "begun"},
+      RunField{"ended_utc", &RunRecord::ended_utc, "ended"},
+      RunField{"verdict", &RunRecord::verdict},
+      RunField{"causes", &RunRecord::causes},
+      RunField{"program", &RunRecord::program, "program"},
+      RunField{"libraries", &RunRecord::libraries, "libraries", false},
+      RunField{"config_sha256", &RunRecord::config_sha256, "config"},
+      RunField{"calibration", &RunRecord::calibration, nullptr, false}};
+  return fields;
+}
+
 RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program) {
   const auto causes = unit.causes();
   const auto calibration = unit.calibration();
@@ -80,6 +98,7 @@ RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersi
                    "unit",
                    unit.config().station,
                    unit.camera_id(),
+                   begun_utc(run),
                    now_utc(),
                    causes.empty() ? "PASS" : "FAIL",
                    "",

@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
-#include "station/station_figures.h"
+#include "evaluation/gate.h"
 #include "station/unit.h"
 
 namespace vlp {
@@ -17,8 +18,8 @@ struct RunRecord {
   /// "unit", or "golden" for the station's reference camera.
   std::string kind;
   std::string station, camera;
-  /// Of the end, as 2026-11-21T13:45:01Z; the run's name tells when it began.
-  std::string ended_utc;
+  /// As 2026-11-21T13:45:01Z.
+  std::string begun_utc, ended_utc;
   /// "PASS" or "FAIL", and why, one cause to a line.
   std::string verdict, causes;
   /// Program with version, and the libraries that the result rests on with theirs.
@@ -26,7 +27,7 @@ struct RunRecord {
   std::string config_sha256;
   /// calibration.yaml as far as it came; may be empty.
   std::string calibration;
-  std::vector<StationFigure> figures;
+  std::vector<CheckedMetric> figures;
   struct Image {
     std::string step, name, sha256;
     /// Why it was not used; empty when it was.
@@ -36,6 +37,20 @@ struct RunRecord {
 
   bool passed() const { return verdict == "PASS"; }
 };
+
+/// A text of a record: a column of the table of runs, a key of their JSON, and so on.
+struct RunField {
+  const char* name;
+  std::string RunRecord::*text;
+  /// For people, who are shown it on a line of its own; nothing when it is not.
+  const char* label = nullptr;
+  /// A column of the CSV of runs.
+  bool in_csv = true;
+};
+
+/// All that a record has beside figures and images, in order. A new one is this line, where it is
+/// filled, and a migration in record_tables.cpp.
+std::span<const RunField> run_fields();
 
 /// A name for a run that begins now: the time and 16 random hexadecimal digits,
 /// 20261121T134501Z-0123456789abcdef.

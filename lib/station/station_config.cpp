@@ -7,7 +7,6 @@
 #include "captures/digest.h"
 #include "geometry/angles.h"
 #include "rig/yaml_reader.h"
-#include "station/station_figures.h"
 
 namespace vlp {
 namespace {
@@ -56,18 +55,6 @@ StationRefusal read_refusal(YamlMap map) {
   return refuse;
 }
 
-std::vector<StationGate> read_gates(YamlMap map) {
-  std::vector<StationGate> gates;
-  for (const FigureKind& kind : station_figures()) {
-    if (const auto value = map.optional(kind.name)) {
-      gates.push_back({kind.name, value->number_within(0, 1e6, kind.unit)});
-    }
-  }
-  map.finish();
-  if (gates.empty()) throw map.error("there should be a gate at least");
-  return gates;
-}
-
 /// Reads the files that a station names, and keeps their digests.
 class Files {
  public:
@@ -102,7 +89,7 @@ GoldenUnit read_golden(YamlMap map, Files& files) {
   if (!golden.calibration.rotation_center) {
     throw calibration.error("should be of a whole calibration: it has no rotation_center");
   }
-  golden.gates = read_gates(map.required("gates").map());
+  golden.gates = read_gates(map.required("gates"), unit_metrics());
   map.finish();
   return golden;
 }
@@ -119,6 +106,11 @@ std::string records_of(const YamlValue& value, const fs::path& file) {
 
 }  // namespace
 
+std::vector<MetricKind> unit_metrics() {
+  return metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
+                       MetricSource::dispersion});
+}
+
 StationConfig read_station(const fs::path& file) {
   YamlMap document = read_yaml(file, "vlp-station/1");
   Files files(file);
@@ -132,7 +124,7 @@ StationConfig read_station(const fs::path& file) {
   }
   if (const auto enough = document.optional("enough")) config.enough = read_enough(enough->map());
   if (const auto refuse = document.optional("refuse")) config.refuse = read_refusal(refuse->map());
-  config.gates = read_gates(document.required("gates").map());
+  config.gates = read_gates(document.required("gates"), unit_metrics());
   if (const auto golden = document.optional("golden")) {
     config.golden = read_golden(golden->map(), files);
   }

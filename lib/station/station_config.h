@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluation/gate.h"
 #include "rig/board.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
@@ -37,17 +38,11 @@ struct StationRefusal {
   int in_a_row = 12;
 };
 
-/// A figure that a unit has to reach: no more than the limit, or no less (`at_least`).
-struct StationGate {
-  std::string figure;
-  double limit;
-};
-
 /// The reference camera of `verify`.
 struct GoldenUnit {
   std::string camera_id;
   Calibration calibration;
-  std::vector<StationGate> gates;
+  std::vector<Gate> gates;
 };
 
 /// A station for one type of camera: `vlp-station/1`. Files that it names are beside it, unless
@@ -62,7 +57,7 @@ struct StationConfig {
   std::optional<Eigen::Vector2d> dispersion_station_m;
   StationEnough enough;
   StationRefusal refuse;
-  std::vector<StationGate> gates;
+  std::vector<Gate> gates;
   std::optional<GoldenUnit> golden;
   /// Folders: where the images of a unit arrive, as CAPTURES/CAMERA/STEP/, and where results go.
   std::filesystem::path captures, results;
@@ -71,6 +66,9 @@ struct StationConfig {
   /// SHA-256 of the digests of station.yaml and of the files that it names.
   std::string sha256;
 };
+
+/// The metrics of a unit, and those that its gates can be of.
+std::vector<MetricKind> unit_metrics();
 
 /// Throws InputError with file, line and key: unknown or missing keys, figures that no station can
 /// mean, a gate of a figure that there is not, a type without row time or read-out.

@@ -34,10 +34,10 @@ std::string outcome_of(const UnitImage& image) {
   return image.refused.empty() ? "taken" : "refused: " + image.refused;
 }
 
-ScreenLine gate_line(const StationFigure& figure) {
+ScreenLine gate_line(const CheckedMetric& figure) {
   const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
-  const std::string limit =
-      fmt::format("{} {:.4g}", figure.at_least ? ">=" : "<=", figure.limit.value_or(0));
+  const std::string limit = fmt::format(
+      "{} {:.4g}", figure.asked == Direction::at_least ? ">=" : "<=", figure.limit.value_or(0));
   const char* outcome = figure.met() ? "met" : figure.value ? "NOT MET" : "not reached";
   return {fmt::format("{:<24}{:>12}{:>14}  {}", figure.name, value, limit, outcome),
           figure.met() ? Tone::plain : Tone::bad};
@@ -76,7 +76,7 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
     add_wrapped(lines, "Last", image->first + ": " + outcome_of(image->second),
                 image->second.refused.empty() ? Tone::good : Tone::bad);
   }
-  for (const StationFigure& figure : unit.figures()) {
+  for (const CheckedMetric& figure : unit.figures()) {
     // Blur is of all views so far: a few may mislead.
     const bool known = figure.value && figure.name != "blur_px";
     if (known && !figure.met()) add_wrapped(lines, "Fails", cause_of(figure), Tone::bad);
@@ -102,7 +102,7 @@ std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
   const Tone tone = record.passed() ? Tone::good : Tone::bad;
   std::vector<ScreenLine> lines{
       {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
-  for (const StationFigure& figure : record.figures) {
+  for (const CheckedMetric& figure : record.figures) {
     if (figure.limit) lines.push_back(gate_line(figure));
   }
   std::istringstream causes(record.causes);

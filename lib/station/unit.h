@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "evaluation/gate.h"
 #include "session/step_history.h"
-#include "station/station_figures.h"
 #include "station/station_step.h"
 #include "station/unit_step.h"
 
@@ -52,7 +52,7 @@ class Unit {
   /// As far as it came; nothing before the lens is known.
   std::optional<Calibration> calibration() const;
   /// All figures, gates among them.
-  std::vector<StationFigure> figures() const;
+  std::vector<CheckedMetric> figures() const;
   /// For the report: of lens, rotation centre and dispersion, as far as it came. Waits for them.
   std::vector<ReportPicture> pictures() const;
   /// Why the unit fails, the root first; empty when it passes.

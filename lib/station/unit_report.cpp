@@ -3,7 +3,6 @@
 #include "station/unit_report.h"
 
 #include <algorithm>
-#include <limits>
 #include <sstream>
 
 #include "captures/csv_writer.h"
@@ -12,21 +11,9 @@
 namespace vlp {
 namespace {
 
-FigureKind kind_of(const StationFigure& figure) {
-  for (const FigureKind& kind : station_figures()) {
-    if (figure.name == kind.name) return kind;
-  }
-  return {"", "", figure.at_least, "", "a figure of another version of the program"};
-}
-
-/// The report's gates are limits from above: of a share that should be large, what is missing.
-GateResult gate_of(const StationFigure& figure) {
-  const double none = std::numeric_limits<double>::quiet_NaN();
-  const double value = figure.value.value_or(none), limit = *figure.limit;
-  if (figure.at_least) {
-    return {figure.name + ", what is missing", "", 1 - value, 1 - limit, figure.met()};
-  }
-  return {figure.name, kind_of(figure).unit, value, limit, figure.met()};
+std::string meaning_of(const CheckedMetric& figure) {
+  const auto kind = metric_kind(figure.name);
+  return kind ? kind->meaning : "a figure of another version of the program";
 }
 
 }  // namespace
@@ -38,14 +25,13 @@ std::string unit_report(const RunRecord& record, const std::filesystem::path& ca
   std::istringstream causes(record.causes);
   for (std::string cause; std::getline(causes, cause);) report.notes.push_back("Cause: " + cause);
   const auto faults = static_cast<double>(report.notes.size());
-  report.gates.push_back({"causes to fail", "", faults, 0, record.passed()});
+  report.gates.push_back({"causes to fail", "", faults, 0, Direction::at_most});
   constexpr int digits = 4;
-  for (const StationFigure& figure : record.figures) {
-    if (figure.limit) report.gates.push_back(gate_of(figure));
+  for (const CheckedMetric& figure : record.figures) {
+    if (figure.limit) report.gates.push_back(figure);
     if (!figure.value) continue;
-    const FigureKind kind = kind_of(figure);
-    report.figures.push_back(
-        {figure.name + ": " + kind.meaning, significant(*figure.value, digits), kind.unit, ""});
+    report.figures.push_back({figure.name + ": " + meaning_of(figure),
+                              significant(*figure.value, digits), figure.unit, ""});
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });

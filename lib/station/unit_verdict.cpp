@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "station/guidance.h"
@@ -61,9 +60,7 @@ bool other_board(const UnitStep& boards) {
 }
 
 bool has_value(const StepResult& result, const std::string& figure) {
-  return std::any_of(result.metrics.begin(), result.metrics.end(), [&](const Metric& value) {
-    return value.name == figure && std::isfinite(value.value);
-  });
+  return value_of(result.metrics, figure).has_value();
 }
 
 /// What the captures of all steps tell of the lamps.
@@ -88,7 +85,7 @@ std::optional<Calibration> Unit::calibration() const {
   return last;
 }
 
-std::vector<StationFigure> Unit::figures() const {
+std::vector<CheckedMetric> Unit::figures() const {
   std::vector<Metric> values;
   if (const auto blur_px = typical_blur_px(step(StationStep::boards))) {
     values.push_back({"blur_px", *blur_px});
@@ -97,20 +94,20 @@ std::vector<StationFigure> Unit::figures() const {
     if (!state.result) continue;
     values.insert(values.end(), state.result->metrics.begin(), state.result->metrics.end());
   }
-  return with_gates(values, config_.gates);
+  return check_all(config_.gates, values, unit_metrics());
 }
 
 std::vector<std::string> Unit::causes() const {
   std::vector<std::string> causes;
   const auto figures = this->figures();
-  const auto add_gate = [&](const StationFigure& figure) {
+  const auto add_gate = [&](const CheckedMetric& figure) {
     if (!figure.met()) causes.push_back(cause_of(figure));
   };
-  const auto blur = [](const StationFigure& figure) { return figure.name == "blur_px"; };
+  const auto blur = [](const CheckedMetric& figure) { return figure.name == "blur_px"; };
   if (other_board(step(StationStep::boards))) {
     causes.emplace_back("wrong board: the tags have other ids");
   }
-  for (const StationFigure& figure : figures) {
+  for (const CheckedMetric& figure : figures) {
     if (blur(figure) && figure.value) add_gate(figure);
   }
   // What a step lacks comes before its figures, and both before the steps that rest on it.
@@ -118,11 +115,11 @@ std::vector<std::string> Unit::causes() const {
     add_problems(*this, each, causes);
     const auto& result = step(each).result;
     if (!result || !result->ok()) break;
-    for (const StationFigure& figure : figures) {
+    for (const CheckedMetric& figure : figures) {
       if (has_value(*result, figure.name)) add_gate(figure);
     }
   }
-  for (const StationFigure& figure : figures) {
+  for (const CheckedMetric& figure : figures) {
     if (!current() && !figure.value) add_gate(figure);
   }
   if (causes.empty()) return causes;

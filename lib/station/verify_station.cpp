@@ -62,18 +62,20 @@ class Verification {
   }
 
   RunRecord record(const ProgramVersion& program) {
-    const auto figures = with_gates(values_, golden_.gates);
-    for (const StationFigure& figure : figures) {
+    const auto figures = check_all(golden_.gates, values_, unit_metrics());
+    for (const CheckedMetric& figure : figures) {
       if (!figure.met()) causes_.push_back(cause_of(figure));
     }
     if (!causes_.empty()) {
       const auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration);
       causes_.insert(causes_.begin(), faults.begin(), faults.end());
     }
-    RunRecord record{new_run(),
+    const std::string run = new_run();
+    RunRecord record{run,
                      "golden",
                      config_.station,
                      golden_.camera_id,
+                     begun_utc(run),
                      now_utc(),
                      causes_.empty() ? "PASS" : "FAIL",
                      "",

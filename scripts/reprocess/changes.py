@@ -99,17 +99,32 @@ def changes_of(rows, before_rows):
     return changes, pairs
 
 
-# What a gate holds at most: its value, or None where there is none.
+
+
+def newly_failed(changes):
+    return len(changes["newly_failed"]) if changes and changes["same_inputs"] else None
+
+
+def worse_share(changes):
+    return changes["worse"] / changes["pairs"] if changes and changes["pairs"] else None
+
+
+# What a gate holds at most: the least and the largest limit that can be meant, and its value, or None where there
+# is none.
 GATES = {
-    "no_result": lambda counts, changes: counts["no_result"] + counts["crashed"],
-    "no_result_share": lambda counts, changes: (counts["no_result"] + counts["crashed"]) / counts["sessions"],
-    "gate_share": lambda counts, changes: counts["gate"] / counts["sessions"],
-    "mean_mm": lambda counts, changes: counts.get("mean_mm"),
-    "median_mm": lambda counts, changes: counts.get("median_mm"),
-    "p90_mm": lambda counts, changes: counts.get("p90_mm"),
-    "newly_failed": lambda counts, changes: len(changes["newly_failed"]) if changes and changes["same_inputs"] else None,
-    "worse_share": lambda counts, changes: changes["worse"] / changes["pairs"] if changes and changes["pairs"] else None,
-    "mean_difference_mm": lambda counts, changes: changes and changes.get("interval_95_mm", [None, None])[1],
+    "no_result": (0, math.inf, lambda counts, changes: counts["no_result"] + counts["crashed"]),
+    "no_result_share": (0, 1, lambda counts, changes: (counts["no_result"] + counts["crashed"]) / counts["sessions"]),
+    "gate_share": (0, 1, lambda counts, changes: counts["gate"] / counts["sessions"]),
+    "mean_mm": (0, math.inf, lambda counts, changes: counts.get("mean_mm")),
+    "median_mm": (0, math.inf, lambda counts, changes: counts.get("median_mm")),
+    "p90_mm": (0, math.inf, lambda counts, changes: counts.get("p90_mm")),
+    "newly_failed": (0, math.inf, lambda counts, changes: newly_failed(changes)),
+    "worse_share": (0, 1, lambda counts, changes: worse_share(changes)),
+    "mean_difference_mm": (
+        -math.inf,
+        math.inf,
+        lambda counts, changes: changes and changes.get("interval_95_mm", [None, None])[1],
+    ),
 }
 
 
@@ -129,6 +144,10 @@ def read_gates(file):
             raise ValueError(f"{file}: gate '{name}' is unknown; there are: {', '.join(GATES)}")
         if isinstance(limit, bool) or not isinstance(limit, (int, float)) or not math.isfinite(limit):
             raise ValueError(f"{file}: {name}: should be a number")
+        least, largest, _ = GATES[name]
+        if not least <= limit <= largest:
+            meant = "a share from 0 to 1" if largest == 1 else "0 or more"
+            raise ValueError(f"{file}: {name}: should be {meant}, not {limit:g}")
     return gates
 
 
@@ -136,7 +155,7 @@ def check_gates(gates, counts, changes):
     """A figure that there is not, of too few cameras or without earlier results, does not pass."""
     results = []
     for name, limit in gates.items():
-        value = GATES[name](counts, changes)
+        value = GATES[name][2](counts, changes)
         passed = value is not None and value <= limit
         results.append({"name": name, "value": value, "limit": limit, "passed": passed})
     return results

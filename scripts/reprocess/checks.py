@@ -32,9 +32,9 @@ def check_previous(previous, results):
 
 
 def check_session_gates(options):
-    """By vlp-evaluate, which comes to its fixes when the gates are right."""
+    """By vlp-calibrate, which comes to its session when the gates are right."""
     if options.session_gates:
-        command = [options.bin / "vlp-evaluate", "/dev/null", "--truth", "/dev/null", "--gates", options.session_gates]
+        command = [options.bin / "vlp-calibrate", "/dev/null", "-o", "/dev/null", "--gates", options.session_gates]
         said = subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()
         if "error: /dev/null" not in said:
             fail(said.split("error: ", 1)[-1])

@@ -12,6 +12,7 @@
 
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "session/lens_step.h"
 
 namespace vlp {
 namespace {
@@ -55,11 +56,10 @@ void try_set(int set, Counts& counts) {
     return;
   }
   const CalibrationReport report = report_on(solution, input);
-  const IntrinsicsGates gates;
-  const bool good = solution.rms_px <= gates.rms_px &&
-                    report.uncertainty_worst_px <= gates.uncertainty_px && report.halves &&
-                    report.halves->rms_px <= gates.halves_px;
-  if (!good) {
+  std::vector<Metric> metrics{{"rms_px", solution.rms_px},
+                              {"uncertainty_px", report.uncertainty_worst_px}};
+  if (report.halves) metrics.push_back({"halves_px", report.halves->rms_px});
+  if (!words_of_missed(check_gates(lens_gates(), metrics)).empty()) {
     ++counts.refused;
     return;
   }

@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "evaluation/check_gates.h"
+#include "evaluation/gate.h"
 
 namespace vlp {
 namespace {
@@ -26,7 +26,9 @@ Evaluation evaluation(std::size_t units) {
 }
 
 TEST(Cautions, TellOfMissingFixesThatNoGateAsksFor) {
-  const GateResult mean{"mean_mm", "mm", 1, 2, true}, missing{"missing", "", 0.9, 1, true};
+  const auto gates =
+      check_gates({{"mean_mm", 2}, {"missing", 1}}, {{"mean_mm", 1}, {"missing", 0.9}});
+  const CheckedMetric &mean = gates[0], &missing = gates[1];
   EXPECT_EQ(unasked_missing(evaluation(50), {mean}),
             "393 of 432 captures have no fix, and no gate 'missing' asks");
   EXPECT_EQ(unasked_missing(evaluation(50), {mean, missing}), "");

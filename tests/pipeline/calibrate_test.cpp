@@ -106,15 +106,26 @@ TEST_F(SmallSession, RunsOnlyWhatIsNotAsBefore) {
 }
 
 TEST_F(SmallSession, EndsWithTheVerdictOfTheGatesEachTime) {
-  folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  mean_mm: 1e-6\n");
+  folder.file("a session/gates.yaml",
+              "format: vlp-gates/1\ngates:\n  mean_mm: 1e-6\n  tilt_deg: 1e-6\n");
   for (int run = 0; run < 2; ++run) {
     const auto result = calibrate();
     EXPECT_EQ(result.exit_code, 1) << result.output << result.errors;
     EXPECT_THAT(result.output, HasSubstr("a gate is not met"));
-    EXPECT_THAT(result.output, HasSubstr("mean_mm"));
+    EXPECT_THAT(result.output, HasSubstr("NOT MET     mean_mm is "));
+    EXPECT_THAT(result.output, HasSubstr("NOT MET     tilt_deg is "));
   }
   EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
-  EXPECT_THAT(result("gates.xml"), HasSubstr("<failure"));
+  EXPECT_THAT(result("gates.xml"), HasSubstr("<failure message=\"tilt_deg is "));
+  // Another limit measures nothing again.
+  folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  tilt_deg: 90\n");
+  const auto met = calibrate();
+  EXPECT_EQ(met.exit_code, 0) << met.output << met.errors;
+  EXPECT_THAT(met.output, HasSubstr("rotation      as before"));
+  folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  coverage: 7\n");
+  const auto refused = calibrate();
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.errors, HasSubstr("gates.yaml:3: gates.coverage: should be a share"));
 }
 
 TEST_F(SmallSession, FollowsWhatIsInItsFolder) {

@@ -43,7 +43,7 @@ TEST(KilledLocate, LeavesTheOldFileOrTheNew) {
   int left_old = 0, left_new = 0;
   for (int i = 0; i < 60; ++i) {
     const auto output = folder.file("fixes.csv", old_content);
-    const double wait_s = random.uniform(0, 1.3 * run_time.count());
+    const double wait_s = random.uniform(0, 2 * run_time.count());
     run_program("(" + locate(large, output) + ") & sleep " + std::to_string(wait_s) +
                 "; kill -9 $! 2>&-; wait");
     const std::string content = TemporaryFolder::content_of(output);

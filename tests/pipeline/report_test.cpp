@@ -105,7 +105,7 @@ TEST_F(ReportTest, RefusesWhatItCannotShow) {
 
 /// A page that passes, small enough to be broken in many ways.
 std::string good_page() {
-  Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, true}}, {}, {}, {}, {}, {}};
+  Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   report.pictures = {
       report_picture(drawing_of(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
   return report_html(report);

@@ -100,6 +100,8 @@ class Changes(unittest.TestCase):
                 ("format: vlp-archive-gates/1\ngates: {odd: 1}\n", "gate 'odd' is unknown"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: .inf}\n", "should be a number"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: true}\n", "should be a number"),
+                ("format: vlp-archive-gates/1\ngates: {worse_share: 7}\n", "a share from 0 to 1, not 7"),
+                ("format: vlp-archive-gates/1\ngates: {mean_mm: -1}\n", "should be 0 or more, not -1"),
                 ("format: [", "is not YAML"),
             ):
                 file.write_text(text)

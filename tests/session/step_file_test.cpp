@@ -17,7 +17,6 @@ StepResult sample() {
   StepResult result;
   result.metrics = {{"rms_px", 0.1 + 0.2},
                     {"uncertainty_px", std::numeric_limits<double>::infinity()}};
-  result.gates = {{"rms_px", "px", 0.1 + 0.2, 1, true}};
   result.warnings = {"one \"lamp\""};
   result.notes = {"note"};
   result.skipped = {{"a.png", "is empty"}};
@@ -36,7 +35,6 @@ TEST(StepFile, GivesBackWhatWasKept) {
   const StepResult& result = kept->result;
   EXPECT_EQ(result.metrics[0].value, 0.1 + 0.2);
   EXPECT_FALSE(std::isfinite(result.metrics[1].value));
-  EXPECT_EQ(result.gates[0].limit, 1);
   EXPECT_EQ(result.warnings, sample().warnings);
   EXPECT_EQ(result.skipped[0].reason, "is empty");
   EXPECT_EQ(result.lamps_left_out[0].captures, 12);

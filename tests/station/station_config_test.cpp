@@ -51,6 +51,8 @@ TEST_F(StationYaml, RefusesAnUnknownGateWithItsLine) {
 }
 
 TEST_F(StationYaml, RefusesWhatNoStationCanMean) {
+  change("station.yaml", "\n  coverage: 0.7", "\n  coverage: 7");
+  EXPECT_THAT(refusal(), HasSubstr("gates.coverage: should be a share from 0 to 1, not 7"));
   change("station.yaml", "board_coverage: 0.7", "board_coverage: 70");
   EXPECT_THAT(refusal(), HasSubstr("enough.board_coverage"));
 }

@@ -71,13 +71,13 @@ TEST_F(UnitTest, HasAReportOfItsVerdict) {
   RunRecord record = record_of(unit, new_run(), {"test", "0"});
   EXPECT_THAT(unit_report(record, "", {}),
               AllOf(HasSubstr("<strong>FAIL"), HasSubstr("Cause: boards")));
-  // A share that should be large stands in the report as what is missing.
-  record.figures = {{"coverage", 0.75, 0.7, true}, {"rms_px", 0.1, 0.3, false}};
+  record.figures =
+      check_gates({{"coverage", 0.7}, {"rms_px", 0.3}}, {{"coverage", 0.75}, {"rms_px", 0.1}});
   record.causes.clear();
   record.verdict = "PASS";
   EXPECT_THAT(unit_report(record, "", {}),
-              AllOf(HasSubstr("<strong>PASS"), HasSubstr("coverage, what is missing"),
-                    HasSubstr("0.25"), Not(HasSubstr("Cause"))));
+              AllOf(HasSubstr("<strong>PASS"), HasSubstr("at least\u00a00.7"), HasSubstr("0.75"),
+                    Not(HasSubstr("Cause"))));
 }
 
 }  // namespace

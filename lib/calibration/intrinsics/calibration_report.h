@@ -31,16 +31,6 @@ struct CalibrationReport {
 /// Precondition: solution.ok(). Two more solves.
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
 
-/// What a calibration has to reach. By what was seen on rendered and real boards of 800 to 4000 px.
-struct IntrinsicsGates {
-  /// Residuals per axis: more means blurred images or the wrong lens model.
-  double rms_px = 1;
-  /// Worst uncertainty over the image, and what the halves differ by, as rms per axis: more means
-  /// too few views, too much alike.
-  double uncertainty_px = 2;
-  double halves_px = 1;
-};
-
 /// What views that took no part in a solution say of its lens: their poses are fitted, nothing
 /// else.
 struct HeldOut {

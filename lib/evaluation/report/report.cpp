@@ -3,7 +3,6 @@
 #include "evaluation/report/report.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "captures/csv_writer.h"
 #include "evaluation/report/calibration_sections.h"
@@ -26,23 +25,22 @@ std::string with_unit(const std::string& text, const std::string& unit) {
   return text.empty() || unit.empty() ? text : text + kSpace + unit;
 }
 
-std::string quantity(double value, const std::string& unit) {
-  if (!std::isfinite(value)) return "none";
-  return with_unit(significant(value, 4), unit);
+std::string quantity(const std::optional<double>& value, const std::string& unit) {
+  return value ? with_unit(significant(*value, 4), unit) : "none";
 }
 
-std::vector<std::string> row_of(const GateResult& gate) {
-  const std::string result = gate.passed ? "met" : "NOT\u00a0MET";
+std::vector<std::string> row_of(const CheckedMetric& gate) {
+  const std::string result = gate.met() ? "met" : "NOT\u00a0MET";
   return {gate.name, quantity(gate.value, gate.unit),
-          "at most\u00a0" + quantity(gate.limit, gate.unit), result};
+          words_of(gate.asked) + kSpace + quantity(gate.limit, gate.unit), result};
 }
 
-std::string verdict(const std::vector<GateResult>& gates, const std::string& caution) {
+std::string verdict(const std::vector<CheckedMetric>& gates, const std::string& caution) {
   if (gates.empty()) {
     return "<div class=\"verdict none\"><strong>NO VERDICT</strong>No gates were set.</div>\n";
   }
   const auto missed =
-      std::count_if(gates.begin(), gates.end(), [](const auto& gate) { return !gate.passed; });
+      std::count_if(gates.begin(), gates.end(), [](const auto& gate) { return !gate.met(); });
   const std::string count = std::to_string(gates.size());
   const std::string of_gates = gates.size() == 1 ? " gate" : " gates";
   const std::string reason = missed == 0
@@ -51,7 +49,7 @@ std::string verdict(const std::vector<GateResult>& gates, const std::string& cau
                                        (missed == 1 ? " is" : " are") + " not met.";
   HtmlTable table{"Gates", {"gate", "figure", "limit", "result"}, {}};
   for (const auto& gate : gates) {
-    if (!gate.passed) table.marked.push_back(table.rows.size());
+    if (!gate.met()) table.marked.push_back(table.rows.size());
     table.rows.push_back(row_of(gate));
   }
   return std::string("<div class=\"verdict ") + (missed == 0 ? "pass" : "fail") + "\"><strong>" +

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/gates.h"
+#include "evaluation/gate.h"
 #include "evaluation/report/report_picture.h"
 #include "rig/calibration.h"
 
@@ -24,7 +24,7 @@ struct ReportFigure {
 struct Report {
   std::string title;
   /// Without gates there is no verdict, which the report says.
-  std::vector<GateResult> gates;
+  std::vector<CheckedMetric> gates;
   std::vector<ReportFigure> figures;
   /// Sentences below the figures: how they were come by, what is missing.
   std::vector<std::string> notes;

@@ -1,13 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/check_gates.h"
+#include "evaluation/gate.h"
 
 #include <gmock/gmock.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <pugixml.hpp>
 
 #include "evaluation/evaluation_files.h"
+#include "evaluation/evaluation_metrics.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
 
@@ -36,52 +38,85 @@ TEST(Gates, HoldWhenTheFigureIsNoLarger) {
                                     {"missing", 0.25},
                                     {"missing", 0.249},
                                     {"height_rms_mm", 2.9}},
-                                   evaluation());
+                                   metrics_of(evaluation()));
   std::vector<bool> passed;
-  for (const GateResult& result : results) passed.push_back(result.passed);
+  for (const CheckedMetric& result : results) passed.push_back(result.met());
   EXPECT_EQ(passed, (std::vector<bool>{true, false, true, true, false, false}));
-  EXPECT_NEAR(results[5].value, 3, 1e-9);
+  EXPECT_NEAR(results[5].value.value(), 3, 1e-9);
   EXPECT_EQ(results[5].unit, "mm");
   EXPECT_EQ(words_of(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is asked for");
 }
 
-TEST(Gates, AreRefusedWhereThereIsNoSuchFigure) {
-  for (const char* name : {"yaw_rms_deg", "limit_ratio", "fitted_mean_mm", "worse_mm"}) {
-    EXPECT_THROW(check_gates({{name, 1}}, evaluation()), std::invalid_argument) << name;
-  }
+TEST(Gates, AreMetUpToTheLimitOrFromItOn) {
+  EXPECT_TRUE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.3}})[0].met());
+  EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].met());
+  const auto coverage = check_gates({{"coverage", 0.7}}, {{"coverage", 0.69}});
+  EXPECT_FALSE(coverage[0].met());
+  EXPECT_EQ(words_of(coverage[0]), "coverage is 0.69, at least 0.7 is asked for");
+  EXPECT_EQ(cause_of(coverage[0]),
+            "the board was not shown all over the image (" + words_of(coverage[0]) + ")");
+  EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].met());
+}
+
+TEST(Gates, OfAllMetricsHaveThoseWithoutAGateAndWithoutAValue) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  const auto known = metric_kinds({MetricSource::lens, MetricSource::rotation});
+  const auto all = check_all({{"rms_px", 0.3}}, {{"tilt_deg", 1}, {"rms_px", infinity}}, known);
+  ASSERT_EQ(all.size(), 2);
+  EXPECT_EQ(all[0].name, "rms_px");
+  EXPECT_FALSE(all[0].value);
+  EXPECT_FALSE(all[0].met());
+  EXPECT_EQ(words_of_missed(all), "rms_px is not known, at most 0.3 px is asked for");
+  EXPECT_EQ(all[1].value, 1);
+  EXPECT_FALSE(all[1].limit);
+  EXPECT_TRUE(all[1].met());
+}
+
+TEST(Gates, ThatChangeTakeThePlaceOfTheSame) {
+  const auto gates =
+      with_changes({{"rms_px", 1}, {"halves_px", 1}}, {{"coverage", 0.6}, {"rms_px", 2}});
+  ASSERT_EQ(gates.size(), 3);
+  EXPECT_EQ(gates[0].limit, 2);
+  EXPECT_EQ(gates[1].limit, 1);
+  EXPECT_EQ(gates[2].metric, "coverage");
 }
 
 TEST(Gates, OfAComparisonOfTooFewDoNotFail) {
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
-  EXPECT_THROW(check_gates({{"worse_mm", 0}}, compared), std::invalid_argument);  // no pair
+  const auto passed = [&] { return check_gates({{"worse_mm", 0}}, metrics_of(compared))[0].met(); };
+  EXPECT_FALSE(value_of(metrics_of(compared), "worse_mm")) << "no pair";
   compared.comparison->pairs = compared.comparison->units = 19;
   compared.comparison->interval_m = {0.1, 1};
-  EXPECT_TRUE(check_gates({{"worse_mm", 0}}, compared)[0].passed);
+  EXPECT_TRUE(passed());
   compared.comparison->interval_m = {};
-  EXPECT_TRUE(check_gates({{"worse_mm", 0}}, compared)[0].passed);
+  EXPECT_TRUE(passed());
   compared.comparison->units = 20;
   compared.comparison->interval_m = {0.1, 1};
-  EXPECT_FALSE(check_gates({{"worse_mm", 0}}, compared)[0].passed);
+  EXPECT_FALSE(passed());
 }
 
 TEST(Gates, HaveLimitsThatAFigureCanReach) {
-  const auto words = [](const char* text) -> std::string {
+  const auto known = metric_kinds({MetricSource::lens, MetricSource::evaluation});
+  const auto words = [&](const char* text) -> std::string {
     try {
-      return gate_of(text).name;
+      return gate_of(text, known).metric;
     } catch (const std::invalid_argument& problem) {
       return problem.what();
     }
   };
   EXPECT_EQ(words("missing=50"),
             "gate 'missing' should be a share from 0 to 1, not 50: for 50 % say 0.5");
+  EXPECT_EQ(words("coverage=7"),
+            "gate 'coverage' should be a share from 0 to 1, not 7: for 7 % say 0.07");
+  EXPECT_EQ(words("yaw_rms_deg=200"), "gate 'yaw_rms_deg' should be at most 180 deg, not 200");
   EXPECT_THAT(words("mean_mm=-1"), HasSubstr("gate 'mean_mm' should not be negative"));
-  EXPECT_EQ(gate_of("missing=1").limit, 1);
-  EXPECT_EQ(gate_of("stated_ratio=50").limit, 50);
+  EXPECT_EQ(gate_of("missing=1", known).limit, 1);
+  EXPECT_EQ(gate_of("stated_ratio=50", known).limit, 50);
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& text) {
     return refusal_of(
-        [&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\ngates:\n" + text)); });
+        [&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\ngates:\n" + text), known); });
   };
   EXPECT_THAT(refusal("  mean_mm: 1\n  missing: 1.5\n"),
               HasSubstr("g.yaml:4: gates.missing: should be a share from 0 to 1"));
@@ -90,8 +125,7 @@ TEST(Gates, HaveLimitsThatAFigureCanReach) {
 }
 
 TEST(Gates, OfWhatIsNotKnownAreNotMet) {
-  const double none = std::numeric_limits<double>::quiet_NaN();
-  const GateResult gate{"halves_px", "px", none, 1, false};
+  const CheckedMetric gate = check_gates({{"halves_px", 1}}, {{"rms_px", 0.1}})[0];
   EXPECT_EQ(words_of(gate), "halves_px is not known, at most 1 px is asked for");
   const auto json = nlohmann::json::parse(json_of(evaluation(), {gate}));
   EXPECT_TRUE(json["gates"][0]["value"].is_null());
@@ -100,24 +134,27 @@ TEST(Gates, OfWhatIsNotKnownAreNotMet) {
 }
 
 TEST(Gates, AreReadFromWords) {
-  const Gate gate = gate_of("p90_mm=2.5");
-  EXPECT_EQ(gate.name, "p90_mm");
+  const auto known = metric_kinds({MetricSource::evaluation});
+  const Gate gate = gate_of("p90_mm=2.5", known);
+  EXPECT_EQ(gate.metric, "p90_mm");
   EXPECT_EQ(gate.limit, 2.5);
   for (const char* bad : {"mean=1", "mean_mm", "mean_mm=", "mean_mm=x", "mean_mm=1mm",
-                          "mean_mm=nan", "mean_mm=inf", "=1", ""}) {
-    EXPECT_THROW(gate_of(bad), std::invalid_argument) << bad;
+                          "mean_mm=nan", "mean_mm=inf", "rms_px=1", "=1", ""}) {
+    EXPECT_THROW(gate_of(bad, known), std::invalid_argument) << bad;
   }
 }
 
 TEST(Gates, AreReadFromAFile) {
   const TemporaryFolder folder;
-  const auto gates =
-      read_gates(folder.file("g.yaml", "format: vlp-gates/1\ngates: {missing: 0, mean_mm: 1.5}\n"));
+  const auto known = metric_kinds({MetricSource::evaluation});
+  const auto gates = read_gates(
+      folder.file("g.yaml", "format: vlp-gates/1\ngates: {missing: 0, mean_mm: 1.5}\n"), known);
   ASSERT_EQ(gates.size(), 2);
-  EXPECT_EQ(gates[0].name, "mean_mm");
+  EXPECT_EQ(gates[0].metric, "mean_mm");
   EXPECT_EQ(gates[0].limit, 1.5);
   const auto refusal = [&](const std::string& text) {
-    return refusal_of([&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\n" + text)); });
+    return refusal_of(
+        [&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\n" + text), known); });
   };
   EXPECT_THAT(refusal("gates:\n  mean_mm: 1\n  mean_cm: 1\n"),
               HasSubstr("g.yaml:4: gates: key 'mean_cm'"));
@@ -127,8 +164,8 @@ TEST(Gates, AreReadFromAFile) {
 }
 
 TEST(EvaluationFiles, AreJsonWithUnitsInTheKeys) {
-  const auto json = nlohmann::json::parse(
-      json_of(evaluation(), check_gates({{"max_mm", 5}, {"missing", 1}}, evaluation())));
+  const auto json = nlohmann::json::parse(json_of(
+      evaluation(), check_gates({{"max_mm", 5}, {"missing", 1}}, metrics_of(evaluation()))));
   EXPECT_EQ(json["format"], "vlp-evaluation/1");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);
@@ -158,8 +195,8 @@ TEST(EvaluationFiles, HaveNoIntervalOfP90OfFewUnits) {
 
 TEST(EvaluationFiles, AreJUnitWithATestForEachGate) {
   pugi::xml_document document;
-  const std::string text =
-      junit_of({{"mean_mm", "mm", 1.25, 1, false}, {"missing", "", 0, 0, true}});
+  const std::string text = junit_of(
+      {{"mean_mm", "mm", 1.25, 1, Direction::at_most}, {"missing", "", 0, 0, Direction::at_most}});
   ASSERT_TRUE(document.load_string(text.c_str()));
   const pugi::xml_node suite = document.child("testsuites").child("testsuite");
   EXPECT_EQ(suite.attribute("tests").as_int(), 2);

@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "evaluation/evaluation.h"
+#include "evaluation/metric.h"
+
+namespace vlp {
+
+/// Those of MetricSource::evaluation that there are, in their order.
+std::vector<Metric> metrics_of(const Evaluation& evaluation);
+
+}  // namespace vlp

@@ -1,0 +1,183 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/gate.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "captures/csv_writer.h"
+#include "rig/yaml_reader.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kDigits = 4;
+
+std::string names_of(const std::vector<MetricKind>& known) {
+  std::string all;
+  for (const MetricKind& kind : known) all.append(all.empty() ? "" : ", ").append(kind.name);
+  return all;
+}
+
+std::string with_unit(double value, const std::string& unit) {
+  return significant(value, kDigits) + (unit.empty() ? "" : " " + unit);
+}
+
+/// What is wrong with a limit; empty when nothing is.
+std::string problem_of(const MetricKind& kind, double limit) {
+  constexpr int digits = 6;
+  const std::string text = significant(limit, digits);
+  if (limit < 0) return "should not be negative, as no figure is to be below zero: " + text;
+  if (limit <= kind.largest) return "";
+  if (kind.largest > 1) {
+    return "should be at most " + with_unit(kind.largest, kind.unit) + ", not " + text;
+  }
+  return "should be a share from 0 to 1, not " + text +
+         (limit > 100 ? "" : ": for " + text + " % say " + significant(limit / 100, digits));
+}
+
+CheckedMetric checked(const MetricKind& kind, const std::vector<Metric>& metrics) {
+  return {kind.name, kind.unit, value_of(metrics, kind.name), {}, kind.asked};
+}
+
+}  // namespace
+
+bool CheckedMetric::met() const {
+  if (!limit) return true;
+  if (!value) return false;
+  return asked == Direction::at_least ? *value >= *limit : *value <= *limit;
+}
+
+std::string gate_descriptions(const std::vector<MetricKind>& known) {
+  std::size_t width = 0;
+  for (const MetricKind& kind : known) width = std::max(width, std::string(kind.name).size());
+  std::string text;
+  for (const MetricKind& kind : known) {
+    std::string name = kind.name;
+    name.resize(width + 2, ' ');
+    text.append("  ").append(name).append(kind.meaning);
+    text.append(kind.asked == Direction::at_least ? ", at least\n" : "\n");
+  }
+  return text;
+}
+
+Gate gate_of(const std::string& text, const std::vector<MetricKind>& known) {
+  const std::size_t sign = text.find('=');
+  const std::string name = text.substr(0, sign);
+  const auto kind = std::find_if(known.begin(), known.end(),
+                                 [&](const MetricKind& each) { return each.name == name; });
+  if (kind == known.end()) {
+    throw std::invalid_argument("gate '" + name +
+                                "' is not known; the gates are: " + names_of(known));
+  }
+  double limit = 0;
+  const char* const end = text.data() + text.size();
+  const char* const begin = sign == std::string::npos ? end : text.data() + sign + 1;
+  const auto [stop, failure] = std::from_chars(begin, end, limit);
+  if (failure != std::errc() || stop != end || !std::isfinite(limit)) {
+    throw std::invalid_argument("gate '" + text + "' should be NAME=VALUE with a finite number");
+  }
+  if (const std::string problem = problem_of(*kind, limit); !problem.empty()) {
+    throw std::invalid_argument("gate '" + name + "' " + problem);
+  }
+  return {name, limit};
+}
+
+std::vector<Gate> gates_of(const std::vector<std::string>& texts,
+                           const std::vector<MetricKind>& known) {
+  std::vector<Gate> gates;
+  for (const std::string& text : texts) {
+    Gate gate = gate_of(text, known);
+    for (const Gate& other : gates) {
+      if (other.metric != gate.metric) continue;
+      throw std::invalid_argument("gate '" + gate.metric + "' stands twice");
+    }
+    gates.push_back(std::move(gate));
+  }
+  return gates;
+}
+
+std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKind>& known) {
+  YamlMap map = value.map();
+  std::vector<Gate> gates;
+  for (const MetricKind& kind : known) {
+    const auto limit = map.optional(kind.name);
+    if (!limit) continue;
+    gates.push_back({kind.name, limit->number()});
+    const std::string problem = problem_of(kind, gates.back().limit);
+    if (!problem.empty()) throw limit->error(problem);
+  }
+  map.finish();
+  if (gates.empty()) throw value.error("holds no gate; the gates are: " + names_of(known));
+  return gates;
+}
+
+std::vector<Gate> read_gates(const std::filesystem::path& file,
+                             const std::vector<MetricKind>& known) {
+  YamlMap document = read_yaml(file, "vlp-gates/1");
+  const YamlValue gates = document.required("gates");
+  document.finish();
+  return read_gates(gates, known);
+}
+
+std::vector<Gate> with_changes(std::vector<Gate> gates, const std::vector<Gate>& changes) {
+  for (const Gate& change : changes) {
+    const auto same = std::find_if(gates.begin(), gates.end(),
+                                   [&](const Gate& gate) { return gate.metric == change.metric; });
+    if (same == gates.end()) {
+      gates.push_back(change);
+    } else {
+      same->limit = change.limit;
+    }
+  }
+  return gates;
+}
+
+std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
+                                       const std::vector<Metric>& metrics) {
+  std::vector<CheckedMetric> results;
+  results.reserve(gates.size());
+  for (const Gate& gate : gates) {
+    results.push_back(checked(metric_kind(gate.metric).value(), metrics));
+    results.back().limit = gate.limit;
+  }
+  return results;
+}
+
+std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
+                                     const std::vector<Metric>& metrics,
+                                     const std::vector<MetricKind>& known) {
+  std::vector<CheckedMetric> results;
+  for (const MetricKind& kind : known) {
+    CheckedMetric result = checked(kind, metrics);
+    for (const Gate& gate : gates) {
+      if (gate.metric == kind.name) result.limit = gate.limit;
+    }
+    if (result.value || result.limit) results.push_back(std::move(result));
+  }
+  return results;
+}
+
+std::string words_of(const CheckedMetric& gate) {
+  return gate.name + " is " + (gate.value ? with_unit(*gate.value, gate.unit) : "not known") +
+         ", " + words_of(gate.asked) + " " + with_unit(gate.limit.value(), gate.unit) +
+         " is asked for";
+}
+
+std::string words_of_missed(const std::vector<CheckedMetric>& gates) {
+  std::string words;
+  for (const CheckedMetric& gate : gates) {
+    if (!gate.met()) words.append(words.empty() ? "" : "; ").append(words_of(gate));
+  }
+  return words;
+}
+
+std::string cause_of(const CheckedMetric& gate) {
+  const auto kind = metric_kind(gate.name);
+  return std::string(kind ? kind->cause : "a gate is not met") + " (" + words_of(gate) + ")";
+}
+
+}  // namespace vlp

@@ -1,0 +1,152 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/metric.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+constexpr const char* kOfFixes = "the fixes are worse than was asked for";
+
+constexpr std::array kMetricKinds{
+    MetricKind{"blur_px", "px", MetricSource::station,
+               "blur of the board's edges, the median view's sigma",
+               "the lens is blurred: out of focus, or dirty"},
+    MetricKind{"focal_percent", "%", MetricSource::station,
+               "difference of the focal length from the nominal one",
+               "wrong lens: another focal length than the type's"},
+    MetricKind{"center_px", "px", MetricSource::station,
+               "distance of the image centre from the nominal one", "the lens is decentred"},
+    MetricKind{"nominal_px", "px", MetricSource::station,
+               "worst difference of the projection from the nominal one, but for a turn",
+               "the lens is not of the type"},
+    MetricKind{"rms_px", "px", MetricSource::lens, "residuals of the corners, rms per axis",
+               "the board's corners do not fit the lens model"},
+    MetricKind{"uncertainty_px", "px", MetricSource::lens,
+               "worst standard deviation of a projection over the image",
+               "the lens is not known well enough: other board views"},
+    MetricKind{"halves_px", "px", MetricSource::lens,
+               "difference of the lenses of every other view, rms per axis",
+               "two halves of the board views give two lenses"},
+    MetricKind{"coverage", "", MetricSource::lens, "share of the image in which there are corners",
+               "the board was not shown all over the image", Direction::at_least, 1},
+    MetricKind{"rotation_px", "px", MetricSource::rotation,
+               "residuals of the turn on the spot, rms", "the lamps do not turn about one axis"},
+    MetricKind{"rotation_spread_px", "px", MetricSource::rotation,
+               "spread of the centres of the lamps' circles, of the level camera",
+               "the circles of the turn have no common centre"},
+    MetricKind{"rotation_sd_px", "px", MetricSource::rotation,
+               "standard deviation of the rotation centre",
+               "the rotation centre is not known well enough"},
+    MetricKind{"tilt_deg", "deg", MetricSource::rotation,
+               "angle between the camera and the axis of rotation", "the camera leans on its mount",
+               Direction::at_most, 90},
+    MetricKind{"lever_arm_mm", "mm", MetricSource::rotation,
+               "distance of the camera from the axis of rotation",
+               "the camera sits beside its axis of rotation"},
+    MetricKind{"dispersion_mm", "mm", MetricSource::dispersion,
+               "radius of the dispersion circle, before its offset is taken off",
+               "the fixes at the station scatter too widely"},
+    MetricKind{"dispersion_offset_px", "px", MetricSource::dispersion,
+               "length of the dispersion's offset",
+               "the fixes at the station turn with the camera"},
+    MetricKind{"world_mm", "mm", MetricSource::dispersion,
+               "offset of the fixes that does not turn with the camera",
+               "the station or its lamp map is off"},
+    MetricKind{"check_fixes", "", MetricSource::station,
+               "share of the check captures that have a fix", "captures of the check have no fix",
+               Direction::at_least, 1},
+    MetricKind{"check_lamps", "", MetricSource::station,
+               "share of the lamps seen in the check captures that the fixes rest on",
+               "lamps contradict their map", Direction::at_least, 1},
+    MetricKind{"check_lamps_seen", "", MetricSource::station,
+               "share of the map's lamps that the check captures show", "a lamp is not seen",
+               Direction::at_least, 1},
+    MetricKind{"check_mean_mm", "mm", MetricSource::station,
+               "mean horizontal error at the known points",
+               "the fixes at the known points are off"},
+    MetricKind{"check_worst_mm", "mm", MetricSource::station,
+               "largest horizontal error at the known points", "a fix at a known point is off"},
+    MetricKind{"check_offset_mm", "mm", MetricSource::station,
+               "length of the mean horizontal error", "the known points or the lamps have moved"},
+    MetricKind{"check_height_mm", "mm", MetricSource::station,
+               "rms error of the height at the known points",
+               "the heights at the known points are off"},
+    MetricKind{"check_residual_px", "px", MetricSource::station,
+               "median residual of the fixes at the known points",
+               "the lamps do not fit their map"},
+    MetricKind{"mean_mm", "mm", MetricSource::evaluation, "mean horizontal error", kOfFixes},
+    MetricKind{"median_mm", "mm", MetricSource::evaluation, "median horizontal error", kOfFixes},
+    MetricKind{"p90_mm", "mm", MetricSource::evaluation,
+               "what 90 % of the horizontal errors do not exceed", kOfFixes},
+    MetricKind{"max_mm", "mm", MetricSource::evaluation, "largest horizontal error", kOfFixes},
+    MetricKind{"rms_mm", "mm", MetricSource::evaluation,
+               "root mean square of the horizontal errors", kOfFixes},
+    MetricKind{
+        "bias_mm", "mm", MetricSource::evaluation,
+        "what the fixes of a station share; needs a truth and stations with two fixes or more",
+        kOfFixes},
+    MetricKind{"scatter_mm", "mm", MetricSource::evaluation,
+               "of fixes within stations; needs a truth and stations with two fixes or more",
+               kOfFixes},
+    MetricKind{"height_rms_mm", "mm", MetricSource::evaluation,
+               "root mean square of the height errors; needs z_m in the truth or the path",
+               "the heights are worse than was asked for"},
+    MetricKind{"yaw_rms_deg", "deg", MetricSource::evaluation,
+               "root mean square of the yaw errors; needs yaw_rad in the truth",
+               "the yaws are worse than was asked for", Direction::at_most, 180},
+    MetricKind{"missing", "", MetricSource::evaluation,
+               "share of the captures without a fix, from 0 to 1", "captures have no fix",
+               Direction::at_most, 1},
+    MetricKind{"stated_ratio", "", MetricSource::evaluation,
+               "horizontal errors / stated sd; needs a truth and sd columns",
+               "the fixes claim to be better than they are"},
+    MetricKind{"limit_ratio", "", MetricSource::reference,
+               "horizontal errors / theoretical limit; needs --lamps, --calibration, --noise-px",
+               kOfFixes},
+    MetricKind{"fitted_mean_mm", "mm", MetricSource::reference,
+               "mean distance of the fitted line; needs --line", kOfFixes},
+    MetricKind{"fitted_p90_mm", "mm", MetricSource::reference,
+               "what 90 % of those distances do not exceed; needs --line", kOfFixes},
+    MetricKind{"fitted_max_mm", "mm", MetricSource::reference,
+               "the largest of those distances; needs --line", kOfFixes},
+    MetricKind{
+        "worse_mm", "mm", MetricSource::reference,
+        "by how much the mean error is certainly larger than that of --compare (lower end of "
+        "the difference's interval): 0 fails on the verdict 'worse'; of fewer "
+        "than 20 stations or captures nothing is certain",
+        "the fixes are worse than those they are compared with"},
+};
+
+}  // namespace
+
+std::string words_of(Direction asked) {
+  return asked == Direction::at_least ? "at least" : "at most";
+}
+
+std::vector<MetricKind> metric_kinds(std::initializer_list<MetricSource> sources) {
+  std::vector<MetricKind> kinds;
+  for (const MetricKind& kind : kMetricKinds) {
+    const bool asked = std::find(sources.begin(), sources.end(), kind.source) != sources.end();
+    if (asked) kinds.push_back(kind);
+  }
+  return kinds;
+}
+
+std::optional<MetricKind> metric_kind(const std::string& name) {
+  const auto kind = std::find_if(kMetricKinds.begin(), kMetricKinds.end(),
+                                 [&](const MetricKind& each) { return each.name == name; });
+  return kind == kMetricKinds.end() ? std::nullopt : std::optional(*kind);
+}
+
+std::optional<double> value_of(const std::vector<Metric>& metrics, const std::string& name) {
+  for (const Metric& metric : metrics) {
+    if (metric.name == name && std::isfinite(metric.value)) return metric.value;
+  }
+  return std::nullopt;
+}
+
+}  // namespace vlp

@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/metric.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+#include <set>
+
+namespace vlp {
+namespace {
+
+TEST(MetricKinds, HaveNamesOfTheirOwnAndWords) {
+  std::set<std::string> names;
+  for (const MetricKind& kind :
+       metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
+                     MetricSource::dispersion, MetricSource::evaluation})) {
+    EXPECT_TRUE(names.insert(kind.name).second) << kind.name;
+    EXPECT_STRNE(kind.cause, "");
+    EXPECT_STRNE(kind.meaning, "");
+    EXPECT_EQ(metric_kind(kind.name)->name, kind.name);
+    const std::string unit = kind.unit;
+    if (unit == "mm" || unit == "px" || unit == "deg") {
+      EXPECT_TRUE(std::string(kind.name).ends_with("_" + unit)) << kind.name;
+    }
+  }
+  EXPECT_FALSE(metric_kind("mean_cm"));
+}
+
+TEST(Metrics, WithoutAFiniteValueHaveNone) {
+  const std::vector<Metric> metrics{{"a", 1}, {"b", std::numeric_limits<double>::quiet_NaN()}};
+  EXPECT_EQ(value_of(metrics, "a"), 1);
+  EXPECT_FALSE(value_of(metrics, "b"));
+  EXPECT_FALSE(value_of(metrics, "c"));
+}
+
+}  // namespace
+}  // namespace vlp
