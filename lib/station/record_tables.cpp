@@ -2,13 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/record_tables.h"
 
+#include <soci/postgresql/soci-postgresql.h>
+
 #include <array>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "station/run_record.h"
-#include "station/station_config.h"
 
 namespace vlp {
 namespace {
@@ -37,53 +38,84 @@ std::vector<std::string> tables() {
           kImages, "CREATE INDEX IF NOT EXISTS runs_by_camera ON runs (camera)"};
 }
 
+/// Of the figures of version 1, which did not keep them. It stays as it is, whatever becomes of the
+/// figures.
+constexpr const char* kUnitsOfVersion1 =
+    "UPDATE figures SET unit = CASE "
+    "WHEN name IN ('blur_px', 'center_px', 'nominal_px', 'rms_px', 'uncertainty_px', 'halves_px', "
+    "'rotation_px', 'rotation_spread_px', 'rotation_sd_px', 'dispersion_offset_px', "
+    "'check_residual_px') THEN 'px' "
+    "WHEN name IN ('lever_arm_mm', 'dispersion_mm', 'world_mm', 'check_mean_mm', "
+    "'check_worst_mm', 'check_offset_mm', 'check_height_mm') THEN 'mm' "
+    "WHEN name = 'tilt_deg' THEN 'deg' WHEN name = 'focal_percent' THEN '%' ELSE '' END";
+
 void from_1_to_2(soci::session& sql) {
   sql << "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT ''";
-  for (const MetricKind& kind : unit_metrics()) {
-    const std::string name = kind.name, unit = kind.unit;
-    sql << "UPDATE figures SET unit = :unit WHERE name = :name", soci::use(unit), soci::use(name);
-  }
+  sql << kUnitsOfVersion1;
 }
 
 /// From each version to the next; the first is of version 1.
 constexpr std::array kMigrations{from_1_to_2};
 static_assert(kMigrations.size() + 1 == kSchema);
 
-int schema_of(soci::session& sql) {
-  int version = 0, count = 0;
-  sql << "SELECT COUNT(*) FROM vlp_schema", soci::into(count);
-  if (count > 0) sql << "SELECT MAX(version) FROM vlp_schema", soci::into(version);
-  return version;
+bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
+
+/// 0 without tables. Throws for a later version than this program's.
+int version_of(soci::session& sql) {
+  const char* const look =
+      is_sqlite(sql)
+          ? "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'vlp_schema'"
+          : "SELECT COUNT(to_regclass('vlp_schema'))";
+  int tables_there = 0, version = 0;
+  sql << look, soci::into(tables_there);
+  if (tables_there == 0) return 0;
+  sql << "SELECT COALESCE(MAX(version), 0) FROM vlp_schema", soci::into(version);
+  if (version <= kSchema) return version;
+  throw std::runtime_error("holds records of version " + std::to_string(version) +
+                           ", this program knows those up to " + std::to_string(kSchema) +
+                           ": use the newer vlp-station that wrote them");
+}
+
+void make_or_migrate(soci::session& sql) {
+  soci::transaction transaction(sql);
+  if (is_sqlite(sql)) {
+    // As a writer from the start: a reader who goes on to write may not wait for other writers.
+    sql << "COMMIT";
+    sql << "BEGIN IMMEDIATE";
+  }
+  if (version_of(sql) == 0) {
+    for (const std::string& table : tables()) sql << table;
+    sql << "INSERT INTO vlp_schema (version) SELECT CAST(:version AS INTEGER) WHERE NOT EXISTS "
+           "(SELECT 1 FROM vlp_schema)",
+        soci::use(kSchema);
+  }
+  // In PostgreSQL, too, one at a time from here on: who waited sees what the other did.
+  sql << "UPDATE vlp_schema SET version = version";
+  const int found = version_of(sql);
+  for (int version = found; version < kSchema; ++version) {
+    kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
+  }
+  if (found < kSchema) sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchema);
+  transaction.commit();
+}
+
+/// What PostgreSQL says to one of two who make the same tables at once, when the other has.
+bool made_by_another(const soci::postgresql_soci_error& error) {
+  constexpr const char *unique_violation = "23505", *duplicate_table = "42P07";
+  return error.sqlstate() == unique_violation || error.sqlstate() == duplicate_table;
 }
 
 }  // namespace
 
 void make_record_tables(soci::session& sql) {
-  int version = 0;
+  // Versions only grow. Without a lock, so that who may only read can.
+  if (version_of(sql) == kSchema) return;
   try {
-    version = schema_of(sql);
-  } catch (const soci::soci_error&) {  // no such table
+    make_or_migrate(sql);
+  } catch (const soci::postgresql_soci_error& error) {
+    if (!made_by_another(error)) throw;
+    make_or_migrate(sql);
   }
-  if (version == kSchema) return;
-  if (version > kSchema) {
-    throw std::runtime_error("holds records of version " + std::to_string(version) +
-                             ", which this program does not know: it is older than they are");
-  }
-  soci::transaction transaction(sql);
-  if (version == 0) {
-    for (const std::string& table : tables()) sql << table;
-    if (schema_of(sql) == 0) {
-      sql << "INSERT INTO vlp_schema (version) VALUES (:version)", soci::use(kSchema);
-    }
-  } else {
-    // A write waits for others that do the same; what they did is seen after it.
-    sql << "UPDATE vlp_schema SET version = version";
-    for (version = schema_of(sql); version < kSchema; ++version) {
-      kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
-    }
-    sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchema);
-  }
-  transaction.commit();
 }
 
 }  // namespace vlp

@@ -6,8 +6,10 @@
 
 namespace vlp {
 
-/// Makes the tables of the records when they are not there, the same in SQLite and PostgreSQL.
-/// Throws soci::soci_error, and std::runtime_error for a database of another version.
+/// Makes the tables of the records when they are not there, the same in SQLite and PostgreSQL, and
+/// brings those of an earlier version up to date, wholly or not at all. Those of the present
+/// version are only read. Throws soci::soci_error, and std::runtime_error for tables of a later
+/// version.
 void make_record_tables(soci::session& sql);
 
 }  // namespace vlp

@@ -6,17 +6,67 @@
 #include <soci/sqlite3/soci-sqlite3.h>
 
 #include <algorithm>
-#include <chrono>
+#include <memory>
 #include <string>
-#include <thread>
 
 #include "rig/input_error.h"
 #include "station/record_tables.h"
 
 namespace vlp {
+namespace {
+
+/// In seconds. Others that write a run need some milliseconds each.
+constexpr int kPatience_s = 30;
+
+bool is_server(const std::string& where) { return where.find("://") != std::string::npos; }
+
+/// The database for a message, a server without user and passwords, wherever they stand. Throws
+/// InputError for what cannot be read; that may have a password anywhere.
+std::string name_of_database(const std::string& where) {
+  if (!is_server(where)) return where;
+  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
+      PQconninfoParse(where.c_str(), nullptr), PQconninfoFree);
+  if (!options) {
+    throw InputError(where.substr(0, where.find("://")) + "://...",
+                     "is not of the form postgresql://USER@HOST/NAME");
+  }
+  std::string host, port, name;
+  for (const PQconninfoOption* option = options.get(); option->keyword != nullptr; ++option) {
+    const std::string keyword = option->keyword;
+    if (option->val == nullptr) continue;
+    if (keyword == "host") host = option->val;
+    if (keyword == "port") port = std::string(":") + option->val;
+    if (keyword == "dbname") name = option->val;
+  }
+  return "postgresql://" + host + port + "/" + name;
+}
+
+/// What a connection has to be told each time that it is made.
+void set_up(soci::session& sql) {
+  if (sql.get_backend_name() == "postgresql") {
+    sql << "SET client_min_messages TO warning";
+    sql << "SET lock_timeout TO '" + std::to_string(kPatience_s) + "s'";
+    return;
+  }
+  // What is committed is on the disk; a second connection sees runs whole.
+  sql << "PRAGMA synchronous = FULL";
+  sql << "PRAGMA foreign_keys = ON";
+}
+
+void open(soci::session& sql, const std::string& where) {
+  if (is_server(where)) {
+    sql.open(soci::postgresql, where);
+  } else {
+    sql.open(soci::sqlite3, "dbname=\"" + where + "\" timeout=" + std::to_string(kPatience_s));
+  }
+  set_up(sql);
+}
+
+}  // namespace
 
 struct Records::Database {
-  std::string where;
+  /// For messages.
+  std::string name;
   soci::session sql;
 
   /// Tables are there; from then on a connection that was lost is made again.
@@ -34,42 +84,22 @@ struct Records::Database {
       // A unit takes its minutes: meanwhile the server was started anew, or the network fell
       // asleep.
       sql.reconnect();
+      set_up(sql);
       return action();
     } catch (const InputError&) {
       throw;
-    } catch (const std::exception& error) {
+    } catch (const soci::soci_error& error) {
       std::string what = error.what();
       std::replace_if(
           what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
-      throw InputError(shown(), "the records: " + what);
+      throw InputError(name, "the records: " + what);
+    } catch (const std::exception& error) {
+      throw InputError(name, error.what());
     }
-  }
-
-  /// Password and user are nobody's business in a message.
-  std::string shown() const {
-    const auto at = where.find('@');
-    return where.starts_with("postgresql://") && at != std::string::npos
-               ? "postgresql://" + where.substr(at + 1)
-               : where;
   }
 };
 
 namespace {
-
-/// In seconds. Others that write a run need some milliseconds each.
-constexpr int kPatience_s = 30;
-
-void open(soci::session& sql, const std::string& where) {
-  if (where.starts_with("postgresql://")) {
-    sql.open(soci::postgresql, where);
-    sql << "SET client_min_messages TO warning";
-    return;
-  }
-  sql.open(soci::sqlite3, "dbname=\"" + where + "\" timeout=" + std::to_string(kPatience_s));
-  // What is committed is on the disk; a second connection sees runs whole.
-  sql << "PRAGMA synchronous = FULL";
-  sql << "PRAGMA foreign_keys = ON";
-}
 
 void put_figures(soci::session& sql, const RunRecord& record) {
   int place = 0;
@@ -124,19 +154,10 @@ std::vector<Row> last_of(std::vector<Row> rows, int last) {
 }  // namespace
 
 Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
-  database_->where = where;
+  database_->name = name_of_database(where);
   database_->run([&] {
     open(database_->sql, where);
-    // Two that make the tables at once get in each other's way once.
-    constexpr int tries = 8;
-    for (int i = 1;; ++i) {
-      try {
-        return make_record_tables(database_->sql);
-      } catch (const soci::soci_error&) {
-        if (i == tries) throw;
-        std::this_thread::sleep_for(std::chrono::milliseconds(20 * i));
-      }
-    }
+    make_record_tables(database_->sql);
   });
   database_->ready = true;
 }
@@ -168,15 +189,6 @@ void Records::keep(const RunRecord& record) {
   });
 }
 
-bool Records::has(const std::string& run) {
-  return database_->run([&] {
-    int count = 0;
-    database_->sql << "SELECT COUNT(*) FROM runs WHERE run = :run", soci::into(count),
-        soci::use(run);
-    return count > 0;
-  });
-}
-
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
   return database_->run([&] {
     RunSummary row;
@@ -184,14 +196,12 @@ std::vector<RunSummary> Records::list(const RunFilter& filter) {
     soci::statement statement(database_->sql);
     statement.exchange(soci::into(row.run));
     statement.exchange(soci::into(row.kind));
-    statement.exchange(soci::into(row.station));
     statement.exchange(soci::into(row.camera));
     statement.exchange(soci::into(row.ended_utc));
     statement.exchange(soci::into(row.verdict));
-    statement.exchange(soci::into(row.causes));
     bind(statement, filter);
     statement.alloc();
-    statement.prepare("SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
+    statement.prepare("SELECT run, kind, camera, ended_utc, verdict FROM runs " +
                       condition(filter) + " ORDER BY ended_utc, run");
     statement.define_and_bind();
     statement.execute();

@@ -20,7 +20,7 @@ struct RunFilter {
 
 /// A run as it is listed.
 struct RunSummary {
-  std::string run, kind, station, camera, ended_utc, verdict, causes;
+  std::string run, kind, camera, ended_utc, verdict;
 };
 
 /// A figure of one run.
@@ -30,10 +30,11 @@ struct TrendPoint {
 };
 
 /// The records of one or more stations in a database: a file of SQLite, or PostgreSQL by a
-/// connection string postgresql://... Tables are made when they are not there. Any number of
-/// programs may use it at once: each run is written in one transaction, and waits up to half a
-/// minute for others. What is kept is on the disk. A connection that was lost is made again. Each
-/// throws InputError that names the database.
+/// connection string postgresql://... Tables are made when they are not there, those of an earlier
+/// version brought up to date; of a later one they are refused. Any number of programs may use it
+/// at once: each run is written in one transaction, which waits up to half a minute for another's.
+/// What is kept is on the disk. A connection that was lost is made again. All throw InputError that
+/// names the database, but no password.
 class Records {
  public:
   explicit Records(const std::string& where);
@@ -43,8 +44,7 @@ class Records {
 
   /// Keeps a run, whole or not at all. One that is kept already stays as it is.
   void keep(const RunRecord& record);
-  bool has(const std::string& run);
-  /// All of one run.
+  /// All of one run; nothing when it is not kept.
   std::optional<RunRecord> find(const std::string& run);
   /// From the first to the last.
   std::vector<RunSummary> list(const RunFilter& filter);

@@ -38,18 +38,18 @@ struct RunRecord {
   bool passed() const { return verdict == "PASS"; }
 };
 
-/// A text of a record: a column of the table of runs, a key of their JSON, and so on.
+/// A text of a record: a column of the table of runs and a key of their JSON.
 struct RunField {
   const char* name;
   std::string RunRecord::*text;
-  /// For people, who are shown it on a line of its own; nothing when it is not.
+  /// With which `show` has it among the last lines; without one it stands elsewhere or not at all.
   const char* label = nullptr;
-  /// A column of the CSV of runs.
+  /// A column of the CSV of runs; in JSON, too, it is brought on one line.
   bool in_csv = true;
 };
 
-/// All that a record has beside figures and images, in order. A new one is this line, where it is
-/// filled, and a migration in record_tables.cpp.
+/// All texts of a record, in order. A new one is a member of RunRecord, a line in run_fields(),
+/// what fills it in record_of() and verify_station(), and a migration in record_tables.cpp.
 std::span<const RunField> run_fields();
 
 /// A name for a run that begins now: the time and 16 random hexadecimal digits,
@@ -59,7 +59,7 @@ std::string new_run();
 std::string begun_utc(const std::string& run);
 std::string now_utc();
 
-/// The record of a unit at its end.
+/// The record of a unit that ends now.
 RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program);
 
 /// OpenCV, Ceres, mrcal and so on, each with its version.

@@ -6,16 +6,24 @@
 #include <unistd.h>
 
 #include <exception>
+#include <iostream>
 #include <string>
 
 namespace vlp {
 
-/// Starts a child that does `action` and ends; returns its process id.
+/// Starts a child that does `action` and ends, with 1 when it throws; returns its process id.
 template <typename Action>
 pid_t start_child(Action action) {
   const pid_t child = ::fork();
   if (child != 0) return child;
-  action();
+  try {
+    action();
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << "\n";
+    ::_exit(1);
+  } catch (...) {
+    ::_exit(1);
+  }
   ::_exit(0);
 }
 

@@ -5,7 +5,12 @@
 #include <gmock/gmock.h>
 #include <sys/wait.h>
 
-#include <cmath>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <future>
+#include <nlohmann/json.hpp>
+#include <thread>
 
 #include "rig/child_process.h"
 #include "station/export_runs.h"
@@ -20,7 +25,9 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::SizeIs;
+using testing::StartsWith;
 
 RunRecord sample(const std::string& run, const std::string& camera, double rms_px) {
   RunRecord record;
@@ -47,6 +54,25 @@ std::string run_of(int number) {
   return "20261121T13450" + std::to_string(number % 10) + "Z-" + std::to_string(1000 + number);
 }
 
+/// A record with another text in each of its fields.
+RunRecord with_all_texts() {
+  RunRecord record = sample(run_of(7), "a", 0.5);
+  for (const RunField& field : run_fields()) {
+    record.*field.text = std::string("the '") + field.name + "' of \"it\"\n";
+  }
+  return record;
+}
+
+void check_all_texts(Records& records) {
+  const RunRecord kept = with_all_texts();
+  records.keep(kept);
+  const auto found = records.find(kept.run);
+  ASSERT_TRUE(found);
+  for (const RunField& field : run_fields()) {
+    EXPECT_EQ((*found).*field.text, kept.*field.text) << field.name;
+  }
+}
+
 /// What holds in every database.
 void check_records(const std::string& where) {
   Records records(where);
@@ -67,8 +93,6 @@ void check_records(const std::string& where) {
   ASSERT_THAT(records.list(filter), SizeIs(1));
   EXPECT_EQ(records.list(filter)[0].run, run_of(1));
 
-  EXPECT_TRUE(records.has(run_of(3)));
-  EXPECT_FALSE(records.has("another"));
   EXPECT_FALSE(records.find("another"));
   const auto found = records.find(run_of(3));
   ASSERT_TRUE(found);
@@ -91,6 +115,7 @@ void check_records(const std::string& where) {
   ASSERT_THAT(trend, SizeIs(3));
   EXPECT_DOUBLE_EQ(trend[2].value, 1.5);
   EXPECT_THAT(records.trend("tilt_deg", {}), IsEmpty());
+  check_all_texts(records);
 }
 
 /// Two programs that write at the same time, the first also makes the tables.
@@ -116,82 +141,176 @@ void check_two_writers(const std::string& where) {
   for (const RunSummary& run : runs) EXPECT_THAT(records.find(run.run)->images, SizeIs(2));
 }
 
+/// The answer of a database to a client that knows nothing of Records. SQL has a statement to a
+/// line; a line that begins with "\! " is for the shell.
+std::string answer_of(const std::string& where, const std::string& sql) {
+  const TemporaryFolder folder;
+  const std::string script = folder.file("script.sql", sql).string();
+  const std::string answer = (folder / "answer").string();
+  const std::string sqlite = folder
+                                 .file("client.py", R"(import os, sqlite3, sys
+database = sqlite3.connect(sys.argv[1], isolation_level=None)
+for line in open(sys.argv[2]):
+    if line.startswith("\\! "):
+        os.system(line[3:])
+    else:
+        for row in database.execute(line):
+            print(*row, sep="|")
+)")
+                                 .string();
+  const bool is_server = where.starts_with("postgresql://");
+  const std::string client = is_server ? "psql -X -q -A -t -v ON_ERROR_STOP=1 '" + where + "' -f "
+                                       : "python3 " + sqlite + " '" + where + "' ";
+  EXPECT_EQ(std::system((client + script + " >" + answer).c_str()), 0) << sql;
+  return TemporaryFolder::content_of(answer);
+}
+
 /// Records as version 1 of their tables kept them.
-const std::string kVersion1 = R"(
-CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);
+const std::string kVersion1 =
+    R"(CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);
 INSERT INTO vlp_schema (version) VALUES (1);
-CREATE TABLE runs (run VARCHAR(64) PRIMARY KEY, kind TEXT NOT NULL, station TEXT NOT NULL,
-  camera TEXT NOT NULL, begun_utc TEXT NOT NULL, ended_utc TEXT NOT NULL, verdict TEXT NOT NULL,
-  causes TEXT NOT NULL, program TEXT NOT NULL, libraries TEXT NOT NULL,
-  config_sha256 TEXT NOT NULL, calibration TEXT NOT NULL);
-CREATE TABLE figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), place INTEGER NOT NULL,
-  name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, gate DOUBLE PRECISION,
-  at_least INTEGER NOT NULL, met INTEGER NOT NULL, PRIMARY KEY (run, name));
-CREATE TABLE images (run VARCHAR(64) NOT NULL REFERENCES runs (run), step VARCHAR(16) NOT NULL,
-  image VARCHAR(255) NOT NULL, sha256 TEXT NOT NULL, refused TEXT NOT NULL,
-  PRIMARY KEY (run, step, image));
+CREATE TABLE runs (run VARCHAR(64) PRIMARY KEY, kind TEXT NOT NULL, station TEXT NOT NULL, )"
+    R"(camera TEXT NOT NULL, begun_utc TEXT NOT NULL, ended_utc TEXT NOT NULL, )"
+    R"(verdict TEXT NOT NULL, causes TEXT NOT NULL, program TEXT NOT NULL, )"
+    R"(libraries TEXT NOT NULL, config_sha256 TEXT NOT NULL, calibration TEXT NOT NULL);
+CREATE TABLE figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), place INTEGER NOT NULL, )"
+    R"(name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, gate DOUBLE PRECISION, )"
+    R"(at_least INTEGER NOT NULL, met INTEGER NOT NULL, PRIMARY KEY (run, name));
+CREATE TABLE images (run VARCHAR(64) NOT NULL REFERENCES runs (run), step VARCHAR(16) NOT NULL, )"
+    R"(image VARCHAR(255) NOT NULL, sha256 TEXT NOT NULL, refused TEXT NOT NULL, )"
+    R"(PRIMARY KEY (run, step, image));
 CREATE INDEX runs_by_camera ON runs (camera);
-INSERT INTO runs VALUES ('20261121T134501Z-0001', 'unit', 'station-1', 'a',
-  '2026-11-21T13:45:01Z', '2026-11-21T13:55:01Z', 'FAIL', 'blurred', 'vlp-station 0.1.0', 'none',
-  'aa', 'format: vlp-calibration/1');
+INSERT INTO runs VALUES ('20261121T134501Z-0001', 'unit', 'station-1', 'a', )"
+    R"('2026-11-21T13:45:01Z', '2026-11-21T13:55:01Z', 'FAIL', 'blurred', 'vlp-station 0.1.0', )"
+    R"('none', 'aa', 'format: vlp-calibration/1');
 INSERT INTO figures VALUES ('20261121T134501Z-0001', 1, 'rms_px', 1.5, 1, 0, 0);
 INSERT INTO figures VALUES ('20261121T134501Z-0001', 2, 'coverage', NULL, 0.7, 1, 0);
+INSERT INTO figures VALUES ('20261121T134501Z-0001', 3, 'tilt_deg', 1, NULL, 0, 1);
+INSERT INTO figures VALUES ('20261121T134501Z-0001', 4, 'world_mm', 1, NULL, 0, 1);
+INSERT INTO figures VALUES ('20261121T134501Z-0001', 5, 'focal_percent', 1, NULL, 0, 1);
 INSERT INTO images VALUES ('20261121T134501Z-0001', 'boards', '0000.png', 'bb', '');
 )";
 
-/// Of a database that holds kVersion1; two programs that open it at once bring it up to date.
+/// Tables, their columns, the version and the figures.
+std::string state_of(const std::string& where) {
+  const bool is_server = where.starts_with("postgresql://");
+  return answer_of(where,
+                   std::string(is_server ? "SELECT table_name, column_name, data_type FROM "
+                                           "information_schema.columns WHERE table_schema = "
+                                           "'public' ORDER BY table_name, ordinal_position;"
+                                         : "SELECT sql FROM sqlite_master ORDER BY name;") +
+                       "\nSELECT * FROM vlp_schema;\nSELECT * FROM figures ORDER BY place;\n");
+}
+
+/// Empties a database of PostgreSQL.
+const std::string kDropAll = "DROP SCHEMA public CASCADE;\nCREATE SCHEMA public;\n";
+
+/// Of a database that holds kVersion1.
 void check_migration(const std::string& where) {
-  std::vector<pid_t> children;
-  for (int i = 0; i < 2; ++i) children.push_back(start_child([&] { Records records(where); }));
-  for (const pid_t child : children) {
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    EXPECT_EQ(status, 0);
-  }
   Records records(where);
   const auto found = records.find("20261121T134501Z-0001");
   ASSERT_TRUE(found);
   EXPECT_EQ(found->station, "station-1");
   EXPECT_EQ(found->begun_utc, "2026-11-21T13:45:01Z");
   EXPECT_EQ(found->calibration, "format: vlp-calibration/1");
-  ASSERT_THAT(found->figures, SizeIs(2));
+  ASSERT_THAT(found->figures, SizeIs(5));
   EXPECT_EQ(words_of(found->figures[0]), "rms_px is 1.5 px, at most 1 px is asked for");
   EXPECT_EQ(words_of(found->figures[1]), "coverage is not known, at least 0.7 is asked for");
+  EXPECT_EQ(found->figures[2].unit, "deg");
+  EXPECT_EQ(found->figures[3].unit, "mm");
+  EXPECT_EQ(found->figures[4].unit, "%");
   EXPECT_THAT(found->images, SizeIs(1));
   records.keep(sample(run_of(5), "b", 0.1));
   EXPECT_THAT(records.list({}), SizeIs(2));
   EXPECT_EQ(records.find(run_of(5))->figures[0].unit, "px");
 }
 
-/// Runs SQL in a file of SQLite.
-void run_sqlite(const TemporaryFolder& folder, const std::string& sql) {
-  folder.file("run.py",
-              "import sqlite3, sys\nsqlite3.connect(sys.argv[1]).executescript(sys.argv[2])\n");
-  ASSERT_EQ(std::system(("python3 '" + (folder / "run.py").string() + "' '" +
-                         (folder / "records.db").string() + "' \"" + sql + "\"")
-                            .c_str()),
-            0);
+/// Of a database that holds kVersion1, which another program is about to bring up to date.
+void check_migration_by_another(const std::string& where) {
+  const TemporaryFolder folder;
+  const auto halfway = folder / "halfway";
+  const bool is_server = where.starts_with("postgresql://");
+  const std::string other = std::string(is_server ? "BEGIN;\n" : "BEGIN IMMEDIATE;\n") +
+                            "UPDATE vlp_schema SET version = version;\n"
+                            "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT '';\n"
+                            "UPDATE figures SET unit = 'by another';\n"
+                            "\\! touch '" +
+                            halfway.string() +
+                            "'; sleep 0.5\n"
+                            "UPDATE vlp_schema SET version = 2;\nCOMMIT;\n";
+  auto done = std::async(std::launch::async, [&] { return answer_of(where, other); });
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!std::filesystem::exists(halfway) && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(refusal_of([&] { Records records(where); }), "");
+  done.get();
+  EXPECT_EQ(Records(where).find("20261121T134501Z-0001")->figures[0].unit, "by another");
+}
+
+/// Of a database that holds kVersion1 and stops what changes its figures.
+void check_stopped_migration(const std::string& where) {
+  const std::string before = state_of(where);
+  EXPECT_THAT(refusal_of([&] { Records records(where); }), HasSubstr("stopped"));
+  EXPECT_EQ(state_of(where), before);
+}
+
+/// Of a database that holds kVersion1.
+void check_later_version(const std::string& where) {
+  answer_of(where, "UPDATE vlp_schema SET version = 99;\n");
+  const std::string before = state_of(where);
+  EXPECT_THAT(refusal_of([&] { Records records(where); }),
+              HasSubstr(": holds records of version 99, this program knows those up to 2: use the "
+                        "newer vlp-station that wrote them"));
+  EXPECT_EQ(state_of(where), before);
 }
 
 TEST(Records, OfVersion1InAFileAreBroughtUpToDate) {
   const TemporaryFolder folder;
-  run_sqlite(folder, kVersion1);
-  check_migration((folder / "records.db").string());
+  const std::string file = (folder / "records.db").string();
+  answer_of(file, kVersion1);
+  check_migration(file);
 }
 
-TEST(Records, OfVersion1InPostgresAreBroughtUpToDate) {
+TEST(Records, OfVersion1InAFileAreBroughtUpToDateOnce) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  answer_of(file, kVersion1);
+  check_migration_by_another(file);
+}
+
+TEST(Records, OfVersion1InAFileStayAsTheyAreWhenItFails) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  answer_of(file, kVersion1 +
+                      "CREATE TRIGGER stop BEFORE UPDATE ON figures BEGIN SELECT RAISE(ABORT, "
+                      "'stopped'); END;\n");
+  check_stopped_migration(file);
+}
+
+TEST(Records, OfALaterVersionInAFileAreLeftAlone) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  answer_of(file, kVersion1);
+  check_later_version(file);
+}
+
+TEST(Records, OfOtherVersionsInPostgresAreTreatedAlike) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
-  ASSERT_EQ(std::system(("psql -q '" + server.uri() + "' -c \"" + kVersion1 + "\"").c_str()), 0);
+  answer_of(server.uri(), kVersion1);
   check_migration(server.uri());
-}
-
-TEST(Records, OfALaterVersionAreLeftAlone) {
-  const TemporaryFolder folder;
-  run_sqlite(folder, kVersion1 + "UPDATE vlp_schema SET version = 99;");
-  EXPECT_THAT(refusal_of([&] { Records records((folder / "records.db").string()); }),
-              HasSubstr("version 99"));
+  answer_of(server.uri(), kDropAll + kVersion1);
+  check_migration_by_another(server.uri());
+  answer_of(server.uri(), kDropAll + kVersion1 +
+                              "CREATE FUNCTION stop() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN "
+                              "RAISE EXCEPTION ''stopped''; END';\n"
+                              "CREATE TRIGGER stop BEFORE UPDATE ON figures FOR EACH ROW EXECUTE "
+                              "FUNCTION stop();\n");
+  check_stopped_migration(server.uri());
+  answer_of(server.uri(), kDropAll + kVersion1);
+  check_later_version(server.uri());
 }
 
 TEST(Records, AreKeptInAFile) {
@@ -209,21 +328,16 @@ TEST(Records, AreKeptInPostgres) {
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
   check_two_writers(server.uri());
-  ASSERT_EQ(std::system(
-                ("psql -q '" + server.uri() + "' -c 'DROP TABLE figures, images, runs, vlp_schema'")
-                    .c_str()),
-            0);
+  answer_of(server.uri(), kDropAll);
   check_records(server.uri());
 
   // The server ends the connection, as one that is started anew does.
   Records records(server.uri());
-  ASSERT_EQ(std::system(("psql -q '" + server.uri() +
-                         "' -o /dev/null -c 'SELECT pg_terminate_backend(pid) FROM "
-                         "pg_stat_activity WHERE pid <> pg_backend_pid()'")
-                            .c_str()),
-            0);
+  answer_of(server.uri(),
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> "
+            "pg_backend_pid() AND backend_type = 'client backend';\n");
   records.keep(sample(run_of(9), "c", 0.1));
-  EXPECT_TRUE(records.has(run_of(9)));
+  EXPECT_TRUE(records.find(run_of(9)));
 }
 
 TEST(Records, RefuseAFileThatIsNoDatabase) {
@@ -234,24 +348,73 @@ TEST(Records, RefuseAFileThatIsNoDatabase) {
 }
 
 TEST(Records, DoNotTellThePasswordOfAServer) {
-  EXPECT_THAT(
-      refusal_of([] { Records records("postgresql://vlp:secret@/postgres?host=/nowhere"); }),
-      testing::AllOf(HasSubstr("/nowhere"), testing::Not(HasSubstr("secret"))));
+  for (const char* where : {"postgresql://vlp:secret@/postgres?host=/nowhere",
+                            "postgresql://vlp@/postgres?password=secret&host=/nowhere",
+                            "postgresql://vlp@/postgres?host=/nowhere&password=a@secret"}) {
+    EXPECT_THAT(
+        refusal_of([&] { Records records(where); }),
+        testing::AllOf(StartsWith("postgresql:///nowhere/postgres: "), Not(HasSubstr("secret"))));
+  }
+  for (const char* where : {"postgresql://vlp@/postgres?secret", "mysql://vlp:secret@/records"}) {
+    EXPECT_THAT(refusal_of([&] { Records records(where); }),
+                testing::AllOf(HasSubstr("://...: is not of the form postgresql://USER@HOST/NAME"),
+                               Not(HasSubstr("secret"))));
+  }
 }
 
-TEST(ExportRuns, WritesCsvAndJson) {
+/// The part of a text up to the end of its first line.
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+TEST(ExportRuns, WritesCsv) {
   const TemporaryFolder folder;
-  const std::vector<RunRecord> runs{sample(run_of(1), "a", 0.25), sample(run_of(2), "b", 1.5)};
-  write_runs(folder / "runs.csv", runs);
-  const std::string csv = TemporaryFolder::content_of(folder / "runs.csv");
-  EXPECT_THAT(csv, HasSubstr("run,kind,station,camera,begun_utc"));
+  const auto file = folder / "runs.csv";
+  write_runs(file, {sample(run_of(1), "a", 0.25), sample(run_of(2), "b", 1.5), with_all_texts()});
+  const std::string csv = TemporaryFolder::content_of(file);
+  EXPECT_EQ(first_line(csv),
+            "run,kind,station,camera,begun_utc,ended_utc,verdict,causes,program,config_sha256,"
+            "blur_px,focal_percent,center_px,nominal_px,rms_px,uncertainty_px,halves_px,coverage,"
+            "rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_mm,dispersion_mm,"
+            "dispersion_offset_px,world_mm,check_fixes,check_lamps,check_lamps_seen,check_mean_mm,"
+            "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
   EXPECT_THAT(csv, HasSubstr("2026-11-21T13:45:01Z,2026-11-21T13:45:01Z,PASS"));
   EXPECT_THAT(csv, HasSubstr("; second"));
-  write_runs(folder / "runs.json", runs);
-  const std::string json = TemporaryFolder::content_of(folder / "runs.json");
-  EXPECT_THAT(json, HasSubstr("\"value\": 0.25"));
-  EXPECT_THAT(json, HasSubstr("\"tilt_deg\": {\n    \"value\": null"));
-  EXPECT_THAT(refusal_of([&] { write_runs(folder / "runs.txt", runs); }), HasSubstr(".csv"));
+  for (const RunField& field : run_fields()) {
+    const std::string text = std::string("the '") + field.name + "' of ";
+    EXPECT_EQ(csv.find(text) != std::string::npos, field.in_csv) << field.name;
+  }
+  EXPECT_THAT(refusal_of([&] { write_runs(folder / "runs.txt", {}); }), HasSubstr(".csv"));
+}
+
+std::vector<std::string> keys_of(const nlohmann::ordered_json& json) {
+  std::vector<std::string> keys;
+  for (const auto& item : json.items()) keys.push_back(item.key());
+  return keys;
+}
+
+TEST(ExportRuns, WritesJson) {
+  const TemporaryFolder folder;
+  const auto file = folder / "runs.json";
+  const RunRecord all = with_all_texts();
+  write_runs(file, {sample(run_of(1), "a", 0.25), all});
+  const auto runs = nlohmann::ordered_json::parse(TemporaryFolder::content_of(file));
+  ASSERT_THAT(runs, SizeIs(2));
+  EXPECT_THAT(
+      keys_of(runs[0]),
+      ElementsAre("run", "kind", "station", "camera", "begun_utc", "ended_utc", "verdict", "causes",
+                  "program", "libraries", "config_sha256", "calibration", "figures", "images"));
+  const auto& figures = runs[0]["figures"];
+  EXPECT_THAT(keys_of(figures), ElementsAre("rms_px", "coverage", "tilt_deg"));
+  EXPECT_THAT(keys_of(figures["rms_px"]), ElementsAre("value", "unit", "gate", "at_least", "met"));
+  EXPECT_EQ(figures["rms_px"]["value"], 0.25);
+  EXPECT_EQ(figures["rms_px"]["unit"], "px");
+  EXPECT_TRUE(figures["tilt_deg"]["value"].is_null());
+  EXPECT_TRUE(figures["coverage"]["gate"].is_null());
+  EXPECT_THAT(keys_of(runs[0]["images"][1]), ElementsAre("step", "image", "sha256", "refused"));
+  EXPECT_EQ(runs[0]["images"][1]["refused"], "too dark");
+  for (const RunField& field : run_fields()) {
+    EXPECT_THAT(runs[1][field.name].get<std::string>(),
+                StartsWith(std::string("the '") + field.name + "' of "));
+  }
 }
 
 }  // namespace
