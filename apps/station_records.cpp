@@ -64,7 +64,8 @@ void show_run(const StationRecordsOptions& options) {
   for (const ScreenLine& line : verdict_screen(record)) fmt::print("{}\n", line.text);
   fmt::print("\nfigures without a gate\n");
   for (const CheckedMetric& figure : record.figures) {
-    if (!figure.limit && figure.value) fmt::print("{:<24}{:>12.4g}\n", figure.name, *figure.value);
+    if (figure.limit || !figure.value) continue;
+    fmt::print("{:<24}{:>12.4g} {}\n", figure.name, *figure.value, figure.unit);
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
@@ -90,8 +91,7 @@ void show_trend(const StationRecordsOptions& options) {
   if (std::none_of(kinds.begin(), kinds.end(),
                    [&](const auto& kind) { return kind.name == options.figure; })) {
     std::string names;
-    for (const MetricKind& kind : kinds)
-      names += (names.empty() ? "" : ", ") + std::string(kind.name);
+    for (const MetricKind& kind : kinds) names.append(names.empty() ? "" : ", ").append(kind.name);
     throw std::invalid_argument("there is no figure " + options.figure + "; there are: " + names);
   }
   Records records = records_of(options);

@@ -91,8 +91,8 @@ void run_verify(const StationRunOptions& options) {
   Records records(config.records);
   const fs::path arrived = config.captures / config.golden->camera_id;
   const bool batch = !options.batch.empty();
-  const auto [record, pictures] =
-      verify_station(config, batch ? fs::path(options.batch) : arrived, kProgram, options.threads);
+  const auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
+                                                 new_run(), kProgram, options.threads);
   Terminal terminal;
   conclude(record, pictures, records, config, terminal);
   if (!batch) put_away(arrived, record.run);

@@ -5,14 +5,15 @@
 #include <ceres/version.h>
 #include <fmt/core.h>
 #include <unistd.h>
-#include <array>
 
 #include <Eigen/Core>
+#include <array>
 #include <chrono>
 #include <ctime>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <random>
+#include <utility>
 
 #include "calibration/intrinsics/mrcal_files.h"
 #include "captures/digest.h"
@@ -94,29 +95,35 @@ std::span<const RunField> run_fields() {
 RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program) {
   const auto causes = unit.causes();
   const auto calibration = unit.calibration();
-  RunRecord record{run,
-                   "unit",
-                   unit.config().station,
-                   unit.camera_id(),
-                   begun_utc(run),
-                   now_utc(),
-                   causes.empty() ? "PASS" : "FAIL",
-                   "",
-                   program.program + " " + program.version,
-                   library_versions(),
-                   unit.config().sha256,
-                   calibration ? calibration_text(*calibration) : "",
-                   unit.figures(),
-                   {}};
-  for (const std::string& cause : causes) record.causes += cause + "\n";
+  RunRecord record{.run = run,
+                   .kind = "unit",
+                   .station = unit.config().station,
+                   .camera = unit.camera_id(),
+                   .begun_utc = begun_utc(run),
+                   .ended_utc = now_utc(),
+                   .verdict = causes.empty() ? "PASS" : "FAIL",
+                   .causes = "",
+                   .program = program.program + " " + program.version,
+                   .libraries = library_versions(),
+                   .config_sha256 = unit.config().sha256,
+                   .calibration = calibration ? calibration_text(*calibration) : "",
+                   .figures = unit.figures(),
+                   .images = {}};
+  for (const std::string& cause : causes) record.causes.append(cause).append("\n");
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
-      record.images.push_back({name_of(step), name, image.sha256,
-                               image.refused + (image.discarded ? " (not kept)" : "")});
+      std::string refused = image.refused;
+      if (image.discarded) refused.append(" (not kept)");
+      record.images.push_back({.step = name_of(step),
+                               .name = name,
+                               .sha256 = image.sha256,
+                               .refused = std::move(refused)});
     }
     for (const auto& file : unit.step(step).waiting) {
-      record.images.push_back({name_of(step), file.filename().string(), sha256_of_file(file),
-                               "not looked at: a step before is not done"});
+      record.images.push_back({.step = name_of(step),
+                               .name = file.filename().string(),
+                               .sha256 = sha256_of_file(file),
+                               .refused = "not looked at: a step before is not done"});
     }
   }
   return record;

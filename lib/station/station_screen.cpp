@@ -39,8 +39,9 @@ ScreenLine gate_line(const CheckedMetric& figure) {
   const std::string limit = fmt::format(
       "{} {:.4g}", figure.asked == Direction::at_least ? ">=" : "<=", figure.limit.value_or(0));
   const char* outcome = figure.met() ? "met" : figure.value ? "NOT MET" : "not reached";
-  return {fmt::format("{:<24}{:>12}{:>14}  {}", figure.name, value, limit, outcome),
-          figure.met() ? Tone::plain : Tone::bad};
+  return {
+      fmt::format("{:<24}{:>12}{:>14} {:<4} {}", figure.name, value, limit, figure.unit, outcome),
+      figure.met() ? Tone::plain : Tone::bad};
 }
 
 const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",

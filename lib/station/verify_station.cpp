@@ -61,7 +61,7 @@ class Verification {
     note(each, step);
   }
 
-  RunRecord record(const ProgramVersion& program) {
+  RunRecord record(const std::string& run, const ProgramVersion& program) {
     const auto figures = check_all(golden_.gates, values_, unit_metrics());
     for (const CheckedMetric& figure : figures) {
       if (!figure.met()) causes_.push_back(cause_of(figure));
@@ -70,22 +70,21 @@ class Verification {
       const auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration);
       causes_.insert(causes_.begin(), faults.begin(), faults.end());
     }
-    const std::string run = new_run();
-    RunRecord record{run,
-                     "golden",
-                     config_.station,
-                     golden_.camera_id,
-                     begun_utc(run),
-                     now_utc(),
-                     causes_.empty() ? "PASS" : "FAIL",
-                     "",
-                     program.program + " " + program.version,
-                     library_versions(),
-                     config_.sha256,
-                     "",
-                     figures,
-                     images_};
-    for (const std::string& cause : causes_) record.causes += cause + "\n";
+    RunRecord record{.run = run,
+                     .kind = "golden",
+                     .station = config_.station,
+                     .camera = golden_.camera_id,
+                     .begun_utc = begun_utc(run),
+                     .ended_utc = now_utc(),
+                     .verdict = causes_.empty() ? "PASS" : "FAIL",
+                     .causes = "",
+                     .program = program.program + " " + program.version,
+                     .libraries = library_versions(),
+                     .config_sha256 = config_.sha256,
+                     .calibration = "",
+                     .figures = figures,
+                     .images = images_};
+    for (const std::string& cause : causes_) record.causes.append(cause).append("\n");
     return record;
   }
 
@@ -105,7 +104,8 @@ class Verification {
   }
   void note(StationStep each, const UnitStep& step) {
     for (const auto& [name, image] : step.images) {
-      images_.push_back({name_of(each), name, image.sha256, image.refused});
+      images_.push_back(
+          {.step = name_of(each), .name = name, .sha256 = image.sha256, .refused = image.refused});
     }
   }
 
@@ -122,13 +122,13 @@ class Verification {
 
 }  // namespace
 
-Verified verify_station(const StationConfig& config, const fs::path& folder,
+Verified verify_station(const StationConfig& config, const fs::path& folder, const std::string& run,
                         const ProgramVersion& program, int threads) {
   Verification verification(config, folder, threads);
   if (fs::is_directory(folder / "boards")) verification.boards();
   if (fs::is_directory(folder / "dispersion")) verification.lamps(StationStep::dispersion);
   verification.lamps(StationStep::check);
-  return {verification.record(program), verification.pictures()};
+  return {verification.record(run, program), verification.pictures()};
 }
 
 }  // namespace vlp

@@ -18,9 +18,9 @@ struct Verified {
 /// and, where they are there, FOLDER/dispersion/ and FOLDER/boards/. The lens that the boards give
 /// is compared with the known one (center_px, focal_percent, nominal_px): when it differs, the
 /// board has. The fixes are made with the known calibration: when they are off, lamps or known
-/// points have moved. Throws InputError without a golden unit in the configuration, or without
-/// images.
+/// points have moved. `run` is of new_run(), from before the measurement. Throws InputError without
+/// images. Precondition: the configuration has a golden unit.
 Verified verify_station(const StationConfig& config, const std::filesystem::path& folder,
-                        const ProgramVersion& program, int threads);
+                        const std::string& run, const ProgramVersion& program, int threads);
 
 }  // namespace vlp

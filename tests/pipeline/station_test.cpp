@@ -8,6 +8,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -31,8 +32,10 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
 
   EXPECT_THAT(records("list").output, HasSubstr("2 runs, 2 passed"));
   EXPECT_THAT(records("list --camera-id 0002").output, HasSubstr("1 runs, 1 passed"));
-  EXPECT_THAT(records("show --camera-id 0001").output,
-              AllOf(HasSubstr("check_mean_mm"), HasSubstr("images     48, 48 used")));
+  EXPECT_THAT(
+      records("show --camera-id 0001").output,
+      AllOf(ContainsRegex("check_mean_mm +[0-9.e-]+ +<= 1 mm +met"),
+            ContainsRegex("nominal_px +[0-9.e-]+ px"), HasSubstr("images     48, 48 used")));
   const auto exported = folder / "runs.json", picture = folder / "trend.svg";
   EXPECT_EQ(records("export -o " + exported.string()).exit_code, 0);
   EXPECT_THAT(TemporaryFolder::content_of(exported), HasSubstr("vlp-calibration/1"));
