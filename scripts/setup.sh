@@ -10,7 +10,7 @@ set -euo pipefail
 
 packages=(
   # compilers and tools
-  g++ cmake ninja-build ccache git pkg-config clang-format clang-tidy
+  g++ cmake ninja-build ccache git pkg-config clang libclang-rt-dev clang-format clang-tidy
   # libraries
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
   libopencv-dev libapriltag-dev libceres-dev libssl-dev

@@ -79,8 +79,9 @@ TEST(TurningAxis, IsExactFromAnywhere) {
     std::vector<Eigen::Vector3d> lamps_m;
     const std::size_t lamps = 2 + random.index(5);
     while (lamps_m.size() < lamps) {
-      const Eigen::Vector3d at_m(random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8),
-                                 random.uniform(1.5, 1.7));
+      // One after another: a compiler may take arguments in any order.
+      const double z_m = random.uniform(1.5, 1.7), y_m = random.uniform(-0.8, 0.8);
+      const Eigen::Vector3d at_m(random.uniform(-0.8, 0.8), y_m, z_m);
       const bool apart = std::all_of(lamps_m.begin(), lamps_m.end(), [&](const auto& other) {
         return (other - at_m).norm() > 0.4;
       });
