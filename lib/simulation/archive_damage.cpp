@@ -13,7 +13,8 @@ namespace fs = std::filesystem;
 std::vector<fs::path> images_in_order(const fs::path& folder) {
   std::vector<fs::path> images;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() == ".png") images.push_back(entry.path());
+    const fs::path ending = entry.path().extension();
+    if (ending == ".png" || ending == ".jpg") images.push_back(entry.path());
   }
   std::sort(images.begin(), images.end());
   return images;

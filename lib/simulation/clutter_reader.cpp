@@ -11,7 +11,7 @@ namespace {
 
 Glow read_steady_lamp(YamlMap map, const Room& room) {
   Glow glow = read_glow(map, room);
-  glow.edge_share = read_edge_share(map);
+  read_profile(map, glow);
   map.finish();
   return glow;
 }

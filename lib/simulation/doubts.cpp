@@ -5,14 +5,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation/picture.h"
+
 namespace vlp {
 namespace {
 
-/// Grey level of a source that fills a pixel on the axis, without the limit of white.
+/// Grey level of a source that fills a pixel on the axis; without a picture it may pass white.
 double level_of(const Scene& scene, const CaptureSet& set, double radiance_e_per_s) {
   const Sensor& sensor = scene.sensor;
-  return sensor.black_level_dn +
-         sensor.gain_dn_per_e * std::min(radiance_e_per_s * set.exposure_s, sensor.full_well_e);
+  const double level =
+      sensor.black_level_dn +
+      sensor.gain_dn_per_e * std::min(radiance_e_per_s * set.exposure_s, sensor.full_well_e);
+  return scene.picture ? coded_level(*scene.picture, sensor, level) : level;
 }
 
 std::string whole(double value) { return std::to_string(std::lround(value)); }
@@ -21,7 +25,7 @@ void add_brightness(const Scene& scene, const CaptureSet& set, const std::string
                     double bright_e_per_s, const std::string& dark, double dark_e_per_s,
                     std::vector<std::string>& doubts) {
   constexpr double too_dark = 0.03, too_bright = 0.6;
-  const double white = scene.sensor.bits == 8 ? 255 : 65535;
+  const double white = white_dn(scene.sensor);
   const std::string fit =
       ": does sensor.gain_dn_per_e suit sensor.bits, and the light the exposure?";
   const double high = level_of(scene, set, bright_e_per_s);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "simulation/picture.h"
+
 namespace vlp {
 namespace {
 
@@ -39,7 +41,8 @@ void add_bloom(const Bloom& bloom, float full_well_e, cv::Mat1f& electrons) {
 
 }  // namespace
 
-cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed) {
+cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
+               const std::optional<Picture>& picture) {
   cv::RNG random(seed);
   cv::Mat1f electrons = mean_electrons.clone();
   if (sensor.shot_noise) {
@@ -52,9 +55,16 @@ cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint6
     value = std::min(value, full_well);
     if (read_noise > 0) value += static_cast<float>(random.gaussian(read_noise));
   }
+  const int type = sensor.bits == 8 ? CV_8U : CV_16U;
   cv::Mat image;
-  electrons.convertTo(image, sensor.bits == 8 ? CV_8U : CV_16U, sensor.gain_dn_per_e,
-                      sensor.black_level_dn);
+  if (!picture) {
+    electrons.convertTo(image, type, sensor.gain_dn_per_e, sensor.black_level_dn);
+    return image;
+  }
+  cv::Mat1f levels;
+  electrons.convertTo(levels, CV_32F, sensor.gain_dn_per_e, sensor.black_level_dn);
+  develop(*picture, sensor, levels);
+  levels.convertTo(image, type);
   return image;
 }
 

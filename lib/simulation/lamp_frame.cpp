@@ -5,6 +5,7 @@
 
 #include "simulation/coverage.h"
 #include "simulation/disc.h"
+#include "simulation/downlight.h"
 #include "simulation/frame_renderer.h"
 #include "simulation/mosaic.h"
 #include "simulation/pixel_window.h"
@@ -88,8 +89,13 @@ class LampFrame {
   /// `target` is the window's part of an image.
   void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
     const Eigen::Isometry3d glow_from_world(Eigen::Translation3d(-glow.position_m));
-    add_shape(rays_, window, target_from_camera(glow_from_world),
-              Disc(glow.diameter_m / 2, glow.edge_share), glow.radiance_e_per_s, target);
+    const TargetFromCamera glow_from_camera = target_from_camera(glow_from_world);
+    if (glow.recess || glow.halo) {
+      add_downlight(rays_, window, glow_from_camera, glow, target);
+      return;
+    }
+    add_shape(rays_, window, glow_from_camera, Disc(glow.diameter_m / 2, glow.edge_share),
+              glow.radiance_e_per_s, target);
   }
   void draw(const Panel& panel, double value, cv::Mat1f& image) const {
     const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "geometry/angles.h"
+#include "simulation/downlight.h"
 
 namespace vlp {
 
@@ -51,7 +52,7 @@ std::vector<Eigen::Vector3d> outline_of(const Glow& glow) {
   for (int i = 0; i < count; ++i) {
     const double angle = 2 * std::numbers::pi * i / count;
     points_m.push_back(glow.position_m +
-                       glow.diameter_m / 2 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
+                       reach_m(glow) * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
   }
   return points_m;
 }

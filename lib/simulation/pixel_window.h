@@ -35,7 +35,8 @@ PixelWindow whole_window(const PixelRays& rays);
 PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const CarrierMotion& motion,
                       const Shutter& shutter, const PixelRays& rays);
 
-/// Points around the rim of a glow, or along the edges of a panel.
+/// Points around the light of a glow (its rim, or where its halo ends), or along the edges of a
+/// panel.
 std::vector<Eigen::Vector3d> outline_of(const Glow& glow);
 std::vector<Eigen::Vector3d> outline_of(const Panel& panel);
 

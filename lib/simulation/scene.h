@@ -20,13 +20,44 @@ namespace vlp {
 /// Radiances, named ..._e_per_s, are the electrons per second that a source frees in a pixel on the
 /// optical axis that it fills.
 
+/// The side to which a reflector is dark: its share at the rim towards an azimuth in the world,
+/// from x to y.
+struct DarkSide {
+  double reflector_share;
+  double azimuth_rad;
+};
+
+/// A source deep in a reflector, seen through its rim, a circle of the diameter D. A ray with the
+/// slope s (metres sideways for each metre up) that crosses the rim's plane at p from its centre
+/// crosses the source's plane at q = p + depth s. Its radiance is
+///   radiance (w + (1 - w) 2^-((2 |q| / source_diameter)^2)),
+/// so that the source, of which half is left at its diameter, shows at -depth s from the rim's
+/// centre. The walls give the share w = reflector_share; with a dark side w falls in proportion to
+/// p's way towards the azimuth, from reflector_share at p = -D / 2 to the dark side's at D / 2.
+struct Recess {
+  double depth_m;
+  double source_diameter_m;
+  double reflector_share;
+  std::optional<DarkSide> dark_side;
+};
+
+/// The ceiling around a glow, lit by it: at r > D / 2 from the centre of the diameter D it adds
+///   radiance share exp(-(r - D / 2) / length), until 8 lengths from the rim.
+struct Halo {
+  double share;
+  double length_m;
+};
+
 /// A horizontal disc of light. Its radiance at the distance r of its centre is
-///   radiance (1 - (1 - edge_share) (2 r / diameter)^2).
+///   radiance (1 - (1 - edge_share) (2 r / diameter)^2),
+/// or that of its recess, of which the disc is the rim.
 struct Glow {
   Eigen::Vector3d position_m;
   double diameter_m;
   double radiance_e_per_s;
   double edge_share;
+  std::optional<Recess> recess = {};
+  std::optional<Halo> halo = {};
 };
 
 /// A lamp of the lamp map: a glow that a square wave switches.
@@ -90,6 +121,23 @@ struct Sensor {
   std::optional<Bloom> bloom;
 };
 
+/// Unsharp mask, of levels v blurred by a Gaussian G of the sigma radius_px:
+///   v + amount (v - G v)
+struct Sharpening {
+  double amount;
+  double radius_px;
+};
+
+/// What a camera makes of the sensor's levels before they are rounded, in this order:
+///   v = white ((level - black level) / (white - black level))^(1 / gamma), from 0 to white;
+/// sharpening; rounding; JPEG. Without a picture the levels are as the sensor has them.
+struct Picture {
+  double gamma;
+  std::optional<Sharpening> sharpening;
+  /// 1 to 100, as libjpeg has it, of images of 8 bits; PNG without it.
+  std::optional<int> jpeg_quality;
+};
+
 /// How the camera sits on what carries it and turns about a vertical axis. It leans by a tilt that
 /// adds no yaw (level_from_zenith): in the camera, up is (sin t cos a, sin t sin a, cos t), with
 /// the tilt t and its azimuth a from the image's x to its y.
@@ -129,6 +177,7 @@ struct Scene {
   Camera camera;
   Optics optics;
   Sensor sensor;
+  std::optional<Picture> picture;
   Mount mount;
   /// Radiance of the ceiling.
   double ambient_e_per_s;

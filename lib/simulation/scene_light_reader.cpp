@@ -1,9 +1,37 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+#include "geometry/angles.h"
 #include "rig/yaml_parts.h"
 #include "simulation/scene_parts.h"
 
 namespace vlp {
+namespace {
+
+double read_share(YamlMap& map, const std::string& key) {
+  return map.required(key).number_within(0, 1, "(of the source's radiance)");
+}
+
+Recess read_recess(YamlMap map, const Glow& rim) {
+  Recess recess;
+  recess.depth_m = map.required("depth_m").number_within(0, 2, "m");
+  const YamlValue source = map.required("source_diameter_m");
+  recess.source_diameter_m = source.number_within(1e-3, 10, "m");
+  if (recess.source_diameter_m > rim.diameter_m) {
+    throw source.error("is larger than the rim, diameter_m");
+  }
+  recess.reflector_share = read_share(map, "reflector_share");
+  if (const auto dark = map.optional("dark_side")) {
+    YamlMap keys = dark->map();
+    recess.dark_side =
+        DarkSide{read_share(keys, "reflector_share"),
+                 rad_from_deg(keys.required("azimuth_deg").number_within(-360, 360, "degrees"))};
+    keys.finish();
+  }
+  map.finish();
+  return recess;
+}
+
+}  // namespace
 
 Glow read_glow(YamlMap& map, const Room& room) {
   const YamlValue position = map.required("position_m");
@@ -16,8 +44,19 @@ Glow read_glow(YamlMap& map, const Room& room) {
   return glow;
 }
 
-double read_edge_share(YamlMap& map) {
-  return map.required("edge_share").number_within(0, 2, "(of the radiance at the centre)");
+void read_profile(YamlMap& map, Glow& glow) {
+  if (const auto recess = map.optional("recess")) {
+    glow.recess = read_recess(recess->map(), glow);
+  } else {
+    glow.edge_share =
+        map.required("edge_share").number_within(0, 2, "(of the radiance at the centre)");
+  }
+  if (const auto halo = map.optional("halo")) {
+    YamlMap keys = halo->map();
+    glow.halo =
+        Halo{read_share(keys, "share"), keys.required("length_m").number_within(1e-3, 2, "m")};
+    keys.finish();
+  }
 }
 
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room) {
@@ -34,7 +73,7 @@ std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room)
                    map.required("duty").number(),
                    {},
                    Eigen::Vector3d::Zero()};
-    read.glow.edge_share = read_edge_share(map);
+    read_profile(map, read.glow);
     if (const auto phase = map.optional("phase")) {
       read.phase = phase->number_within(0, 1, "(of a period)");
     }

@@ -30,9 +30,11 @@ void check_count(double captures, const Place& where) {
 /// Lights are checked against the room.
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room);
 Clutter read_clutter(YamlMap map, const std::vector<SceneLamp>& lamps, const Room& room);
-/// A glow's keys but edge_share.
+/// A glow's keys but those of read_profile().
 Glow read_glow(YamlMap& map, const Room& room);
-double read_edge_share(YamlMap& map);
+/// How its brightness is spread: recess or edge_share, and halo.
+void read_profile(YamlMap& map, Glow& glow);
+Picture read_picture(YamlMap map, const Sensor& sensor);
 SceneBoard read_scene_board(YamlMap map);
 ArchiveSpreads read_archive_spreads(YamlMap map);
 /// Where the axis stands at each capture: spots, a grid or a drive, all in the room.

@@ -108,6 +108,9 @@ Scene read_scene(const std::filesystem::path& file) {
   scene.camera = read_scene_camera(document.required("camera").map());
   scene.optics = read_optics(document.required("optics").map());
   scene.sensor = read_sensor(document.required("sensor").map());
+  if (const auto picture = document.optional("picture")) {
+    scene.picture = read_picture(picture->map(), scene.sensor);
+  }
   scene.mount = read_mount(document.required("mount").map());
   scene.ambient_e_per_s = read_radiance(document, "ambient_e_per_s");
   if (const auto lamps = document.optional("lamps")) scene.lamps = read_scene_lamps(*lamps, room);

@@ -8,15 +8,16 @@
 
 #include "camera/lens.h"
 #include "rig/board_layout.h"
+#include "simulation/picture.h"
 #include "simulation/seeded_random.h"
 
 namespace vlp {
 namespace {
 
-std::string image_name(std::size_t index, std::size_t count) {
+std::string image_name(const Scene& scene, std::size_t index, std::size_t count) {
   const std::string number = std::to_string(index);
   const std::size_t digits = std::max<std::size_t>(4, std::to_string(count - 1).size());
-  return std::string(digits - number.size(), '0') + number + ".png";
+  return std::string(digits - number.size(), '0') + number + image_ending(scene.picture);
 }
 
 Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
@@ -77,7 +78,7 @@ LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index)
   const double jitter_rad = captures.yaw_jitter_rad * random.uniform(-1.0, 1.0);
 
   LampShot shot;
-  shot.image = image_name(index, shots_in(set));
+  shot.image = image_name(scene, index, shots_in(set));
   shot.time_s = static_cast<double>(index) * captures.interval_s;
   shot.exposure_s = set.exposure_s;
   shot.motion.axis_m << captures.spots_m[step.spot], captures.heights_m[step.height];
@@ -123,7 +124,7 @@ BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t inde
   const Eigen::Vector3d tilt_axis(std::cos(azimuth), std::sin(azimuth), 0);
 
   BoardShot shot;
-  shot.image = image_name(index, shots_in(set));
+  shot.image = image_name(scene, index, shots_in(set));
   shot.exposure_s = set.exposure_s;
   shot.camera_from_board_at_0.linear() =
       facing * rotation(tilt, tilt_axis) * rotation(roll, Eigen::Vector3d::UnitZ());

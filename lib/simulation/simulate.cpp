@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <mutex>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
 #include "captures/in_parallel.h"
@@ -13,6 +12,7 @@
 #include "simulation/doubts.h"
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
+#include "simulation/picture.h"
 #include "simulation/truth.h"
 
 namespace vlp {
@@ -55,10 +55,9 @@ void write_common_files(const Scene& scene, const fs::path& output) {
   write_calibration(output / "true_calibration.yaml", true_calibration(scene));
 }
 
-void write_image(const fs::path& file, const cv::Mat& lines, Readout readout) {
-  const cv::Mat image = readout == Readout::rows ? lines : cv::Mat(lines.t());
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
+void write_image(const fs::path& file, const cv::Mat& lines, const Scene& scene) {
+  const bool by_rows = scene.camera.readout == Readout::rows;
+  const auto bytes = encoded(by_rows ? lines : cv::Mat(lines.t()), scene.picture);
   write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -67,7 +66,7 @@ bool render(const Scene& scene, const FrameRenderer& renderer, const CaptureSet&
             std::size_t index, const fs::path& folder) {
   const auto write = [&](const std::string& image, const auto& electrons, std::uint64_t seed) {
     if (fs::exists(folder / image)) return false;
-    write_image(folder / image, expose(scene.sensor, electrons(), seed), renderer.rays().readout());
+    write_image(folder / image, expose(scene.sensor, electrons(), seed, scene.picture), scene);
     return true;
   };
   if (set.board) {

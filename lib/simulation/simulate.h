@@ -34,7 +34,8 @@ using SimulationProgress = std::function<void(const SimulationSummary& so_far, s
 
 /// Renders a scene into `output`:
 ///   scene.yaml, lamps.yaml (as surveyed), board.yaml, true_calibration.yaml, true_lamps.yaml
-///   FOLDER/0000.png, 0001.png, ... and the tables of write_truth()
+///   FOLDER/0000.png, 0001.png, ... (.jpg as the scene's picture has it) and the tables of
+///   write_truth()
 /// Each file appears whole; images that are there are kept, so that an interrupted run goes on
 /// where it stopped. The bytes depend on the scene alone, not on the threads. Throws
 /// InputError: a folder that holds something else, files that cannot be written;

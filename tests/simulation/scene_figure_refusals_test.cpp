@@ -40,9 +40,10 @@ TEST(SceneFigures, OfTheSensorAreChecked) {
   EXPECT_EQ(refusal_with("black_level_dn: 2", "black_level_dn: 256"),
             "scene.yaml:6: sensor.black_level_dn: 256 DN is not within 0 and 255 DN: is it in the "
             "right unit?");
-  EXPECT_EQ(scene_refusal(scene_with("bits: 8, gain_dn_per_e: 0.02, black_level_dn: 2",
-                                     "bits: 16, gain_dn_per_e: 0.02, black_level_dn: 256")),
-            "");
+  std::string deep = scene_with("bits: 8, gain_dn_per_e: 0.02, black_level_dn: 2",
+                                "bits: 16, gain_dn_per_e: 0.02, black_level_dn: 256");
+  const std::string jpeg = ", jpeg_quality: 90";
+  EXPECT_EQ(scene_refusal(deep.erase(deep.find(jpeg), jpeg.size())), "");
   EXPECT_EQ(refusal_with("full_well_e: 13000", "full_well_e: 0"),
             "scene.yaml:6: sensor.full_well_e: 0 electrons is not within 1 and 1.0e+09 electrons: "
             "is it in the right unit?");
@@ -96,6 +97,61 @@ TEST(SceneFigures, OfTheLampsAreChecked) {
             "is it in the right unit?");
   EXPECT_EQ(refusal_with("[0.001, 0.002, 0.003]", "[0.001, 0.002]"),
             "scene.yaml:11: lamps[1].map_error_m: should be 3 numbers, not 2");
+}
+
+TEST(SceneFigures, OfARecessAndAHaloAreChecked) {
+  const std::string recess = "scene.yaml:13: clutter.steady_lamps[1].recess.";
+  const std::string unit = ": is it in the right unit?";
+  EXPECT_EQ(refusal_with("depth_m: 0.07", "depth_m: -0.07"),
+            recess + "depth_m: -0.07 m is not within 0 and 2 m" + unit);
+  EXPECT_EQ(refusal_with("depth_m: 0.07", "depth_m: 0"), "");
+  EXPECT_EQ(refusal_with("source_diameter_m: 0.04", "source_diameter_m: 0.15"),
+            recess + "source_diameter_m: is larger than the rim, diameter_m");
+  EXPECT_EQ(refusal_with("source_diameter_m: 0.04", "source_diameter_m: 0.14"), "");
+  EXPECT_EQ(refusal_with("source_diameter_m: 0.04", "source_diameter_m: 0"),
+            recess + "source_diameter_m: 0 m is not within 0.001 and 10 m" + unit);
+  EXPECT_EQ(refusal_with("reflector_share: 0.1", "reflector_share: 10"),
+            recess +
+                "reflector_share: 10 (of the source's radiance) is not within 0 and 1 (of the "
+                "source's radiance)" +
+                unit);
+  EXPECT_EQ(refusal_with("share: 0.02", "share: -0.02"),
+            "scene.yaml:11: lamps[1].halo.share: -0.02 (of the source's radiance) is not within 0 "
+            "and 1 (of the source's radiance)" +
+                unit);
+  EXPECT_EQ(refusal_with("length_m: 0.015", "length_m: 0"),
+            "scene.yaml:11: lamps[1].halo.length_m: 0 m is not within 0.001 and 2 m" + unit);
+}
+
+TEST(SceneFigures, OfARecessStandInPlaceOfAnEdgeShare) {
+  EXPECT_EQ(refusal_with("recess: {", "edge_share: 1, recess: {"),
+            "scene.yaml:13: clutter.steady_lamps[1]: key 'edge_share' is unknown here; the keys "
+            "are: position_m, diameter_m, radiance_e_per_s, recess, halo");
+}
+
+TEST(SceneFigures, OfThePictureAreChecked) {
+  const std::string gamma = "scene.yaml:29: picture.gamma: ";
+  EXPECT_EQ(refusal_with("gamma: 2.2", "gamma: 0"),
+            gamma +
+                "0 (of the tone curve) is not within 0.1 and 10 (of the tone curve): is it in "
+                "the right unit?");
+  EXPECT_EQ(refusal_with("gamma: 2.2", "gamma: -2.2"),
+            gamma +
+                "-2.2 (of the tone curve) is not within 0.1 and 10 (of the tone curve): is it "
+                "in the right unit?");
+  EXPECT_EQ(refusal_with("jpeg_quality: 90", "jpeg_quality: 0"),
+            "scene.yaml:29: picture.jpeg_quality: should be a whole number within 1 and 100, not "
+            "'0'");
+  EXPECT_EQ(refusal_with("jpeg_quality: 90", "jpeg_quality: 101"),
+            "scene.yaml:29: picture.jpeg_quality: should be a whole number within 1 and 100, not "
+            "'101'");
+  EXPECT_EQ(refusal_with("bits: 8", "bits: 16"),
+            "scene.yaml:29: picture.jpeg_quality: JPEG has 8 bits: set sensor.bits to 8");
+  EXPECT_EQ(refusal_with("radius_px: 1.5", "radius_px: 0"),
+            "scene.yaml:29: picture.sharpening.radius_px: 0 px is not within 0.3 and 50 px: is it "
+            "in the right unit?");
+  EXPECT_EQ(refusal_with("black_level_dn: 2", "black_level_dn: 255"),
+            "scene.yaml:29: picture: needs levels between sensor.black_level_dn and white");
 }
 
 TEST(SceneFigures, OfAWindowOrOccluderMakeARectangle) {

@@ -12,9 +12,10 @@ using testing::HasSubstr;
 TEST(SceneRefusals, NoneIsOfTheSample) { EXPECT_EQ(scene_refusal(kSceneYaml), ""); }
 
 TEST(SceneRefusals, NameAnUnknownKeyWhereverItStands) {
-  EXPECT_EQ(refusal_with("seed: 7", "seed: 7\nlight: 1"),
-            "scene.yaml:3: key 'light' is unknown here; the keys are: format, seed, room, camera, "
-            "optics, sensor, mount, ambient_e_per_s, lamps, clutter, board, archive, captures");
+  EXPECT_EQ(
+      refusal_with("seed: 7", "seed: 7\nlight: 1"),
+      "scene.yaml:3: key 'light' is unknown here; the keys are: format, seed, room, camera, "
+      "optics, sensor, picture, mount, ambient_e_per_s, lamps, clutter, board, archive, captures");
   EXPECT_EQ(refusal_with("z_m: [0, 1.7]", "z_m: [0, 1.7], w_m: 0"),
             "scene.yaml:3: room: key 'w_m' is unknown here; the keys are: x_m, y_m, z_m");
   const auto unknown = [](const std::string& before, const std::string& place) {
@@ -28,6 +29,11 @@ TEST(SceneRefusals, NameAnUnknownKeyWhereverItStands) {
   unknown("share: 0.3", "6: sensor.bloom");
   unknown("tilt_deg", "7: mount");
   unknown("id: 5", "11: lamps[1]");
+  unknown("share: 0.02", "11: lamps[1].halo");
+  unknown("depth_m", "13: clutter.steady_lamps[1].recess");
+  unknown("reflector_share: 0.05", "13: clutter.steady_lamps[1].recess.dark_side");
+  unknown("gamma", "29: picture");
+  unknown("amount", "29: picture.sharpening");
   unknown("position_m: [0.3", "13: clutter.steady_lamps[0]");
   unknown("corner_m: [-0.9", "14: clutter.windows[0]");
   unknown("of_lamp", "15: clutter.reflections[0]");
@@ -47,7 +53,7 @@ TEST(SceneRefusals, NameAnUnknownKeyWhereverItStands) {
 TEST(SceneRefusals, NameTheMissingKey) {
   EXPECT_EQ(refusal_with("seed: 7\n", ""),
             "scene.yaml:1: key 'seed' is missing; there are: format, room, camera, optics, sensor, "
-            "mount, ambient_e_per_s, lamps, clutter, board, captures");
+            "mount, ambient_e_per_s, lamps, clutter, board, captures, picture");
   const auto missing = [](const std::string& text, const std::string& place,
                           const std::string& key) {
     EXPECT_THAT(refusal_with(text, ""),
@@ -64,6 +70,13 @@ TEST(SceneRefusals, NameTheMissingKey) {
   missing("frequency_hz: 1600, ", "10: lamps[0]: ", "frequency_hz");
   missing("duty: 0.4, ", "10: lamps[0]: ", "duty");
   missing(", edge_share: 0.8", "10: lamps[0]: ", "edge_share");
+  missing(", length_m: 0.015", "11: lamps[1].halo: ", "length_m");
+  missing("depth_m: 0.07, ", "13: clutter.steady_lamps[1].recess: ", "depth_m");
+  missing("source_diameter_m: 0.04, ", "13: clutter.steady_lamps[1].recess: ", "source_diameter_m");
+  missing(" reflector_share: 0.1,", "13: clutter.steady_lamps[1].recess: ", "reflector_share");
+  missing(", azimuth_deg: 90", "13: clutter.steady_lamps[1].recess.dark_side: ", "azimuth_deg");
+  missing("gamma: 2.2, ", "29: picture: ", "gamma");
+  missing(", radius_px: 1.5", "29: picture.sharpening: ", "radius_px");
   missing("of_lamp: 5, ", "15: clutter.reflections[0]: ", "of_lamp");
   missing("  margin_m: 0.02\n", "18: board: ", "margin_m");
   missing("exposure_s: 5.0e-5, ", "25: captures[0]: ", "exposure_s");

@@ -17,9 +17,9 @@ mount: {tilt_deg: 2, tilt_azimuth_deg: 90, lever_arm_m: [0.03, -0.04]}
 ambient_e_per_s: 1.0e+6
 lamps:
   - {id: 1, position_m: [-0.6, -0.3, 1.6], diameter_m: 0.18, frequency_hz: 1600, duty: 0.4, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
-  - {id: 5, position_m: [0.6, 0.2, 1.5], diameter_m: 0.1, frequency_hz: 2500, duty: 0.5, radiance_e_per_s: 3.0e+8, edge_share: 0.9, phase: 0.25, map_error_m: [0.001, 0.002, 0.003]}
+  - {id: 5, position_m: [0.6, 0.2, 1.5], diameter_m: 0.1, frequency_hz: 2500, duty: 0.5, radiance_e_per_s: 3.0e+8, edge_share: 0.9, phase: 0.25, map_error_m: [0.001, 0.002, 0.003], halo: {share: 0.02, length_m: 0.015}}
 clutter:
-  steady_lamps: [{position_m: [0.3, 0, 1.6], diameter_m: 0.12, radiance_e_per_s: 1.5e+8, edge_share: 0.7}]
+  steady_lamps: [{position_m: [0.3, 0, 1.6], diameter_m: 0.12, radiance_e_per_s: 1.5e+8, edge_share: 0.7}, {position_m: [-0.3, 0.1, 1.6], diameter_m: 0.14, radiance_e_per_s: 1.6e+8, recess: {depth_m: 0.07, source_diameter_m: 0.04, reflector_share: 0.1, dark_side: {reflector_share: 0.05, azimuth_deg: 90}}}]
   windows: [{corner_m: [-0.9, -0.1, 1.6], edges_m: [[0.25, 0, 0], [0, 0.3, 0]], radiance_e_per_s: 8.0e+7}]
   reflections: [{of_lamp: 5, position_m: [0.2, 0.1, 1.6], diameter_m: 0.22, radiance_e_per_s: 1.2e+7}]
   occluders: [{corner_m: [-0.7, -0.2, 1.4], edges_m: [[0.1, 0.1, 0], [-0.2, 0.2, 0]], radiance_e_per_s: 2.0e+6}]
@@ -35,6 +35,7 @@ captures:
   - {folder: grid, exposure_s: 2.0e-5, grid: {x_m: [-0.6, 0.6], y_m: [0.3, -0.3], columns: 3, rows: 2}, heights_m: [0.1], turn: {count: 4, jitter_deg: 9}, turn_rate_deg_per_s: 90, interval_s: 2}
   - {folder: line, exposure_s: 5.0e-5, drive: {from_m: [-0.3, 0], to_m: [0.5, 0.4], speed_m_per_s: 0.5}, heights_m: [0], yaws_deg: [0], interval_s: 0.25}
   - {folder: boards, exposure_s: 0.004, views: {count: 5, distance_m: [0.2, 0.4], tilt_deg: 45, roll_deg: 180, spread: 0.75, velocity_m_per_s: [0.1, 0, 0.2]}}
+picture: {gamma: 2.2, sharpening: {amount: 0.6, radius_px: 1.5}, jpeg_quality: 90}
 )";
 // clang-format on
 

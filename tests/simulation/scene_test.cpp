@@ -83,6 +83,29 @@ TEST(Scene, HasTheClutterAndTheBoard) {
   EXPECT_EQ(scene.board->surround_e_per_s, 6e5);
 }
 
+TEST(Scene, HasRecessesAndHalos) {
+  const Scene scene = scene_of(kSceneYaml);
+  EXPECT_FALSE(scene.lamps[0].glow.recess);
+  EXPECT_FALSE(scene.lamps[0].glow.halo);
+  EXPECT_EQ(scene.lamps[1].glow.halo->share, 0.02);
+  EXPECT_EQ(scene.lamps[1].glow.halo->length_m, 0.015);
+  const Recess recess = scene.clutter.steady_lamps.at(1).recess.value();
+  EXPECT_EQ(recess.depth_m, 0.07);
+  EXPECT_EQ(recess.source_diameter_m, 0.04);
+  EXPECT_EQ(recess.reflector_share, 0.1);
+  EXPECT_EQ(recess.dark_side->reflector_share, 0.05);
+  EXPECT_NEAR(recess.dark_side->azimuth_rad, std::numbers::pi / 2, kRounding);
+}
+
+TEST(Scene, HasAPicture) {
+  const Picture picture = scene_of(kSceneYaml).picture.value();
+  EXPECT_EQ(picture.gamma, 2.2);
+  EXPECT_EQ(picture.sharpening->amount, 0.6);
+  EXPECT_EQ(picture.sharpening->radius_px, 1.5);
+  EXPECT_EQ(picture.jpeg_quality, 90);
+  EXPECT_FALSE(scene_of(scene_with("picture: ", "# ")).picture);
+}
+
 TEST(Scene, HasTheSpotsInTheOrderOfTheFile) {
   const CaptureSet set = scene_of(kSceneYaml).sets.at(0);
   EXPECT_EQ(set.folder, "spots");
@@ -143,11 +166,12 @@ TEST(Scene, HasViewsOfTheBoard) {
 }
 
 TEST(ScenesOfTheDatasets, AreReadAndHaveASample) {
-  for (const std::string name : {"paper-rig", "paper-rig-faulty", "wide", "clutter"}) {
+  for (const std::string name :
+       {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights"}) {
     SCOPED_TRACE(name);
     const Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
     EXPECT_EQ(scene.camera.id, name);
-    EXPECT_GE(scene.lamps.size(), 6U);
+    EXPECT_GE(scene.lamps.size(), 5U);
     EXPECT_EQ(scene.sets.at(0).folder, "sample");
   }
 }

@@ -1,0 +1,76 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/downlight.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/disc.h"
+
+namespace vlp {
+namespace {
+
+/// Where the halo ends: at 3e-4 of what it is at the rim.
+constexpr double kHaloLengths = 8;
+
+double wall_share(const Recess& recess, double radius_m, const Eigen::Vector2d& at_m) {
+  if (!recess.dark_side) return recess.reflector_share;
+  const DarkSide& dark = *recess.dark_side;
+  const Eigen::Vector2d towards(std::cos(dark.azimuth_rad), std::sin(dark.azimuth_rad));
+  const double way = std::clamp((1 + at_m.dot(towards) / radius_m) / 2, 0.0, 1.0);
+  return recess.reflector_share + way * (dark.reflector_share - recess.reflector_share);
+}
+
+/// Of the source's radiance, where a ray from the eye crosses the rim's plane.
+double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d& eye_m,
+                    const Eigen::Vector2d& at_m) {
+  const Eigen::Vector2d slope = (at_m - eye_m.head<2>()) / -eye_m.z();
+  const Eigen::Vector2d source_m = at_m + recess.depth_m * slope;
+  const double wall = wall_share(recess, radius_m, at_m);
+  const double ratio = 2 * source_m.norm() / recess.source_diameter_m;
+  return wall + (1 - wall) * std::exp2(-ratio * ratio);
+}
+
+double share_around(const Halo& halo, double radius_m, const Eigen::Vector2d& at_m) {
+  const double lengths = std::max(0.0, at_m.norm() - radius_m) / halo.length_m;
+  return lengths < kHaloLengths ? halo.share * std::exp(-lengths) : 0;
+}
+
+}  // namespace
+
+double reach_m(const Glow& glow) {
+  return glow.diameter_m / 2 + (glow.halo ? kHaloLengths * glow.halo->length_m : 0);
+}
+
+void add_downlight(const PixelRays& rays, const PixelWindow& window,
+                   const TargetFromCamera& glow_from_camera, const Glow& glow, cv::Mat1f& image) {
+  const double radius_m = glow.diameter_m / 2;
+  cv::Mat1f inside = window.image(0);
+  add_shape(rays, window, glow_from_camera, Disc(radius_m, 1), 1, inside);
+  if (!glow.recess) {
+    add_shape(rays, window, glow_from_camera, Disc(radius_m, glow.edge_share),
+              glow.radiance_e_per_s, image);
+  }
+  for (int line = window.line_begin; line < window.line_end; ++line) {
+    const Eigen::Isometry3d pose = glow_from_camera(line);
+    const Eigen::Vector3d eye_m = pose.translation();
+    const auto hit = [&](int at_line, int place) {
+      return plane_hit(eye_m, pose.linear() * rays.corner(at_line, place));
+    };
+    for (int place = window.place_begin; place < window.place_end; ++place) {
+      const int row = line - window.line_begin, column = place - window.place_begin;
+      const double part = inside(row, column);
+      if (part == 0 && !glow.halo) continue;
+      const Eigen::Vector2d at_m = (hit(line, place) + hit(line, place + 1) + hit(line + 1, place) +
+                                    hit(line + 1, place + 1)) /
+                                   4;
+      if (!at_m.allFinite()) continue;
+      double share = 0;
+      if (glow.recess) share += part * share_inside(*glow.recess, radius_m, eye_m, at_m);
+      if (glow.halo) share += (1 - part) * share_around(*glow.halo, radius_m, at_m);
+      image(row, column) += static_cast<float>(glow.radiance_e_per_s * share);
+    }
+  }
+}
+
+}  // namespace vlp

@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulation/scene.h"
+
+namespace vlp {
+
+/// 255 or 65535.
+double white_dn(const Sensor& sensor);
+
+/// The tone curve of Picture.
+double coded_level(const Picture& picture, const Sensor& sensor, double level_dn);
+
+/// Tone curve and sharpening of Picture, on levels before they are rounded. Where the image ends it
+/// is continued.
+void develop(const Picture& picture, const Sensor& sensor, cv::Mat1f& levels);
+
+/// How the names of the images end.
+std::string image_ending(const std::optional<Picture>& picture);
+
+/// The image as a file: JPEG, or PNG, of which every level comes back.
+std::vector<unsigned char> encoded(const cv::Mat& image, const std::optional<Picture>& picture);
+
+}  // namespace vlp

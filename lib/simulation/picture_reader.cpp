@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/picture.h"
+#include "simulation/scene_parts.h"
+
+namespace vlp {
+
+Picture read_picture(YamlMap map, const Sensor& sensor) {
+  if (sensor.black_level_dn >= white_dn(sensor)) {
+    throw map.error("needs levels between sensor.black_level_dn and white");
+  }
+  Picture picture;
+  picture.gamma = map.required("gamma").number_within(0.1, 10, "(of the tone curve)");
+  if (const auto sharpening = map.optional("sharpening")) {
+    YamlMap keys = sharpening->map();
+    picture.sharpening = Sharpening{keys.required("amount").number_within(0, 10, "(of the detail)"),
+                                    keys.required("radius_px").number_within(0.3, 50, "px")};
+    keys.finish();
+  }
+  if (const auto quality = map.optional("jpeg_quality")) {
+    picture.jpeg_quality = quality->integer_within(1, 100);
+    if (sensor.bits != 8) throw quality->error("JPEG has 8 bits: set sensor.bits to 8");
+  }
+  map.finish();
+  return picture;
+}
+
+}  // namespace vlp

@@ -1,0 +1,129 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Lamps deep in a reflector, and the ceiling around them.
+#include "simulation/downlight.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "simulation/plain_scene.h"
+#include "simulation/truth.h"
+
+namespace vlp {
+namespace {
+
+/// A level pinhole camera of f = 500 px, 1.5 m below the lamp, whose rim has a radius of 9 cm:
+/// 1 cm is 3.33 px, and a lit pixel 50,000 electrons.
+class Downlight : public testing::Test {
+ protected:
+  Downlight() { scene_.camera = pinhole_camera(); }
+
+  Glow& glow() { return scene_.lamps[0].glow; }
+  cv::Mat1f rendered(const Eigen::Vector3d& eye_m = {0, 0, 0.1}, double duty = 1) const {
+    const FrameRenderer renderer(scene_);
+    LampShot shot = shot_at(scene_, eye_m, 0);
+    shot.waves[0].duty = duty;
+    return renderer.lamp_electrons(shot);
+  }
+  /// Where the middle of a pixel is in the rim's plane, from the lamp; from straight below.
+  static Eigen::Vector2d at_m(int u, int v) {
+    return Eigen::Vector2d(u - 399.5, v - 299.5) / 500 * 1.5;
+  }
+  Eigen::Vector2d projected(const Eigen::Vector3d& point_m, const LampShot& shot) const {
+    const Lens lens(scene_.camera.lens_model, scene_.camera.intrinsics);
+    return lens.project(shot.motion.world_from_camera(0).inverse() * point_m).value();
+  }
+
+  static constexpr double kRadiusM = 0.09, kFull = 5e4;
+  Scene scene_ = plain_scene();
+};
+
+TEST_F(Downlight, WithWallsAsBrightAsItsSourceIsADisc) {
+  const Eigen::Vector3d eye_m(0.21, -0.4, 0.1);
+  const cv::Mat1f disc = rendered(eye_m);
+  glow().recess = Recess{0.05, 0.03, 1, {}};
+  EXPECT_LT(cv::norm(rendered(eye_m), disc, cv::NORM_INF), 1e-6 * kFull) << "rim and all";
+}
+
+TEST_F(Downlight, ShowsItsSourceDepthTimesSlopeFromTheCentreOfTheRim) {
+  glow().recess = Recess{0.05, 0.02, 0, {}};
+  const Eigen::Vector3d eye_m(0.31, -0.155, 0.1);
+  const Eigen::Vector3d slope(-0.2, 0.1, 0);  // of the ray to the source, 1.55 m above
+  const LampShot shot = shot_at(scene_, eye_m, 0);
+  const Eigen::Vector2d core_px = brightness_of(rendered(eye_m)).centroid_px;
+  const Eigen::Vector2d rim_px = projected(glow().position_m, shot);
+  EXPECT_LT((core_px - projected(glow().position_m - 0.05 * slope, shot)).norm(), 0.002);
+  EXPECT_NEAR((core_px - rim_px).norm(), 0.05 * slope.norm() / 1.5 * 500, 0.002);
+  const FrameRenderer renderer(scene_);
+  EXPECT_LT((true_lamps(scene_, renderer, shot).at(0).pixel - rim_px).norm(), 1e-6)
+      << "the truth is the rim's centre";
+}
+
+TEST_F(Downlight, IsHalfAsBrightAtItsSourcesDiameter) {
+  glow().recess = Recess{0, 0.06, 0, {}};
+  const cv::Mat1f image = rendered({0.0015, 0.0015, 0.1});  // the lamp is at (399, 299)
+  EXPECT_NEAR(image(299, 399) / kFull, 1, 1e-6);
+  EXPECT_NEAR(image(299, 409) / kFull, 0.5, 1e-6) << "3 cm are 10 px";
+}
+
+TEST_F(Downlight, HasTheBrightnessOfItsEquationAllOverItsInside) {
+  glow().recess = Recess{0.06, 0.05, 0.1, DarkSide{0.02, M_PI}};
+  const cv::Mat1f image = rendered();
+  for (const cv::Point& at : {cv::Point(399, 299), cv::Point(405, 310), cv::Point(375, 299),
+                              cv::Point(424, 299), cv::Point(400, 272)}) {
+    const Eigen::Vector2d p = at_m(at.x, at.y);
+    const Eigen::Vector2d q = p * (1 + 0.06 / 1.5);
+    const double wall = 0.1 + (0.02 - 0.1) * (1 - p.x() / kRadiusM) / 2;
+    const double ratio = q.norm() / 0.025;
+    const double expected = wall + (1 - wall) * std::pow(2, -ratio * ratio);
+    EXPECT_NEAR(image(at) / kFull, expected, 1e-4) << at;
+  }
+  EXPECT_LT(image(299, 373), 0.3 * image(299, 426)) << "dark towards -x";
+}
+
+TEST_F(Downlight, LightsTheCeilingAroundIt) {
+  const cv::Mat1f without = rendered();
+  glow().halo = Halo{0.02, 0.03};
+  const cv::Mat1f image = rendered();
+  for (const cv::Point& at : {cv::Point(432, 299), cv::Point(399, 345), cv::Point(340, 260)}) {
+    const double lengths = (at_m(at.x, at.y).norm() - kRadiusM) / 0.03;
+    EXPECT_NEAR(image(at) / kFull, 0.02 * std::exp(-lengths), 1e-6) << at;
+  }
+  EXPECT_EQ(image(299, 399), without(299, 399)) << "not inside the rim";
+  EXPECT_EQ(image(299, 399 + 30 + 82), 0) << "8 lengths are 80 px";
+  EXPECT_GT(image(299, 399 + 30 + 78), 0);
+  EXPECT_NEAR(reach_m(glow()), 0.09 + 0.24, 1e-12);
+}
+
+TEST_F(Downlight, FlickersWithItsHalo) {
+  glow().recess = Recess{0.05, 0.04, 0.1, {}};
+  glow().halo = Halo{0.02, 0.03};
+  const cv::Mat1f always = rendered(), switched = rendered({0, 0, 0.1}, 0.5);
+  bool dark = false, lit = false;
+  for (int line = 285; line < 315; ++line) {
+    const double share = switched(line, 399) / always(line, 399);
+    EXPECT_NEAR(switched(line, 380) / always(line, 380), share, 1e-5);
+    EXPECT_NEAR(switched(line, 440) / always(line, 440), share, 1e-5) << "on the ceiling";
+    dark = dark || share < 0.1;
+    lit = lit || share > 0.9;
+  }
+  EXPECT_TRUE(dark && lit);
+}
+
+TEST_F(Downlight, MayBeASteadyLampBehindSomething) {
+  scene_.lamps[0].glow.radiance_e_per_s = 0;
+  scene_.clutter.steady_lamps = {
+      {{0, 0, 1.6}, 0.18, 1e9, 0, Recess{0.05, 0.04, 0.2, {}}, Halo{0.1, 0.02}}};
+  const cv::Mat1f open = rendered();
+  scene_.clutter.occluders = {{{-0.2, -0.2, 0.85}, {0.2, 0, 0}, {0, 0.4, 0}, 0}};
+  const cv::Mat1f image = rendered();
+  for (const int v : {270, 299, 335}) {
+    EXPECT_EQ(image(v, 390), 0);
+    EXPECT_GT(open(v, 390), 0);
+    EXPECT_FLOAT_EQ(image(v, 410), open(v, 410));
+  }
+}
+
+}  // namespace
+}  // namespace vlp

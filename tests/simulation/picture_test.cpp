@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// What a camera makes of the levels of its sensor.
+#include "simulation/picture.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+
+#include "simulation/exposure.h"
+#include "simulation/plain_scene.h"
+
+namespace vlp {
+namespace {
+
+const Sensor kSensor{8, 0.5, 0, 60000, 0, false, {}};
+
+/// So many electrons on the left and on the right of column 20.
+cv::Mat1f step(double left, double right) {
+  cv::Mat1f electrons(20, 40, float(left));
+  electrons.colRange(20, 40) = right;
+  return electrons;
+}
+
+bool same(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; }
+
+TEST(ToneCurve, OfAStepRaisesItsSharesOfWhiteToOneByGamma) {
+  const cv::Mat image = expose(kSensor, step(20, 200), 1, Picture{2.2, {}, {}});
+  EXPECT_EQ(image.at<std::uint8_t>(10, 19), std::lround(255 * std::pow(10 / 255.0, 1 / 2.2)));
+  EXPECT_EQ(image.at<std::uint8_t>(10, 20), std::lround(255 * std::pow(100 / 255.0, 1 / 2.2)));
+}
+
+TEST(ToneCurve, BeginsAtTheBlackLevelAndEndsAtWhite) {
+  Sensor sensor = kSensor;
+  sensor.black_level_dn = 15;
+  const Picture picture{2, {}, {}};
+  EXPECT_EQ(coded_level(picture, sensor, 15), 0);
+  EXPECT_EQ(coded_level(picture, sensor, 3), 0) << "noise below it";
+  EXPECT_EQ(coded_level(picture, sensor, 15 + 60), 255 * 0.5);
+  EXPECT_EQ(coded_level(picture, sensor, 300), 255);
+  sensor.bits = 16;
+  EXPECT_EQ(coded_level(picture, sensor, 65535), 65535);
+}
+
+TEST(ToneCurve, OfGammaOneIsNone) {
+  const Sensor noisy{16, 0.5, 0, 60000, 0, true, {}};
+  const cv::Mat1f electrons = step(300, 3000);
+  EXPECT_TRUE(same(expose(noisy, electrons, 1, Picture{1, {}, {}}), expose(noisy, electrons, 1)));
+}
+
+TEST(Sharpening, OvershootsAStepAsAnUnsharpMask) {
+  const double amount = 0.8, radius_px = 1.5, low = 50, high = 100;
+  const Picture picture{1, Sharpening{amount, radius_px}, {}};
+  cv::Mat1f levels = step(low, high);
+  develop(picture, kSensor, levels);
+  // Beside the edge the blur has (1 + g) / 2 of the step, with g its kernel's largest weight.
+  double sum = 0;
+  for (int i = -6; i <= 6; ++i) sum += std::exp(-i * i / (2 * radius_px * radius_px));
+  const double overshoot = amount * (high - low) * (1 - 1 / sum) / 2;
+  EXPECT_NEAR(levels(10, 20), high + overshoot, 1e-3);
+  EXPECT_NEAR(levels(10, 19), low - overshoot, 1e-3);
+  EXPECT_NEAR(levels(10, 0), low, 1e-3);
+  EXPECT_NEAR(levels(10, 39), high, 1e-3);
+}
+
+TEST(Sharpening, ComesAfterTheToneCurveAndBeforeRounding) {
+  const Picture curve{2, {}, {}}, both{2, Sharpening{1, 1}, {}};
+  const double low = coded_level(curve, kSensor, 10), high = coded_level(curve, kSensor, 100);
+  const cv::Mat image = expose(kSensor, step(20, 200), 1, both);
+  const Picture sharpening{1, Sharpening{1, 1}, {}};
+  cv::Mat1f levels = step(low, high);
+  develop(sharpening, kSensor, levels);
+  for (const int u : {18, 19, 20, 21}) {
+    EXPECT_EQ(image.at<std::uint8_t>(10, u), std::lround(levels(10, u))) << u;
+  }
+}
+
+TEST(PictureFile, IsAPngWithoutLossUnlessItIsAJpeg) {
+  const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
+  const cv::Mat image = expose(noisy, step(50, 400), 1);
+  for (const auto& picture : {std::optional<Picture>(), std::optional<Picture>({2.2, {}, {}})}) {
+    EXPECT_EQ(image_ending(picture), ".png");
+    EXPECT_TRUE(same(cv::imdecode(encoded(image, picture), cv::IMREAD_UNCHANGED), image));
+  }
+}
+
+TEST(PictureFile, IsAJpegOfItsQuality) {
+  const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
+  const cv::Mat image = expose(noisy, step(50, 400), 1);
+  const Picture coarse{1, {}, 30}, fine{1, {}, 95};
+  EXPECT_EQ(image_ending(fine), ".jpg");
+  const auto bytes = encoded(image, fine);
+  EXPECT_EQ(bytes.at(0), 0xff);
+  EXPECT_EQ(bytes.at(1), 0xd8);
+  EXPECT_EQ(encoded(image, fine), bytes);
+  EXPECT_GT(bytes.size(), encoded(image, coarse).size());
+  const cv::Mat found = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(found.type(), CV_8U);
+  const double loss = cv::norm(found, image),
+               coarse_loss =
+                   cv::norm(cv::imdecode(encoded(image, coarse), cv::IMREAD_UNCHANGED), image);
+  EXPECT_GT(loss, 0);
+  EXPECT_LT(loss, 0.5 * coarse_loss);
+}
+
+TEST(PictureFile, IsNamedByItsKind) {
+  Scene scene = plain_scene();
+  const LampCaptures captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
+  const CaptureSet set{"one", 5e-5, captures, {}};
+  EXPECT_EQ(lamp_shot(scene, set, 0).image, "0000.png");
+  scene.picture = Picture{2.2, {}, 90};
+  EXPECT_EQ(lamp_shot(scene, set, 0).image, "0000.jpg");
+}
+
+}  // namespace
+}  // namespace vlp
