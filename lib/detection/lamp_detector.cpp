@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "detection/lights/background.h"
 #include "detection/lights/glow.h"
 #include "detection/lights/glow_envelope.h"
 #include "detection/lights/lines.h"
+#include "detection/lights/rim.h"
 #include "detection/lights/runs.h"
 #include "geometry/frames.h"
 
@@ -28,13 +30,9 @@ int most_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_tim
   return static_cast<int>(std::ceil(most)) + spare;
 }
 
-cv::Rect box_of(const Blob& blob) {
-  int begin = blob.runs[0].begin, end = blob.runs[0].end;
-  for (const Run& run : blob.runs) {
-    begin = std::min(begin, run.begin);
-    end = std::max(end, run.end);
-  }
-  return {begin, blob.top(), end - begin, blob.bottom() + 1 - blob.top()};
+/// Of two centres per axis.
+double apart(const Light& a, const Light& b) {
+  return (a.pixel - b.pixel).norm() / std::numbers::sqrt2;
 }
 
 }  // namespace
@@ -61,7 +59,7 @@ std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& 
                                               const Background& background) const {
   constexpr double least_roundness = 0.5, softest_edge = 0.3;
   constexpr std::size_t most_lights = 4;
-  const cv::Rect box = box_of(blob);
+  const cv::Rect box = blob.box();
   std::vector<LightPart> parts;
   auto rest = outline_of(lines, blob, background);
   while (parts.size() < most_lights) {
@@ -77,20 +75,28 @@ std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& 
   }
   const std::optional<Light>& first = parts.front().light;
   const bool edge = first && first->roundness >= least_roundness &&
-                    first->rise_px <= softest_edge * first->radius_px;
-  if (!edge) {
-    if (auto glow = glow_of(lines, blob, background, shape_)) return {{std::move(glow), {}, box}};
+                    first->rise_px <= softest_edge * first->radius_px &&
+                    !unevenly_lit(lines, blob, first->outline, background);
+  if (edge) return parts;
+  auto rim = rim_of(lines, blob, background, shape_);
+  if (!rim || !rim->clear) {
+    if (auto glow = glow_of(lines, blob, background, shape_)) {
+      // Either may be what it is; the other's centre is as far off.
+      if (rim) glow->sigma_px = std::hypot(glow->sigma_px, apart(rim->light, *glow));
+      return {{std::move(glow), {}, box}};
+    }
   }
+  if (rim) return {{std::move(rim->light), {}, box}};
   return parts;
 }
 
 void LampDetector::measure(const cv::Mat& lines, const Background& background, Light& light) const {
   const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
-  if (light.glows) {
+  if (light.glows || light.uneven) {
     // Its stripes reach further than its outline.
     const Eigen::Vector2d beyond(0, light.radius_px);
     const auto signal = line_signal(lines, low - beyond, high + beyond, background.level);
-    light.stripes = stripes_of(without_glow(signal));
+    light.stripes = stripes_of(striped_part(without_glow(signal)));
     return;
   }
   auto better = shape_.light_of(refined(lines, light.outline, low, high, background), background);

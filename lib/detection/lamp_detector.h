@@ -26,8 +26,9 @@ DetectorCamera detector_camera(const Calibration& calibration);
 /// between threads.
 ///
 /// Centre: from the outline of the lit lines, never from brightness, see LightShape. A lamp that
-/// has no edge because it glows is outlined where it passes a tenth of its brightest level; how
-/// round its glow is limits its centre then, and sigma_px may be too small. Identity: a lamp of
+/// is lit unevenly is outlined by its rim, see rim_of(). One that has no edge because it glows is
+/// outlined where it passes a tenth of its brightest level; how round its glow is limits its centre
+/// then, and sigma_px may be too small. Identity: a lamp of
 /// frequency f has stripes of 1 / (f row_time) lines (Chen and Guan, section 2.1), or what a
 /// trained classifier says.
 class LampDetector {

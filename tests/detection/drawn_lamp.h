@@ -51,7 +51,14 @@ struct DrawnGlow {
   double fall_px = 13, core_px = 10;
 };
 
-/// A striped disc, or a bulb that glows.
+/// A source deep in a reflector: its walls are lit to a share of the lamp's level, a core off the
+/// middle fully, and the ceiling around to a share that falls from the rim on.
+struct DrawnRecess {
+  Eigen::Vector2d core_off_px{6, 14};
+  double core_px = 14, walls = 0.1, halo = 0.02, halo_px = 12;
+};
+
+/// A striped disc, a bulb that glows, or a downlight.
 struct DrawnLamp {
   Eigen::Vector2d center{101.3, 79.6};
   double radius_px = 38.4, blur_px = 0.8;
@@ -59,6 +66,7 @@ struct DrawnLamp {
   DrawnStripes stripes = {};
   std::optional<DrawnBar> bar = {};
   std::optional<DrawnGlow> glow = {};
+  std::optional<DrawnRecess> recess = {};
 
   double light(const Eigen::Vector2d& pixel) const {
     const Eigen::Vector2d away = pixel - center;
@@ -66,6 +74,13 @@ struct DrawnLamp {
     if (glow) {
       const double beyond_px = std::hypot(away.norm(), glow->core_px) - glow->core_px;
       light *= std::exp(-beyond_px / glow->fall_px);
+    } else if (recess) {
+      const double inside = blurred_step(radius_px - away.norm(), blur_px);
+      const double core =
+          std::exp(-(away - recess->core_off_px).squaredNorm() / 2 / std::pow(recess->core_px, 2));
+      const double beyond_px = std::max(0.0, away.norm() - radius_px);
+      light *= inside * (recess->walls + (1 - recess->walls) * core) +
+               (1 - inside) * recess->halo * std::exp(-beyond_px / recess->halo_px);
     } else {
       light *= blurred_step(radius_px - away.norm(), blur_px);
     }

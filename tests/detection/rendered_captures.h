@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "detection/lamp_detector.h"
 #include "simulation/exposure.h"
+#include "simulation/picture.h"
 #include "simulation/truth.h"
 
 namespace vlp {
@@ -33,8 +35,10 @@ class Captures {
 
   LampShot shot(std::size_t index) const { return lamp_shot(scene_, set_, index); }
   cv::Mat image(const LampShot& shot) const {
-    const cv::Mat lines = expose(scene_.sensor, renderer_.lamp_electrons(shot), shot.noise_seed);
-    return scene_.camera.readout == Readout::rows ? lines : cv::Mat(lines.t());
+    const cv::Mat lines =
+        expose(scene_.sensor, renderer_.lamp_electrons(shot), shot.noise_seed, scene_.picture);
+    const cv::Mat image = scene_.camera.readout == Readout::rows ? lines : cv::Mat(lines.t());
+    return cv::imdecode(encoded(image, scene_.picture), cv::IMREAD_UNCHANGED);
   }
   std::vector<TrueLamp> truth(const LampShot& shot) const {
     return true_lamps(scene_, renderer_, shot);

@@ -30,13 +30,13 @@ void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) co
                           stripes.clarity >= least_clarity;
     light.kind = flickers ? LightKind::unknown : LightKind::steady;
     if (!flickers) continue;
-    sharpest_px = std::min(sharpest_px, light.rise_px);
+    if (!light.uneven) sharpest_px = std::min(sharpest_px, light.rise_px);
     light.lamp = lamp_of(stripes);
   }
   for (Light& light : lights) {
     // A lamp's reflection flickers like the lamp. Where most of the edge is not the lamp's, a
     // circle through the rest is not to be trusted.
-    const bool soft = light.rise_px > much_softer * sharpest_px;
+    const bool soft = !light.uneven && light.rise_px > much_softer * sharpest_px;
     const bool strays = light.outside > most_outside;
     if (soft || strays || light.roundness < least_roundness) light.lamp.reset();
   }

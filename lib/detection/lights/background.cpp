@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace vlp {
@@ -28,9 +29,23 @@ std::vector<Level> sample_of(const cv::Mat& image) {
   return sample;
 }
 
+/// The least difference between two levels: of 12 bits in 16, or of 8, it is more than 1.
+template <typename Level>
+double step_of(std::vector<Level> sample) {
+  std::sort(sample.begin(), sample.end());
+  double step = std::numeric_limits<Level>::max();
+  for (std::size_t i = 1; i < sample.size(); ++i) {
+    if (sample[i] > sample[i - 1]) step = std::min<double>(step, sample[i] - sample[i - 1]);
+  }
+  // Of an image of few levels it says nothing.
+  constexpr double most_share = 1 / 128.0;
+  return step <= most_share * std::numeric_limits<Level>::max() ? step : 1;
+}
+
 template <typename Level>
 Background background(const cv::Mat& image) {
   std::vector<Level> sample = sample_of<Level>(image);
+  const double step = step_of(sample);
   const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
   std::nth_element(sample.begin(), middle, sample.end());
   const double median = *middle;
@@ -47,7 +62,8 @@ Background background(const cv::Mat& image) {
     noise = std::max(noise, *tenth / 1.2816);
   }
   // Grey levels are coarse: of those around, the mean and the scatter say more.
-  constexpr double around = 3, least_noise = 0.3;
+  constexpr double around = 3;
+  const double least_noise = 0.3 * step;
   double count = 0, sum = 0, sum_of_squares = 0;
   for (const Level value : sample) {
     const double off = value - median;
@@ -60,7 +76,7 @@ Background background(const cv::Mat& image) {
   if (median > 0) noise = std::sqrt(sum_of_squares / count - std::pow(sum / count, 2));
   noise = std::max(noise, least_noise);
   constexpr double clear = 4.5, least = 1.6;
-  return {level, noise, level + std::max(clear * noise, least)};
+  return {level, noise, level + std::max(clear * noise, least * step)};
 }
 
 }  // namespace

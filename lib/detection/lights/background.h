@@ -11,7 +11,8 @@ struct Background {
   /// Mean of the pixels around the median, and their standard deviation, in grey levels.
   double level;
   double noise;
-  /// Pixels above are lit: level + 4.5 noise, and at least 1.6 grey levels more.
+  /// Pixels above are lit: level + 4.5 noise, and at least 1.6 of the steps between the levels that
+  /// the image has more.
   double threshold;
 };
 

@@ -74,20 +74,29 @@ std::vector<EdgePoint> outline_at(const cv::Mat& image, const Blob& blob,
 
 std::optional<Light> glow_of(const cv::Mat& image, const Blob& blob, const Background& background,
                              const LightShape& shape) {
-  constexpr std::array shares = {0.1, 0.15, 0.2};
-  constexpr double softest_edge = 0.15;  // of the radius
+  constexpr std::array shares = {0.1, 0.15, 0.2, 0.125, 0.175};  // the last two for want of others
+  constexpr std::size_t enough = 3;
+  constexpr double least_shrinking = 1.1;  // of the outline, from a tenth of the level to a fifth
+  constexpr double softest_edge = 0.15;    // of the radius
   std::vector<Light> glows;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const double share : shares) {
+    if (glows.size() == enough) break;
     auto light = shape.light_of(outline_at(image, blob, background, share), background);
-    if (!light || !(light->rise_px > softest_edge * light->radius_px)) return std::nullopt;
-    mean += light->pixel / double(shares.size());
+    if (!light) continue;
+    if (!(light->rise_px > softest_edge * light->radius_px)) return std::nullopt;
+    mean += light->pixel;
     glows.push_back(std::move(*light));
   }
+  if (glows.size() < enough) return std::nullopt;
+  double least_px = glows.front().radius_px;
+  for (const Light& glow : glows) least_px = std::min(least_px, glow.radius_px);
+  if (glows.front().radius_px < least_shrinking * least_px) return std::nullopt;
+  mean /= double(glows.size());
   double variance = 0;
   for (const Light& glow : glows) {
-    variance += (std::pow(glow.sigma_px, 2) + (glow.pixel - mean).squaredNorm() / 2) /
-                double(shares.size());
+    variance +=
+        (std::pow(glow.sigma_px, 2) + (glow.pixel - mean).squaredNorm() / 2) / double(glows.size());
   }
   Light result = std::move(glows.front());
   result.low += mean - result.pixel;

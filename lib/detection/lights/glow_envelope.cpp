@@ -74,9 +74,23 @@ std::vector<double> without_glow(const std::vector<double>& signal) {
   const double least = lost * *std::max_element(envelope.begin(), envelope.end());
   result.reserve(signal.size());
   for (std::size_t i = 0; i < signal.size(); ++i) {
-    if (envelope[i] > least) result.push_back(signal[i] / envelope[i]);
+    if (envelope[i] > least) result.push_back(std::clamp(signal[i] / envelope[i], 0.0, 1.0));
   }
   return result;
+}
+
+std::vector<double> striped_part(const std::vector<double>& without_glow) {
+  constexpr int enough_stripes = 4;
+  constexpr std::ptrdiff_t beyond = 2;
+  const auto lit = [](double brightness) { return brightness >= 0.5; };
+  const auto first = std::find_if(without_glow.begin(), without_glow.end(), lit);
+  const auto last = std::find_if(without_glow.rbegin(), without_glow.rend(), lit).base();
+  if (first >= last) return {};
+  int stripes = 1;
+  for (auto line = first + 1; line < last; ++line) stripes += lit(*line) && !lit(*(line - 1));
+  if (stripes >= enough_stripes) return {first, last};
+  return {first - std::min(beyond, first - without_glow.begin()),
+          last + std::min(beyond, without_glow.end() - last)};
 }
 
 }  // namespace vlp

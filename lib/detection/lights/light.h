@@ -33,6 +33,8 @@ struct Light {
   Stripes stripes;
   /// Whether it has no edge, and its outline is a level.
   bool glows;
+  /// Whether it is lit unevenly, and its outline is a rim, see rim_of().
+  bool uneven;
   /// How soft the outline is: from a quarter to three quarters of the level.
   double rise_px;
   /// The share of the blob's edge that lies on the circle.

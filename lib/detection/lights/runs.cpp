@@ -83,6 +83,15 @@ struct Growing {
 
 }  // namespace
 
+cv::Rect Blob::box() const {
+  int begin = runs[0].begin, end = runs[0].end;
+  for (const Run& run : runs) {
+    begin = std::min(begin, run.begin);
+    end = std::max(end, run.end);
+  }
+  return {begin, top(), end - begin, bottom() + 1 - top()};
+}
+
 std::vector<Run> find_runs(const cv::Mat& image, double threshold) {
   const double most = image.depth() == CV_8U ? 255 : 65535;
   if (threshold >= most) return {};

@@ -25,6 +25,7 @@ struct Blob {
 
   int top() const { return runs.front().row; }
   int bottom() const { return runs.back().row; }
+  cv::Rect box() const;
 };
 
 std::vector<Blob> group_runs(const std::vector<Run>& runs, int most_dark_rows);

@@ -41,12 +41,12 @@ Ellipse ellipse_of(double axis_ratio, double angle_rad) {
   return {{300.2, 199.7}, 40 * root, 40 / root, angle_rad};
 }
 
-std::optional<RobustEllipse> fit_of(const Points& points) {
+std::optional<RobustEllipse> ellipse_of(const Points& points) {
   return fit_robust_ellipse(points, std::vector<double>(points.size(), 1), 0.35);
 }
 
 void expect_found(const Points& points, const Ellipse& truth, double within, int count) {
-  const auto fit = fit_of(points);
+  const auto fit = ellipse_of(points);
   ASSERT_TRUE(fit);
   EXPECT_THAT(fit->center, IsNear(truth.center, within));
   EXPECT_THAT(fit->rim_from_circle, IsNear(truth.rim_from_circle(), within));
@@ -92,7 +92,7 @@ TEST(RobustEllipse, HasTheCovarianceOfItsScatter) {
       constexpr int draws = 2000;
       double sum = 0;
       for (int i = 0; i < draws; ++i) {
-        const auto fit = fit_of(with_noise(truth.points(80, 0, arc_rad), 0.1, random));
+        const auto fit = ellipse_of(with_noise(truth.points(80, 0, arc_rad), 0.1, random));
         ASSERT_TRUE(fit);
         const Vector2d error = fit->center - truth.center;
         sum += error.dot(fit->center_covariance.llt().solve(error));
@@ -109,7 +109,7 @@ TEST(RobustEllipse, IsWhatOpenCvFindsWithoutOutliers) {
   for (int degrees = 0; degrees < 180; degrees += 20) {
     const Ellipse truth = ellipse_of(1.12, degrees * pi / 180);
     const Points points = with_noise(truth.points(150), 0.1, random);
-    const auto fit = fit_of(points);
+    const auto fit = ellipse_of(points);
     std::vector<cv::Point2f> pixels;
     for (const Vector2d& point : points) pixels.emplace_back(float(point.x()), float(point.y()));
     const cv::RotatedRect oracle = cv::fitEllipseDirect(pixels);
@@ -127,7 +127,7 @@ TEST(RobustEllipse, OfACircleIsAsGoodAsTheCircle) {
   for (int i = 0; i < 500; ++i) {
     const Points points = with_noise(arc(truth, 0, 2 * pi, 80), 0.1, random);
     const auto circle = fit_robust_circle(points, std::vector<double>(80, 1), 0.35);
-    const auto ellipse = fit_of(points);
+    const auto ellipse = ellipse_of(points);
     ASSERT_TRUE(circle && ellipse);
     of_circle += (circle->circle.center - truth.center).squaredNorm();
     of_ellipse += (ellipse->center - truth.center).squaredNorm();
@@ -138,10 +138,11 @@ TEST(RobustEllipse, OfACircleIsAsGoodAsTheCircle) {
 
 TEST(RobustEllipse, IsNothingWithoutSevenPointsThatAgree) {
   const Ellipse truth = ellipse_of(1.05, 0.3);
-  for (const std::size_t count : {0U, 1U, 4U, 5U, 6U}) EXPECT_FALSE(fit_of(truth.points(count)));
-  EXPECT_TRUE(fit_of(truth.points(7)));
-  EXPECT_FALSE(fit_of(Points(20, Vector2d(3, 4))));
-  EXPECT_FALSE(fit_of({{0, 0}, {3, 2}, {6, 4}, {9, 6}, {12, 8}, {15, 10}, {18, 12}, {21, 14}}));
+  for (const std::size_t count : {0U, 1U, 4U, 5U, 6U})
+    EXPECT_FALSE(ellipse_of(truth.points(count)));
+  EXPECT_TRUE(ellipse_of(truth.points(7)));
+  EXPECT_FALSE(ellipse_of(Points(20, Vector2d(3, 4))));
+  EXPECT_FALSE(ellipse_of({{0, 0}, {3, 2}, {6, 4}, {9, 6}, {12, 8}, {15, 10}, {18, 12}, {21, 14}}));
 }
 
 }  // namespace

@@ -1,0 +1,130 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/lights/rim.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "detection/drawn_lamp.h"
+#include "detection/lamp_detector.h"
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector2d;
+
+const cv::Size kSize(300, 280);
+
+Blob largest_blob(const cv::Mat& image, const Background& background) {
+  const auto blobs = group_runs(find_runs(image, background.threshold), 24);
+  return *std::max_element(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) {
+    return a.box().area() < b.box().area();
+  });
+}
+
+std::optional<Rim> rim_in(const cv::Mat& image) {
+  const Background background = background_of(image);
+  return rim_of(image, largest_blob(image, background), background,
+                LightShape(drawn_camera(kSize)));
+}
+
+/// A downlight whose core lies off the middle in that direction.
+DrawnLamp downlight(double angle_rad, double period_lines) {
+  DrawnRecess recess;
+  recess.core_off_px = 16 * Vector2d(std::cos(angle_rad), std::sin(angle_rad));
+  return {.center = {151.3, 139.6},
+          .radius_px = 50.7,
+          .blur_px = 1.2,
+          .level = 0.8,
+          .stripes = {.period_lines = period_lines},
+          .recess = recess};
+}
+
+template <typename Test>
+void for_each_downlight(const Test& test) {
+  std::uint64_t seed = 0;
+  for (const double period : {12.0, 17.0, 26.0, 33.0}) {
+    for (const double noise : {0.5, 1.0, 2.0}) {
+      for (int i = 0; i < 8; ++i) {
+        SCOPED_TRACE(testing::Message() << period << " lines, noise " << noise << ", " << i);
+        const DrawnLamp lamp = downlight(i * std::numbers::pi / 4 + 0.2, period);
+        for (const int depth : {CV_8U, CV_16U}) test(lamp, depth, noise, ++seed);
+      }
+    }
+  }
+}
+
+TEST(Rim, IsThatOfADownlightWhereverItsCoreIs) {
+  double chi_square = 0, worst_px = 0, count = 0;
+  for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
+    const auto rim = rim_in(drawn({lamp}, kSize, depth, noise, seed));
+    ASSERT_TRUE(rim);
+    EXPECT_TRUE(rim->clear);
+    EXPECT_TRUE(rim->light.uneven);
+    EXPECT_NEAR(rim->light.radius_px, lamp.radius_px, 1);
+    const double error_px = (rim->light.pixel - lamp.center).norm();
+    worst_px = std::max(worst_px, error_px);
+    chi_square += std::pow(error_px / rim->light.sigma_px, 2) / 2;
+    ++count;
+  });
+EXPECT_LT(worst_px, 0.5) << "the core is 16 px off";
+  EXPECT_LT(chi_square / count, 1.5);
+  EXPECT_GT(chi_square / count, 0.1);
+}
+
+TEST(Rim, OfADownlightLeadsToItsLamp) {
+  for_each_downlight([](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
+    const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
+    const auto lights =
+        LampDetector(map, drawn_camera(kSize)).detect(drawn({lamp}, kSize, depth, noise, seed));
+    ASSERT_EQ(lights.size(), 1U);
+    EXPECT_EQ(lights[0].kind, LightKind::lamp);
+    EXPECT_EQ(lights[0].lamp, 7);
+    EXPECT_NEAR(lights[0].stripes.period_lines / lamp.stripes.period_lines, 1, 0.01);
+    EXPECT_LT((lights[0].pixel - lamp.center).norm(), 1);
+  });
+}
+
+TEST(Rim, OfAGlowIsNotClear) {
+  for (const double period : {9.0, 14.5, 22.0}) {
+    for (const double noise : {0.0, 0.5, 1.5}) {
+      const DrawnLamp glow{
+          .center = {151.3, 139.6}, .stripes = {.period_lines = period}, .glow = DrawnGlow()};
+      const auto rim = rim_in(drawn({glow}, kSize, CV_8U, noise));
+      EXPECT_FALSE(rim && rim->clear) << period << " lines, noise " << noise;
+    }
+  }
+}
+
+TEST(Rim, OfADiscIsItsEdge) {
+  const DrawnLamp disc{.center = {151.3, 139.6}, .radius_px = 50.7};
+  const auto rim = rim_in(drawn({disc}, kSize, CV_8U, 1));
+  ASSERT_TRUE(rim);
+  EXPECT_TRUE(rim->clear);
+  EXPECT_LT((rim->light.pixel - disc.center).norm(), 0.2);
+}
+
+TEST(Rim, IsNotLookedForInSpecks) {
+  const DrawnLamp speck{.center = {151.3, 139.6}, .radius_px = 8};
+  EXPECT_FALSE(rim_in(drawn({speck}, kSize, CV_8U)));
+}
+
+TEST(UnevenlyLit, IsADownlightAndNotADisc) {
+  const auto uneven = [](const DrawnLamp& lamp, int depth) {
+    const cv::Mat image = drawn({lamp}, kSize, depth, 1);
+    const Background background = background_of(image);
+    const Blob blob = largest_blob(image, background);
+    return unevenly_lit(image, blob, outline_of(image, blob, background), background);
+  };
+  for (const int depth : {CV_8U, CV_16U}) {
+    EXPECT_TRUE(uneven(downlight(0.2, 17), depth));
+    EXPECT_FALSE(uneven({.center = {151.3, 139.6}, .radius_px = 50.7}, depth));
+  }
+  EXPECT_FALSE(unevenly_lit(cv::Mat1b(20, 20), Blob{{{3, 2, 9}}}, {}, Background{0, 1, 5}));
+}
+
+}  // namespace
+}  // namespace vlp
