@@ -73,12 +73,18 @@ std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& 
   for (LightPart& part : parts) {
     if (part.light) part.light->outside = double(rest.size()) / double(part.light->outline.size());
   }
+  const auto sharp = [](const LightPart& part) {
+    return part.light && part.light->rise_px <= softest_edge * part.light->radius_px;
+  };
   const std::optional<Light>& first = parts.front().light;
-  const bool edge = first && first->roundness >= least_roundness &&
-                    first->rise_px <= softest_edge * first->radius_px &&
+  const bool edge = sharp(parts.front()) && first->roundness >= least_roundness &&
                     !unevenly_lit(lines, blob, first->outline, background);
   if (edge) return parts;
-  auto rim = rim_of(lines, blob, background, shape_);
+  // Lights that touch have an edge each, and no rim around all.
+  std::optional<Rim> rim;
+  if (std::count_if(parts.begin(), parts.end(), sharp) < 2) {
+    rim = rim_of(lines, blob, background, shape_);
+  }
   if (!rim || !rim->clear) {
     if (auto glow = glow_of(lines, blob, background, shape_)) {
       // Either may be what it is; the other's centre is as far off.

@@ -29,17 +29,20 @@ std::vector<Level> sample_of(const cv::Mat& image) {
   return sample;
 }
 
-/// The least difference between two levels: of 12 bits in 16, or of 8, it is more than 1.
+/// The least difference between two levels: of 12 bits in 16, or of 8, it is more than 1. Few
+/// levels do not tell.
 template <typename Level>
 double step_of(std::vector<Level> sample) {
+  constexpr int enough = 16;
   std::sort(sample.begin(), sample.end());
   double step = std::numeric_limits<Level>::max();
+  int levels = 1;
   for (std::size_t i = 1; i < sample.size(); ++i) {
-    if (sample[i] > sample[i - 1]) step = std::min<double>(step, sample[i] - sample[i - 1]);
+    if (sample[i] == sample[i - 1]) continue;
+    ++levels;
+    step = std::min<double>(step, sample[i] - sample[i - 1]);
   }
-  // Of an image of few levels it says nothing.
-  constexpr double most_share = 1 / 128.0;
-  return step <= most_share * std::numeric_limits<Level>::max() ? step : 1;
+  return levels >= enough ? step : 1;
 }
 
 template <typename Level>

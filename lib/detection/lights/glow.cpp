@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 
 #include "detection/lights/glow_envelope.h"
 #include "detection/lights/profile.h"
@@ -76,9 +77,9 @@ std::optional<Light> glow_of(const cv::Mat& image, const Blob& blob, const Backg
                              const LightShape& shape) {
   constexpr std::array shares = {0.1, 0.15, 0.2, 0.125, 0.175};  // the last two for want of others
   constexpr std::size_t enough = 3;
-  constexpr double least_shrinking = 1.1;  // of the outline, from a tenth of the level to a fifth
+  constexpr double least_shrinking = 0.1;  // of the outline, from a tenth of the level to a fifth
   constexpr double softest_edge = 0.15;    // of the radius
-  std::vector<Light> glows;
+  std::map<double, Light> glows;           // by share
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const double share : shares) {
     if (glows.size() == enough) break;
@@ -86,25 +87,26 @@ std::optional<Light> glow_of(const cv::Mat& image, const Blob& blob, const Backg
     if (!light) continue;
     if (!(light->rise_px > softest_edge * light->radius_px)) return std::nullopt;
     mean += light->pixel;
-    glows.push_back(std::move(*light));
+    glows.emplace(share, std::move(*light));
   }
   if (glows.size() < enough) return std::nullopt;
-  double least_px = glows.front().radius_px;
-  for (const Light& glow : glows) least_px = std::min(least_px, glow.radius_px);
-  if (glows.front().radius_px < least_shrinking * least_px) return std::nullopt;
+  auto& [least_share, result] = *glows.begin();
+  double least_px = result.radius_px;
+  for (const auto& [share, glow] : glows) least_px = std::min(least_px, glow.radius_px);
+  const double of_a_fifth = std::log(glows.rbegin()->first / least_share) / std::log(2);
+  if (result.radius_px < (1 + least_shrinking * of_a_fifth) * least_px) return std::nullopt;
   mean /= double(glows.size());
   double variance = 0;
-  for (const Light& glow : glows) {
+  for (const auto& [share, glow] : glows) {
     variance +=
         (std::pow(glow.sigma_px, 2) + (glow.pixel - mean).squaredNorm() / 2) / double(glows.size());
   }
-  Light result = std::move(glows.front());
   result.low += mean - result.pixel;
   result.high += mean - result.pixel;
   result.pixel = mean;
   result.sigma_px = std::sqrt(variance);
   result.glows = true;
-  return result;
+  return std::move(result);
 }
 
 }  // namespace vlp

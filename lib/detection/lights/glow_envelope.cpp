@@ -79,18 +79,18 @@ std::vector<double> without_glow(const std::vector<double>& signal) {
   return result;
 }
 
-std::vector<double> striped_part(const std::vector<double>& without_glow) {
+std::vector<double> striped_part(const std::vector<double>& brightness) {
   constexpr int enough_stripes = 4;
   constexpr std::ptrdiff_t beyond = 2;
-  const auto lit = [](double brightness) { return brightness >= 0.5; };
-  const auto first = std::find_if(without_glow.begin(), without_glow.end(), lit);
-  const auto last = std::find_if(without_glow.rbegin(), without_glow.rend(), lit).base();
+  const auto lit = [](double line) { return line >= 0.5; };
+  const auto first = std::find_if(brightness.begin(), brightness.end(), lit);
+  const auto last = std::find_if(brightness.rbegin(), brightness.rend(), lit).base();
   if (first >= last) return {};
   int stripes = 1;
-  for (auto line = first + 1; line < last; ++line) stripes += lit(*line) && !lit(*(line - 1));
+  for (auto at = first + 1; at < last; ++at) stripes += lit(*at) && !lit(*(at - 1));
   if (stripes >= enough_stripes) return {first, last};
-  return {first - std::min(beyond, first - without_glow.begin()),
-          last + std::min(beyond, without_glow.end() - last)};
+  return {first - std::min(beyond, first - brightness.begin()),
+          last + std::min(beyond, brightness.end() - last)};
 }
 
 }  // namespace vlp

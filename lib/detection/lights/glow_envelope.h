@@ -16,6 +16,6 @@ std::vector<double> without_glow(const std::vector<double>& signal);
 /// From the first line of half that brightness to the last. Where the first stripe begins and the
 /// last one ends may be where the light does; with less than four stripes, which need those ends,
 /// from two lines before to two after.
-std::vector<double> striped_part(const std::vector<double>& without_glow);
+std::vector<double> striped_part(const std::vector<double>& brightness);
 
 }  // namespace vlp

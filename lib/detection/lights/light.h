@@ -33,7 +33,8 @@ struct Light {
   Stripes stripes;
   /// Whether it has no edge, and its outline is a level.
   bool glows;
-  /// Whether it is lit unevenly, and its outline is a rim, see rim_of().
+  /// Whether it is lit unevenly, and its outline is a rim, see rim_of(); its roundness is the share
+  /// of the ends of its lit lines that show the rim.
   bool uneven;
   /// How soft the outline is: from a quarter to three quarters of the level.
   double rise_px;

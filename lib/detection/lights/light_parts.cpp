@@ -16,7 +16,10 @@ bool near(const cv::Rect& a, const cv::Rect& b) {
   return 2 * gap_across < size && 2 * gap_along < size;
 }
 
-bool glows(const LightPart& part) { return part.light && part.light->glows; }
+/// Whether it is no part of a light that something in the way splits.
+bool whole(const LightPart& part) {
+  return part.light && (part.light->glows || part.light->uneven);
+}
 
 std::size_t points_of(const LightPart& part) { return part.light ? part.light->outline.size() : 0; }
 
@@ -56,14 +59,14 @@ std::vector<Light> joined(std::vector<LightPart> parts, const LightShape& shape,
   int tries = 0;
   for (std::size_t i = 0; i < parts.size() && tries < most_tries; ++i) {
     for (std::size_t j = i + 1; j < parts.size() && tries < most_tries; ++j) {
-      if (glows(parts[i]) || glows(parts[j]) || !near(parts[i].box, parts[j].box)) continue;
+      if (whole(parts[i]) || whole(parts[j]) || !near(parts[i].box, parts[j].box)) continue;
       ++tries;
       std::vector<EdgePoint> both = parts[i].outline;
       both.insert(both.end(), parts[j].outline.begin(), parts[j].outline.end());
       both = outermost(std::move(both));
-      auto whole = shape.light_of(both, background);
-      if (!whole || !is_of_both(*whole, parts[i], parts[j], both.size())) continue;
-      parts[i] = {std::move(whole), std::move(both), parts[i].box | parts[j].box};
+      auto one = shape.light_of(both, background);
+      if (!one || !is_of_both(*one, parts[i], parts[j], both.size())) continue;
+      parts[i] = {std::move(one), std::move(both), parts[i].box | parts[j].box};
       parts.erase(parts.begin() + std::ptrdiff_t(j));
       j = i;  // the whole may have more parts
     }

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
@@ -27,8 +26,9 @@ struct Ring {
 /// The box of a light and a margin around it, above the dark.
 class Face {
  public:
-  Face(const cv::Mat& image, const cv::Rect& box, const Background& background)
-      : box_(box), window_(std::clamp(std::max(box.width, box.height) / 30, 2, 6)) {
+  /// Means are of so many pixels.
+  Face(const cv::Mat& image, const cv::Rect& box, const Background& background, int window)
+      : box_(box), window_(window) {
     constexpr double share = 0.02;
     image(box).convertTo(levels_, CV_32F, 1, -background.level);
     double brightest = 0;
@@ -110,28 +110,54 @@ class Face {
   std::vector<int> lit_;
 };
 
-double sum_of(const Face& face, const std::vector<int>& lines, double u, double v, double radius) {
-  constexpr double steepest = 0.94;  // where lines still cross the circle
-  const auto bounded = [](double e) { return std::clamp(e, -0.7, 1.0); };
-  double sum = 0;
-  for (const int line : lines) {
-    const double off = line - v;
-    if (std::abs(off) > steepest * radius) continue;
-    const double half = std::sqrt(radius * radius - off * off);
-    sum += bounded(face.step(line, static_cast<int>(std::lround(u - half + 0.5)), true)) +
-           bounded(face.step(line, static_cast<int>(std::lround(u + half + 0.5)), false));
+/// Of some of the lit lines e at each border, for a light that begins there and for one that ends.
+class Steps {
+ public:
+  explicit Steps(const Face& face) : width_(face.box().width) {
+    constexpr std::size_t most_lines = 48;
+    const std::vector<int>& lit = face.lit_lines();
+    every_ = (lit.size() + most_lines - 1) / most_lines;
+    for (std::size_t i = 0; i < lit.size(); i += every_) {
+      lines_.push_back(lit[i]);
+      for (int border = 0; border < width_; ++border) {
+        for (const bool begins : {true, false}) {
+          e_.push_back(std::clamp(face.step(lit[i], border, begins), -0.7, 1.0));
+        }
+      }
+    }
   }
-  return sum;
-}
+
+  /// Over all lit lines.
+  double sum_of(double u, double v, double radius) const {
+    constexpr double steepest = 0.94;  // where lines still cross the circle
+    double sum = 0;
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+      const double off = lines_[i] - v;
+      if (std::abs(off) > steepest * radius) continue;
+      const double half = std::sqrt(radius * radius - off * off);
+      sum += at(i, u - half, 0) + at(i, u + half, 1);
+    }
+    return sum * double(every_);
+  }
+
+ private:
+  double at(std::size_t line, double u, std::size_t end) const {
+    const int border = static_cast<int>(std::floor(u + 1));  // border i is at i - 0.5
+    if (border < 0 || border >= width_) return 0;
+    return e_[2 * (line * static_cast<std::size_t>(width_) + static_cast<std::size_t>(border)) +
+              end];
+  }
+
+  int width_;
+  std::size_t every_;
+  std::vector<int> lines_;
+  std::vector<double> e_;
+};
 
 /// The rings of the largest sum: the best, and the best of those that are far from it.
 std::array<Ring, 2> best_rings(const Face& face, const cv::Rect& blob) {
-  constexpr std::size_t most_lines = 48;
   constexpr double fine = 20, far = 0.15;
-  const std::vector<int>& lit = face.lit_lines();
-  std::vector<int> lines;
-  const std::size_t every = (lit.size() + most_lines - 1) / most_lines;
-  for (std::size_t i = 0; i < lit.size(); i += every) lines.push_back(lit[i]);
+  const Steps steps(face);
   const double size = std::max(blob.width, blob.height), step = std::max(1.0, size / 2 / fine);
   const double u0 = blob.x - face.box().x + blob.width / 2.0;
   const double v0 = blob.y - face.box().y + blob.height / 2.0;
@@ -139,8 +165,8 @@ std::array<Ring, 2> best_rings(const Face& face, const cv::Rect& blob) {
   for (double radius = size / 6; radius <= 0.6 * size; radius += step) {
     for (double dv = -size / 4; dv <= size / 4; dv += step) {
       for (double du = -size / 4; du <= size / 4; du += step) {
-        rings.push_back({u0 + du, v0 + dv, radius,
-                         sum_of(face, lines, u0 + du, v0 + dv, radius) * double(every)});
+        const double u = u0 + du, v = v0 + dv;
+        rings.push_back({u, v, radius, steps.sum_of(u, v, radius)});
       }
     }
   }
@@ -244,16 +270,21 @@ bool unevenly_lit(const cv::Mat& image, const Blob& blob, const std::vector<Edge
 std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Background& background,
                           const LightShape& shape) {
   constexpr int least_size = 20, least_lines = 10;
-  constexpr double margin = 0.2, least_step = 0.28, clear_step = 0.33, one_point = 2;
+  constexpr double margin = 0.2, least_step = 0.28, clear_step = 0.33, least_shown = 0.5;
+  constexpr double one_point = 2;
   const cv::Rect box = blob.box();
   if (std::min(box.width, box.height) < least_size) return std::nullopt;
   const int more = static_cast<int>(margin * std::max(box.width, box.height));
   const cv::Rect wide =
       cv::Rect(box.x - more, box.y - more, box.width + 2 * more, box.height + 2 * more) &
       cv::Rect(0, 0, image.cols, image.rows);
-  const Face face(image, wide, background);
+  // As coarse as the search for the ring; fine enough for the rim.
+  const int size = std::max(wide.width, wide.height);
+  const int fine = std::clamp(size / 30, 2, 6), coarse = std::max(fine, size / 50);
+  const Face blurred(image, wide, background, coarse);
+  const Face face = fine == coarse ? blurred : Face(image, wide, background, fine);
   if (face.lit_lines().size() < least_lines) return std::nullopt;
-  const auto [best, other] = best_rings(face, box);
+  const auto [best, other] = best_rings(blurred, box);
   const auto crossings = 2 * std::count_if(face.lit_lines().begin(), face.lit_lines().end(),
                                            [&, v = best.v, r = best.radius](int line) {
                                              return std::abs(line - v) < r;
@@ -275,7 +306,9 @@ std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Backgrou
   light->sigma_px = std::sqrt(std::pow(light->sigma_px, 2) * points_of_a_stripe(light->outline) +
                               odds * away / 2);
   light->uneven = true;
-  return Rim{std::move(*light), best.sum > clear_step * double(crossings)};
+  light->roundness = std::min(1.0, double(light->outline.size()) / double(crossings));
+  const bool clear = best.sum > clear_step * double(crossings) && light->roundness > least_shown;
+  return Rim{std::move(*light), clear};
 }
 
 }  // namespace vlp

@@ -35,9 +35,9 @@ struct Rim {
 ///
 /// The rim is the circle whose crossings with the lit lines have the largest sum of e (Daugman 1993
 /// has this of irises, with levels), then the ellipse through the steps near it. It is clear when e
-/// is a third on average; nothing below 0.28. The sigma of its centre is that of the ellipse, the
-/// points of a stripe counted as one, and where another circle has nearly that sum, the distance
-/// to it.
+/// is a third on average and half of the crossings show a step; nothing below 0.28. The sigma of
+/// its centre is that of the ellipse, the points of a stripe counted as one, and where another
+/// circle has nearly that sum, the distance to it by the odds that it is the rim.
 std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Background& background,
                           const LightShape& shape);
 

@@ -87,6 +87,34 @@ TEST(Background, OfPartOfAnImageLeavesTheRestOut) {
   expect_flat(part, 30);
 }
 
+TEST(Background, OfFewerBitsInSixteenIsTheSame) {
+  Random random(3);
+  cv::Mat eight(600, 800, CV_8U), sixteen;
+  for (const double dark : {0.2, 3.0, 40.0}) {
+    for (int row = 0; row < eight.rows; ++row) {
+      for (int column = 0; column < eight.cols; ++column) {
+        const double lamp = row < 60 && column < 60 ? 3 * row : 0;
+        eight.at<std::uint8_t>(row, column) =
+            cv::saturate_cast<std::uint8_t>(dark + lamp + 0.8 * random.normal());
+      }
+    }
+    const Background expected = background_of(eight);
+    for (const int step : {16, 257}) {
+      eight.convertTo(sixteen, CV_16U, step);
+      const Background found = background_of(sixteen);
+      EXPECT_NEAR(found.level / step, expected.level, 1e-9);
+      EXPECT_NEAR(found.noise / step, expected.noise, 1e-9);
+      EXPECT_NEAR(found.threshold / step, expected.threshold, 1e-9);
+    }
+  }
+}
+
+TEST(Background, OfFewLevelsSaysNothingOfTheirStep) {
+  cv::Mat image = cv::Mat::zeros(600, 800, CV_16U);
+  image(cv::Rect(100, 50, 200, 200)) = 400;
+  EXPECT_LT(background_of(image).threshold, 2);
+}
+
 TEST(Background, MeetsEveryKindOfColumn) {
   // Of four columns one is darker, as behind a mosaic of colours.
   for (const cv::Size size : {cv::Size(800, 600), cv::Size(1280, 960), cv::Size(1920, 1200)}) {

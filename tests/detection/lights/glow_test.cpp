@@ -65,8 +65,8 @@ TEST(Glow, IsFoundWithItsCentreAndItsStripes) {
       const Vector2d beyond(0, light->radius_px);
       const auto signal =
           line_signal(image, light->low - beyond, light->high + beyond, background_of(image).level);
-      EXPECT_NEAR(stripes_of(without_glow(signal)).period_lines / lamp.stripes.period_lines, 1,
-                  0.02);
+      const Stripes seen = stripes_of(striped_part(without_glow(signal)));
+      EXPECT_NEAR(seen.period_lines / lamp.stripes.period_lines, 1, 0.02);
     });
   }
   EXPECT_LT(worst_px, 1) << "of a radius of 45 and more";
@@ -133,6 +133,25 @@ TEST(WithoutGlow, OfStripesWithoutGlowIsTheStripes) {
   const auto flat = without_glow(signal);
   ASSERT_EQ(flat.size(), truth.size());
   for (std::size_t i = 0; i < flat.size(); ++i) EXPECT_NEAR(flat[i], truth[i], 1e-9);
+}
+
+TEST(StripedPart, LeavesOutWhatIsDarkBeyondTheStripes) {
+  const std::vector<double> dark(5, 0.1), lit(3, 0.9);
+  const auto stripes = [&](int count) {
+    std::vector<double> lines = dark;
+    for (int i = 0; i < count; ++i) {
+      lines.insert(lines.end(), lit.begin(), lit.end());
+      lines.insert(lines.end(), dark.begin(), dark.end());
+    }
+    return lines;
+  };
+  EXPECT_EQ(striped_part(stripes(4)).size(), 4 * 3 + 3 * 5);
+  EXPECT_EQ(striped_part(stripes(4)).front(), 0.9);
+  EXPECT_EQ(striped_part(stripes(4)).back(), 0.9);
+  EXPECT_EQ(striped_part(stripes(3)).size(), 3 * 3 + 2 * 5 + 2 + 2) << "needs its ends";
+  EXPECT_EQ(striped_part(lit), lit);
+  EXPECT_TRUE(striped_part(dark).empty());
+  EXPECT_TRUE(striped_part({}).empty());
 }
 
 TEST(WithoutGlow, OfNothingIsNothing) {

@@ -70,9 +70,25 @@ TEST(Rim, IsThatOfADownlightWhereverItsCoreIs) {
     chi_square += std::pow(error_px / rim->light.sigma_px, 2) / 2;
     ++count;
   });
-EXPECT_LT(worst_px, 0.5) << "the core is 16 px off";
+  EXPECT_LT(worst_px, 0.5) << "the core is 16 px off";
   EXPECT_LT(chi_square / count, 1.5);
   EXPECT_GT(chi_square / count, 0.1);
+}
+
+TEST(Rim, IsSeenOfLargeDownlightsToo) {
+  for (const double scale : {3.0, 7.0}) {
+    DrawnLamp lamp = downlight(0.7, 40);
+    lamp.center *= scale, lamp.radius_px *= scale;
+    lamp.recess->core_off_px *= scale, lamp.recess->core_px *= scale, lamp.recess->halo_px *= scale;
+    const cv::Size size(int(scale * kSize.width), int(scale * kSize.height));
+    const cv::Mat image = drawn({lamp}, size, CV_8U, 1);
+    const Background background = background_of(image);
+    const auto rim =
+        rim_of(image, largest_blob(image, background), background, LightShape(drawn_camera(size)));
+    ASSERT_TRUE(rim) << scale;
+    EXPECT_TRUE(rim->clear) << scale;
+    EXPECT_LT((rim->light.pixel - lamp.center).norm(), 0.5) << scale;
+  }
 }
 
 TEST(Rim, OfADownlightLeadsToItsLamp) {
