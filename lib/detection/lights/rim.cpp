@@ -231,7 +231,7 @@ double bright_level(const cv::Mat& image, const Blob& blob, double dark) {
   levels.reserve(blob.runs.size());
   for (const Run& run : blob.runs) {
     const auto* row = image.ptr<Level>(run.row) + run.begin;
-    const int quarter = run.width() / 4;
+    const std::ptrdiff_t quarter = run.width() / 4;
     levels.push_back(std::max({row[quarter], row[2 * quarter], row[3 * quarter]}));
   }
   const auto tenth = levels.begin() + std::ptrdiff_t(levels.size() * 9 / 10);
