@@ -30,7 +30,7 @@ int most_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_tim
   return static_cast<int>(std::ceil(most)) + spare;
 }
 
-/// Of two centres per axis.
+/// How far two centres are apart, per axis.
 double apart(const Light& a, const Light& b) {
   return (a.pixel - b.pixel).norm() / std::numbers::sqrt2;
 }

@@ -68,12 +68,13 @@ Json metrics_of(const SessionResult& result) {
   for (const SessionStep& step : result.steps) {
     const Json of_step = json_of(step.result);
     for (Json metric : of_step.at("metrics")) {
+      const auto name = metric.at("name").get<std::string>();
       metric["step"] = step.name;
-      if (const auto kind = metric_kind(metric.at("name").get<std::string>())) {
+      if (const auto kind = metric_kind(name)) {
         metric["unit"] = kind->unit;
       }
       for (const CheckedMetric& gate : step.result.gates) {
-        if (gate.name != metric.at("name")) continue;
+        if (gate.name != name) continue;
         const Json of_gate = json_of(gate);
         for (const char* key : {"limit", "asked", "met"}) metric[key] = of_gate.at(key);
       }

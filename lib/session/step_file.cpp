@@ -74,7 +74,7 @@ std::optional<KeptStep> read_step(const std::filesystem::path& file) {
   const Json json = Json::parse(stream, nullptr, false);
   if (!json.is_object()) return std::nullopt;
   try {
-    if (json.at("format") != kFormat) return std::nullopt;
+    if (json.at("format").get<std::string>() != kFormat) return std::nullopt;
     return KeptStep{json.at("key").get<std::string>(), json.at("outputs").get<std::string>(),
                     result_of(json.at("result"))};
   } catch (const Json::exception&) {
