@@ -2,33 +2,37 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs the Debian packages that the toolbox is built and tested with. As root or through sudo;
-# again and again; silent when nothing is missing.
+# Installs the Debian packages that the toolbox needs. As root or through sudo; again and again;
+# silent when nothing is missing.
 #
-#   scripts/setup.sh [--batch]    --batch: also what scripts/reprocess.sh and its tests need
+#   scripts/setup.sh --build    to build the programs and run them
+#   scripts/setup.sh [--tests]  also what the tests, the benchmarks and the checks of the code need
+#   scripts/setup.sh --batch    also what scripts/reprocess.sh and its tests need
 set -euo pipefail
 
-packages=(
-  # compilers and tools
-  g++ cmake ninja-build ccache git pkg-config clang libclang-rt-dev clang-format clang-tidy
-  # libraries
+build=(
+  g++ cmake ninja-build ccache git pkg-config
   libeigen3-dev libyaml-cpp-dev libcsv-dev libcli11-dev libspdlog-dev libfmt-dev
   libopencv-dev libapriltag-dev libceres-dev libssl-dev
   nlohmann-json3-dev libpugixml-dev
   libmrcal-dev libsuitesparse-dev libcairo2-dev
   libsoci-dev libboost-dev libsqlite3-dev libpq-dev  # SOCI's headers include Boost's since Debian 13
   gnuplot-nox fonts-dejavu-core
-  # tests and benchmarks
+)
+tests=(
+  clang libclang-rt-dev clang-format clang-tidy
   libgtest-dev libgmock-dev libbenchmark-dev mrcal python3-mrcal poppler-utils unzip
   postgresql postgresql-client tmux util-linux  # of the station
   chromium-headless-shell python3  # the report is opened in a browser
   debootstrap  # of tests/bare_root.sh
 )
-case ${1:-} in
-  '') ;;
-  # Snakemake, and a Slurm on one machine for the tests of its profile.
-  --batch) packages+=(snakemake slurmctld slurmd slurm-client munge procps) ;;
-  *) echo "setup.sh: unknown option $1; there is --batch" >&2; exit 2 ;;
+# Snakemake, and a Slurm on one machine for the tests of its profile.
+batch=(snakemake slurmctld slurmd slurm-client munge procps)
+case ${1:---tests} in
+  --build) packages=("${build[@]}") ;;
+  --tests) packages=("${build[@]}" "${tests[@]}") ;;
+  --batch) packages=("${build[@]}" "${tests[@]}" "${batch[@]}") ;;
+  *) echo "setup.sh: unknown option $1; there are --build, --tests and --batch" >&2; exit 2 ;;
 esac
 
 missing=()

@@ -6,7 +6,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-scripts/setup.sh
+scripts/setup.sh --tests
 cmake --preset release -DVLP_TOOLBOX=ON -DBUILD_TESTING=ON -DVLP_WARNINGS_AS_ERRORS="${CI:+ON}"
 cmake --build --preset release
 ctest --preset release --parallel "$(nproc)"
