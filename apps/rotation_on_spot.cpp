@@ -5,9 +5,9 @@
 #include <map>
 
 #include "app.h"
-#include "evaluation/gnuplot.h"
 #include "history.h"
 #include "print_rotation.h"
+#include "report/plots/gnuplot.h"
 #include "session/rotation_step.h"
 #include "step_outcome.h"
 

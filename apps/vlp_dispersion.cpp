@@ -15,8 +15,8 @@
 
 #include "app.h"
 #include "capture_options.h"
-#include "evaluation/gnuplot.h"
 #include "history.h"
+#include "report/plots/gnuplot.h"
 #include "rig/input_error.h"
 #include "session/dispersion_step.h"
 #include "session/session_folder.h"

@@ -7,10 +7,10 @@
 
 #include "app.h"
 #include "captures/csv_writer.h"
-#include "evaluation/floor_plot.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"
 #include "positioning/floor_summary.h"
+#include "report/plots/floor_plot.h"
 
 namespace vlp {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <utility>
 
-#include "calibration/plots/calibration_plots.h"
+#include "report/plots/calibration_plots.h"
 #include "rig/stage.h"
 
 namespace vlp {

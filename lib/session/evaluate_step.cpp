@@ -8,9 +8,9 @@
 
 #include "evaluation/cautions.h"
 #include "evaluation/evaluation_metrics.h"
-#include "evaluation/report/evaluation_figures.h"
-#include "evaluation/report/evaluation_pictures.h"
-#include "evaluation/report/report.h"
+#include "report/evaluation_figures.h"
+#include "report/evaluation_pictures.h"
+#include "report/report.h"
 #include "rig/input_error.h"
 
 namespace vlp {

@@ -8,7 +8,7 @@
 
 #include "evaluation/evaluation.h"
 #include "evaluation/gate.h"
-#include "evaluation/report/report_picture.h"
+#include "report/report_picture.h"
 #include "session/step_result.h"
 
 namespace vlp {

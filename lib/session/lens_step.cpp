@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
-#include "calibration/plots/calibration_plots.h"
+#include "report/plots/calibration_plots.h"
 #include "rig/stage.h"
 
 namespace vlp {

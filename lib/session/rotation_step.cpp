@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "calibration/levelling/map_doubt.h"
-#include "calibration/plots/calibration_plots.h"
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/turning_axis.h"
 #include "geometry/angles.h"
+#include "report/plots/calibration_plots.h"
 #include "rig/stage.h"
 #include "session/lamp_images.h"
 

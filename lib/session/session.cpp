@@ -2,16 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "session/session.h"
 
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <memory>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -29,31 +24,12 @@
 #include "session/rotation_step.h"
 #include "session/row_time_step.h"
 #include "session/session_file.h"
-#include "session/step_file.h"
+#include "session/session_results.h"
 
 namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Held while a run is at work in a folder of results; the system lets go of it when the run ends,
-/// however it does.
-class ResultsLock {
- public:
-  explicit ResultsLock(const fs::path& results)
-      : descriptor_(::open((results / "steps/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
-    if (descriptor_ < 0) throw InputError(results, "cannot be written to");
-    if (::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
-    ::close(descriptor_);
-    throw InputError(results, "another run is at work there");
-  }
-  ~ResultsLock() { ::close(descriptor_); }
-  ResultsLock(const ResultsLock&) = delete;
-  ResultsLock& operator=(const ResultsLock&) = delete;
-
- private:
-  int descriptor_;
-};
 
 /// Which program this is: another build need not give the same results.
 std::string build_of(const ProgramVersion& program) {
@@ -76,29 +52,6 @@ std::string without_folder(std::string text, const fs::path& named) {
     }
   }
   return text;
-}
-
-/// What a run may have written, but for the fixes of drives.
-constexpr std::array kResults{
-    "lens.yaml",    "lens.cameramodel", "lens.svg",       "camera.yaml",     "rotated.yaml",
-    "rotation.svg", "calibration.yaml", "dispersion.svg", "check-fixes.csv", "evaluation.json",
-    "gates.xml",    "report.html",      "session.json"};
-
-/// Fixes of drives, but for those that are wanted.
-void forget_drives(const fs::path& results, const std::set<std::string>& wanted) {
-  for (const auto& entry : fs::directory_iterator(results)) {
-    const std::string name = entry.path().filename().string();
-    const bool drive = name.starts_with("line-") && name.ends_with("-fixes.csv");
-    if (drive && !wanted.contains(name)) fs::remove(entry.path());
-  }
-}
-
-void forget_all(const fs::path& results) {
-  for (const char* name : kResults) fs::remove(results / name);
-  forget_drives(results, {});
-  for (const auto& entry : fs::directory_iterator(results / "steps")) {
-    if (entry.path().extension() == ".json") fs::remove(entry.path());
-  }
 }
 
 const char* step_of(MetricSource source) {
@@ -127,13 +80,6 @@ std::vector<Gate> gates_for(const SessionFolder& session, const SessionOptions& 
   return with_changes(std::move(gates), read_gates(file, session_metrics()));
 }
 
-/// What the last step writes, which gates are a part of.
-void forget_evaluation(const fs::path& results) {
-  for (const char* name : {"evaluation.json", "gates.xml", "report.html", "steps/evaluate.json"}) {
-    fs::remove(results / name);
-  }
-}
-
 /// What a step comes to, and how it is written once it is known.
 struct Work {
   StepResult result;
@@ -142,10 +88,10 @@ struct Work {
 
 class SessionRun {
  public:
-  SessionRun(const SessionFolder& session, std::vector<Gate> gates, fs::path results,
+  SessionRun(const SessionFolder& session, std::vector<Gate> gates, SessionResults& results,
              const SessionOptions& options, const SessionObserver& observer)
       : session_(session),
-        results_(std::move(results)),
+        results_(results),
         options_(options),
         observer_(observer),
         build_(build_of(options.program)),
@@ -153,7 +99,7 @@ class SessionRun {
 
   SessionResult run() {
     check_redo();
-    forget_other_steps();
+    results_.plan(outputs());
     if (calibrate() && locate()) {
       add_gates_of_no_step();
       evaluate();
@@ -168,23 +114,23 @@ class SessionRun {
     std::string names;
     for (const auto& [step, files] : steps) names.append(names.empty() ? "" : ", ").append(step);
     for (const std::string& name : options_.redo) {
-      const auto known = [&](const auto& step) { return step.first == name; };
+      const auto known = [&](const StepOutputs& step) { return step.step == name; };
       if (std::any_of(steps.begin(), steps.end(), known)) continue;
       std::string reason = "there is no step " + name + " here; the steps are: ";
       throw std::invalid_argument(reason.append(names));
     }
   }
 
-  fs::path out(const std::string& name) const { return results_ / name; }
+  bool asked_again(const std::string& step) const {
+    return std::find(options_.redo.begin(), options_.redo.end(), step) != options_.redo.end();
+  }
+
+  fs::path out(const std::string& name) const { return results_.file(name); }
   fs::path lamps_file() const { return session_.lamps(); }
 
   std::string without_folder(std::string text) const {
-    return vlp::without_folder(vlp::without_folder(std::move(text), session_.path()), results_);
-  }
-
-  void remove(const std::string& name) const {
-    std::error_code ignored;
-    fs::remove(out(name), ignored);
+    return vlp::without_folder(vlp::without_folder(std::move(text), session_.path()),
+                               results_.path());
   }
 
   std::vector<fs::path> lines() const {
@@ -192,65 +138,27 @@ class SessionRun {
   }
 
   /// The steps of this session, and what each writes.
-  std::vector<std::pair<std::string, std::vector<std::string>>> outputs() const {
+  std::vector<StepOutputs> outputs() const {
     const auto with_picture = [&](std::vector<std::string> names, const char* picture) {
       if (options_.report) names.emplace_back(picture);
       return names;
     };
-    std::vector<std::pair<std::string, std::vector<std::string>>> steps;
-    steps.emplace_back("lens", session_.camera()
-                                   ? std::vector<std::string>()
-                                   : with_picture({"lens.yaml", "lens.cameramodel"}, "lens.svg"));
-    steps.emplace_back("row-time", std::vector<std::string>{"camera.yaml"});
-    steps.emplace_back("rotation", with_picture({"rotated.yaml"}, "rotation.svg"));
-    steps.emplace_back("dispersion", with_picture({"calibration.yaml"}, "dispersion.svg"));
-    if (session_.check()) steps.emplace_back("check", std::vector<std::string>{"check-fixes.csv"});
+    std::vector<StepOutputs> steps;
+    steps.push_back({"lens", session_.camera()
+                                 ? std::vector<std::string>()
+                                 : with_picture({"lens.yaml", "lens.cameramodel"}, "lens.svg")});
+    steps.push_back({"row-time", std::vector<std::string>{"camera.yaml"}});
+    steps.push_back({"rotation", with_picture({"rotated.yaml"}, "rotation.svg")});
+    steps.push_back({"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")});
+    if (session_.check()) steps.push_back({"check", std::vector<std::string>{"check-fixes.csv"}});
     for (const fs::path& line : lines()) {
       const std::string name = line.filename().string();
-      steps.emplace_back(name, std::vector<std::string>{name + "-fixes.csv"});
+      steps.push_back({name, std::vector<std::string>{name + "-fixes.csv"}});
     }
     std::vector<std::string> evaluation{"evaluation.json", "gates.xml"};
     if (options_.report) evaluation.emplace_back("report.html");
-    steps.emplace_back("evaluate", evaluation);
+    steps.push_back({"evaluate", evaluation});
     return steps;
-  }
-
-  /// Results of an earlier run that this one does not make.
-  void forget_other_steps() const {
-    std::set<std::string> wanted, steps;
-    for (const auto& [step, files] : outputs()) {
-      wanted.insert(files.begin(), files.end());
-      steps.insert(step);
-    }
-    for (const char* name : kResults) {
-      if (!wanted.contains(name)) remove(name);
-    }
-    forget_drives(results_, wanted);
-    for (const auto& entry : fs::directory_iterator(results_ / "steps")) {
-      const bool step = entry.path().extension() == ".json";
-      if (step && !steps.contains(entry.path().stem().string())) fs::remove(entry.path());
-    }
-  }
-
-  void forget(const std::string& name) const {
-    std::error_code ignored;
-    fs::remove(results_ / "steps" / (name + ".json"), ignored);
-    for (const auto& [step, files] : outputs()) {
-      if (step != name) continue;
-      for (const std::string& file : files) remove(file);
-    }
-  }
-
-  std::string digest_of_outputs(const std::string& name) const {
-    std::string digests;
-    for (const auto& [step, files] : outputs()) {
-      if (step != name) continue;
-      for (const std::string& file : files) {
-        const bool there = fs::exists(out(file));
-        digests += file + " " + (there ? sha256_of_file(out(file)) : "") + "\n";
-      }
-    }
-    return sha256_of_text(digests);
   }
 
   std::string key_of(const std::vector<fs::path>& inputs, const std::string& options) {
@@ -273,21 +181,15 @@ class SessionRun {
   bool step(const std::string& name, const std::vector<fs::path>& inputs,
             const std::string& options, const std::function<Work()>& work) {
     if (observer_.begins) observer_.begins(name);
-    const fs::path kept_file = results_ / "steps" / (name + ".json");
     const std::string key = key_of(inputs, options);
-    const bool redo =
-        std::find(options_.redo.begin(), options_.redo.end(), name) != options_.redo.end();
-    const auto kept = read_step(kept_file);
     SessionStep done{name, false, {}};
-    // What could not be read may be there now.
-    const bool again = redo || !kept || kept->result.failure == StepFailure::bad_input;
-    if (!again && kept->key == key && kept->outputs == digest_of_outputs(name)) {
+    if (auto kept = results_.kept(name, key); kept && !asked_again(name)) {
       done.as_before = true;
-      done.result = kept->result;
+      done.result = std::move(*kept);
     } else {
-      forget(name);
+      results_.forget(name);
       done.result = attempt(work);
-      write_step(kept_file, {key, digest_of_outputs(name), done.result});
+      results_.keep(name, key, done.result);
     }
     if (done.result.ok()) done.result.gates = check_gates(gates_of(name), done.result.metrics);
     result_.gates.insert(result_.gates.end(), done.result.gates.begin(), done.result.gates.end());
@@ -357,9 +259,9 @@ class SessionRun {
     return step("lens", {session_.boards(), session_.board()}, settings, [&] {
       const Board board = read_board(session_.board());
       const auto images = image_files({session_.boards().string()});
-      SeenBoards seen = see_boards(
-          {images, board, session_.board(), options_.threads, results_ / "steps/corners"},
-          observer_.progress);
+      SeenBoards seen =
+          see_boards({images, board, session_.board(), options_.threads, results_.corners()},
+                     observer_.progress);
       if (!seen.ok()) return Work{seen};
       Camera camera;
       camera.id = options_.camera_id;
@@ -482,7 +384,11 @@ class SessionRun {
     }
     result_.calibration = read_calibration(camera);
     if (result_.calibration->camera.row_time_s || session_.classifier()) {
-      forget("row-time");
+      results_.forget("row-time");
+      if (asked_again("row-time")) {
+        throw std::invalid_argument(
+            "there is no step row-time here: the row time is known, or there is a classifier");
+      }
     } else if (!find_row_time(camera)) {
       return false;
     } else {
@@ -491,7 +397,7 @@ class SessionRun {
     if (!find_rotation(camera)) return false;
     result_.calibration = read_calibration(out("rotated.yaml"));
     if (!session_.dispersion()) {
-      forget("dispersion");
+      results_.forget("dispersion");
       write_calibration(out("calibration.yaml"), *result_.calibration);
       return true;
     }
@@ -502,18 +408,31 @@ class SessionRun {
 
   /// A camera.yaml that cannot be read is a step that failed.
   bool readable(const fs::path& camera) {
-    const bool told = options_.row_time_s || options_.readout;
-    return step("lens", {camera}, told ? "told" : "", [&] {
+    const std::string unused = stated_of_the_camera();
+    return step("lens", {camera}, unused, [&] {
       const auto report = read_calibration(camera).intrinsics_report;
       Work work;
       if (report) work.result.metrics = {{"rms_px", report->rms_px}};
-      if (told) {
-        work.result.warnings.emplace_back(
-            "camera.yaml says what the camera is: row time and read-out that were stated are not "
-            "used");
+      if (!unused.empty()) {
+        work.result.warnings.push_back(
+            "camera.yaml says what the camera is: not used is what was stated of its " + unused);
       }
       return work;
     });
+  }
+
+  /// "name, row time"; empty where all is left as it is.
+  std::string stated_of_the_camera() const {
+    const SessionOptions unstated;
+    std::string stated;
+    const auto add = [&](bool is_stated, const char* what) {
+      if (is_stated) stated.append(stated.empty() ? "" : ", ").append(what);
+    };
+    add(options_.camera_id != unstated.camera_id, "name");
+    add(options_.lens_model != unstated.lens_model, "lens model");
+    add(options_.row_time_s.has_value(), "row time");
+    add(options_.readout.has_value(), "read-out");
+    return stated;
   }
 
   bool locate() {
@@ -613,7 +532,7 @@ class SessionRun {
       result_.verdict = SessionVerdict::no_result;
       result_.failure = last.result.failure;
       result_.reason = last.name + ": " + last.result.why;
-      forget_from(last.name);
+      results_.forget_behind(last.name);
     }
     const std::string missed = words_of_missed(result_.gates);
     if (!missed.empty() && last.result.ok()) {
@@ -623,17 +542,8 @@ class SessionRun {
     write_file(out("session.json"), session_json(result_, options_));
   }
 
-  /// Of a step that failed and of those behind it nothing stays.
-  void forget_from(const std::string& failed) const {
-    bool behind = false;
-    for (const auto& [name, files] : outputs()) {
-      if (behind) forget(name);
-      behind = behind || name == failed;
-    }
-  }
-
   const SessionFolder& session_;
-  fs::path results_;
+  SessionResults& results_;
   const SessionOptions& options_;
   const SessionObserver& observer_;
   std::string build_;
@@ -641,33 +551,6 @@ class SessionRun {
   InputDigests digests_;
   SessionResult result_;
 };
-
-/// Says whose results they are.
-fs::path mark_of(const fs::path& results) { return results / "steps/session"; }
-
-std::string mark_text(const fs::path& session) {
-  return fs::weakly_canonical(session / "").string() + "\n";
-}
-
-/// That neither another session's results are there, nor what is not of this program.
-void check_results(const fs::path& results, const fs::path& session) {
-  const fs::path mark = mark_of(results);
-  const std::string name = mark_text(session);
-  constexpr std::size_t most_bytes = 1 << 16;
-  if (fs::exists(mark)) {
-    if (read_text_file(mark, most_bytes) == name) return;
-    throw InputError(results,
-                     "holds the results of another session; give this one a folder of its own");
-  }
-  std::vector<const char*> others(kResults.begin(), kResults.end());
-  others.insert(others.end(), {"lamps.yaml", "board.yaml", "boards", "rotation"});
-  for (const char* other : others) {
-    if (!fs::exists(results / other)) continue;
-    throw InputError(results, fmt::format("holds {}, which is not of vlp-calibrate; give the "
-                                          "results a folder of their own",
-                                          other));
-  }
-}
 
 }  // namespace
 
@@ -695,12 +578,7 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
   if (holds_captures(session, results)) {
     throw InputError(results, "holds captures: results go to a folder of their own");
   }
-  check_results(results, session);
-  std::error_code not_made;
-  fs::create_directories(results / "steps", not_made);
-  if (not_made) throw InputError(results, "cannot be made: " + not_made.message());
-  const ResultsLock lock(results);
-  if (!fs::exists(mark_of(results))) write_file(mark_of(results), mark_text(session));
+  SessionResults taken(results, session);
   std::optional<SessionFolder> folder;
   std::vector<Gate> gates;
   try {
@@ -712,14 +590,14 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
     result.failure = StepFailure::bad_input;
     result.reason = without_folder(error.what(), session);
     if (folder) {
-      forget_evaluation(results);  // the rest is as good as before
+      taken.forget_evaluation();  // the rest is as good as before
     } else {
-      forget_all(results);
+      taken.forget_all();
     }
-    write_file(results / "session.json", session_json(result, options));
+    write_file(taken.file("session.json"), session_json(result, options));
     return result;
   }
-  return SessionRun(*folder, std::move(gates), results, options, observer).run();
+  return SessionRun(*folder, std::move(gates), taken, options, observer).run();
 }
 
 }  // namespace vlp

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "evaluation/gate.h"
-#include "evaluation/gnuplot.h"
+#include "report/plots/gnuplot.h"
 #include "rig/calibration.h"
 
 namespace vlp {

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "captures/csv_writer.h"
-#include "evaluation/gnuplot.h"
-#include "evaluation/plot_parts.h"
+#include "report/plots/gnuplot.h"
+#include "report/plots/plot_parts.h"
 
 namespace vlp {
 

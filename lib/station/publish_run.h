@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "evaluation/report/report_picture.h"
+#include "report/report_picture.h"
 #include "station/records.h"
 
 namespace vlp {

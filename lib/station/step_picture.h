@@ -6,7 +6,7 @@
 #include <future>
 #include <optional>
 
-#include "evaluation/report/report_picture.h"
+#include "report/report_picture.h"
 
 namespace vlp {
 

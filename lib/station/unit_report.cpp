@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "captures/csv_writer.h"
-#include "evaluation/report/report.h"
+#include "report/report.h"
 
 namespace vlp {
 namespace {

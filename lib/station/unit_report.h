@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/report/report_picture.h"
+#include "report/report_picture.h"
 #include "station/run_record.h"
 
 namespace vlp {

@@ -3,6 +3,9 @@
 #include "station/unit_step.h"
 
 #include <algorithm>
+#include <utility>
+
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -59,9 +62,7 @@ std::optional<double> typical_blur_px(const UnitStep& boards) {
     if (counts && image.blur_px) blurs_px.push_back(*image.blur_px);
   }
   if (blurs_px.empty()) return std::nullopt;
-  const auto middle = blurs_px.begin() + static_cast<std::ptrdiff_t>(blurs_px.size() / 2);
-  std::nth_element(blurs_px.begin(), middle, blurs_px.end());
-  return *middle;
+  return upper_median(std::move(blurs_px));
 }
 
 }  // namespace vlp

@@ -63,21 +63,31 @@ TEST_P(Accuracy, KeepsToItsGates) {
 
 INSTANTIATE_TEST_SUITE_P(Rigs, Accuracy, testing::Values("paper-rig", "paper-rig-faulty"));
 
-/// Fewer check captures, so that it is quick; a line of the paper's.
+/// Small images, few captures; a line of the paper's.
 class SmallSession : public Calibrate {
  protected:
   void SetUp() override {
     Calibrate::SetUp();
     if (IsSkipped()) return;
-    std::string scene = TemporaryFolder::content_of(kDatasets + "paper-rig/scene.yaml");
-    const std::string grid = "columns: 6, rows: 6}\n    heights_m: [0, 0.1, 0.2, 0.3]";
-    ASSERT_NE(scene.find(grid), std::string::npos);
-    scene.replace(scene.find(grid), grid.size(), "columns: 3, rows: 2}\n    heights_m: [0]");
+    const std::string scene =
+        TemporaryFolder::content_of(kDatasets + "archive/scene.yaml") +
+        "  - folder: line-x\n"
+        "    exposure_s: 5.0e-5\n"
+        "    drive: {from_m: [-0.35, 0], to_m: [0.35, 0], speed_m_per_s: 0.1}\n"
+        "    heights_m: [0]\n"
+        "    yaws_deg: [0]\n"
+        "    interval_s: 0.25\n";
     render(folder.file("scene.yaml", scene).string(), "boards,rotation,dispersion,check,line-x");
   }
 };
 
-TEST_F(SmallSession, RunsOnlyWhatIsNotAsBefore) {
+TEST_F(Calibrate, RunsOnlyWhatIsNotAsBefore) {
+  // Stripes enough to find the row time; fewer check captures than the scene has.
+  std::string scene = TemporaryFolder::content_of(kDatasets + "paper-rig/scene.yaml");
+  const std::string grid = "columns: 6, rows: 6}\n    heights_m: [0, 0.1, 0.2, 0.3]";
+  ASSERT_NE(scene.find(grid), std::string::npos);
+  scene.replace(scene.find(grid), grid.size(), "columns: 3, rows: 2}\n    heights_m: [0]");
+  render(folder.file("scene.yaml", scene).string(), "boards,rotation,dispersion,check,line-x");
   const auto first = calibrate("--readout rows");  // and finds the row time
   ASSERT_EQ(first.exit_code, 0) << first.output << first.errors;
   EXPECT_THAT(first.output, Not(HasSubstr("as before")));
@@ -143,9 +153,12 @@ TEST_F(SmallSession, FollowsWhatIsInItsFolder) {
   fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
   const auto known = calibrate();
   ASSERT_EQ(known.exit_code, 0) << known.errors;
-  EXPECT_THAT(known.errors, HasSubstr("camera.yaml says what the camera is"));
+  EXPECT_THAT(known.errors, HasSubstr("camera.yaml says what the camera is: not used is what was "
+                                      "stated of its row time, read-out"));
+  EXPECT_THAT(calibrate("--camera-id other --lens LENSMODEL_OPENCV5").errors,
+              HasSubstr("stated of its name, lens model"));
   EXPECT_THAT(calibrate("").errors, Not(HasSubstr("camera.yaml says")));
-  EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: \"paper-rig\""));
+  EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: \"archive\""));
   EXPECT_FALSE(fs::exists(folder / "results/lens.yaml"));
   fs::remove(folder / "a session/camera.yaml");
   ASSERT_EQ(calibrate().exit_code, 0);
@@ -195,8 +208,57 @@ TEST_F(SmallSession, EndsWhereAStageCannotGoOn) {
 }
 
 /// The same session through the programs of single steps, by hand.
-TEST_F(SmallSession, GivesWhatTheSingleProgramsGive) {
-  // An inclination sensor that reads a little, and a table of places without truth.csv.
+class ByHand : public SmallSession {
+ protected:
+  const std::string how = "--row-time-s 3e-5 --readout rows --camera-id unit";
+
+  std::string by_hand(const std::string& name) const {
+    return TemporaryFolder::content_of(folder / name);
+  }
+  static std::string without_history(const std::string& calibration) {
+    return calibration.substr(calibration.find("\ncamera:"));
+  }
+  /// `lens` comes before: the session's, or that of its boards, found here.
+  void run_steps(const std::string& lens, const std::string& truth,
+                 const std::string& options = "") const {
+    const std::string in = "'" + path("a session") + "/", out = "'" + path("");
+    const std::string lamps = " --lamps " + in + "lamps.yaml' " + options + " --calibration ";
+    for (const std::string& command :
+         {"vlp-rotation " + in + "rotation'" + lamps + lens + " -o " + out + "rotated.yaml'",
+          "vlp-dispersion " + in + "dispersion'" + lamps + out + "rotated.yaml' -o " + out +
+              "calibration.yaml'",
+          "vlp-locate " + in + "check'" + lamps + out + "calibration.yaml' -o " + out +
+              "fixes.csv'",
+          "vlp-evaluate " + out + "fixes.csv' --truth " + in + "check/" + truth +
+              "' --calibration " + out + "calibration.yaml' --json " + out + "evaluation.json'"}) {
+      const auto run = run_program(command);
+      ASSERT_EQ(run.exit_code, 0) << command << run.errors;
+    }
+  }
+  std::string lens_by_hand() const {
+    const std::string in = "'" + path("a session") + "/", lens = "'" + path("lens.yaml'");
+    const auto run = run_program("vlp-intrinsics " + in + "boards' --board " + in + "board.yaml' " +
+                                 how + " -o " + lens);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return lens;
+  }
+  void expect_the_same() const {
+    EXPECT_EQ(by_hand("fixes.csv"), result("check-fixes.csv"));
+    EXPECT_EQ(by_hand("evaluation.json"), result("evaluation.json"));
+    EXPECT_EQ(without_history(by_hand("calibration.yaml")),
+              without_history(result("calibration.yaml")));
+  }
+};
+
+TEST_F(ByHand, GivesTheSame) {
+  ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
+  run_steps(lens_by_hand(), "truth.csv");
+  expect_the_same();
+  EXPECT_EQ(by_hand("lens.cameramodel"), result("lens.cameramodel"));
+}
+
+TEST_F(ByHand, GivesTheSameWithAnInclinationSensor) {
+  // One that reads a little, and a table of places without truth.csv.
   std::string captures = "image,x_m,y_m,z_m,roll_rad,pitch_rad\n";
   for (const TruthRow& row : read_truth(folder / "a session/check/truth.csv")) {
     captures +=
@@ -204,37 +266,36 @@ TEST_F(SmallSession, GivesWhatTheSingleProgramsGive) {
   }
   fs::remove(folder / "a session/check/truth.csv");
   folder.file("a session/check/captures.csv", captures);
-  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows --camera-id unit").exit_code,
-            0);
-  const std::string in = "'" + path("a session") + "/", out = "'" + path("");
-  const std::string lamps = " --lamps " + in + "lamps.yaml' --calibration " + out;
-  for (const std::string& command :
-       {"vlp-intrinsics " + in + "boards' --board " + in + "board.yaml' --row-time-s 3e-5 " +
-            "--readout rows --camera-id unit -o " + out + "lens.yaml'",
-        "vlp-rotation " + in + "rotation'" + lamps + "lens.yaml' -o " + out + "rotated.yaml'",
-        "vlp-dispersion " + in + "dispersion'" + lamps + "rotated.yaml' -o " + out +
-            "calibration.yaml'",
-        "vlp-locate " + in + "check'" + lamps + "calibration.yaml' -o " + out + "fixes.csv'",
-        "vlp-evaluate " + out + "fixes.csv' --truth " + in + "check/captures.csv' --calibration " +
-            out + "calibration.yaml' --json " + out + "evaluation.json'"}) {
-    const auto run = run_program(command);
-    ASSERT_EQ(run.exit_code, 0) << command << run.errors;
-  }
-  const auto by_hand = [&](const char* name) { return TemporaryFolder::content_of(folder / name); };
-  EXPECT_EQ(by_hand("fixes.csv"), result("check-fixes.csv"));
-  EXPECT_EQ(by_hand("evaluation.json"), result("evaluation.json"));
-  EXPECT_EQ(by_hand("lens.cameramodel"), result("lens.cameramodel"));
-  const auto without_history = [](const std::string& calibration) {
-    return calibration.substr(calibration.find("\ncamera:"));
-  };
-  EXPECT_EQ(without_history(by_hand("calibration.yaml")),
-            without_history(result("calibration.yaml")));
+  ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
+  run_steps(lens_by_hand(), "captures.csv");
+  expect_the_same();
   // The inclination counts: without it the fixes are others.
   folder.file("a session/check/captures.csv",
               std::regex_replace(captures, std::regex("0.001,-0.002"), "0,0"));
-  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows --camera-id unit").exit_code,
-            0);
+  ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
   EXPECT_NE(by_hand("fixes.csv"), result("check-fixes.csv"));
+}
+
+TEST_F(ByHand, GivesTheSameWithALensThatIsGiven) {
+  fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
+  ASSERT_EQ(calibrate("--no-report").exit_code, 0);
+  run_steps("'" + path("a session/camera.yaml'"), "truth.csv");
+  expect_the_same();
+}
+
+TEST_F(ByHand, GivesTheSameWithAClassifier) {
+  const std::string in = path("a session");
+  const auto trained = run_program("vlp-train '" + in + "/rotation' --lamps '" + in +
+                                   "/lamps.yaml' --calibration '" + in +
+                                   "/true_calibration.yaml' -o '" + in + "/classifier.yaml'");
+  ASSERT_EQ(trained.exit_code, 0) << trained.errors;
+  // It alone tells the lamps apart.
+  const std::string map = TemporaryFolder::content_of(folder / "a session/lamps.yaml");
+  folder.file("a session/lamps.yaml",
+              std::regex_replace(map, std::regex(", frequency_hz: [0-9.e+]+"), ""));
+  ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
+  run_steps(lens_by_hand(), "truth.csv", "--classifier '" + in + "/classifier.yaml'");
+  expect_the_same();
 }
 
 TEST_F(SmallSession, RunsAStepAgainThatIsAskedFor) {
@@ -249,6 +310,9 @@ TEST_F(SmallSession, RunsAStepAgainThatIsAskedFor) {
   const auto unknown = calibrate("--redo checks");
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.errors, HasSubstr("there is no step checks here; the steps are: lens, "));
+  const auto known = calibrate("--row-time-s 3e-5 --readout rows --redo row-time");
+  EXPECT_EQ(known.exit_code, 2);
+  EXPECT_THAT(known.errors, HasSubstr("there is no step row-time here: the row time is known"));
 }
 
 TEST_F(SmallSession, GoesOnWhereItWasKilled) {

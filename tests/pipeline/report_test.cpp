@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/report/report.h"
+#include "report/report.h"
 
 #include <gmock/gmock.h>
 
-#include "evaluation/cdf_plot.h"
-#include "evaluation/intrinsics_plot.h"
+#include "report/plots/cdf_plot.h"
+#include "report/plots/intrinsics_plot.h"
 #include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"

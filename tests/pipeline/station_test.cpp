@@ -1,6 +1,9 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-station: units to their verdicts, from full folders; the records.
+#include <nlohmann/json.hpp>
+#include <regex>
+
 #include "small_station.h"
 
 namespace vlp {
@@ -63,6 +66,50 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   EXPECT_FALSE(fs::exists(captures("0001")));
   EXPECT_THAT(records("list --kind golden").output, HasSubstr("3 runs, 1 passed"));
   EXPECT_THAT(records("verify").errors, HasSubstr("check"));
+}
+
+/// The station feeds images one by one to the steps that vlp-calibrate takes a folder through.
+TEST_F(Station, GivesWhatVlpCalibrateGives) {
+  render();
+  ASSERT_EQ(run_program(batch()).exit_code, 0);
+  for (const char* name : {"lamps.yaml", "board.yaml"}) {
+    fs::copy_file(folder / "station" / name, folder / "unit" / name,
+                  fs::copy_options::overwrite_existing);
+  }
+  const auto calibrated = run_program(
+      "vlp-calibrate " + (folder / "unit").string() + " -o " + (folder / "results").string() +
+      " --no-report --camera-id 0001 --row-time-s 3e-5 --readout rows");
+  ASSERT_EQ(calibrated.exit_code, 0) << calibrated.errors;
+  // What only one of them knows: what was done, and the size of the pixels.
+  const auto comparable = [](std::string calibration) {
+    calibration = calibration.substr(calibration.find("\ncamera:"));
+    return std::regex_replace(calibration, std::regex("\n  pixel_pitch_m: [0-9.e-]+"), "");
+  };
+  EXPECT_EQ(comparable(result("0001", "calibration.yaml")),
+            comparable(TemporaryFolder::content_of(folder / "results/calibration.yaml")));
+
+  using Json = nlohmann::json;
+  ASSERT_EQ(records("export -o " + (folder / "runs.json").string()).exit_code, 0);
+  const Json figures =
+      Json::parse(TemporaryFolder::content_of(folder / "runs.json")).at(0).at("figures");
+  const auto of_station = [&](const std::string& name) {
+    return figures.at(name).at("value").get<double>();
+  };
+  const auto of_session = [&](const char* file) {
+    return Json::parse(TemporaryFolder::content_of(folder / "results" / file));
+  };
+  const Json session = of_session("session.json");
+  int same = 0;
+  for (const Json& metric : session.at("metrics")) {
+    const auto name = metric.at("name").get<std::string>();
+    if (!figures.contains(name)) continue;
+    EXPECT_EQ(of_station(name), metric.at("value").get<double>()) << name;
+    ++same;
+  }
+  EXPECT_EQ(same, 12);  // of lens, rotation and dispersion
+  // The errors have the station's names, and there their fixes go through a table of nanometres.
+  const auto horizontal = of_session("evaluation.json").at("horizontal");
+  EXPECT_NEAR(of_station("check_mean_mm"), horizontal.at("mean_mm").get<double>(), 1e-6);
 }
 
 TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {

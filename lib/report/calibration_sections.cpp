@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/calibration_sections.h"
+
+#include <cmath>
+
+#include "captures/csv_writer.h"
+#include "geometry/angles.h"
+#include "report/html.h"
+
+namespace vlp {
+namespace {
+
+std::string six_digits(double value) { return significant(value, 6); }
+
+/// Of a standard deviation.
+std::string rough(double value) { return significant(value, 2); }
+
+std::string pair(const Eigen::Vector2d& values, const std::string& unit) {
+  return six_digits(values.x()) + ", " + six_digits(values.y()) + " " + unit;
+}
+
+/// ", standard deviation 0.1, 0.2 px" of a pair; nothing without a covariance.
+std::string deviations(const std::optional<Matrix2>& covariance, double scale,
+                       const std::string& unit) {
+  if (!covariance) return "";
+  const auto sd = [&](int i) { return rough(scale * std::sqrt((*covariance)(i, i))); };
+  return "; standard deviation " + sd(0) + ", " + sd(1) + " " + unit;
+}
+
+}  // namespace
+
+std::string camera_table(const Camera& camera) {
+  HtmlTable table;
+  const auto line = [&](const char* label, std::string value) {
+    table.rows.push_back({label, std::move(value)});
+  };
+  const auto& [width_px, height_px] = camera.imager_px;
+  if (!camera.id.empty()) line("camera", camera.id);
+  line("image", std::to_string(width_px) + " x " + std::to_string(height_px) + " px");
+  line("lens model", std::string(name_of(camera.lens_model)));
+  const std::vector<double>& k = camera.intrinsics;
+  line("focal length", pair({k[0], k[1]}, "px"));
+  line("principal point", pair({k[2], k[3]}, "px"));
+  std::string distortion;
+  for (std::size_t i = 4; i < k.size(); ++i) {
+    distortion.append(i > 4 ? ", " : "").append(six_digits(k[i]));
+  }
+  if (!distortion.empty()) line("distortion", distortion);
+  if (camera.pixel_pitch_m) line("pixel pitch", six_digits(1e6 * *camera.pixel_pitch_m) + " um");
+  if (camera.row_time_s) line("row time", six_digits(1e6 * *camera.row_time_s) + " us");
+  if (camera.readout) line("read-out", *camera.readout == Readout::rows ? "rows" : "columns");
+  return html_table(table);
+}
+
+std::string intrinsics_table(const IntrinsicsReport& report) {
+  HtmlTable table{"Lens calibration",
+                  {},
+                  {{"views of the board", std::to_string(report.views)},
+                   {"corners", std::to_string(report.corners)},
+                   {"outliers", std::to_string(report.outliers)},
+                   {"residual, rms per axis", significant(report.rms_px, 3) + " px"}}};
+  if (report.uncertainty_px) {
+    table.rows.push_back({"worst uncertainty of the projection, one standard deviation",
+                          significant(*report.uncertainty_px, 3) + " px"});
+  }
+  if (report.board_warp_m) {
+    const auto& [x_m, y_m] = *report.board_warp_m;
+    table.rows.push_back({"deflection of the board along x, y",
+                          significant(1e3 * x_m, 3) + ", " + significant(1e3 * y_m, 3) + " mm"});
+  }
+  return html_table(table);
+}
+
+std::string rotation_table(const RotationCenter& center) {
+  const Eigen::Vector3d& up = center.zenith_in_camera;
+  const double tilt_rad = std::atan2(up.head<2>().norm(), up.z());
+  HtmlTable table{"",
+                  {},
+                  {{"rotation centre in the undistorted image",
+                    pair(center.center_px, "px") + deviations(center.covariance, 1, "px")},
+                   {"tilt of the camera", significant(deg_from_rad(tilt_rad), 4) + " degrees"},
+                   {"correction", center.model == RotationModel::tilt ? "tilt" : "shift"}}};
+  if (center.lever_arm_m) {
+    table.rows.push_back({"from the axis of rotation to the camera",
+                          pair(1e3 * *center.lever_arm_m, "mm") +
+                              deviations(center.lever_arm_covariance, 1e3, "mm")});
+  }
+  return html_table(table);
+}
+
+std::string dispersion_table(const Dispersion& dispersion) {
+  const auto mm = [](double value_m) { return significant(1e3 * value_m, 3); };
+  return html_table(
+      {"",
+       {},
+       {{"captures at the station", std::to_string(dispersion.captures)},
+        {"radius of the circle before", mm(dispersion.radius_m) + " mm"},
+        {"its centre from the station",
+         mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
+        {"offset taken off the image",
+         pair(dispersion.offset_px, "px") + deviations(dispersion.covariance, 1, "px")}}});
+}
+
+std::string history_list(const std::vector<HistoryEntry>& entries) {
+  constexpr std::size_t most_unfolded = 8;
+  std::string html;
+  for (const auto& entry : entries) {
+    html += entry.inputs.size() > most_unfolded ? "<details>\n" : "<details open>\n";
+    html += html_element("summary", entry.part + ": " + entry.program + " " + entry.version + ", " +
+                                        std::to_string(entry.inputs.size()) +
+                                        (entry.inputs.size() == 1 ? " input" : " inputs"));
+    if (!entry.options.empty()) {
+      html += "<p>Options: <code>" + html_text(entry.options) + "</code></p>\n";
+    }
+    HtmlTable table{"", {"input", "SHA-256"}, {}};
+    for (const auto& [file, sha256] : entry.inputs) table.rows.push_back({file, sha256});
+    if (!table.rows.empty()) html += "<div class=\"digests\">\n" + html_table(table) + "</div>\n";
+    html += "</details>\n";
+  }
+  return html;
+}
+
+}  // namespace vlp

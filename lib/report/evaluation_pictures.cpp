@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/evaluation_pictures.h"
+
+#include "report/plots/cdf_plot.h"
+#include "report/plots/error_plot.h"
+#include "report/plots/round_numbers.h"
+#include "report/plots/track_plot.h"
+
+namespace vlp {
+namespace {
+
+Eigen::Vector2d place_m(const FixRow& row) { return row.fix->pose.position_m.head<2>(); }
+
+ErrorPlot floor_of(const EvaluationInput& input, const std::vector<FixError>& errors,
+                   const LampMap& lamps) {
+  ErrorPlot plot{"Fixes on the floor", {}, {}, lamps};
+  std::vector<bool> found(input.truth ? input.truth->rows.size() : 0);
+  plot.fixes.reserve(errors.size());
+  for (const FixError& error : errors) {
+    const Eigen::Vector2d fix_m = place_m(input.fixes.rows[error.fix]);
+    plot.fixes.push_back({fix_m - error.horizontal_m, fix_m});
+    if (input.truth) found[error.truth] = true;
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!found[i]) plot.missing_m.push_back(input.truth->rows[i].xy_m);
+  }
+  return plot;
+}
+
+}  // namespace
+
+std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
+                                               const Evaluation& evaluation, const LampMap& lamps) {
+  const std::vector<FixError> errors = errors_of(input, input.fixes).errors;
+  std::vector<ReportPicture> pictures;
+  if (!input.line_m) {
+    pictures.push_back(report_picture(drawing_of(floor_of(input, errors, lamps))));
+  } else if (evaluation.fit) {
+    pictures.push_back(drive_picture("Drive", input.fixes.rows, *input.line_m, *evaluation.fit));
+  }
+  CdfPlot::Curve curve{"fixes", {}, evaluation.horizontal_m.median, evaluation.horizontal_m.p90};
+  curve.errors_m.reserve(errors.size());
+  for (const FixError& error : errors) curve.errors_m.push_back(error.horizontal_m.norm());
+  pictures.push_back(report_picture(drawing_of(CdfPlot{"Horizontal errors", {curve}})));
+  pictures.back().alt += " Half of the fixes are no further off than " + in_mm(curve.p50_m) +
+                         ", nine tenths no further than " + in_mm(curve.p90_m) + ".";
+  return pictures;
+}
+
+ReportPicture drive_picture(const std::string& title, const std::vector<FixRow>& fixes,
+                            const CommandedLine& commanded_m, const LineFit& fit) {
+  TrackPlot plot{title, commanded_m, {}, fit.line_m};
+  for (const FixRow& row : fixes) {
+    if (row.fix) plot.fixes_m.push_back(place_m(row));
+  }
+  ReportPicture picture = report_picture(drawing_of(plot));
+  picture.caption = title + ". " + picture.caption;
+  picture.alt = title + ". " + picture.alt + " The fitted line is off by " +
+                in_mm(fit.distances_m.mean) + " on average.";
+  return picture;
+}
+
+}  // namespace vlp

@@ -1,0 +1,23 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "evaluation/evaluation.h"
+#include "report/report_picture.h"
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// Errors on the floor and their distribution; with a commanded line the drive along it instead of
+/// the floor. Throws InputError, see svg_of(). Precondition: there is a fix.
+std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
+                                               const Evaluation& evaluation, const LampMap& lamps);
+
+/// A drive along a commanded line. Precondition: `fit` is that of the fixes.
+ReportPicture drive_picture(const std::string& title, const std::vector<FixRow>& fixes,
+                            const CommandedLine& commanded_m, const LineFit& fit);
+
+}  // namespace vlp

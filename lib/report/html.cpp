@@ -1,0 +1,100 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/html.h"
+
+#include <openssl/evp.h>
+
+#include <algorithm>
+
+namespace vlp {
+namespace {
+
+std::string base64(const std::string& bytes) {
+  constexpr std::size_t group = 3, letters = 4;
+  std::string text((bytes.size() + group - 1) / group * letters + 1, '\0');  // and a final zero
+  // The library's interface is C's: it wants unsigned characters.
+  const int length = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                                     reinterpret_cast<const unsigned char*>(bytes.data()),
+                                     static_cast<int>(bytes.size()));
+  text.resize(static_cast<std::size_t>(length));
+  return text;
+}
+
+}  // namespace
+
+std::string html_text(std::string_view text) {
+  constexpr unsigned char first_printable = 0x20, del = 0x7f;
+  std::string escaped;
+  escaped.reserve(text.size());
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      case '\n':
+      case '\t':
+        escaped += ' ';
+        break;
+      default:
+        escaped += byte < first_printable || byte == del ? "\xef\xbf\xbd" : std::string(1, c);
+    }
+  }
+  return escaped;
+}
+
+std::string html_element(std::string_view name, std::string_view text) {
+  const std::string tag(name);
+  return "<" + tag + ">" + html_text(text) + "</" + tag + ">\n";
+}
+
+std::string html_table(const HtmlTable& table) {
+  // Who has no mouse can scroll what has the focus.
+  std::string html = "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"" +
+                     html_text(table.caption.empty() ? "Table" : table.caption) + "\">\n<table>\n";
+  if (!table.caption.empty()) html += html_element("caption", table.caption);
+  if (!table.header.empty()) {
+    html += "<thead><tr>";
+    for (const auto& cell : table.header) html += "<th scope=\"col\">" + html_text(cell) + "</th>";
+    html += "</tr></thead>\n";
+  }
+  html += "<tbody>\n";
+  for (std::size_t number = 0; number < table.rows.size(); ++number) {
+    const auto& row = table.rows[number];
+    const bool marked =
+        std::find(table.marked.begin(), table.marked.end(), number) != table.marked.end();
+    html += marked ? "<tr class=\"marked\">" : "<tr>";
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      html += i == 0 ? "<th scope=\"row\">" : "<td>";
+      html += html_text(row[i]);
+      html += i == 0 ? "</th>" : "</td>";
+    }
+    html += "</tr>\n";
+  }
+  return html + "</tbody>\n</table>\n</div>\n";
+}
+
+std::string html_figure(const ReportPicture& picture) {
+  const bool png = picture.image.rfind("\x89PNG", 0) == 0;
+  const std::string large = picture.part == ReportPart::camera ? " class=\"large\"" : "";
+  return "<figure" + large +
+         ">\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Picture\">"
+         "<img alt=\"" +
+         html_text(picture.alt) + "\" src=\"data:image/" + (png ? "png" : "svg+xml") + ";base64," +
+         base64(picture.image) + "\"></div>\n" + html_element("figcaption", picture.caption) +
+         "</figure>\n";
+}
+
+}  // namespace vlp

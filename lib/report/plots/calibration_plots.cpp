@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/calibration_plots.h"
+
+#include <Eigen/Geometry>
+
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
+
+namespace vlp {
+
+IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution) {
+  const BoardProblem& problem = solution.problem;
+  IntrinsicsPlot plot{title, problem.imager_px, {}, 0, {}};
+  const auto residuals_px = residuals_of(problem);
+  for (std::size_t i = 0; i < residuals_px.size(); ++i) {
+    if (!residuals_px[i].allFinite()) continue;
+    const Eigen::Vector3d& point = problem.points[i];
+    plot.corners.push_back({point.head<2>(), residuals_px[i], point.z() <= 0});
+  }
+  const ProjectionUncertainty uncertainty(solution);
+  for (const Eigen::Vector2d& pixel : pixel_grid(problem.imager_px)) {
+    if (pixel.y() == 0) ++plot.cols;
+    plot.sd_px.push_back(uncertainty.worst_px(pixel));
+  }
+  return plot;
+}
+
+RotationPlot plot_of(const std::string& title, const SpotCaptures& spot,
+                     const CircleCenters& circles, const RotationFit& fit, const Camera& camera) {
+  RotationPlot plot{
+      title, {}, fit.center.center_px, undistorted_pixel(camera, Eigen::Vector2d::Zero())};
+  for (const auto& [lamp, height, circle] : circles.circles) {
+    const Eigen::Vector2d radii_px(camera.intrinsics[0], camera.intrinsics[1]);
+    plot.traces.push_back({spot.lamps[lamp].id,
+                           {},
+                           undistorted_pixel(camera, circle.circle.center),
+                           circle.circle.radius * radii_px});
+    for (const SpotSighting& sighting : spot.sightings) {
+      if (sighting.lamp != lamp || spot.captures[sighting.capture].height != height) continue;
+      plot.traces.back().places_px.push_back(undistorted_pixel(camera, sighting.ray.hnormalized()));
+    }
+  }
+  return plot;
+}
+
+DispersionPlot plot_of(const std::string& title, const DispersionFit& fit) {
+  DispersionPlot plot{title, {{}, fit.before}, {{}, fit.after}, {}};
+  for (const auto& fix : fit.fixes) {
+    if (fix.used) {
+      plot.before.errors_m.push_back(fix.before_m);
+      plot.after.errors_m.push_back(fix.after_m);
+    } else {
+      plot.outliers_m.push_back(fix.before_m);
+    }
+  }
+  return plot;
+}
+
+}  // namespace vlp

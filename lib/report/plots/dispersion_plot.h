@@ -1,0 +1,33 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "geometry/circle_fit.h"
+#include "report/plots/gnuplot.h"
+
+namespace vlp {
+
+/// Fixes about a known station, in the world: Chen and Guan, figure 6.
+struct DispersionPlot {
+  std::string title;
+  /// Some fixes minus station, in metres, and the circle around them.
+  struct Fixes {
+    std::vector<Eigen::Vector2d> errors_m;
+    Circle circle;
+  };
+  Fixes before, after;
+  /// Left out: as they are before.
+  std::vector<Eigen::Vector2d> outliers_m;
+};
+
+/// Draws it in millimetres, .png or .svg by the ending. Throws InputError, see draw().
+void draw_dispersion_plot(const std::filesystem::path& picture, const DispersionPlot& plot);
+/// The same before it is drawn.
+Drawing drawing_of(const DispersionPlot& plot);
+
+}  // namespace vlp

@@ -1,0 +1,163 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/error_plot.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "captures/csv_writer.h"
+#include "report/plots/plot_parts.h"
+#include "report/plots/round_numbers.h"
+#include "report/plots/thinning.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kMostArrows = 500, kFurthest = 20, kMostMissing = 200;
+constexpr double kLongestShare = 0.25;
+
+double error_m(const ErrorPlot::Fix& fix) { return (fix.fix_m - fix.truth_m).norm(); }
+
+std::vector<double> errors_of(const ErrorPlot& plot) {
+  std::vector<double> errors_m;
+  errors_m.reserve(plot.fixes.size());
+  for (const auto& fix : plot.fixes) errors_m.push_back(error_m(fix));
+  return errors_m;
+}
+
+/// Nine tenths of the errors are no larger; 0 for none.
+double p90_of(std::vector<double> errors_m) {
+  if (errors_m.empty()) return 0;
+  const auto nth = errors_m.begin() + static_cast<std::ptrdiff_t>((errors_m.size() - 1) * 9 / 10);
+  std::nth_element(errors_m.begin(), nth, errors_m.end());
+  return *nth;
+}
+
+/// The plan, how much longer the arrows are, and the paper that holds them all.
+struct Scale {
+  double width_m, p90_m, times;
+  Eigen::AlignedBox2d paper;
+
+  explicit Scale(const ErrorPlot& plot) : p90_m(p90_of(errors_of(plot))) {
+    for (const auto& fix : plot.fixes) paper.extend(fix.truth_m);
+    for (const auto& place_m : plot.missing_m) paper.extend(place_m);
+    for (const Lamp& lamp : plot.lamps.lamps) paper.extend(lamp.position_m.head<2>());
+    if (paper.isEmpty()) paper.extend(Eigen::Vector2d::Zero());
+    constexpr double least_m = 1e-3;
+    width_m = std::max(paper.sizes().maxCoeff(), least_m);
+    times = error_magnification(p90_m, width_m);
+  }
+  double longest_m() const { return kLongestShare * width_m / times; }
+};
+
+/// The data blocks; `scale.paper` grows by the arrows.
+struct Blocks {
+  std::string arrows, cut, places, missing, lamps;
+
+  Blocks(const ErrorPlot& plot, std::size_t step, Scale& scale) {
+    for (const std::size_t i : thinned(errors_of(plot), step, step > 1 ? kFurthest : 0)) {
+      const Eigen::Vector2d& from_m = plot.fixes[i].truth_m;
+      const double length_m = error_m(plot.fixes[i]), longest_m = scale.longest_m();
+      Eigen::Vector2d arrow_m = scale.times * (plot.fixes[i].fix_m - from_m);
+      if (length_m > longest_m) arrow_m *= longest_m / length_m;
+      (length_m > longest_m ? cut : arrows) +=
+          data_row({from_m.x(), from_m.y(), arrow_m.x(), arrow_m.y()});
+      places += data_row({from_m.x(), from_m.y()});
+      scale.paper.extend(from_m + arrow_m);
+    }
+    const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMostMissing);
+    for (std::size_t i = 0; i < plot.missing_m.size(); i += missing_step) {
+      missing += data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
+    }
+    for (const auto& [id, position_m, diameter, frequency, duty] : plot.lamps.lamps) {
+      lamps += data_row({position_m.x(), position_m.y(), double(id)});
+    }
+  }
+  std::string text() const {
+    return data_block("arrows", arrows) + data_block("cut", cut) + data_block("places", places) +
+           data_block("missing", missing) + data_block("lamps", lamps);
+  }
+};
+
+/// A bar at the lower left, in the room below the plan.
+std::string bar(const Scale& scale, const Eigen::Vector2d& from_m) {
+  if (!(scale.p90_m > 0)) return "";
+  const double length_m = round_below(1.5 * scale.p90_m);
+  const auto at = [&](double x_m) {
+    return significant(x_m, 7) + "," + significant(from_m.y(), 7);
+  };
+  const double end_m = from_m.x() + scale.times * length_m;
+  return "set arrow from " + at(from_m.x()) + " to " + at(end_m) +
+         " heads size graph 0.01,90 linewidth 2 front\nset label '" + in_mm(length_m) + "' at " +
+         at(end_m) + " offset 1,0 front\n";
+}
+
+std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& scale) {
+  const auto color = [](const char* name) { return std::string(" linecolor rgb '") + name + "' "; };
+  const std::string arrow =
+      " using 1:2:3:4 with vectors filled head size graph 0.012,20 linewidth ";
+  const auto cut = std::count_if(plot.fixes.begin(), plot.fixes.end(),
+                                 [&](const auto& fix) { return error_m(fix) > scale.longest_m(); });
+  std::vector<std::string> layers;
+  if (!blocks.arrows.empty()) {
+    layers.push_back("$arrows" + arrow + "1.3" + color(plot_colors::blue) +
+                     "title 'error of a fix'");
+  }
+  if (!blocks.places.empty()) {
+    layers.emplace_back(
+        "$places using 1:2 with points pointtype 7 pointsize 0.25 linecolor rgb 'black' title "
+        "'truth'");
+  }
+  if (cut > 0) {
+    layers.push_back("$cut" + arrow + "1.5 dashtype 2" + color(plot_colors::vermillion) +
+                     "title '" + std::to_string(cut) + " beyond " + in_mm(scale.longest_m()) +
+                     ", cut short'");
+  }
+  if (!blocks.missing.empty()) {
+    const std::size_t count = plot.missing_m.size(), step = thinning_step(count, kMostMissing);
+    layers.push_back(
+        "$missing using 1:2 with points pointtype 2 linewidth 2" + color(plot_colors::vermillion) +
+        "title 'no fix: " + (step == 1 ? std::to_string(count) : thinning_note(count, step)) + "'");
+  }
+  if (!blocks.lamps.empty()) {
+    layers.push_back("$lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
+                     color(plot_colors::grey) +
+                     "title 'lamps', $lamps using 1:2:(sprintf('%d', int($3))) with labels left "
+                     "offset 1,0.7 notitle");
+  }
+  std::string command;
+  for (const auto& layer : layers) command.append(command.empty() ? "plot " : ", ").append(layer);
+  return command + "\n";
+}
+
+}  // namespace
+
+double error_magnification(double p90_m, double width_m) {
+  constexpr double largest_share = 0.1;
+  return p90_m > 0 ? std::max(1.0, round_below(largest_share * width_m / p90_m)) : 1;
+}
+
+Drawing drawing_of(const ErrorPlot& plot) {
+  Scale scale(plot);
+  const std::size_t step = thinning_step(plot.fixes.size(), kMostArrows);
+  const Blocks blocks(plot, step, scale);
+  const double margin_m = 0.06 * scale.width_m;
+  const Eigen::Vector2d least = scale.paper.min() - Eigen::Vector2d(margin_m, 2 * margin_m),
+                        most = scale.paper.max() + Eigen::Vector2d(margin_m, margin_m);
+  std::string title =
+      plot.title + "\nerrors drawn " + significant(scale.times, 6) + " times as long";
+  const std::string note = thinning_note(plot.fixes.size(), step);
+  if (!note.empty()) title += "; " + note + ", and the 20 largest";
+  constexpr int width_px = 720, beside_px = 90, around_px = 180, smallest_px = 400,
+                largest_px = 900;
+  const double plan_px = (width_px - beside_px) * (most.y() - least.y()) / (most.x() - least.x());
+  return {"errors", width_px,
+          static_cast<int>(std::clamp<double>(plan_px + around_px, smallest_px, largest_px)),
+          blocks.text() + plot_settings() + "set title " + gnuplot_quoted(title) + " noenhanced\n" +
+              bar(scale, {scale.paper.min().x(), scale.paper.min().y() - 1.2 * margin_m}) +
+              "set xlabel 'x (m)'\nset ylabel 'y (m)'\nset size ratio -1\nset xrange " +
+              plot_range(least.x(), most.x()) + "\nset yrange " + plot_range(least.y(), most.y()) +
+              "\n" + layers(plot, blocks, scale)};
+}
+
+}  // namespace vlp

@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/floor_plot.h"
+
+#include "captures/csv_writer.h"
+#include "report/plots/gnuplot.h"
+#include "report/plots/plot_parts.h"
+
+namespace vlp {
+
+void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
+                     const LampMap& lamps) {
+  std::string places, on_floor;
+  for (const auto& place : plot.places) {
+    if (place.value) places += data_row({place.xy_m.x(), place.xy_m.y(), *place.value});
+  }
+  for (const Lamp& lamp : lamps.lamps) {
+    on_floor += data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
+  }
+  const std::string half = significant(plot.step_m / 2, kPlotDigits);
+  const std::string commands =
+      data_block("places", places) + data_block("lamps", on_floor) + plot_settings() +
+      "set title " + gnuplot_quoted(plot.title) +
+      " noenhanced\n"
+      "set cblabel " +
+      gnuplot_quoted(plot.label) +
+      " noenhanced\n"
+      "set xlabel 'x (m)'\n"
+      "set ylabel 'y (m)'\n"
+      "set size ratio -1\n"
+      "set offsets " +
+      half + "," + half + "," + half + "," + half +
+      "\n"
+      "set autoscale fix\n"
+      "plot $places using 1:2:(" +
+      half + "):(" + half +
+      "):3 with boxxyerror fillstyle solid "
+      "linecolor palette notitle, "
+      "$lamps using 1:2 with points pointtype 7 pointsize 1.2 linecolor rgb 'white' notitle, "
+      "$lamps using 1:2 with points pointtype 6 pointsize 1.2 linewidth 2 linecolor rgb 'black' "
+      "title 'lamps', "
+      "$lamps using 1:2:(sprintf('%d', int($3))) with labels boxed offset 0,1.2 notitle\n";
+  draw(picture, {"limits", 900, 700, commands});
+}
+
+}  // namespace vlp

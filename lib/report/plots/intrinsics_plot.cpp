@@ -1,0 +1,163 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/intrinsics_plot.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "captures/csv_writer.h"
+#include "report/plots/plot_parts.h"
+#include "report/plots/round_numbers.h"
+
+namespace vlp {
+namespace {
+
+/// The data, in blocks: corners and outliers as u v du dv, and the map as u v sd.
+std::string data_of(const IntrinsicsPlot& plot) {
+  std::string corners, outliers, map;
+  for (const auto& [seen_px, residual_px, outlier] : plot.corners) {
+    (outlier ? outliers : corners) +=
+        data_row({seen_px.x(), seen_px.y(), residual_px.x(), residual_px.y()});
+  }
+  const auto [width, height] = plot.imager_px;
+  const auto cols = static_cast<std::size_t>(plot.cols), rows = plot.sd_px.size() / cols;
+  for (std::size_t row = 0; row < rows; ++row) {
+    const double v = (height - 1) * double(row) / double(rows - 1);
+    for (std::size_t col = 0; col < cols; ++col) {
+      const double u = (width - 1) * double(col) / double(cols - 1);
+      const double sd_px = plot.sd_px[row * cols + col];
+      map += std::isfinite(sd_px)
+                 ? data_row({u, v, sd_px})
+                 : significant(u, kPlotDigits) + " " + significant(v, kPlotDigits) + " NaN\n";
+    }
+    map += "\n";
+  }
+  return data_block("corners", corners) + data_block("outliers", outliers) + data_block("map", map);
+}
+
+/// For example "12 corners, 3 outliers (crosses)".
+std::string counts(const IntrinsicsPlot& plot, const std::string& outliers) {
+  const auto left_out = std::count_if(plot.corners.begin(), plot.corners.end(),
+                                      [](const auto& corner) { return corner.outlier; });
+  const auto used = static_cast<std::ptrdiff_t>(plot.corners.size()) - left_out;
+  std::string text = std::to_string(used) + " corners";
+  if (left_out > 0) text += ", " + std::to_string(left_out) + " outliers" + outliers;
+  return text;
+}
+
+/// A layer of corners, and one of outliers where there are any.
+std::string layers(const IntrinsicsPlot& plot, const std::string& of_corners,
+                   const std::string& of_outliers) {
+  std::string layers =
+      "plot $corners " + of_corners + " linecolor rgb '" + plot_colors::blue + "' notitle";
+  if (std::any_of(plot.corners.begin(), plot.corners.end(),
+                  [](const auto& corner) { return corner.outlier; })) {
+    layers +=
+        ", $outliers " + of_outliers + " linecolor rgb '" + plot_colors::vermillion + "' notitle";
+  }
+  return layers + "\n";
+}
+
+double rms_px(const IntrinsicsPlot& plot) {
+  double squares = 0, count = 0;
+  for (const auto& corner : plot.corners) {
+    if (corner.outlier) continue;
+    squares += corner.residual_px.squaredNorm();
+    count += 2;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
+/// Colours by the logarithm, and lines at round numbers.
+std::string map_of(const IntrinsicsPlot& plot) {
+  double least = INFINITY, most = 0;
+  for (const double sd_px : plot.sd_px) {
+    if (!std::isfinite(sd_px) || !(sd_px > 0)) continue;
+    least = std::min(least, sd_px);
+    most = std::max(most, sd_px);
+  }
+  if (most == 0) return "plot NaN title 'not determined'\n";
+  const auto levels = round_numbers(least, most);
+  std::string tics, lines;
+  for (const double level : levels) {
+    const std::string text = significant(level, kPlotDigits);
+    tics.append(tics.empty() ? "" : ",").append(text);
+    if (level > least && level < most) lines.append(lines.empty() ? "" : ",").append(text);
+  }
+  std::string commands;
+  if (!lines.empty()) {
+    commands = "set contour base\nunset surface\nset cntrparam levels discrete " + lines +
+               "\nset table $lines\nsplot $map using 1:2:3\nunset table\nunset contour\n";
+  }
+  const auto rows = plot.sd_px.size() / static_cast<std::size_t>(plot.cols);
+  const std::string half_u =
+                        significant((plot.imager_px[0] - 1) / 2.0 / (plot.cols - 1), kPlotDigits),
+                    half_v =
+                        significant((plot.imager_px[1] - 1) / 2.0 / double(rows - 1), kPlotDigits);
+  commands += "set cbrange [" + significant(levels.front(), kPlotDigits) + ":" +
+              significant(levels.back(), kPlotDigits) + "]\nset cbtics (" + tics +
+              ")\nset logscale cb\nset cblabel 'standard deviation (px)'\n"
+              "plot $map using 1:2:(" +
+              half_u + "):(" + half_v +
+              "):3 with boxxyerror fillstyle solid linecolor palette notitle";
+  if (!lines.empty()) {
+    // Room for the labels.
+    const auto away = [](const char* column, int size_px) {
+      return "abs(" + std::string(column) + " / " + std::to_string(size_px) + " - 0.5) < 0.44";
+    };
+    const std::string inside =
+        away("$1", plot.imager_px[0]) + " && " + away("$2", plot.imager_px[1]);
+    commands +=
+        ", $lines using 1:2 with lines linewidth 1.5 linecolor rgb 'white' notitle"
+        ", $lines using (" +
+        inside + " ? $1 : NaN):2:(sprintf('%g', $3)) every 1000::3 with labels boxed notitle";
+  }
+  return commands + "\n";
+}
+
+}  // namespace
+
+double residual_magnification(double rms_px, int width_px) {
+  return rms_px > 0 ? round_below(width_px / 40.0 / rms_px) : 1;
+}
+
+Drawing drawing_of(const IntrinsicsPlot& plot) {
+  assert(plot.cols >= 2 && plot.sd_px.size() >= 2 * static_cast<std::size_t>(plot.cols));
+  const auto [width, height] = plot.imager_px;
+  const std::string times = significant(residual_magnification(rms_px(plot), width), kPlotDigits);
+  const std::string arrows =
+      "using 1:2:($3 * " + times + "):($4 * " + times + ") with vectors nohead ";
+  const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.18";
+  const std::string commands =
+      data_of(plot) + plot_settings() +
+      "set size ratio -1\n"
+      "set xrange [-0.5:" +
+      significant(width - 0.5, kPlotDigits) +
+      "]\n"
+      "set yrange [" +
+      significant(height - 0.5, kPlotDigits) +
+      ":-0.5]\n"  // as in the image
+      "set xlabel 'u (px)'\n"
+      "set ylabel 'v (px)'\n"
+      "set multiplot layout 2,2 margins 0.1,0.9,0.08,0.88 spacing 0.13,0.2 title " +
+      gnuplot_quoted(plot.title) +
+      " noenhanced\n"
+      "set title " +
+      gnuplot_quoted("corners of all views\n" + counts(plot, " (crosses)")) + "\n" +
+      layers(plot, dots, "using 1:2 with points pointtype 2 pointsize 1.2 linewidth 2") +
+      "set title " +
+      gnuplot_quoted("residuals, seen minus projected, " + times + " times as long\n" +
+                     counts(plot, " (thick)")) +
+      "\n" +
+      layers(plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
+             arrows + "linewidth 2") +
+      "set title 'uncertainty of the projection'\n" + map_of(plot) + "unset multiplot\n";
+  return {"intrinsics", 900, 280 + 720 * height / width, commands};
+}
+
+void draw_intrinsics_plot(const std::filesystem::path& picture, const IntrinsicsPlot& plot) {
+  draw(picture, drawing_of(plot));
+}
+
+}  // namespace vlp

@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "report/plots/gnuplot.h"
+
+namespace vlp {
+
+/// Lamps while the camera turns on the spot, in the undistorted image (the figure 4 of Chen and
+/// Guan).
+struct RotationPlot {
+  /// Of a lamp at one height, with the ellipse fitted to it.
+  struct Trace {
+    int lamp;
+    std::vector<Eigen::Vector2d> places_px;
+    Eigen::Vector2d center_px;
+    Eigen::Vector2d radii_px;
+  };
+  std::string title;
+  std::vector<Trace> traces;
+  Eigen::Vector2d rotation_center_px;
+  Eigen::Vector2d principal_point_px;
+};
+
+/// Draws the traces, and beside them, enlarged, the centres of the ellipses, the rotation centre
+/// and the principal point; .png or .svg by the ending. Throws InputError, see draw().
+void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot& plot);
+/// The same before it is drawn.
+Drawing drawing_of(const RotationPlot& plot);
+
+}  // namespace vlp

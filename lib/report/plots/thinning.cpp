@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/thinning.h"
+
+#include <algorithm>
+#include <cassert>
+#include <numeric>
+
+namespace vlp {
+namespace {
+
+/// "2nd", "11th".
+std::string ordinal(std::size_t number) {
+  const bool teen = number / 10 % 10 == 1;
+  const std::size_t last = teen ? 0 : number % 10;
+  return std::to_string(number) + (last == 1 ? "st" : last == 2 ? "nd" : last == 3 ? "rd" : "th");
+}
+
+}  // namespace
+
+std::size_t thinning_step(std::size_t count, std::size_t most) {
+  assert(most > 0);
+  return count <= most ? 1 : (count + most - 1) / most;
+}
+
+std::string thinning_note(std::size_t count, std::size_t step) {
+  if (step == 1) return "";
+  return "every " + ordinal(step) + " of " + std::to_string(count) + " drawn";
+}
+
+std::vector<std::size_t> thinned(std::span<const double> values, std::size_t step,
+                                 std::size_t largest) {
+  std::vector<std::size_t> all(values.size()), chosen;
+  std::iota(all.begin(), all.end(), 0);
+  for (std::size_t i = 0; i < values.size(); i += step) chosen.push_back(i);
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(largest, all.size()));
+  std::partial_sort(all.begin(), end, all.end(), [&](std::size_t a, std::size_t b) {
+    return values[a] != values[b] ? values[a] > values[b] : a < b;
+  });
+  chosen.insert(chosen.end(), all.begin(), end);
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+}  // namespace vlp

@@ -1,0 +1,116 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/track_plot.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cassert>
+
+#include "captures/csv_writer.h"
+#include "report/plots/plot_parts.h"
+#include "report/plots/round_numbers.h"
+#include "report/plots/thinning.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kMostFixes = 2000;
+
+/// Frame of the commanded line: from its start along it and to its left.
+struct LineFrame {
+  Eigen::Vector2d start_m, along;
+
+  explicit LineFrame(const std::array<Eigen::Vector2d, 2>& line_m)
+      : start_m(line_m[0]), along((line_m[1] - line_m[0]).normalized()) {}
+
+  Eigen::Vector2d of(const Eigen::Vector2d& in_world_m) const {
+    const Eigen::Vector2d from_start_m = in_world_m - start_m;
+    return {along.dot(from_start_m), along.x() * from_start_m.y() - along.y() * from_start_m.x()};
+  }
+};
+
+/// x and y in the world, metres along the commanded line, millimetres to its left.
+std::string row_of(const LineFrame& frame, const Eigen::Vector2d& point_m) {
+  const Eigen::Vector2d in_line_m = frame.of(point_m);
+  return data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
+}
+
+/// All three, for the columns of the data.
+std::string layers(const std::string& columns) {
+  const auto color = [](const char* name) { return std::string(" linecolor rgb '") + name + "' "; };
+  return "plot $commanded using " + columns + " with lines linewidth 2 linecolor rgb 'black' " +
+         "title 'commanded', $fixes using " + columns + " with points pointtype 7 pointsize 0.35" +
+         color(plot_colors::blue) + "title 'fixes', $fitted using " + columns +
+         " with lines linewidth 2 dashtype 2" + color(plot_colors::vermillion) +
+         "title 'fitted line'\n";
+}
+
+}  // namespace
+
+Drawing drawing_of(const TrackPlot& plot) {
+  assert(plot.commanded_m[0] != plot.commanded_m[1] && plot.fitted_m[0] != plot.fitted_m[1]);
+  assert(!plot.fixes_m.empty());
+  const LineFrame frame(plot.commanded_m);
+  const std::size_t step = thinning_step(plot.fixes_m.size(), kMostFixes);
+  std::string commanded, fixes, fitted;
+  Eigen::AlignedBox2d floor, along(Eigen::Vector2d::Zero());
+  for (const auto& point_m : plot.commanded_m) {
+    commanded += row_of(frame, point_m);
+    floor.extend(point_m);
+    along.extend(frame.of(point_m));
+  }
+  for (std::size_t i = 0; i < plot.fixes_m.size(); i += step) {
+    fixes += row_of(frame, plot.fixes_m[i]);
+    floor.extend(plot.fixes_m[i]);
+    along.extend(frame.of(plot.fixes_m[i]));
+  }
+  // Drawn as far as the fixes go, wherever its two points are: a drive that ends early shows.
+  const LineFrame fitted_frame(plot.fitted_m);
+  const auto along_fitted_m = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return fitted_frame.of(a).x() < fitted_frame.of(b).x();
+  };
+  const auto [first, last] =
+      std::minmax_element(plot.fixes_m.begin(), plot.fixes_m.end(), along_fitted_m);
+  for (const auto& end_m : {*first, *last}) {
+    const Eigen::Vector2d foot_m =
+        fitted_frame.start_m + fitted_frame.of(end_m).x() * fitted_frame.along;
+    fitted += row_of(frame, foot_m);
+    floor.extend(foot_m);
+    along.extend(frame.of(foot_m));
+  }
+  constexpr double margin = 0.1;
+  const double around_m = margin * floor.sizes().maxCoeff();
+  const Eigen::Vector2d low = floor.min().array() - around_m, high = floor.max().array() + around_m;
+  const Eigen::Vector2d sizes_m = high - low;
+  const std::string tics = significant(round_below(sizes_m.maxCoeff() / 4), 7);
+  constexpr double width_px = 620, around_px = 60, below_px = 430;
+  constexpr double smallest_px = 60, largest_px = 420;
+  const double plan_px = std::clamp(width_px * sizes_m.y() / sizes_m.x(), smallest_px, largest_px),
+               height_px = around_px + plan_px + below_px;
+  const auto from_bottom = [&](double y_px) { return significant(y_px / height_px, 4); };
+  const double aside_mm = 1e3 * (along.sizes().y() * 0.15 + 1e-6);
+  const std::string note = thinning_note(plot.fixes_m.size(), step);
+  return {"track", 720, static_cast<int>(height_px),
+          data_block("commanded", commanded) + data_block("fixes", fixes) +
+              data_block("fitted", fitted) + plot_settings() + "set multiplot title " +
+              gnuplot_quoted(note.empty() ? plot.title : plot.title + "\n" + note) +
+              " noenhanced\n"
+              "set lmargin at screen 0.12\nset rmargin at screen 0.98\nset bmargin at screen " +
+              from_bottom(below_px) + "\nset tmargin at screen " + from_bottom(below_px + plan_px) +
+              "\nset size ratio -1\nset xtics " + tics + "\nset ytics " + tics +
+              "\nset xlabel 'x (m)'\nset ylabel 'y (m)'\nunset key\nset xrange " +
+              plot_range(low.x(), high.x()) + "\nset yrange " + plot_range(low.y(), high.y()) +
+              "\n" + layers("1:2") + "set bmargin at screen " + from_bottom(100) +
+              "\nset tmargin at screen " + from_bottom(below_px - 85) +
+              "\nset size noratio\nset xtics autofreq\nset ytics autofreq\nset key horizontal Left "
+              "reverse center at screen 0.54, screen " +
+              from_bottom(22) +
+              " maxrows 1\nset "
+              "xlabel 'along the commanded line (m)'\n"
+              "set ylabel 'to its left (mm)'\nset xrange " +
+              plot_range(along.min().x() - around_m, along.max().x() + around_m) + "\nset yrange " +
+              plot_range(1e3 * along.min().y() - aside_mm, 1e3 * along.max().y() + aside_mm) +
+              "\n" + layers("3:4") + "unset multiplot\n"};
+}
+
+}  // namespace vlp

@@ -1,0 +1,115 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/report.h"
+
+#include <algorithm>
+
+#include "captures/csv_writer.h"
+#include "report/calibration_sections.h"
+#include "report/html.h"
+#include "report/report_style.h"
+
+namespace vlp {
+namespace {
+
+/// No-break: a unit stays with its number.
+const std::string kSpace = "\u00a0";
+
+/// Nothing when the body is empty.
+std::string section(const std::string& heading, const std::string& body) {
+  if (body.empty()) return "";
+  return "<section>\n" + html_element("h2", heading) + body + "</section>\n";
+}
+
+std::string with_unit(const std::string& text, const std::string& unit) {
+  return text.empty() || unit.empty() ? text : text + kSpace + unit;
+}
+
+std::string quantity(const std::optional<double>& value, const std::string& unit) {
+  return value ? with_unit(significant(*value, 4), unit) : "none";
+}
+
+std::vector<std::string> row_of(const CheckedMetric& gate) {
+  const std::string result = gate.met() ? "met" : "NOT\u00a0MET";
+  return {gate.name, quantity(gate.value, gate.unit),
+          words_of(gate.asked) + kSpace + quantity(gate.limit, gate.unit), result};
+}
+
+std::string verdict(const std::vector<CheckedMetric>& gates, const std::string& caution) {
+  if (gates.empty()) {
+    return "<div class=\"verdict none\"><strong>NO VERDICT</strong>No gates were set.</div>\n";
+  }
+  const auto missed =
+      std::count_if(gates.begin(), gates.end(), [](const auto& gate) { return !gate.met(); });
+  const std::string count = std::to_string(gates.size());
+  const std::string of_gates = gates.size() == 1 ? " gate" : " gates";
+  const std::string reason = missed == 0
+                                 ? "Every figure is within its limit (" + count + of_gates + ")."
+                                 : std::to_string(missed) + " of " + count + of_gates +
+                                       (missed == 1 ? " is" : " are") + " not met.";
+  HtmlTable table{"Gates", {"gate", "figure", "limit", "result"}, {}};
+  for (const auto& gate : gates) {
+    if (!gate.met()) table.marked.push_back(table.rows.size());
+    table.rows.push_back(row_of(gate));
+  }
+  return std::string("<div class=\"verdict ") + (missed == 0 ? "pass" : "fail") + "\"><strong>" +
+         (missed == 0 ? "PASS" : "FAIL") + "</strong>" + reason +
+         (caution.empty() ? "" : html_element("p", caution)) + "</div>\n" + html_table(table);
+}
+
+std::string figures_of(const Report& report) {
+  std::string html;
+  if (!report.figures.empty()) {
+    HtmlTable table{"", {"figure", "value", "95 % confidence interval"}, {}};
+    for (const auto& [label, value, unit, interval] : report.figures) {
+      table.rows.push_back({label, with_unit(value, unit), with_unit(interval, unit)});
+    }
+    html += html_table(table);
+  }
+  for (const auto& note : report.notes) html += html_element("p", note);
+  return html;
+}
+
+std::string pictures_of(const Report& report, ReportPart part) {
+  std::string html;
+  for (const auto& picture : report.pictures) {
+    if (picture.part == part) html += html_figure(picture);
+  }
+  return html;
+}
+
+std::string history_of(const Report& report) {
+  std::vector<HistoryEntry> entries;
+  if (report.calibration) entries = report.calibration->history;
+  if (report.evaluation) entries.push_back(*report.evaluation);
+  return history_list(entries);
+}
+
+}  // namespace
+
+std::string report_html(const Report& report) {
+  std::string camera, rotation, dispersion;
+  if (const auto& calibration = report.calibration) {
+    camera = camera_table(calibration->camera);
+    if (calibration->intrinsics_report) camera += intrinsics_table(*calibration->intrinsics_report);
+    if (calibration->rotation_center) rotation = rotation_table(*calibration->rotation_center);
+    if (calibration->dispersion) dispersion = dispersion_table(*calibration->dispersion);
+  }
+  const auto pictures = [&](ReportPart part) { return pictures_of(report, part); };
+  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n" +
+         html_element("title", report.title) + "<style>" + std::string(kReportStyle) +
+         "</style>\n</head>\n<body>\n<header>\n" + html_element("h1", report.title) +
+         "</header>\n<main>\n" + verdict(report.gates, report.caution) +
+         section("Figures", figures_of(report)) +
+         section("Camera", camera + pictures(ReportPart::camera)) +
+         section("Rotation centre", rotation + pictures(ReportPart::rotation)) +
+         section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
+         section("Fixes on the floor", pictures(ReportPart::floor)) +
+         section("Distribution of the errors", pictures(ReportPart::distribution)) +
+         section("Moving tracks", pictures(ReportPart::tracks)) +
+         section("More pictures", pictures(ReportPart::other)) +
+         section("History", history_of(report)) + "</main>\n</body>\n</html>\n";
+}
+
+}  // namespace vlp

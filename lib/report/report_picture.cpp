@@ -1,0 +1,114 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/report_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <pugixml.hpp>
+#include <string_view>
+
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kMostBytes = std::size_t{16} << 20;
+
+struct Kind {
+  std::string_view title;
+  ReportPart part;
+  std::string_view caption, alt;
+};
+
+constexpr std::array<Kind, 7> kKinds = {
+    {{"intrinsics", ReportPart::camera,
+      "Coverage: the corners of all views should reach the edges of the image. Residuals: short "
+      "and "
+      "without a pattern; long arrows that point the same way mean a lens that is not modelled "
+      "well. "
+      "Uncertainty: how far the projection can be trusted, by one standard deviation.",
+      "Three maps of the image: corners of the board in all views, their residuals enlarged, and "
+      "the "
+      "standard deviation of the projection."},
+     {"rotation", ReportPart::rotation,
+      "Left: the lamps while the camera turns on the spot; each goes round an ellipse. Right, "
+      "enlarged: the centres of the ellipses, by lamp, with the rotation centre and the principal "
+      "point. Centres far apart are a sign of tilt.",
+      "Traces of the lamps in the undistorted image with fitted ellipses, and beside them the "
+      "centres of the ellipses, the rotation centre and the principal point."},
+     {"dispersion", ReportPart::dispersion,
+      "Fixes at a known station minus the station, before and after the dispersion calibration, "
+      "each "
+      "with the smallest circle around them. The circle after should be the smaller.",
+      "Errors of fixes about the station with their dispersion circles, before and after."},
+     {"errors", ReportPart::floor,
+      "Arrows from where the captures were towards their fixes, enlarged as the title says; the "
+      "bar "
+      "below the plan has the scale.",
+      "Floor plan with the lamps and an enlarged error arrow at each true place."},
+     {"cdf", ReportPart::distribution,
+      "The share of fixes that are no further off than so much; marks at half and at nine tenths.",
+      "Cumulative distribution of the horizontal errors."},
+     {"track", ReportPart::tracks,
+      "Above: the commanded line and the fixes on the floor. Below: how far they are to the left "
+      "of "
+      "the commanded line, in millimetres; what scatters about the fitted line is jitter.",
+      "Commanded line, fixes and the line fitted to them, on the floor and across the line."},
+     {"limits", ReportPart::other,
+      "What accuracy the room and the camera allow over the floor, by one standard deviation.",
+      "Map of the theoretical limit over the floor with the lamps."}}};
+
+/// Between <title> and </title>; empty without.
+std::string_view svg_title(std::string_view svg) {
+  constexpr std::string_view opening = "<title>";
+  const std::size_t start = svg.find(opening);
+  if (start == std::string_view::npos) return {};
+  const std::size_t end = svg.find("</title>", start);
+  return svg.substr(start + opening.size(), end - start - opening.size());
+}
+
+/// It ends in the chunk IEND and its check sum.
+bool is_whole_png(std::string_view png) {
+  constexpr std::string_view end("IEND\xAE\x42\x60\x82");
+  return png.ends_with(end);
+}
+
+bool is_whole_svg(const std::string& svg) {
+  pugi::xml_document document;
+  return document.load_buffer(svg.data(), svg.size()) && document.child("svg").first_child();
+}
+
+ReportPicture picture_of(std::string image, const std::string& name) {
+  const std::string_view title = svg_title(image);
+  const auto* kind = std::find_if(kKinds.begin(), kKinds.end(),
+                                  [&](const Kind& other) { return other.title == title; });
+  if (kind == kKinds.end()) return {ReportPart::other, std::move(image), name, "Picture " + name};
+  return {kind->part, std::move(image), std::string(kind->caption), std::string(kind->alt)};
+}
+
+}  // namespace
+
+ReportPicture read_report_picture(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string image(kMostBytes + 1, '\0');
+  if (!stream) throw InputError(file, "cannot be read");
+  stream.read(image.data(), static_cast<std::streamsize>(image.size()));
+  image.resize(static_cast<std::size_t>(stream.gcount()));
+  if (image.size() > kMostBytes) throw InputError(file, "is longer than 16 MiB; draw less into it");
+  constexpr std::size_t head = 1024;
+  const bool png = image.starts_with("\x89PNG");
+  if (!png && image.substr(0, head).find("<svg") == std::string::npos) {
+    throw InputError(file, "is neither an SVG nor a PNG");
+  }
+  if (png ? !is_whole_png(image) : !is_whole_svg(image)) {
+    throw InputError(file, "is cut short, or holds no picture");
+  }
+  return picture_of(std::move(image), file.filename().string());
+}
+
+ReportPicture report_picture(const Drawing& drawing) {
+  return picture_of(svg_of(drawing), drawing.name);
+}
+
+}  // namespace vlp

@@ -1,0 +1,85 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/error_plot.h"
+
+#include <gmock/gmock.h>
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// A metre wide, errors of 1 mm along x.
+ErrorPlot grid(int fixes) {
+  ErrorPlot plot{"a <floor>", {}, {}, {}};
+  for (int i = 0; i < fixes; ++i) {
+    const Eigen::Vector2d truth_m(double(i) / (fixes - 1), 0.1 * (i % 3));
+    plot.fixes.push_back({truth_m, truth_m + Eigen::Vector2d(0.001, 0)});
+  }
+  return plot;
+}
+
+TEST(ErrorMagnification, MakesErrorsATenthToA25thOfTheFloor) {
+  EXPECT_DOUBLE_EQ(error_magnification(0.001, 1), 100);
+  EXPECT_DOUBLE_EQ(error_magnification(0.0011, 1), 50);
+  EXPECT_DOUBLE_EQ(error_magnification(0.5, 1), 1) << "never smaller than they are";
+  EXPECT_DOUBLE_EQ(error_magnification(0, 1), 1);
+}
+
+TEST(ErrorPlot, DrawsArrowsEnlargedWithTheScale) {
+  const Drawing drawing = drawing_of(grid(11));
+  EXPECT_THAT(drawing.commands, HasSubstr("errors drawn 100 times as long"));
+  EXPECT_THAT(drawing.commands, HasSubstr("0.5 0.2 0.1 0 \n"));
+  EXPECT_THAT(drawing.commands, HasSubstr("'1 mm'"));
+  EXPECT_THAT(drawing.commands, Not(HasSubstr("cut short")));
+  const std::string svg = svg_of(drawing);
+  EXPECT_THAT(svg, HasSubstr("<title>errors</title>"));
+  EXPECT_THAT(svg, HasSubstr("a &lt;floor>"));
+  EXPECT_EQ(svg_of(drawing), svg);
+}
+
+TEST(ErrorPlot, CutsShortWhatWouldLeaveThePaperAndCountsIt) {
+  ErrorPlot plot = grid(31);
+  plot.fixes[3].fix_m.x() += 5;
+  plot.fixes[7].fix_m.y() += 5;
+  const std::string commands = drawing_of(plot).commands;
+  EXPECT_THAT(commands, HasSubstr("2 beyond 2.5 mm, cut short"));
+  EXPECT_THAT(commands, HasSubstr("0.1 0 0.25 0 \n"));
+}
+
+TEST(ErrorPlot, ShowsWhereFixesAreMissingAndTheLamps) {
+  ErrorPlot plot = grid(5);
+  plot.missing_m = {{0.3, 0.3}};
+  plot.lamps.lamps = {{17, {0.4, 0.2, 2}, {}, {}, {}}};
+  const std::string svg = svg_of(drawing_of(plot));
+  EXPECT_THAT(svg, HasSubstr("no fix: 1"));
+  EXPECT_THAT(svg, HasSubstr(">17<"));
+}
+
+TEST(ErrorPlot, SaysThatNotAllMissingFixesAreDrawn) {
+  ErrorPlot plot = grid(5);
+  for (int i = 0; i < 1000; ++i) plot.missing_m.emplace_back(0.001 * i, 0);
+  EXPECT_THAT(drawing_of(plot).commands, HasSubstr("no fix: every 5th of 1000 drawn"));
+}
+
+TEST(ErrorPlot, StaysSmallAndKeepsTheLargestErrors) {
+  ErrorPlot plot = grid(100'000);
+  plot.fixes[12'345].fix_m.y() += 0.0013;
+  const Drawing drawing = drawing_of(plot);
+  EXPECT_THAT(drawing.commands, HasSubstr("every 200th of 100000 drawn, and the 20 largest"));
+  EXPECT_THAT(drawing.commands, HasSubstr("0.1234512 0 0.1 0.13 \n"));
+  EXPECT_LT(svg_of(drawing).size(), 350'000u);  // half a kilobyte an arrow
+}
+
+TEST(ErrorPlot, OfOneFixOrNone) {
+  ErrorPlot plot = grid(2);
+  plot.fixes.pop_back();
+  EXPECT_THAT(svg_of(drawing_of(plot)), HasSubstr("<svg"));
+  plot.fixes.clear();
+  plot.missing_m = {{0, 0}};
+  EXPECT_THAT(svg_of(drawing_of(plot)), HasSubstr("no fix: 1"));
+}
+
+}  // namespace
+}  // namespace vlp

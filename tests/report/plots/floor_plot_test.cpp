@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/floor_plot.h"
+
+#include <gmock/gmock.h>
+
+#include "report/plots/gnuplot.h"
+#include "report/plots/plot_parts.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class FloorPlotTest : public testing::Test {
+ protected:
+  TemporaryFolder folder;
+  LampMap lamps{{{7, {0, 0, 2}, {}, {}, {}}}};
+  FloorPlot plot{"a 'title'", "label (mm)", 0.5, {{{0, 0}, 1.0}, {{0.5, 0}, 2.0}, {{1, 0}, {}}}};
+};
+
+TEST_F(FloorPlotTest, IsAPngOrAnSvgByItsEnding) {
+  draw_floor_plot(folder / "a.png", plot, lamps);
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "a.png"), StartsWith("\x89PNG"));
+  draw_floor_plot(folder / "a.svg", plot, lamps);
+  const std::string svg = TemporaryFolder::content_of(folder / "a.svg");
+  EXPECT_THAT(svg, HasSubstr("<svg"));
+  EXPECT_THAT(svg, HasSubstr("a 'title'"));
+  EXPECT_THAT(svg, HasSubstr(">7<"));
+}
+
+TEST_F(FloorPlotTest, IsTheSameBytesTwice) {
+  for (const char* name : {"a.png", "a.svg"}) {
+    draw_floor_plot(folder / name, plot, lamps);
+    const std::string first = TemporaryFolder::content_of(folder / name);
+    draw_floor_plot(folder / name, plot, lamps);
+    EXPECT_EQ(TemporaryFolder::content_of(folder / name), first);
+  }
+}
+
+TEST_F(FloorPlotTest, RefusesAnotherEnding) {
+  EXPECT_THAT(refusal_of([&] { draw_floor_plot(folder / "a.gif", plot, lamps); }),
+              HasSubstr("a.gif: a picture's name should end in .png or .svg"));
+}
+
+TEST_F(FloorPlotTest, KeepsTheOldPictureWhenGnuplotFails) {
+  const auto file = folder.file("a.png", "old");
+  EXPECT_THAT(refusal_of([&] {
+                draw(file, {"a", 100, 100, "plot nonsense\n"});
+              }),
+              HasSubstr("a.png: cannot be drawn"));
+  EXPECT_EQ(TemporaryFolder::content_of(file), "old");
+}
+
+TEST(GnuplotQuoted, LeavesNothingToInterpret) {
+  EXPECT_EQ(gnuplot_quoted("it's `ls` $x"), "'it''s `ls` $x'");
+}
+
+}  // namespace
+}  // namespace vlp

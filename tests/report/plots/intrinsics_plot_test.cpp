@@ -1,0 +1,94 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/intrinsics_plot.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+class IntrinsicsPlotTest : public testing::Test {
+ protected:
+  /// What gnuplot says, on stderr, is for whoever runs the program: nothing.
+  std::string svg_of(const IntrinsicsPlot& drawn) const {
+    testing::internal::CaptureStderr();
+    draw_intrinsics_plot(folder / "a.svg", drawn);
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    return TemporaryFolder::content_of(folder / "a.svg");
+  }
+
+  TemporaryFolder folder;
+  /// Rms per axis 0.1 px.
+  IntrinsicsPlot plot{"a 'title'",
+                      {800, 600},
+                      {{{100, 50}, {0.1, 0.1}, false},
+                       {{400, 300}, {-0.1, 0.1}, false},
+                       {{700, 500}, {3, 0}, true}},
+                      3,
+                      {0.4, 0.3, 0.4, 0.2, 0.03, 0.2, 0.4, 0.3, 0.4}};
+};
+
+TEST_F(IntrinsicsPlotTest, SaysWhatIsDrawnAndHowLarge) {
+  const std::string svg = svg_of(plot);
+  for (const char* text : {"a 'title'", "2 corners", "1 outliers", "200 times as long",
+                           "standard deviation (px)", "0.05", "0.1", "0.2", "0.5"}) {
+    EXPECT_THAT(svg, HasSubstr(text));
+  }
+  EXPECT_THAT(svg, AllOf(HasSubstr("u (px)"), HasSubstr("v (px)")));
+  plot.corners.pop_back();
+  EXPECT_THAT(svg_of(plot), Not(HasSubstr("outliers")));
+}
+
+TEST_F(IntrinsicsPlotTest, IsAPngOrAnSvgTheSameBytesTwice) {
+  draw_intrinsics_plot(folder / "a.png", plot);
+  const std::string first = TemporaryFolder::content_of(folder / "a.png");
+  EXPECT_THAT(first, StartsWith("\x89PNG"));
+  draw_intrinsics_plot(folder / "a.png", plot);
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "a.png"), first);
+  EXPECT_EQ(svg_of(plot), svg_of(plot));
+  EXPECT_THAT(refusal_of([&] { draw_intrinsics_plot(folder / "a.gif", plot); }),
+              HasSubstr("a.gif: a picture's name should end in .png or .svg"));
+}
+
+TEST_F(IntrinsicsPlotTest, LeavesBlankWhatIsNotKnown) {
+  const std::string whole = svg_of(plot);
+  plot.sd_px[0] = std::numeric_limits<double>::infinity();
+  const std::string part = svg_of(plot);
+  EXPECT_NE(part, whole);
+  EXPECT_THAT(part, HasSubstr("0.05"));
+  plot.sd_px.assign(9, std::nan(""));
+  EXPECT_THAT(svg_of(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));
+}
+
+TEST_F(IntrinsicsPlotTest, DrawsAMapAllOfOneValueAndCornersWithoutResiduals) {
+  plot.sd_px.assign(9, 0.2);
+  for (auto& corner : plot.corners) corner = {corner.seen_px, {0, 0}, false};
+  EXPECT_THAT(svg_of(plot), AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
+}
+
+TEST(ResidualMagnification, IsARoundNumberThatShowsTheResiduals) {
+  EXPECT_DOUBLE_EQ(residual_magnification(0.1, 800), 200);
+  EXPECT_DOUBLE_EQ(residual_magnification(0.11, 800), 100);
+  EXPECT_DOUBLE_EQ(residual_magnification(1, 4000), 100);
+  EXPECT_DOUBLE_EQ(residual_magnification(40, 800), 0.5);
+  EXPECT_DOUBLE_EQ(residual_magnification(0, 800), 1);
+  for (const double rms_px : {0.013, 0.05, 0.17, 0.48, 1.3}) {
+    const double length_px = rms_px * residual_magnification(rms_px, 800);
+    EXPECT_LE(length_px, 800 / 40.0);
+    EXPECT_GE(length_px, 800 / 100.0);
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,33 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/rotation_plot.h"
+
+#include <gmock/gmock.h>
+
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(RotationPlot, ShowsLampsCirclesCentreAndPrincipalPoint) {
+  const TemporaryFolder folder;
+  const RotationPlot plot{"unit 'seven'",
+                          {{42, {{100, 200}, {300, 200}, {200, 300}}, {200, 200}, {100, 101}},
+                           {43, {{150, 200}, {250, 200}, {200, 250}}, {201, 199}, {50, 50.5}}},
+                          {203, 198},
+                          {210, 190}};
+  draw_rotation_plot(folder / "a.svg", plot);
+  const std::string svg = TemporaryFolder::content_of(folder / "a.svg");
+  for (const char* part : {"unit 'seven'", ">42<", ">43<", "principal point", "rotation centre"}) {
+    EXPECT_THAT(svg, HasSubstr(part));
+  }
+  EXPECT_THAT(svg, Not(HasSubstr(">44<")));
+  draw_rotation_plot(folder / "b.svg", plot);
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "b.svg"), svg);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/thinning.h"
+
+#include <gmock/gmock.h>
+
+namespace vlp {
+namespace {
+
+using testing::ElementsAre;
+
+TEST(Thinning, LeavesNoMoreThanAsked) {
+  EXPECT_EQ(thinning_step(0, 10), 1u);
+  EXPECT_EQ(thinning_step(10, 10), 1u);
+  EXPECT_EQ(thinning_step(11, 10), 2u);
+  EXPECT_EQ(thinning_step(101, 10), 11u);
+  EXPECT_EQ(thinning_note(10, 1), "");
+  EXPECT_EQ(thinning_note(20, 2), "every 2nd of 20 drawn");
+  EXPECT_EQ(thinning_note(101, 11), "every 11th of 101 drawn");
+  EXPECT_EQ(thinning_note(230, 23), "every 23rd of 230 drawn");
+}
+
+TEST(Thinning, KeepsTheLargestInTheirPlace) {
+  const std::vector<double> values = {1, 9, 2, 3, 9, 8, 0};
+  EXPECT_THAT(thinned(values, 3, 2), ElementsAre(0, 1, 3, 4, 6));
+  EXPECT_THAT(thinned(values, 3, 0), ElementsAre(0, 3, 6));
+  EXPECT_THAT(thinned({}, 3, 2), ElementsAre());
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,58 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/report_picture.h"
+
+#include <gmock/gmock.h>
+
+#include "report/plots/dispersion_plot.h"
+#include "report/plots/rotation_plot.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TEST(ReportPicture, KnowsWhatTheProgramsDraw) {
+  const TemporaryFolder folder;
+  draw_rotation_plot(folder / "a.svg", {"", {}, {203, 198}, {210, 190}});
+  EXPECT_EQ(read_report_picture(folder / "a.svg").part, ReportPart::rotation);
+  draw_dispersion_plot(folder / "b.svg", {"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}});
+  const ReportPicture picture = read_report_picture(folder / "b.svg");
+  EXPECT_EQ(picture.part, ReportPart::dispersion);
+  EXPECT_EQ(picture.image, TemporaryFolder::content_of(folder / "b.svg"));
+  EXPECT_THAT(picture.caption, HasSubstr("station"));
+  EXPECT_THAT(picture.alt, HasSubstr("dispersion"));
+}
+
+TEST(ReportPicture, TakesOthersByTheirName) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("my room.svg", "<?xml?><svg><title>else</title></svg>");
+  EXPECT_EQ(read_report_picture(file).part, ReportPart::other);
+  EXPECT_EQ(read_report_picture(file).caption, "my room.svg");
+  EXPECT_EQ(read_report_picture(folder.file("a.png", "\x89PNG...IEND\xAE\x42\x60\x82")).part,
+            ReportPart::other);
+}
+
+TEST(ReportPicture, RefusesWhatIsNone) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(refusal_of([&] { read_report_picture(folder / "none.svg"); }),
+              HasSubstr("none.svg: cannot be read"));
+  EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("a.svg", "")); }),
+              HasSubstr("a.svg: is neither an SVG nor a PNG"));
+  EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("b.svg", "x,y\n")); }),
+              HasSubstr("b.svg: is neither"));
+  for (const char* cut : {"<?xml?><svg><title>else</title>", "<svg></svg>", "\x89PNG.."}) {
+    EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("d.svg", cut)); }),
+                HasSubstr("d.svg: is cut short"))
+        << cut;
+  }
+  const std::string long_svg = "<svg>" + std::string((16u << 20) + 1, ' ');
+  EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("c.svg", long_svg)); }),
+              HasSubstr("c.svg: is longer than 16 MiB"));
+}
+
+}  // namespace
+}  // namespace vlp
