@@ -36,7 +36,7 @@ struct Options {
   /// captures.csv; empty: that of the folder.
   std::string captures;
   std::string plot;
-  std::string method = "camera", circle = "mean";
+  std::string method = "camera", circle = "mean", of = "camera";
 };
 
 /// What is known of the captures besides their images; without their places where --station says
@@ -57,7 +57,8 @@ KnownPlaces places_of(const Options& options, const std::vector<Frame>& frames,
                       const CapturesTable& captures) {
   std::optional<Eigen::Vector2d> station_m;
   if (options.station_m) station_m = Eigen::Vector2d(options.station_m->data());
-  KnownPlaces places = at_known_places(frames, captures, station_m);
+  KnownPlaces places = at_known_places(frames, captures, station_m,
+                                       options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
   if (places.captures.empty() && captures.empty()) {
     throw std::invalid_argument("where is the station? Give --station or --captures");
   }
@@ -145,6 +146,12 @@ int main(int argc, char** argv) {
   auto* station = app.add_option("--station", options.station_m, "Where the camera is in the world")
                       ->check(vlp::finite())
                       ->option_text("X_M Y_M");
+  app.add_option("--of", options.of,
+                 "Whose place --station is: the camera's (default), or that of the axis it turns "
+                 "about, a lever arm away")
+      ->needs(station)
+      ->check(CLI::IsMember({"camera", "axis"}))
+      ->option_text("camera|axis");
   app.add_option("--captures", options.captures,
                  "captures.csv: image, x_m, y_m (where the camera is) [, roll_rad, pitch_rad]; "
                  "default: captures.csv and truth.csv in the folder")

@@ -11,11 +11,19 @@
 
 namespace vlp {
 
+/// Whose place is known. The axis stands where the lever arm, taken off, puts the camera.
+enum class PlaceOf { camera, axis };
+
 /// What is known of a capture besides its image.
 struct Capture {
   std::optional<double> time_s;
-  /// Where the camera is known to be.
+  /// Where the camera, or the axis that it turns about, is known to be; the yaw is the camera's.
   std::optional<double> x_m, y_m, z_m, yaw_rad;
+  PlaceOf place = PlaceOf::camera;
+  /// Standard deviation of the place per axis, as far as it is stated.
+  std::optional<double> place_sd_m;
+  /// Captures with one name were taken turning on one spot, at one height; may be empty.
+  std::string spot;
   /// From the inclination sensor: roll_rad and pitch_rad, both or neither.
   std::optional<Inclination> inclination;
 };
@@ -23,9 +31,10 @@ struct Capture {
 /// Captures by the name of their image.
 using CapturesTable = std::map<std::string, Capture>;
 
-/// Reads `captures.csv`: the column image, then any of time_s, x_m, y_m, z_m, yaw_rad, roll_rad,
-/// pitch_rad; a field may be empty. Throws InputError: see CsvTable; an image twice; one of
-/// roll_rad and pitch_rad without the other.
+/// Reads `captures.csv`: the column image, then any of time_s, x_m, y_m, z_m, yaw_rad, place,
+/// place_sd_m, spot, roll_rad, pitch_rad; a field may be empty. Throws InputError: see CsvTable; an
+/// image twice; one of roll_rad and pitch_rad without the other; a place that is neither camera nor
+/// axis; a place_sd_m that is negative.
 CapturesTable read_captures(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "captures/fixes_table.h"
 
+#include <algorithm>
 #include <array>
 
 #include "captures/csv_reader.h"
@@ -18,18 +19,21 @@ struct FixColumns {
              csv.required("yaw_rad")},
         sd{csv.optional("sd_x_m"), csv.optional("sd_y_m"), csv.optional("sd_z_m"),
            csv.optional("sd_yaw_rad")},
+        noise_sd{csv.optional("noise_sd_x_m"), csv.optional("noise_sd_y_m"),
+                 csv.optional("noise_sd_z_m"), csv.optional("noise_sd_yaw_rad")},
         residual_px(csv.optional("residual_px")) {}
 
   std::array<CsvTable::Column, 4> pose;
-  std::array<std::optional<CsvTable::Column>, 4> sd;
+  std::array<std::optional<CsvTable::Column>, 4> sd, noise_sd;
   std::optional<CsvTable::Column> residual_px;
 };
 
-std::optional<Eigen::Vector4d> sd_in(const CsvTable& csv, std::size_t row,
-                                     const FixColumns& columns) {
+std::optional<Eigen::Vector4d> sd_in(
+    const CsvTable& csv, std::size_t row,
+    const std::array<std::optional<CsvTable::Column>, 4>& columns) {
   Eigen::Vector4d sd;
   for (int i = 0; i < 4; ++i) {
-    const auto column = columns.sd[static_cast<std::size_t>(i)];
+    const auto column = columns[static_cast<std::size_t>(i)];
     const auto value = column ? csv.optional_number(row, *column) : std::nullopt;
     if (!value) return std::nullopt;
     if (*value < 0) throw csv.error(row, *column, "should not be negative");
@@ -43,8 +47,9 @@ FixRow::Fix fix_in(const CsvTable& csv, std::size_t row, const FixColumns& colum
   FixRow::Fix fix{
       {{csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m), csv.coordinate_m(row, z_m)},
        csv.number(row, yaw_rad)},
-      sd_in(csv, row, columns),
-      0};
+      sd_in(csv, row, columns.sd),
+      0,
+      sd_in(csv, row, columns.noise_sd)};
   if (columns.residual_px) {
     fix.residual_px = csv.optional_number(row, *columns.residual_px).value_or(0);
   }
@@ -56,22 +61,48 @@ FixRow::Fix fix_in(const CsvTable& csv, std::size_t row, const FixColumns& colum
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows) {
   constexpr int digits = 9;     // nanometres
   constexpr int sd_digits = 6;  // significant
-  CsvWriter csv(file, {"image", "status", "x_m", "y_m", "z_m", "yaw_rad", "sd_x_m", "sd_y_m",
-                       "sd_z_m", "sd_yaw_rad", "lamps", "residual_px"});
-  for (const FixRow& row : rows) {
-    const std::string lamps = std::to_string(row.lamps);
-    if (!row.fix) {
-      csv.row({row.image, row.status, "", "", "", "", "", "", "", "", lamps, ""});
-      continue;
+  std::vector<std::string> header{"image",  "status",     "x_m",    "y_m",
+                                  "z_m",    "yaw_rad",    "sd_x_m", "sd_y_m",
+                                  "sd_z_m", "sd_yaw_rad", "lamps",  "residual_px"};
+  const bool noise = std::any_of(rows.begin(), rows.end(), [](const FixRow& row) {
+    return row.fix && row.fix->noise_sd.has_value();
+  });
+  const bool rejected = std::any_of(rows.begin(), rows.end(),
+                                    [](const FixRow& row) { return !row.rejected.empty(); });
+  if (noise) {
+    header.insert(header.end(),
+                  {"noise_sd_x_m", "noise_sd_y_m", "noise_sd_z_m", "noise_sd_yaw_rad"});
+  }
+  if (rejected) header.emplace_back("rejected");
+  CsvWriter csv(file, header);
+  const auto add_sd = [](std::vector<std::string>& fields,
+                         const std::optional<Eigen::Vector4d>& sd) {
+    for (int i = 0; i < 4; ++i) {
+      fields.push_back(sd ? significant((*sd)[i], sd_digits) : std::string());
     }
-    const auto& [pose, sd, residual_px] = *row.fix;
-    const auto sd_field = [&sd = sd](int i) {
-      return sd ? significant((*sd)[i], sd_digits) : std::string();
-    };
-    csv.row({row.image, row.status, fixed(pose.position_m.x(), digits),
-             fixed(pose.position_m.y(), digits), fixed(pose.position_m.z(), digits),
-             fixed(pose.yaw_rad, digits), sd_field(0), sd_field(1), sd_field(2), sd_field(3), lamps,
-             significant(residual_px, sd_digits)});
+  };
+  for (const FixRow& row : rows) {
+    std::vector<std::string> fields{row.image, row.status};
+    if (row.fix) {
+      const Pose& pose = row.fix->pose;
+      for (const double x_m : pose.position_m) fields.push_back(fixed(x_m, digits));
+      fields.push_back(fixed(pose.yaw_rad, digits));
+    } else {
+      fields.resize(6);
+    }
+    add_sd(fields, row.fix ? row.fix->sd : std::nullopt);
+    fields.push_back(std::to_string(row.lamps));
+    fields.push_back(row.fix ? significant(row.fix->residual_px, sd_digits) : std::string());
+    if (noise) add_sd(fields, row.fix ? row.fix->noise_sd : std::nullopt);
+    if (rejected) {
+      std::string ids;
+      for (const int id : row.rejected) {
+        if (!ids.empty()) ids += ' ';
+        ids += std::to_string(id);
+      }
+      fields.push_back(std::move(ids));
+    }
+    csv.row(fields);
   }
   csv.save();
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <string_view>
 
 #include "camera_mount.h"
@@ -33,16 +34,20 @@ std::string_view explanation_of(FixStatus status);
 struct Fix {
   FixStatus status = FixStatus::too_few_lamps;
   /// Of the camera, or of the robot's centre when a CameraMount is given; the covariance of
-  /// (X, Y, Z, yaw) is that of the pixel noise (and of the inclination, when its noise is given).
+  /// (X, Y, Z, yaw) is all that is known of its error: noise_covariance, and what calibration and
+  /// lamp map got wrong, as far as they state it (common_errors.h).
   PoseEstimate estimate;
+  /// The part that is of this frame alone and averages out: that of the pixel noise (and of the
+  /// inclination, when its noise is given).
+  Matrix4 noise_covariance = Matrix4::Zero();
   /// Root of the mean squared distance between the lamps' pixels and where the fix sees them. Zero,
   /// to rounding, with one or two lamps.
   double residual_px = 0;
   /// Lamps that the fix rests on.
   int lamps = 0;
-  /// Lamps that were left out because the others contradict them, and the id of the first.
+  /// Lamps that were left out because the others contradict them, and the ids of the first of them.
   int rejected_lamps = 0;
-  int rejected_lamp_id = -1;
+  std::array<int, 32> rejected_ids = {};
   /// Detections whose id is not in the lamp map; they are left out. Holds whatever the status.
   int unknown_lamps = 0;
 

@@ -39,21 +39,6 @@ void mirror(SightedFrame& frame) {
   }
 }
 
-/// Leaves only those that agree.
-void keep(SightedFrame& frame, const Consensus& consensus) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < frame.size; ++i) {
-    if (consensus.agreeing[i]) {
-      frame.sightings[kept] = frame.sightings[i];
-      frame.ids[kept] = frame.ids[i];
-      frame.nearest_m[kept++] = frame.nearest_m[i];
-    } else if (frame.rejected_lamps++ == 0) {
-      frame.rejected_lamp_id = frame.ids[i];
-    }
-  }
-  frame.size = kept;
-}
-
 /// How far in z a lamp may be from where the fix sees it. The spreads of the lamps in z and on the
 /// floor plan give the scale, since the fix may be wrong.
 double limit_of(const SightedFrame& frame, double max_residual_share) {
@@ -92,7 +77,7 @@ ConsistentFix fix_doubtful(SightedFrame& frame, const ConsistentFix& all,
   const auto majority = find_consensus(frame.span(), kTooNoisySigmas * noise_of(frame.span()));
   if (!majority) return all;
   SightedFrame agreeing = frame;
-  keep(agreeing, *majority);
+  agreeing.keep(majority->agreeing);
   const ConsistentFix solution =
       fix_consistent(agreeing.span(), limit_of(agreeing, max_residual_share));
   const double remaining = excess_of(solution.fix, agreeing.size);
@@ -104,6 +89,20 @@ ConsistentFix fix_doubtful(SightedFrame& frame, const ConsistentFix& all,
 }
 
 }  // namespace
+
+void SightedFrame::keep(const std::bitset<kMaxSightings>& kept) {
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (kept[i]) {
+      sightings[next] = sightings[i];
+      ids[next] = ids[i];
+      nearest_m[next++] = nearest_m[i];
+    } else {
+      rejected_ids[static_cast<std::size_t>(rejected_lamps++)] = ids[i];
+    }
+  }
+  size = next;
+}
 
 ConsistentFix fix_frame(SightedFrame& frame, double max_residual_share) {
   const double limit = limit_of(frame, max_residual_share);
@@ -117,7 +116,7 @@ ConsistentFix fix_frame(SightedFrame& frame, double max_residual_share) {
   if (frame.size < 4) return all;
   const auto majority = find_consensus(frame.span(), limit);
   if (!majority) return all;
-  keep(frame, *majority);
+  frame.keep(majority->agreeing);
   return fix_consistent(frame.span(), limit_of(frame, max_residual_share));
 }
 

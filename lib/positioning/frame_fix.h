@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstddef>
 #include <span>
 
@@ -23,9 +24,11 @@ struct SightedFrame {
   bool noise_is_stated = true;
   int unknown_lamps = 0;
   int rejected_lamps = 0;
-  int rejected_lamp_id = -1;
+  std::array<int, kMaxSightings> rejected_ids;
 
   std::span<const Sighting> span() const { return {sightings.data(), size}; }
+  /// Leaves only the sightings that are `kept`; the others count as rejected.
+  void keep(const std::bitset<kMaxSightings>& kept);
 };
 
 /// The fix of a frame of two lamps or more whose identities may be wrong. A lamp contradicts the

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "geometry/plane.h"
 #include "positioning/one_lamp_fix.h"
 #include "positioning/sighting.h"
 
@@ -82,6 +83,7 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
       lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
       origin_m_(center_of(lamps_)),
       base_from_camera_(level_from_camera(calibration, options.correction)),
+      common_(lamps_, calibration, options.correction),
       mount_(options.mount),
       max_residual_share_(options.max_residual_share),
       unstated_sigma_px_(options.unstated_sigma_px) {
@@ -135,6 +137,63 @@ FixStatus Positioner::sight(std::span<const Detection> detections,
   return FixStatus::ok;
 }
 
+std::size_t Positioner::index_of(int id) const {
+  const auto lamp =
+      std::lower_bound(lamps_.begin(), lamps_.end(), id,
+                       [](const Lamp& candidate, int sought) { return candidate.id < sought; });
+  return static_cast<std::size_t>(lamp - lamps_.begin());
+}
+
+/// Where everything that is uncertain is stated, it decides; else the rules of fix_frame() do.
+void Positioner::reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
+                                    ConsistentFix& solution) const {
+  if (solution.status != FixStatus::ok || frame.size < 4) return;
+  // What the noise alone explains needs nothing else to.
+  if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
+  const LevelPose pose(solution.fix.pose);
+  std::array<Matrix2, max_lamps> common;
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    common[i] =
+        common_.covariance_of(common_.effect_on(frame.sightings[i], pose, lens_, level_from_base),
+                              index_of(frame.ids[i]));
+  }
+  const Unexplained wrong =
+      find_unexplained(frame.span(), {common.data(), frame.size}, solution.fix);
+  if (wrong.count == 0) return;
+  std::bitset<kMaxSightings> kept;
+  kept.set();
+  for (std::size_t i = 0; i < wrong.count; ++i) kept.reset(wrong.lamps[i]);
+  frame.keep(kept);
+  solution = fix_consistent(frame.span(), std::numeric_limits<double>::infinity());
+}
+
+Matrix4 Positioner::common_covariance(const SightedFrame& frame,
+                                      const Eigen::Matrix3d& level_from_base,
+                                      const PoseEstimate& camera) const {
+  const LevelPose pose(camera.pose);
+  CommonErrors::ByShared by_shared = CommonErrors::ByShared::Zero(4, common_.shared());
+  std::array<CommonErrors::ByLamp, max_lamps> by_lamp;
+  std::array<std::size_t, max_lamps> lamps;
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    const Sighting& sighting = frame.sightings[i];
+    const auto effect = common_.effect_on(sighting, pose, lens_, level_from_base);
+    Eigen::Matrix<double, 4, 2> gain;
+    if (frame.size == 1) {
+      // fix_one_lamp(): s = p - H e^{jg} z.
+      gain.setZero();
+      gain.topRows<2>() = -height_above(pose, sighting.lamp_m) * times_matrix(pose.heading);
+    } else {
+      const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
+      gain = camera.covariance * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
+             (whitening.transpose() * whitening);
+    }
+    by_shared.noalias() += gain.lazyProduct(effect.by_shared);
+    by_lamp[i] = gain * effect.by_lamp;
+    lamps[i] = index_of(frame.ids[i]);
+  }
+  return common_.covariance_of(by_shared, {by_lamp.data(), frame.size}, {lamps.data(), frame.size});
+}
+
 Fix Positioner::locate(std::span<const Detection> detections,
                        const Sensors& sensors) const noexcept {
   if (!finite(sensors)) return refused(FixStatus::not_finite, 0);
@@ -149,7 +208,12 @@ Fix Positioner::locate(std::span<const Detection> detections,
   const double sigma_rad = sensors.inclination_sigma_rad;
   LeanEffect by_lean = LeanEffect::Zero();
   if (frame.size > 1) {
-    const auto [status, solution] = fix_frame(frame, max_residual_share_);
+    // Where all that is uncertain is stated, noise alone decides nothing.
+    const bool total = common_.complete();
+    if (total) frame.noise_is_stated = false;
+    ConsistentFix found = fix_frame(frame, max_residual_share_);
+    if (total) reject_unexplained(frame, lean.level_from_base, found);
+    const auto& [status, solution] = found;
     if (status != FixStatus::ok) return refused(status, frame.unknown_lamps);
     fix.estimate = {solution.pose, solution.covariance};
     fix.residual_px = solution.residual_px;
@@ -167,12 +231,26 @@ Fix Positioner::locate(std::span<const Detection> detections,
   fix.status = FixStatus::ok;
   fix.lamps = static_cast<int>(frame.size);
   fix.rejected_lamps = frame.rejected_lamps;
-  fix.rejected_lamp_id = frame.rejected_lamp_id;
+  std::copy_n(frame.rejected_ids.begin(),
+              std::min(static_cast<std::size_t>(frame.rejected_lamps), fix.rejected_ids.size()),
+              fix.rejected_ids.begin());
   fix.unknown_lamps = frame.unknown_lamps;
+  const Matrix4 common = common_.stated()
+                             ? common_covariance(frame, lean.level_from_base, fix.estimate)
+                             : Matrix4(Matrix4::Zero());
+  // The error of the inclination is of this frame, too.
   if (mount_) {
-    fix.estimate = robot_from_camera(fix.estimate, by_lean, sigma_rad, *mount_, lean);
-  } else if (sigma_rad > 0) {
-    fix.estimate.covariance += sigma_rad * sigma_rad * by_lean * by_lean.transpose();
+    PoseEstimate whole = fix.estimate;
+    whole.covariance += common;
+    fix.noise_covariance =
+        robot_from_camera(fix.estimate, by_lean, sigma_rad, *mount_, lean).covariance;
+    fix.estimate = robot_from_camera(whole, by_lean, sigma_rad, *mount_, lean);
+  } else {
+    if (sigma_rad > 0) {
+      fix.estimate.covariance += sigma_rad * sigma_rad * by_lean * by_lean.transpose();
+    }
+    fix.noise_covariance = fix.estimate.covariance;
+    fix.estimate.covariance += common;
   }
   fix.estimate.pose.position_m += origin_m_;
   return fix;

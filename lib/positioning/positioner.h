@@ -13,6 +13,7 @@
 #include "../rig/detection.h"
 #include "../rig/lamp_map.h"
 #include "camera_mount.h"
+#include "common_errors.h"
 #include "correction.h"
 #include "fix.h"
 #include "frame_fix.h"
@@ -62,18 +63,25 @@ class Positioner {
 
   /// The fix of one frame. Neither allocates nor throws. One lamp: fix_one_lamp(); two: in closed
   /// form; more: fix_weighted() from initial_pose(), without the lamps whose identity is wrong
-  /// (fix_frame).
+  /// (fix_frame) and, where the calibration's or the survey's covariance covers every lamp, those
+  /// that all that is uncertain together does not explain (find_unexplained).
   Fix locate(std::span<const Detection> detections, const Sensors& sensors = {}) const noexcept;
 
  private:
   FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
                   SightedFrame& frame) const;
+  std::size_t index_of(int id) const;
+  void reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
+                          ConsistentFix& solution) const;
+  Matrix4 common_covariance(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
+                            const PoseEstimate& camera) const;
 
   std::vector<Lamp> lamps_;        // in the order of their ids, their places from origin_m_
   std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
   Lens lens_;
   Eigen::Vector3d origin_m_;
   Eigen::Matrix3d base_from_camera_;
+  CommonErrors common_;
   std::optional<CameraMount> mount_;
   double max_residual_share_;
   double unstated_sigma_px_;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rig/calibration.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -13,21 +15,47 @@ namespace {
 constexpr int kLarge = std::numeric_limits<int>::max();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-IntrinsicsReport read_intrinsics_report(YamlMap map) {
-  IntrinsicsReport report;
-  report.views = map.required("views").integer_within(0, kLarge);
-  report.corners = map.required("corners").integer_within(0, kLarge);
-  report.outliers = map.required("outliers").integer_within(0, kLarge);
-  report.rms_px = map.required("rms_px").number_within(0, kInfinity, "px");
-  if (const auto value = map.optional("board_warp_m")) {
-    const auto warp = value->numbers(2);
-    report.board_warp_m = {warp[0], warp[1]};
+/// `rows` rows of `cols` numbers.
+Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_t cols) {
+  const auto list = value.list();
+  if (list.size() != rows) {
+    throw value.error("should be " + std::to_string(rows) + " rows of " + std::to_string(cols) +
+                      " numbers");
   }
-  if (const auto value = map.optional("uncertainty_px")) {
-    report.uncertainty_px = value->number_within(0, kInfinity, "px");
+  Eigen::MatrixXd matrix(rows, cols);
+  for (std::size_t row = 0; row < rows; ++row) {
+    matrix.row(static_cast<Eigen::Index>(row)) = Eigen::Map<const Eigen::RowVectorXd>(
+        list[row].numbers(cols).data(), static_cast<Eigen::Index>(cols));
   }
-  map.finish();
-  return report;
+  return matrix;
+}
+
+/// The rows of the lower triangle, 1, 2, 3 ... numbers.
+Eigen::MatrixXd read_joint_covariance(const YamlValue& value, std::size_t size) {
+  const auto list = value.list();
+  if (list.size() != size) {
+    throw value.error("should be " + std::to_string(size) +
+                      " rows of 1, 2, 3 ... numbers, the lower triangle");
+  }
+  Eigen::MatrixXd matrix(size, size);
+  for (std::size_t row = 0; row < size; ++row) {
+    const auto numbers = list[row].numbers(row + 1);
+    for (std::size_t col = 0; col <= row; ++col) {
+      const auto i = static_cast<Eigen::Index>(row), j = static_cast<Eigen::Index>(col);
+      matrix(i, j) = matrix(j, i) = numbers[col];
+    }
+    // Of any two, the correlation: what makes a matrix no covariance is mostly a slip in one
+    // number.
+    for (std::size_t col = 0; col <= row; ++col) {
+      const auto i = static_cast<Eigen::Index>(row), j = static_cast<Eigen::Index>(col);
+      constexpr double rounding = 1e-9;
+      if (matrix(i, i) < 0 ||
+          matrix(i, j) * matrix(i, j) > matrix(i, i) * matrix(j, j) * (1 + rounding)) {
+        throw list[row].error("is not a covariance's: no correlation is beyond 1");
+      }
+    }
+  }
+  return matrix;
 }
 
 Matrix2 read_covariance(const YamlValue& value) {
@@ -46,7 +74,27 @@ Matrix2 read_covariance(const YamlValue& value) {
   return covariance;
 }
 
-RotationCenter read_rotation_center(YamlMap map) {
+IntrinsicsReport read_intrinsics_report(YamlMap map, std::size_t intrinsics) {
+  IntrinsicsReport report;
+  report.views = map.required("views").integer_within(0, kLarge);
+  report.corners = map.required("corners").integer_within(0, kLarge);
+  report.outliers = map.required("outliers").integer_within(0, kLarge);
+  report.rms_px = map.required("rms_px").number_within(0, kInfinity, "px");
+  if (const auto value = map.optional("board_warp_m")) {
+    const auto warp = value->numbers(2);
+    report.board_warp_m = {warp[0], warp[1]};
+  }
+  if (const auto value = map.optional("uncertainty_px")) {
+    report.uncertainty_px = value->number_within(0, kInfinity, "px");
+  }
+  if (const auto value = map.optional("covariance")) {
+    report.covariance = read_joint_covariance(*value, intrinsics);
+  }
+  map.finish();
+  return report;
+}
+
+RotationCenter read_rotation_center(YamlMap map, std::size_t intrinsics) {
   RotationCenter center;
   const YamlValue model = map.required("model");
   if (model.text() != "shift" && model.text() != "tilt") {
@@ -68,11 +116,14 @@ RotationCenter read_rotation_center(YamlMap map) {
     if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
     center.lever_arm_covariance = read_covariance(*value);
   }
+  if (const auto value = map.optional("by_intrinsics")) {
+    center.by_intrinsics = read_matrix(*value, 2, intrinsics);
+  }
   map.finish();
   return center;
 }
 
-Dispersion read_dispersion(YamlMap map) {
+Dispersion read_dispersion(YamlMap map, std::size_t intrinsics) {
   Dispersion dispersion;
   dispersion.offset_px = Eigen::Vector2d(map.required("offset_px").numbers(2).data());
   dispersion.radius_m = map.required("radius_m").number_within(0, kInfinity, "m");
@@ -81,8 +132,41 @@ Dispersion read_dispersion(YamlMap map) {
   if (const auto value = map.optional("covariance")) {
     dispersion.covariance = read_covariance(*value);
   }
+  if (const auto value = map.optional("by_intrinsics")) {
+    dispersion.by_intrinsics = read_matrix(*value, 2, intrinsics);
+  }
+  if (const auto value = map.optional("by_zenith")) {
+    dispersion.by_zenith = read_matrix(*value, 2, 2);
+  }
   map.finish();
   return dispersion;
+}
+
+Adjustment read_adjustment(YamlMap map, const Camera& camera) {
+  Adjustment adjustment;
+  for (const YamlValue& item : map.required("sets").list()) adjustment.sets.push_back(item.text());
+  adjustment.captures = map.required("captures").integer_within(1, kLarge);
+  adjustment.detections = map.required("detections").integer_within(1, kLarge);
+  adjustment.residual_px = map.required("residual_px").number_within(0, kInfinity, "px");
+  for (const YamlValue& item : map.required("lamps").list()) {
+    YamlMap lamp = item.map();
+    adjustment.lamps.push_back({lamp.required("id").integer_within(0, kLarge),
+                                Eigen::Vector3d(lamp.required("position_m").numbers(3).data())});
+    lamp.finish();
+  }
+  const YamlValue parameters = map.required("parameters");
+  const auto found = parameters.list();
+  const auto names = parameter_names(camera, adjustment);
+  for (std::size_t i = 0; i < std::max(found.size(), names.size()); ++i) {
+    if (i >= found.size() || i >= names.size() || found[i].text() != names[i]) {
+      throw parameters.error(
+          "should be the lens model's, the zenith, the lever arm, the lamps: " +
+          (i < names.size() ? names[i] + " is missing in its place" : "there are more than these"));
+    }
+  }
+  adjustment.covariance = read_joint_covariance(map.required("covariance"), names.size());
+  map.finish();
+  return adjustment;
 }
 
 HistoryEntry read_history_entry(YamlMap map) {
@@ -102,6 +186,18 @@ HistoryEntry read_history_entry(YamlMap map) {
 
 }  // namespace
 
+std::vector<std::string> parameter_names(const Camera& camera, const Adjustment& adjustment) {
+  constexpr std::array lens{"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2",
+                            "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"};
+  std::vector<std::string> names(lens.begin(), lens.begin() + std::ssize(camera.intrinsics));
+  names.insert(names.end(), {"zenith_x", "zenith_y", "lever_arm_x_m", "lever_arm_y_m"});
+  for (const Adjustment::Place& lamp : adjustment.lamps) {
+    const std::string prefix = "lamp_" + std::to_string(lamp.id);
+    for (const char* axis : {"_x_m", "_y_m", "_z_m"}) names.push_back(prefix + axis);
+  }
+  return names;
+}
+
 Calibration read_calibration(const std::filesystem::path& file) {
   YamlMap document = read_yaml(file, "vlp-calibration/1");
   Calibration calibration;
@@ -109,19 +205,27 @@ Calibration read_calibration(const std::filesystem::path& file) {
   const auto report = document.optional("intrinsics_report");
   const auto rotation_center = document.optional("rotation_center");
   const auto dispersion = document.optional("dispersion");
+  const auto adjustment = document.optional("adjustment");
   const auto history = document.optional("history");
   document.finish();
   YamlMap camera_map = camera.map();
   calibration.camera = read_camera(camera_map);
   camera_map.finish();
-  if (report) calibration.intrinsics_report = read_intrinsics_report(report->map());
-  if (rotation_center) calibration.rotation_center = read_rotation_center(rotation_center->map());
-  if (dispersion) calibration.dispersion = read_dispersion(dispersion->map());
+  const std::size_t intrinsics = calibration.camera.intrinsics.size();
+  if (report) calibration.intrinsics_report = read_intrinsics_report(report->map(), intrinsics);
+  if (rotation_center) {
+    calibration.rotation_center = read_rotation_center(rotation_center->map(), intrinsics);
+  }
+  if (dispersion) calibration.dispersion = read_dispersion(dispersion->map(), intrinsics);
+  if (adjustment) {
+    calibration.adjustment = read_adjustment(adjustment->map(), calibration.camera);
+  }
   if (!history) return calibration;
   for (const YamlValue& item : history->list()) {
     calibration.history.push_back(read_history_entry(item.map()));
     const std::string& part = calibration.history.back().part;
-    if ((part == "rotation_center" && !rotation_center) || (part == "dispersion" && !dispersion)) {
+    if ((part == "rotation_center" && !rotation_center) || (part == "dispersion" && !dispersion) ||
+        (part == "adjustment" && !adjustment)) {
       throw item.error("says that there is a part '" + part + "': is the file cut short?");
     }
   }

@@ -42,6 +42,8 @@ struct IntrinsicsReport {
   /// Worst standard deviation of a projection over the image. Infinite where the lens has no ray;
   /// that is not written.
   std::optional<double> uncertainty_px;
+  /// Of the intrinsics, in their order.
+  std::optional<Eigen::MatrixXd> covariance = {};
 };
 
 /// How the rotation centre is applied (Chen and Guan, section 3.1, and theory of the same):
@@ -62,6 +64,9 @@ struct RotationCenter {
   /// the camera's yaw on the robot zero, it is x and y of CameraMount::position_in_robot_m.
   std::optional<Eigen::Vector2d> lever_arm_m = {};
   std::optional<Matrix2> lever_arm_covariance = {};
+  /// What an error of the intrinsics does to the zenith's normalized point (x/z, y/z), a column
+  /// each: `covariance` is that of the captures alone, with the lens taken as exact.
+  std::optional<Eigen::MatrixXd> by_intrinsics = {};
 };
 
 /// The dispersion calibration (Chen and Guan, section 3.2).
@@ -76,11 +81,39 @@ struct Dispersion {
   int captures;
   /// Of offset_px, in px^2.
   std::optional<Matrix2> covariance = {};
+  /// What an error of the intrinsics, and one of the zenith's normalized point, does to
+  /// offset_px / f, a column each: `covariance` takes both as exact.
+  std::optional<Eigen::MatrixXd> by_intrinsics = {};
+  std::optional<Matrix2> by_zenith = {};
 };
+
+/// What one adjustment of many captures (vlp-adjust) says of all that it estimated together.
+struct Adjustment {
+  /// The lamps, where the map that goes with the covariance has them.
+  struct Place {
+    int id;
+    Eigen::Vector3d position_m;
+  };
+  std::vector<Place> lamps;
+  /// Joint, of the errors of: the intrinsics; the zenith's normalized point (x/z, y/z); the lever
+  /// arm, x and y in metres; x, y and z of each of the lamps. Zero where something was taken as
+  /// exact.
+  Eigen::MatrixXd covariance;
+  /// The folders or tables that it rests on, without their own folders.
+  std::vector<std::string> sets;
+  int captures;
+  int detections;
+  /// Per axis, of those.
+  double residual_px;
+};
+
+/// A name for each row of Adjustment::covariance: fx, fy, cx, cy, k1 ..., zenith_x, zenith_y,
+/// lever_arm_x_m, lever_arm_y_m, lamp_ID_x_m ...
+std::vector<std::string> parameter_names(const Camera& camera, const Adjustment& adjustment);
 
 /// How a part came to be.
 struct HistoryEntry {
-  /// Key of the part: "camera", "rotation_center", "dispersion".
+  /// Key of the part: "camera", "rotation_center", "dispersion", "adjustment".
   std::string part;
   std::string program;
   std::string version;
@@ -99,6 +132,7 @@ struct Calibration {
   std::optional<RotationCenter> rotation_center;
   std::optional<Dispersion> dispersion;
   std::vector<HistoryEntry> history;
+  std::optional<Adjustment> adjustment = {};
 };
 
 /// Reads `vlp-calibration/1`; keys are the names of the fields above. Throws InputError: unknown

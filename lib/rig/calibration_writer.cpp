@@ -29,6 +29,25 @@ void emit_camera(YAML::Emitter& out, const Camera& camera) {
   out << YAML::EndMap;
 }
 
+void emit_matrix(YAML::Emitter& out, const char* key, const Eigen::MatrixXd& matrix) {
+  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    const Eigen::VectorXd numbers = matrix.row(row);
+    emit_row(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
+  }
+  out << YAML::EndSeq;
+}
+
+/// The rows of the lower triangle.
+void emit_joint_covariance(YAML::Emitter& out, const Eigen::MatrixXd& covariance) {
+  out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
+  for (Eigen::Index row = 0; row < covariance.rows(); ++row) {
+    const Eigen::VectorXd numbers = covariance.row(row).head(row + 1);
+    emit_row(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
+  }
+  out << YAML::EndSeq;
+}
+
 void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) {
   begin_part(out, "intrinsics_report");
   emit_integer(out, "views", report.views);
@@ -40,6 +59,7 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
   if (report.uncertainty_px && std::isfinite(*report.uncertainty_px)) {
     emit_number(out, "uncertainty_px", *report.uncertainty_px);
   }
+  if (report.covariance) emit_joint_covariance(out, *report.covariance);
   out << YAML::EndMap;
 }
 
@@ -60,6 +80,7 @@ void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
   if (center.lever_arm_covariance) {
     emit_covariance(out, "lever_arm_covariance", *center.lever_arm_covariance);
   }
+  if (center.by_intrinsics) emit_matrix(out, "by_intrinsics", *center.by_intrinsics);
   out << YAML::EndMap;
 }
 
@@ -70,6 +91,30 @@ void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
   emit_numbers(out, "center_m", dispersion.center_m);
   emit_integer(out, "captures", dispersion.captures);
   if (dispersion.covariance) emit_covariance(out, "covariance", *dispersion.covariance);
+  if (dispersion.by_intrinsics) emit_matrix(out, "by_intrinsics", *dispersion.by_intrinsics);
+  if (dispersion.by_zenith) emit_covariance(out, "by_zenith", *dispersion.by_zenith);
+  out << YAML::EndMap;
+}
+
+void emit_adjustment(YAML::Emitter& out, const Camera& camera, const Adjustment& adjustment) {
+  begin_part(out, "adjustment");
+  out << YAML::Key << "sets" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (const std::string& set : adjustment.sets) out << YAML::DoubleQuoted << set;
+  out << YAML::EndSeq;
+  emit_integer(out, "captures", adjustment.captures);
+  emit_integer(out, "detections", adjustment.detections);
+  emit_number(out, "residual_px", adjustment.residual_px);
+  out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
+  for (const auto& [id, position_m] : adjustment.lamps) {
+    out << YAML::Flow << YAML::BeginMap;
+    emit_integer(out, "id", id);
+    emit_numbers(out, "position_m", position_m);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::Key << "parameters" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (const std::string& name : parameter_names(camera, adjustment)) out << name;
+  out << YAML::EndSeq;
+  emit_joint_covariance(out, adjustment.covariance);
   out << YAML::EndMap;
 }
 
@@ -103,6 +148,9 @@ void write_calibration(const std::filesystem::path& file, const Calibration& cal
   if (calibration.intrinsics_report) emit_intrinsics_report(out, *calibration.intrinsics_report);
   if (calibration.rotation_center) emit_rotation_center(out, *calibration.rotation_center);
   if (calibration.dispersion) emit_dispersion(out, *calibration.dispersion);
+  if (calibration.adjustment) {
+    emit_adjustment(out, calibration.camera, *calibration.adjustment);
+  }
   emit_camera(out, calibration.camera);
   out << YAML::EndMap << YAML::Newline;
   write_file(file, out.c_str());

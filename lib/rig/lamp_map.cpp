@@ -16,6 +16,7 @@ namespace {
 constexpr const char* kLampsFormat = "vlp-lamps/1";
 constexpr double kTooHigh_m = 200;  // a ceiling above this was given in millimetres
 constexpr double kCoincident_m = 1e-3;
+constexpr double kWorstSurvey_m = 1;  // beyond it was given in millimetres
 
 std::optional<double> optional_within(YamlMap& map, const std::string& key, double min, double max,
                                       std::string_view unit) {
@@ -34,6 +35,7 @@ Lamp read_lamp(YamlMap& map) {
   lamp.diameter_m = optional_within(map, "diameter_m", 1e-3, 10, "m");
   lamp.frequency_hz = optional_within(map, "frequency_hz", 50, 1e6, "Hz");
   lamp.duty = optional_within(map, "duty", 0.01, 0.99, "(a share of the period)");
+  lamp.sd_m = optional_within(map, "sd_m", 0, kWorstSurvey_m, "m");
   return lamp;
 }
 
@@ -57,12 +59,14 @@ const Lamp* find_lamp(std::span<const Lamp> lamps, int id) {
 
 LampMap read_lamp_map(const std::filesystem::path& file) {
   YamlMap document = read_yaml(file, kLampsFormat);
+  const auto sd_m = optional_within(document, "sd_m", 0, kWorstSurvey_m, "m");
   const YamlValue list = document.required("lamps");
   document.finish();
   LampMap map;
   for (const YamlValue& item : list.list()) {
     YamlMap keys = item.map();
-    const Lamp lamp = read_lamp(keys);
+    Lamp lamp = read_lamp(keys);
+    if (!lamp.sd_m) lamp.sd_m = sd_m;
     keys.finish();
     check_lamp(map.lamps, lamp, item);
     map.lamps.push_back(lamp);
@@ -83,6 +87,7 @@ void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {
     if (lamp.diameter_m) emit_number(out, "diameter_m", *lamp.diameter_m);
     if (lamp.frequency_hz) emit_number(out, "frequency_hz", *lamp.frequency_hz);
     if (lamp.duty) emit_number(out, "duty", *lamp.duty);
+    if (lamp.sd_m) emit_number(out, "sd_m", *lamp.sd_m);
     out << YAML::EndMap;
   }
   out << YAML::EndSeq << YAML::EndMap << YAML::Newline;

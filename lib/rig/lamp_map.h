@@ -18,6 +18,8 @@ struct Lamp {
   std::optional<double> frequency_hz;
   /// The lit share of a period.
   std::optional<double> duty;
+  /// Standard deviation of position_m per axis, as far as the survey states it.
+  std::optional<double> sd_m = {};
 };
 
 /// The lamps of a room, in the order of the file. Ids are unique, no two lamps coincide.
@@ -27,6 +29,7 @@ struct LampMap {
 
 /// Reads `vlp-lamps/1`:
 ///   format: vlp-lamps/1
+///   sd_m: 0.002            # of the survey, of all lamps that state none of their own
 ///   lamps:
 ///     - {id: 1, position_m: [0.5, -0.3, 2.1], diameter_m: 0.18, frequency_hz: 2000, duty: 0.5}
 /// Throws InputError: unknown or missing keys, an id that stands twice, two lamps within 1 mm,

@@ -31,8 +31,21 @@ Calibration with_rotation_center(Calibration calibration, const RotationCenter& 
                                  HistoryEntry entry) {
   calibration.dispersion.reset();
   forget(calibration, "dispersion");
+  calibration.adjustment.reset();
+  forget(calibration, "adjustment");
   calibration.rotation_center = rotation_center;
   remember(calibration, "rotation_center", std::move(entry));
+  return calibration;
+}
+
+Calibration with_adjustment(Calibration calibration, const RotationCenter& rotation_center,
+                            Adjustment adjustment, HistoryEntry entry) {
+  calibration.dispersion.reset();
+  forget(calibration, "dispersion");
+  forget(calibration, "rotation_center");
+  calibration.rotation_center = rotation_center;
+  calibration.adjustment = std::move(adjustment);
+  remember(calibration, "adjustment", std::move(entry));
   return calibration;
 }
 

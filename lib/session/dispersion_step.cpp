@@ -4,29 +4,87 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <utility>
 
+#include "geometry/frames.h"
+#include "positioning/positioner.h"
 #include "report/plots/calibration_plots.h"
 #include "rig/stage.h"
 
 namespace vlp {
 
 KnownPlaces at_known_places(std::span<const Frame> frames, const CapturesTable& table,
-                            const std::optional<Eigen::Vector2d>& place_m) {
+                            const std::optional<Eigen::Vector2d>& place_m, PlaceOf place_of) {
   KnownPlaces places;
   for (const Frame& frame : frames) {
     const auto entry = table.find(frame.image);
     const Capture known = entry == table.end() ? Capture{} : entry->second;
     if (known.x_m && known.y_m) {
       places.captures.push_back({frame.detections, {*known.x_m, *known.y_m}, known.inclination});
+      places.of.push_back(known.place);
     } else if (place_m) {
       places.captures.push_back({frame.detections, *place_m, known.inclination});
+      places.of.push_back(place_of);
     } else {
       ++places.without;
     }
   }
   return places;
 }
+
+namespace {
+
+Fix fix_of(const Positioner& positioner, const StationCapture& capture) {
+  Sensors sensors;
+  sensors.inclination = capture.inclination;
+  return positioner.locate(capture.detections, sensors);
+}
+
+/// The captures with places of the camera. Those without a fix have no yaw, and keep theirs.
+std::vector<StationCapture> at_cameras(const KnownPlaces& places, const LampMap& lamps,
+                                       const Calibration& levelled) {
+  std::vector<StationCapture> captures = places.captures;
+  const Positioner positioner(lamps, levelled);
+  const Eigen::Vector2d& arm_m = *levelled.rotation_center->lever_arm_m;
+  for (std::size_t i = 0; i < captures.size(); ++i) {
+    if (places.of[i] != PlaceOf::axis) continue;
+    const Fix fix = fix_of(positioner, captures[i]);
+    if (!fix.ok()) continue;
+    captures[i].station_m +=
+        rotation_about_z(fix.estimate.pose.yaw_rad).topLeftCorner<2, 2>() * arm_m;
+  }
+  return captures;
+}
+
+/// An offset d acts as a camera that is H d / f beside where it is.
+void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, const LampMap& lamps,
+                       const Calibration& levelled) {
+  const auto& center = levelled.rotation_center;
+  if (!center || !center->lever_arm_m) return;
+  const Eigen::Vector2d& arm_m = *center->lever_arm_m;
+  const Positioner positioner(lamps, levelled);
+  double height_m = 0;
+  int fixes = 0;
+  for (const StationCapture& capture : places.captures) {
+    const Fix fix = fix_of(positioner, capture);
+    if (!fix.ok()) continue;
+    height_m += lamps.lamps.front().position_m.z() - fix.estimate.pose.position_m.z();
+    ++fixes;
+  }
+  if (fixes == 0) return;
+  const Eigen::Vector2d focal_px(levelled.camera.intrinsics[0], levelled.camera.intrinsics[1]);
+  const Eigen::Vector2d beside_m =
+      height_m / fixes * result.fit.dispersion.offset_px.cwiseQuotient(focal_px);
+  constexpr double alike = 0.2, least_m = 1e-3;
+  if (arm_m.norm() < least_m || (beside_m + arm_m).norm() > alike * arm_m.norm()) return;
+  result.warnings.push_back(fmt::format(
+      "the offset is that of the lever arm, {:.1f} mm: the places are those of the axis, and fixes "
+      "would be {:.1f} mm wrong; say so: place: axis in captures.csv, or --of axis",
+      1e3 * arm_m.norm(), 1e3 * beside_m.norm()));
+}
+
+}  // namespace
 
 DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,
                                   DispersionMethod method, DispersionCircle circle,
@@ -35,7 +93,18 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   Calibration levelled = input.calibration;
   levelled.dispersion.reset();
   if (doubts_map(input, levelled, result)) return result;
-  result.fit = fit_dispersion(places.captures, input.lamps, input.calibration, method, circle);
+  const bool of_axis =
+      std::find(places.of.begin(), places.of.end(), PlaceOf::axis) != places.of.end();
+  const auto& center = input.calibration.rotation_center;
+  if (of_axis && !(center && center->lever_arm_m)) {
+    result.fail(StepFailure::undetermined,
+                "the places are of the axis, and the calibration knows no lever arm from it to the "
+                "camera: vlp-rotation finds it from captures at two heights");
+    return result;
+  }
+  const std::vector<StationCapture> captures =
+      of_axis ? at_cameras(places, input.lamps, levelled) : places.captures;
+  result.fit = fit_dispersion(captures, input.lamps, input.calibration, method, circle);
   const DispersionFit& fit = result.fit;
   std::string why(explanation_of(fit.status));
   switch (fit.status) {
@@ -56,6 +125,7 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   if (!input.calibration.rotation_center) {
     result.warnings.emplace_back("the calibration has no rotation_center: run vlp-rotation first");
   }
+  if (!of_axis) warn_of_lever_arm(result, places, input.lamps, levelled);
   constexpr double millimetres = 1e3;
   result.metrics = {{"dispersion_mm", millimetres * fit.dispersion.radius_m},
                     {"dispersion_offset_px", fit.dispersion.offset_px.norm()}};

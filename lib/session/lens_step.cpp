@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
 #include "report/plots/calibration_plots.h"
 #include "rig/stage.h"
 
@@ -39,6 +40,7 @@ Sorted sorted(const LensInput& input, LensResult& result) {
 
 IntrinsicsReport report_of(const LensResult& result, const IntrinsicsInput& input) {
   const IntrinsicsSolution& solution = result.solution;
+  const Eigen::MatrixXd covariance = ProjectionUncertainty(solution).intrinsics_covariance();
   const Eigen::Vector2d warp_m =
       solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
   return {static_cast<int>(solution.views.size()),
@@ -46,7 +48,8 @@ IntrinsicsReport report_of(const LensResult& result, const IntrinsicsInput& inpu
           solution.outliers,
           solution.rms_px,
           std::array{warp_m.x(), warp_m.y()},
-          result.report.uncertainty_worst_px};
+          result.report.uncertainty_worst_px,
+          covariance.allFinite() ? std::optional(covariance) : std::nullopt};
 }
 
 Camera camera_of(Camera camera, const BoardProblem& problem) {

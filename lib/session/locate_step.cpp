@@ -7,8 +7,13 @@
 #include <algorithm>
 #include <map>
 
+#include "camera/lens.h"
 #include "captures/outside_image.h"
+#include "geometry/median.h"
+#include "positioning/correction.h"
+#include "positioning/lean.h"
 #include "positioning/residual_noise.h"
+#include "rig/find_lamp.h"
 
 namespace vlp {
 namespace {
@@ -45,7 +50,15 @@ FixRow row_of(const Frame& frame, const Fix& fix, bool noise_known) {
   FixRow row{frame.image, std::string(name_of(fix.status)), {}, fix.lamps};
   if (!fix.ok()) return row;
   row.fix = {fix.estimate.pose, {}, fix.residual_px};
-  if (noise_known) row.fix->sd = fix.estimate.covariance.diagonal().cwiseSqrt();
+  if (noise_known) {
+    row.fix->sd = fix.estimate.covariance.diagonal().cwiseSqrt();
+    if (fix.estimate.covariance != fix.noise_covariance) {
+      row.fix->noise_sd = fix.noise_covariance.diagonal().cwiseSqrt();
+    }
+  }
+  const auto listed =
+      std::min<std::size_t>(fix.rejected_ids.size(), static_cast<std::size_t>(fix.rejected_lamps));
+  row.rejected.assign(fix.rejected_ids.begin(), fix.rejected_ids.begin() + std::ptrdiff_t(listed));
   return row;
 }
 
@@ -86,19 +99,52 @@ void warn_of_captures(LocateResult& result, const LocateInput& input) {
       without, input.frames.size(), input.frames.front().image, captures.begin()->first));
 }
 
-void tell_of_lamps_left_out(LocateResult& result, const std::vector<Frame>& frames) {
+/// How far from its place in the map a lamp is seen, on the ceiling; nothing where that is not
+/// known: with a mount fixes are not of the camera.
+std::optional<double> off_m(const LocateInput& input, std::size_t frame, const Fix& fix, int id,
+                            const Lens& lens, const Eigen::Matrix3d& base_from_camera) {
+  const Lamp* lamp = find_lamp(input.lamps.lamps, id);
+  if (lamp == nullptr || input.how.mount) return std::nullopt;
+  const auto& [image, detections] = input.frames[frame];
+  const auto detection = std::find_if(detections.begin(), detections.end(),
+                                      [&](const Detection& one) { return one.lamp == id; });
+  if (detection == detections.end()) return std::nullopt;
+  const auto ray = lens.unproject(detection->pixel);
+  if (!ray) return std::nullopt;
+  const Sensors sensors = sensors_of(image, input);
+  const Lean lean = sensors.inclination ? lean_of(*sensors.inclination, 0) : Lean();
+  const Eigen::Vector3d level = lean.level_from_base * base_from_camera * ray->direction;
+  const Pose& pose = fix.estimate.pose;
+  const double height_m = lamp->position_m.z() - pose.position_m.z();
+  const Eigen::Vector3d seen_m =
+      pose.position_m + rotation_about_z(pose.yaw_rad) * level * (height_m / level.z());
+  return (seen_m - lamp->position_m).head<2>().norm();
+}
+
+void tell_of_lamps_left_out(LocateResult& result, const LocateInput& input) {
+  const Lens lens(input.calibration.camera.lens_model, input.calibration.camera.intrinsics);
+  const Eigen::Matrix3d base_from_camera =
+      level_from_camera(input.calibration, input.how.correction);
   int unknown = 0, rejected = 0;
-  std::map<int, int> captures;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
+  struct LeftOut {
+    int captures = 0;
+    std::vector<double> off_m = {};
+  };
+  std::map<int, LeftOut> lamps;
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
     const Fix& fix = result.fixes[i];
     unknown += fix.unknown_lamps;
     rejected += fix.rejected_lamps;
-    if (fix.rejected_lamps == 0) continue;
-    ++captures[fix.rejected_lamp_id];
-    result.details.push_back(fmt::format("{}: lamp {} contradicts the others and is left out",
-                                         frames[i].image, fix.rejected_lamp_id));
+    for (const int id : result.rows[i].rejected) {
+      LeftOut& lamp = lamps[id];
+      ++lamp.captures;
+      if (const auto off = off_m(input, i, fix, id, lens, base_from_camera)) {
+        lamp.off_m.push_back(*off);
+      }
+      result.details.push_back(fmt::format("{}: lamp {} contradicts the others and is left out",
+                                           input.frames[i].image, id));
+    }
   }
-  for (const auto& [lamp, count] : captures) result.lamps_left_out.push_back({lamp, count});
   if (unknown > 0) {
     result.warnings.push_back(
         fmt::format("{} detections of lamps that are not in the map, left out", unknown));
@@ -106,6 +152,15 @@ void tell_of_lamps_left_out(LocateResult& result, const std::vector<Frame>& fram
   if (rejected > 0) {
     result.warnings.push_back(
         fmt::format("{} detections that contradict the others, left out", rejected));
+  }
+  for (auto& [id, lamp] : lamps) {
+    result.lamps_left_out.push_back({id, lamp.captures});
+    std::string words = fmt::format("lamp {} is left out of {} of {} captures", id, lamp.captures,
+                                    input.frames.size());
+    if (!lamp.off_m.empty()) {
+      words += fmt::format(": {:.0f} mm off", 1e3 * upper_median(std::move(lamp.off_m)));
+    }
+    result.warnings.push_back(std::move(words));
   }
 }
 
@@ -136,7 +191,7 @@ LocateResult locate_frames(const LocateInput& input) {
   }
   warn_of_image(result, input);
   warn_of_captures(result, input);
-  tell_of_lamps_left_out(result, input.frames);
+  tell_of_lamps_left_out(result, input);
   result.summary = summarize(result.rows);
   if (result.summary.fixes == 0) {
     result.fail(StepFailure::undetermined,

@@ -30,6 +30,18 @@ TEST(CapturesTable, ReadsAnyOfItsColumns) {
   EXPECT_FALSE(captures.at("b").z_m);
 }
 
+TEST(CapturesTable, TellsWhosePlaceItIsAndWhichCapturesAreOfOneSpot) {
+  const TemporaryFolder folder;
+  const auto captures = read_captures(folder.file(
+      "captures.csv", "image,x_m,y_m,place,place_sd_m,spot\na,1,2,axis,0.001,s1\nb,1,2,,,\n"));
+  EXPECT_EQ(captures.at("a").place, PlaceOf::axis);
+  EXPECT_EQ(captures.at("a").place_sd_m, 0.001);
+  EXPECT_EQ(captures.at("a").spot, "s1");
+  EXPECT_EQ(captures.at("b").place, PlaceOf::camera);
+  EXPECT_FALSE(captures.at("b").place_sd_m);
+  EXPECT_TRUE(captures.at("b").spot.empty());
+}
+
 TEST(CapturesTable, RefusesWhatContradicts) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& content) {
@@ -40,6 +52,8 @@ TEST(CapturesTable, RefusesWhatContradicts) {
   EXPECT_THAT(refusal("image,roll_rad\na,0.1\n"), HasSubstr("without the other"));
   EXPECT_THAT(refusal("image,z_m\na,high\n"), HasSubstr("c.csv:2: z_m: should be a finite number"));
   EXPECT_THAT(refusal("image,z_m\n,1\n"), HasSubstr("c.csv:2: image: is empty"));
+  EXPECT_THAT(refusal("image,place\na,robot\n"), HasSubstr("should be camera or axis"));
+  EXPECT_THAT(refusal("image,place_sd_m\na,-1\n"), HasSubstr("should not be negative"));
 }
 
 }  // namespace

@@ -67,5 +67,25 @@ TEST(FixesTable, NamesTheLineOfBadRows) {
   EXPECT_THAT(refusal(""), HasSubstr("fixes.csv: holds no fix"));
 }
 
+TEST(FixesTable, HasTheNoisesPartAndTheLampsLeftOutWhereThereAreAny) {
+  const TemporaryFolder folder;
+  FixRow plain{"a", "ok", FixRow::Fix{{{1, 2, 3}, 0.5}, Eigen::Vector4d(1, 1, 1, 1), 0.1}, 4};
+  FixRow whole = plain;
+  whole.image = "b";
+  whole.fix->noise_sd = Eigen::Vector4d(0.25, 0.25, 0.5, 0.125);
+  whole.rejected = {7, 12};
+  write_fixes(folder / "plain.csv", {plain});
+  EXPECT_THAT(folder.content_of(folder / "plain.csv"),
+              testing::Not(testing::HasSubstr("noise_sd_x_m")));
+  write_fixes(folder / "whole.csv", {plain, whole});
+  EXPECT_THAT(folder.content_of(folder / "whole.csv"),
+              HasSubstr("residual_px,noise_sd_x_m,noise_sd_y_m,noise_sd_z_m,noise_sd_yaw_rad,"
+                        "rejected\n"));
+  EXPECT_THAT(folder.content_of(folder / "whole.csv"), HasSubstr("7 12"));
+  const auto read = read_fixes(folder / "whole.csv");
+  EXPECT_FALSE(read[0].fix->noise_sd);
+  EXPECT_EQ(read[1].fix->noise_sd, whole.fix->noise_sd);
+}
+
 }  // namespace
 }  // namespace vlp

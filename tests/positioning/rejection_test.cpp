@@ -45,7 +45,7 @@ TEST_F(Rejection, LeavesOutOneMisidentifiedLampOfFour) {
       expect_truth(fix);
       EXPECT_EQ(fix.lamps, 3);
       EXPECT_EQ(fix.rejected_lamps, 1);
-      EXPECT_EQ(fix.rejected_lamp_id, id);
+      EXPECT_EQ(fix.rejected_ids[0], id);
     }
   }
 }
@@ -76,7 +76,7 @@ TEST_F(Rejection, WorksUnderLampsOfManyHeightsAndATilt) {
     const Fix fix = locate(detections);
     SCOPED_TRACE(wrong);
     expect_truth(fix);
-    EXPECT_EQ(fix.rejected_lamp_id, static_cast<int>(wrong) + 1);
+    EXPECT_EQ(fix.rejected_ids[0], static_cast<int>(wrong) + 1);
   }
 }
 
@@ -100,7 +100,7 @@ TEST_F(Rejection, LeavesOutALampThatIsALittleOffWhereTheNoiseIsStated) {
       const Fix fix = locate(detections);
       expect_truth(fix);
       EXPECT_EQ(fix.rejected_lamps, 1);
-      EXPECT_EQ(fix.rejected_lamp_id, static_cast<int>(wrong) + 1);
+      EXPECT_EQ(fix.rejected_ids[0], static_cast<int>(wrong) + 1);
       for (Detection& detection : detections) detection.sigma_px.reset();
       EXPECT_EQ(locate(detections).rejected_lamps, 0);
     }
@@ -154,7 +154,7 @@ TEST_F(Rejection, OfAWrongLampFarFromACluster) {
       if (!stated) detection.sigma_px.reset();
     }
     const Fix fix = locate(detections);
-    EXPECT_TRUE(!fix.ok() || fix.rejected_lamp_id == 5) << fix.residual_px << " px";
+    EXPECT_TRUE(!fix.ok() || fix.rejected_ids[0] == 5) << fix.residual_px << " px";
   }
 }
 

@@ -45,6 +45,39 @@ TEST(Calibration, MayHaveItsPartsInAnyOrder) {
   expect_same(read_calibration(folder.file("calibration.yaml", reordered)), sample_calibration());
 }
 
+TEST(Calibration, KeepsCovariancesAndAnAdjustment) {
+  Calibration calibration = sample_calibration();
+  const Eigen::MatrixXd root = Eigen::MatrixXd::Random(12 + 6, 12 + 6);
+  const Eigen::MatrixXd covariance = 0.01 * root * root.transpose();
+  calibration.intrinsics_report->covariance = covariance.topLeftCorner(8, 8);
+  calibration.rotation_center->by_intrinsics = root.topLeftCorner(2, 8);
+  calibration.dispersion->by_zenith = Matrix2{{-1, 0.1}, {0, -1}};
+  calibration.adjustment = Adjustment{
+      {{3, {1, 2, 3}}, {7, {-1, 0, 3}}}, covariance, {"rotation", "survey"}, 12, 70, 0.05};
+  expect_kept(calibration);
+}
+
+TEST(Calibration, RefusesAnAdjustmentThatIsOfSomethingElse) {
+  const TemporaryFolder folder;
+  Calibration calibration = sample_calibration();
+  calibration.adjustment =
+      Adjustment{{{3, {1, 2, 3}}}, Eigen::MatrixXd::Identity(15, 15), {"rotation"}, 12, 70, 0.05};
+  write_calibration(folder / "good.yaml", calibration);
+  const std::string good = folder.content_of(folder / "good.yaml");
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    const auto file = folder.file("bad.yaml", changed(good, from, to));
+    try {
+      read_calibration(file);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(refusal("zenith_x", "zenith_y"), testing::HasSubstr("zenith_x is missing"));
+  EXPECT_THAT(refusal("    - [0, 1]", "    - [2, 1]"), testing::HasSubstr("correlation"));
+  EXPECT_THAT(refusal("    - [1]\n", ""), testing::HasSubstr("15 rows of 1, 2, 3"));
+}
+
 TEST(Calibration, IsWrittenWithoutAnInfiniteUncertainty) {
   Calibration calibration = sample_calibration();
   calibration.intrinsics_report->uncertainty_px = std::numeric_limits<double>::infinity();

@@ -27,6 +27,20 @@ TEST(LampMap, IsWrittenByteForByteInTheFormat) {
   EXPECT_EQ(folder.content_of(folder / "lamps.yaml"), kLampsYaml);
 }
 
+TEST(LampMap, HasAStandardDeviationOfAllLampsOrOfOne) {
+  const TemporaryFolder folder;
+  const LampMap map = read_lamp_map(folder.file("lamps.yaml", R"(format: vlp-lamps/1
+sd_m: 0.002
+lamps:
+  - {id: 1, position_m: [0.5, -0.3, 2.1]}
+  - {id: 7, position_m: [-0.25, 0, 2.1], sd_m: 0.01}
+)"));
+  EXPECT_EQ(map.lamps[0].sd_m, 0.002);
+  EXPECT_EQ(map.lamps[1].sd_m, 0.01);
+  write_lamp_map(folder / "written.yaml", map);
+  expect_same(read_lamp_map(folder / "written.yaml"), map);
+}
+
 TEST(LampMap, FindsALampByItsId) {
   LampMap map;
   for (const int id : {7, 2, 40}) map.lamps.push_back({id, {0, 0.1 * id, 2}, {}, {}, {}});

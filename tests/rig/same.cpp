@@ -16,6 +16,7 @@ void expect_same(const LampMap& found, const LampMap& expected) {
     EXPECT_EQ(found.lamps[i].diameter_m, expected.lamps[i].diameter_m);
     EXPECT_EQ(found.lamps[i].frequency_hz, expected.lamps[i].frequency_hz);
     EXPECT_EQ(found.lamps[i].duty, expected.lamps[i].duty);
+    EXPECT_EQ(found.lamps[i].sd_m, expected.lamps[i].sd_m);
   }
 }
 
@@ -51,6 +52,7 @@ void expect_same(const IntrinsicsReport& found, const IntrinsicsReport& expected
   EXPECT_EQ(found.rms_px, expected.rms_px);
   EXPECT_EQ(found.board_warp_m, expected.board_warp_m);
   EXPECT_EQ(found.uncertainty_px, expected.uncertainty_px);
+  EXPECT_EQ(found.covariance, expected.covariance);
 }
 
 void expect_same(const RotationCenter& found, const RotationCenter& expected) {
@@ -60,6 +62,7 @@ void expect_same(const RotationCenter& found, const RotationCenter& expected) {
   EXPECT_EQ(found.covariance, expected.covariance);
   EXPECT_EQ(found.lever_arm_m, expected.lever_arm_m);
   EXPECT_EQ(found.lever_arm_covariance, expected.lever_arm_covariance);
+  EXPECT_EQ(found.by_intrinsics, expected.by_intrinsics);
 }
 
 void expect_same(const Dispersion& found, const Dispersion& expected) {
@@ -68,6 +71,21 @@ void expect_same(const Dispersion& found, const Dispersion& expected) {
   EXPECT_EQ(found.center_m, expected.center_m);
   EXPECT_EQ(found.captures, expected.captures);
   EXPECT_EQ(found.covariance, expected.covariance);
+  EXPECT_EQ(found.by_intrinsics, expected.by_intrinsics);
+  EXPECT_EQ(found.by_zenith, expected.by_zenith);
+}
+
+void expect_same(const Adjustment& found, const Adjustment& expected) {
+  ASSERT_EQ(found.lamps.size(), expected.lamps.size());
+  for (std::size_t i = 0; i < found.lamps.size(); ++i) {
+    EXPECT_EQ(found.lamps[i].id, expected.lamps[i].id);
+    EXPECT_EQ(found.lamps[i].position_m, expected.lamps[i].position_m);
+  }
+  EXPECT_EQ(found.covariance, expected.covariance);
+  EXPECT_EQ(found.sets, expected.sets);
+  EXPECT_EQ(found.captures, expected.captures);
+  EXPECT_EQ(found.detections, expected.detections);
+  EXPECT_EQ(found.residual_px, expected.residual_px);
 }
 
 void expect_same(const HistoryEntry& found, const HistoryEntry& expected) {
@@ -95,6 +113,7 @@ void expect_same(const Calibration& found, const Calibration& expected) {
   expect_same(found.intrinsics_report, expected.intrinsics_report);
   expect_same(found.rotation_center, expected.rotation_center);
   expect_same(found.dispersion, expected.dispersion);
+  expect_same(found.adjustment, expected.adjustment);
   ASSERT_EQ(found.history.size(), expected.history.size());
   for (std::size_t i = 0; i < found.history.size(); ++i) {
     SCOPED_TRACE(i);

@@ -69,8 +69,8 @@ struct Blocks {
     for (std::size_t i = 0; i < plot.missing_m.size(); i += missing_step) {
       missing += data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
     }
-    for (const auto& [id, position_m, diameter, frequency, duty] : plot.lamps.lamps) {
-      lamps += data_row({position_m.x(), position_m.y(), double(id)});
+    for (const Lamp& lamp : plot.lamps.lamps) {
+      lamps += data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
     }
   }
   std::string text() const {

@@ -1,0 +1,188 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-adjust: any sets of captures -> everything they share, solved together.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "app.h"
+#include "capture_options.h"
+#include "geometry/angles.h"
+#include "history.h"
+#include "rig/input_error.h"
+#include "session/adjust_step.h"
+#include "session/session_folder.h"
+#include "session/step_history.h"
+#include "step_outcome.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  CaptureOptions images;  // but for the sets
+  std::vector<std::string> sets, turns;
+  std::string refined_map;
+  std::optional<double> map_sd_m, place_sd_m;
+};
+
+/// A folder of images, or a table, and the captures.csv in its folder.
+AdjustSet read_set(const Options& options, const std::string& set, bool turn, const LampMap& lamps,
+                   const Calibration& calibration) {
+  const fs::path path(set);
+  const bool folder = fs::is_directory(path);
+  AdjustSet read{last_name(path), {}, {}, turn || path.filename() == "rotation"};
+  if (folder) {
+    CaptureOptions images = options.images;
+    images.images = set;
+    read.frames = see_lamps(images, lamps, calibration).frames;
+    read.captures = options.place_sd_m ? captures_in(path) : captures_table(path);
+  } else {
+    read.frames = read_detections(path);
+    read.captures = captures_table(path.parent_path());
+  }
+  return read;
+}
+
+void print_summary(const AdjustmentResult& found, const Calibration& before) {
+  const RotationCenter& center = found.center;
+  const double focal_px = std::sqrt(found.camera.intrinsics[0] * found.camera.intrinsics[1]);
+  fmt::print("captures    {} used, {} left out\n", found.captures, found.captures_left_out);
+  fmt::print("detections  {} used, {} left out\n", found.detections, found.detections_left_out);
+  const Eigen::Vector3d& up = center.zenith_in_camera;
+  fmt::print("tilt        {:.4f} deg, sd {:.4f} deg\n",
+             deg_from_rad(std::acos(std::min(1.0, up.z()))),
+             deg_from_rad(std::sqrt(center.covariance->trace() / 2) / focal_px));
+  if (before.rotation_center) {
+    const double cosine = std::min(1.0, up.dot(before.rotation_center->zenith_in_camera));
+    fmt::print("            {:.4f} deg from that of the calibration before\n",
+               deg_from_rad(std::acos(cosine)));
+  }
+  if (const auto& arm_m = center.lever_arm_m) {
+    fmt::print("lever arm   {:.3f} {:.3f} mm, sd {:.3f} {:.3f} mm\n", 1e3 * arm_m->x(),
+               1e3 * arm_m->y(), 1e3 * std::sqrt((*center.lever_arm_covariance)(0, 0)),
+               1e3 * std::sqrt((*center.lever_arm_covariance)(1, 1)));
+  } else {
+    fmt::print("lever arm   not determined: a turn on a spot at a second height tells it\n");
+  }
+  if (found.lens_freedom > 0) {
+    fmt::print("lens        corrected: chi-squared {:.1f}, {} expected\n", found.lens_chi_squared,
+               found.lens_freedom);
+  } else {
+    fmt::print("lens        taken as exact: the calibration has no covariance of it\n");
+  }
+  fmt::print("residual    {:.4f} px per axis\n", found.residual_px);
+  for (const auto& place : found.places) {
+    fmt::print("place       {}: {:.3f} {:.3f} {:.3f} mm from where it is said to be{}\n",
+               place.name, 1e3 * place.misfit_m.x(), 1e3 * place.misfit_m.y(),
+               1e3 * place.misfit_m.z(), place.wrong ? ", left out" : "");
+  }
+  fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "moved by x y z (mm)", "sd (mm)");
+  for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {
+    fmt::print("{:10} {:10.3f}{:9.3f}{:9.3f} {:10.3f}{:9.3f}{:9.3f}{}\n", id,
+               1e3 * correction_m.x(), 1e3 * correction_m.y(), 1e3 * correction_m.z(),
+               1e3 * sd_m.x(), 1e3 * sd_m.y(), 1e3 * sd_m.z(),
+               moved ? "  elsewhere than in the map" : "");
+  }
+}
+
+void run(const CLI::App& app, const Options& options) {
+  const CaptureOptions& images = options.images;
+  std::vector<std::string> inputs{images.lamps, images.calibration, images.classifier};
+  for (const auto* sets : {&options.sets, &options.turns}) {
+    for (const std::string& set : *sets) {
+      inputs.push_back(set);
+      const fs::path folder = fs::is_directory(set) ? fs::path(set) : fs::path(set).parent_path();
+      for (const char* table : {"captures.csv", "truth.csv"}) {
+        const fs::path beside = folder / table;
+        const bool fresh = std::find(inputs.begin(), inputs.end(), beside) == inputs.end();
+        if (fresh && fs::exists(beside)) inputs.push_back(beside);
+      }
+    }
+  }
+  check_output(images.output, inputs);
+  if (!options.refined_map.empty()) check_output(options.refined_map, inputs);
+  if (options.refined_map == images.output) {
+    throw std::invalid_argument("--output and --refine-map name one file");
+  }
+  AdjustStepInput input;
+  input.lamps = read_lamp_map(images.lamps);
+  input.lamps_file = images.lamps;
+  input.calibration = read_calibration(images.calibration);
+  input.calibration_file = images.calibration;
+  input.map_sd_m = options.map_sd_m;
+  input.place_sd_m = options.place_sd_m;
+  input.refine_map = !options.refined_map.empty();
+  for (const std::string& set : options.sets) {
+    input.sets.push_back(read_set(options, set, false, input.lamps, input.calibration));
+  }
+  for (const std::string& set : options.turns) {
+    input.sets.push_back(read_set(options, set, true, input.lamps, input.calibration));
+  }
+  for (const AdjustSet& set : input.sets) check_lamps(set.frames, input.lamps, input.lamps_file);
+  const AdjustStepResult result = solve_adjustment(input, history_entry(app, inputs));
+  tell(result);
+  require(result);
+  if (input.refine_map) write_lamp_map(options.refined_map, result.found.refined);
+  write_calibration(images.output, result.calibration);
+  print_summary(result.found, input.calibration);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Everything that captures share, solved together: the camera's tilt and lever arm, the\n"
+      "lamps' places, the lens within what its calibration leaves open, with their joint\n"
+      "covariance, from any sets of captures: turns on a spot, known places, drives, heights.\n"
+      "captures.csv in a set's folder tells what is known: spot (captures of one name were taken\n"
+      "turning on one spot), x_m, y_m, z_m with place (camera or axis: whose place it is) and\n"
+      "place_sd_m. A set called rotation is a turn on the spot.\n\n"
+      "Example, from the project's folder:\n"
+      "  build/bin/vlp-adjust datasets/example/detections.csv --turn datasets/example/turning.csv "
+      "\\\n"
+      "    --lamps datasets/example/lamps.yaml --map-sd-m 0.002 \\\n"
+      "    --calibration datasets/example/calibration.yaml -o adjusted.yaml --refine-map "
+      "refined.yaml\n",
+      "vlp-adjust");
+  vlp::Options options;
+  app.add_option("sets", options.sets,
+                 "Folders of images, or tables: image, lamp, u_px, v_px [, sigma_px]")
+      ->option_text("SET...");
+  app.add_option("--turn", options.turns, "Further sets, each a turn on the spot")
+      ->option_text("SET...");
+  app.add_option("--lamps", options.images.lamps, "Lamp map, lamps.yaml, with its sd_m")
+      ->required();
+  app.add_option("--calibration", options.images.calibration,
+                 "Calibration of the camera; a rotation centre in it is where the search starts")
+      ->required();
+  app.add_option("-o,--output", options.images.output,
+                 "Where to write the calibration with its adjustment")
+      ->required();
+  app.add_option("--refine-map", options.refined_map,
+                 "Where to write the map with its lamps "
+                 "where the captures show them")
+      ->option_text("FILE");
+  app.add_option("--map-sd-m", options.map_sd_m,
+                 "Standard deviation per axis of lamps whose survey states none")
+      ->check(vlp::finite_not_negative());
+  app.add_option("--place-sd-m", options.place_sd_m,
+                 "Standard deviation per axis of places that state none, those of truth.csv too")
+      ->check(vlp::finite_positive());
+  vlp::add_detect_options(app, options.images);
+  return vlp::run_app(app, argc, argv, [&] {
+    if (options.sets.empty() && options.turns.empty()) {
+      throw std::invalid_argument("which captures? Name a folder of images or a table");
+    }
+    vlp::run(app, options);
+  });
+}

@@ -1,0 +1,601 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/adjustment/adjustment.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "calibration/adjustment/adjustment_problem.h"
+#include "geometry/median.h"
+#include "positioning/consistent_fix.h"
+#include "positioning/frame_fix.h"
+#include "positioning/lean.h"
+#include "rig/find_lamp.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+/// Chi-squared of three beyond which a lamp has moved: 1e-4 of those that have not.
+constexpr double kMovedChiSquared = 21.1;
+/// Standard deviations beyond which a place is wrong, and a detection an outlier.
+constexpr double kWrongPlace = 5, kOutlier = 4.5;
+
+/// All that is read from the input and does not change.
+struct Assembled {
+  AdjustmentProblem problem;
+  Eigen::Vector3d origin_m;
+  std::vector<AdjustmentResult::Place> places = {};
+  std::vector<double> place_sd_m = {};
+  std::vector<bool> lamp_seen = {};
+  int captures_left_out = 0;
+  bool noise_is_stated = true;
+};
+
+Eigen::Vector3d mean_of(const LampMap& map) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Lamp& lamp : map.lamps) sum += lamp.position_m - map.lamps.front().position_m;
+  return map.lamps.front().position_m + sum / static_cast<double>(map.lamps.size());
+}
+
+/// Of two lamps or more, whatever a map that is a little off makes of it; and if that is far off,
+/// of those that agree.
+std::optional<Pose> rough_pose(const std::vector<Sighting>& sightings,
+                               const std::vector<std::size_t>& lamps,
+                               const std::vector<Eigen::Vector3d>& lamps_m) {
+  if (sightings.size() < 2) return std::nullopt;
+  constexpr double usual_share = 0.1;
+  if (sightings.size() > 3) {
+    SightedFrame frame;
+    frame.noise_is_stated = false;
+    for (std::size_t i = 0; i < sightings.size(); ++i) {
+      frame.sightings[i] = sightings[i];
+      frame.ids[i] = static_cast<int>(i);
+      frame.nearest_m[i] = kInfinite;
+      for (std::size_t j = 0; j < lamps_m.size(); ++j) {
+        if (j == lamps[i]) continue;
+        frame.nearest_m[i] =
+            std::min(frame.nearest_m[i], (lamps_m[j] - sightings[i].lamp_m).head<2>().norm());
+      }
+    }
+    frame.size = sightings.size();
+    const auto [status, fix] = fix_frame(frame, usual_share);
+    if (status == FixStatus::ok) return fix.pose;
+  }
+  const auto [status, fix] = fix_consistent(sightings, kInfinite);
+  return status == FixStatus::ok ? std::optional(fix.pose) : std::nullopt;
+}
+
+/// A key by which captures share a place: their spot, or the place itself.
+using PlaceKey = std::tuple<std::string, double, double, double, PlaceOf>;
+
+Assembled assemble(const AdjustmentInput& input) {
+  const Camera& camera = input.calibration.camera;
+  const auto& report = input.calibration.intrinsics_report;
+  const auto& center = input.calibration.rotation_center;
+  std::map<std::string, std::size_t> spots;
+  for (const AdjustmentCapture& capture : input.captures) {
+    if (!capture.spot.empty()) spots.emplace(capture.spot, spots.size());
+  }
+  Assembled all{
+      AdjustmentProblem(camera.lens_model,
+                        LensFreedom(camera.intrinsics, report ? report->covariance : std::nullopt),
+                        input.lamps.lamps.size(), spots.size()),
+      mean_of(input.lamps)};
+  AdjustmentProblem& problem = all.problem;
+  const AdjustmentLayout& layout = problem.layout();
+  const Lens lens(camera.lens_model, camera.intrinsics);
+  std::vector<Eigen::Vector3d> lamps_m;
+  for (const Lamp& lamp : input.lamps.lamps) {
+    lamps_m.emplace_back(lamp.position_m - all.origin_m);
+    problem.state().segment<3>(layout.lamp(lamps_m.size() - 1)) = lamps_m.back();
+    problem.lamps.push_back({lamps_m.back(), lamp.sd_m.value_or(0)});
+  }
+  all.lamp_seen.resize(lamps_m.size());
+  Eigen::Vector2d zenith(0, 0), arm_m(0, 0);
+  if (center) {
+    zenith = center->zenith_in_camera.head<2>() / center->zenith_in_camera.z();
+    arm_m = center->lever_arm_m.value_or(arm_m);
+  }
+  problem.state().segment<2>(layout.zenith) = zenith;
+  problem.state().segment<2>(layout.lever_arm) = arm_m;
+  const Eigen::Matrix3d base_from_camera =
+      turn_by_zenith(zenith, Eigen::Vector3d::UnitZ()).camera_from_level.transpose();
+
+  std::vector<Eigen::Vector3d> axes_m(spots.size(), Eigen::Vector3d::Zero());
+  std::vector<int> spot_captures(spots.size(), 0);
+  std::map<PlaceKey, std::size_t> place_of_key;
+  std::vector<AdjustmentProblem::Sighting> seen;
+  std::vector<Sighting> sightings;
+  std::vector<std::size_t> lamps;
+  for (const AdjustmentCapture& capture : input.captures) {
+    const Lean lean = capture.inclination ? lean_of(*capture.inclination, 0) : Lean();
+    seen.clear();
+    sightings.clear();
+    lamps.clear();
+    for (const Detection& detection : capture.detections) {
+      const Lamp* lamp = find_lamp(input.lamps.lamps, detection.lamp);
+      if (lamp == nullptr || sightings.size() == kMaxSightings) continue;
+      const auto index = static_cast<std::size_t>(lamp - input.lamps.lamps.data());
+      const auto ray = lens.unproject(detection.pixel);
+      if (!ray || std::find(lamps.begin(), lamps.end(), index) != lamps.end()) continue;
+      const Eigen::Vector3d level = lean.level_from_base * base_from_camera * ray->direction;
+      if (!(level.z() > 0)) continue;
+      const double sigma_px = detection.sigma_px.value_or(1);
+      if (!detection.sigma_px) all.noise_is_stated = false;
+      seen.push_back({problem.captures.size(), index, detection.pixel, sigma_px});
+      lamps.push_back(index);
+      sightings.push_back(
+          {lamps_m[index], level.hnormalized(), Eigen::Matrix2d(lens.focal_px().asDiagonal()), 1});
+    }
+    const auto pose = rough_pose(sightings, lamps, lamps_m);
+    if (!pose) {
+      ++all.captures_left_out;
+      continue;
+    }
+    std::optional<std::size_t> spot;
+    if (!capture.spot.empty()) {
+      spot = spots.at(capture.spot);
+      const Eigen::Matrix2d turn = rotation_about_z(pose->yaw_rad).topLeftCorner<2, 2>();
+      axes_m[*spot] += pose->position_m;
+      axes_m[*spot].head<2>() -= turn * arm_m;
+      ++spot_captures[*spot];
+      problem.has_lever_arm = true;
+    }
+    const std::size_t index = problem.captures.size();
+    problem.add_capture({spot, lean.level_from_base.transpose(), 0}, *pose);
+    for (const auto& sighting : seen) {
+      problem.sightings.push_back(sighting);
+      all.lamp_seen[sighting.lamp] = true;
+    }
+    if (!capture.place) continue;
+    const KnownPlace& place = *capture.place;
+    const PlaceKey key = capture.spot.empty() ? PlaceKey{"", place.xy_m.x(), place.xy_m.y(),
+                                                         place.z_m.value_or(kInfinite), place.of}
+                                              : PlaceKey{capture.spot, 0, 0, 0, place.of};
+    const auto [entry, fresh] = place_of_key.emplace(key, all.places.size());
+    if (fresh) {
+      all.places.push_back({capture.spot.empty() ? capture.name : capture.spot, place.of, 0,
+                            Eigen::Vector3d::Zero(), false});
+      all.place_sd_m.push_back(place.sd_m);
+    }
+    ++all.places[entry->second].captures;
+    Eigen::Vector3d stated_m(place.xy_m.x(), place.xy_m.y(), place.z_m.value_or(0));
+    stated_m -= all.origin_m;
+    problem.has_lever_arm |= place.of == PlaceOf::axis;
+    problem.places.push_back(
+        {index, entry->second, place.of == PlaceOf::axis, stated_m, place.z_m ? 3 : 2, place.sd_m});
+  }
+  for (auto& place : problem.places) {
+    place.sd_m *= std::sqrt(static_cast<double>(all.places[place.place].captures));
+  }
+  problem.place_used.assign(all.places.size(), true);
+  for (std::size_t i = 0; i < axes_m.size(); ++i) {
+    problem.state().segment<3>(layout.spot(i)) = axes_m[i] / std::max(1, spot_captures[i]);
+  }
+  return all;
+}
+
+/// Lengths of the whitened residuals; infinite where the lens has no such ray.
+std::vector<double> lengths_of(const AdjustmentProblem& problem) {
+  std::vector<double> lengths;
+  lengths.reserve(problem.sightings.size());
+  const auto lens = problem.lens();
+  for (const auto& sighting : problem.sightings) {
+    const auto at = lens ? problem.linearize(sighting, *lens) : std::nullopt;
+    lengths.push_back(at ? at->residual.norm() : kInfinite);
+  }
+  return lengths;
+}
+
+/// Leaves out what is beyond the residuals' scatter, as the median shows it. Whether that changes
+/// anything.
+bool leave_out_outliers(AdjustmentProblem& problem, bool noise_is_stated) {
+  constexpr double median_of_rayleigh = 1.17741;  // sqrt(2 ln 2)
+  constexpr double rounding = 1e-6;               // standard deviations
+  const std::vector<double> lengths = lengths_of(problem);
+  std::vector<double> used;
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    if (problem.sightings[i].used) used.push_back(lengths[i]);
+  }
+  if (used.empty()) return false;
+  const double scatter = upper_median(used) / median_of_rayleigh;
+  const double limit = kOutlier * std::max(scatter, noise_is_stated ? 1 : rounding);
+  bool changed = false;
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const bool use = lengths[i] <= limit;
+    changed |= use != problem.sightings[i].used;
+    problem.sightings[i].used = use;
+  }
+  return changed;
+}
+
+/// Found less stated, the mean over a place's captures.
+void measure_places(Assembled& all) {
+  for (auto& place : all.places) place.misfit_m.setZero();
+  for (const auto& seen : all.problem.places) {
+    auto& place = all.places[seen.place];
+    place.misfit_m.head(seen.size) +=
+        (all.problem.place_of(seen) - seen.stated_m).head(seen.size) / place.captures;
+  }
+}
+
+double misfit_of(const Assembled& all, std::size_t place) {
+  return all.places[place].misfit_m.norm() / all.place_sd_m[place];
+}
+
+/// The correction of a lamp over what its survey and everything else let expect: with r = found
+/// less surveyed, r' (sd^2 - C)^-1 r when the survey counts, r' (sd^2 + C)^-1 r when it does not.
+double moved_chi_squared(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                         std::size_t lamp, double sd_m, bool counts) {
+  const Eigen::Index at = problem.layout().lamp(lamp);
+  const Eigen::Vector3d r_m = problem.state().segment<3>(at) - problem.lamps[lamp].surveyed_m;
+  const Eigen::Matrix3d found = covariance.block<3, 3>(at, at);
+  const Eigen::Matrix3d survey = sd_m * sd_m * Eigen::Matrix3d::Identity();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
+      counts ? Eigen::Matrix3d(survey - found) : Eigen::Matrix3d(survey + found));
+  // Where nothing but the survey says where the lamp is, nothing contradicts it.
+  constexpr double told = 1e-6;
+  double sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double variance = eigen.eigenvalues()[i];
+    if (!(variance > told * sd_m * sd_m)) continue;
+    const double along = eigen.eigenvectors().col(i).dot(r_m);
+    sum += along * along / variance;
+  }
+  return sum;
+}
+
+/// Survey and places that the rest contradicts, found one at a time.
+class Contradictions {
+ public:
+  explicit Contradictions(Assembled& all) : all_(all) {
+    for (const auto& lamp : all.problem.lamps) sd_m_.push_back(lamp.sd_m);
+    moved_.resize(sd_m_.size());
+  }
+
+  const std::vector<bool>& moved() const { return moved_; }
+  /// Where most lamps contradict their survey, which of them did is not to be told.
+  bool most() const { return most_; }
+  double sd_m(std::size_t lamp) const { return sd_m_[lamp]; }
+
+  /// What the robust solution, which it does not spoil, is far from at once.
+  void leave_out_the_worst() {
+    constexpr double far = 8;  // standard deviations
+    for (std::size_t i = 0; i < sd_m_.size(); ++i) {
+      const auto& [surveyed_m, sd_m] = all_.problem.lamps[i];
+      const Eigen::Vector3d found_m =
+          all_.problem.state().segment<3>(all_.problem.layout().lamp(i));
+      if (all_.lamp_seen[i] && sd_m > 0 && (found_m - surveyed_m).norm() > far * sd_m) {
+        release(i);
+      }
+    }
+    measure_places(all_);
+    for (std::size_t i = 0; i < all_.places.size(); ++i) {
+      all_.problem.place_used[i] = misfit_of(all_, i) <= kWrongPlace;
+    }
+  }
+
+  /// Leaves out the worst of those that count, or takes back what is not contradicted after all.
+  /// Whether that changes anything.
+  bool settle(const Eigen::MatrixXd& covariance) {
+    measure_places(all_);
+    for (std::size_t i = 0; i < all_.places.size(); ++i) {
+      if (taken_back_places_.contains(i) || all_.problem.place_used[i]) continue;
+      if (misfit_of(all_, i) > kWrongPlace) continue;
+      taken_back_places_.insert(i);
+      all_.problem.place_used[i] = true;
+      return true;
+    }
+    std::size_t worst_place = all_.places.size();
+    double worst = kWrongPlace;
+    for (std::size_t i = 0; i < all_.places.size(); ++i) {
+      if (!all_.problem.place_used[i] || misfit_of(all_, i) <= worst) continue;
+      worst = misfit_of(all_, i);
+      worst_place = i;
+    }
+    if (worst_place < all_.places.size()) {
+      all_.problem.place_used[worst_place] = false;
+      return true;
+    }
+    std::size_t worst_lamp = sd_m_.size();
+    double worst_chi = kMovedChiSquared;
+    for (std::size_t i = 0; i < sd_m_.size(); ++i) {
+      if (!all_.lamp_seen[i] || !(sd_m_[i] > 0)) continue;
+      const double chi = moved_chi_squared(all_.problem, covariance, i, sd_m_[i], !moved_[i]);
+      if (moved_[i] && chi < kMovedChiSquared && !taken_back_.contains(i)) {
+        taken_back_.insert(i);
+        moved_[i] = false;
+        all_.problem.lamps[i].sd_m = sd_m_[i];
+        return true;
+      }
+      if (moved_[i] || chi <= worst_chi) continue;
+      worst_chi = chi;
+      worst_lamp = i;
+    }
+    if (worst_lamp == sd_m_.size() || most_) return false;
+    const auto seen = std::count(all_.lamp_seen.begin(), all_.lamp_seen.end(), true);
+    const auto released = std::count(moved_.begin(), moved_.end(), true);
+    if (2 * (released + 1) >= seen) {
+      most_ = true;
+      for (std::size_t i = 0; i < sd_m_.size(); ++i) all_.problem.lamps[i].sd_m = sd_m_[i];
+      moved_.assign(moved_.size(), false);
+      return true;
+    }
+    release(worst_lamp);
+    return true;
+  }
+
+ private:
+  void release(std::size_t lamp) {
+    moved_[lamp] = true;
+    all_.problem.lamps[lamp].sd_m = kInfinite;
+  }
+
+  Assembled& all_;
+  std::vector<double> sd_m_;
+  std::vector<bool> moved_;
+  std::set<std::size_t> taken_back_, taken_back_places_;
+  bool most_ = false;
+};
+
+/// Root of the squared whitened residuals over their degrees of freedom, less what the unknowns
+/// take of the detections.
+struct Noise {
+  double ratio;
+  double freedom;
+};
+
+Noise noise_of(const Assembled& all, const Eigen::MatrixXd& covariance) {
+  const AdjustmentProblem& problem = all.problem;
+  const AdjustmentLayout& at = problem.layout();
+  const std::vector<double> lengths = lengths_of(problem);
+  double squares = 0, freedom = 0;
+  std::vector<bool> capture_used(problem.captures.size()), lamp_used(problem.lamps.size());
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    if (!problem.sightings[i].used) continue;
+    squares += lengths[i] * lengths[i];
+    freedom += 2;
+    capture_used[problem.sightings[i].capture] = true;
+    lamp_used[problem.sightings[i].lamp] = true;
+  }
+  std::vector<bool> spot_used(static_cast<std::size_t>(at.shared - at.spots) / 3);
+  for (std::size_t k = 0; k < capture_used.size(); ++k) {
+    if (!capture_used[k]) continue;
+    const auto& spot = problem.captures[k].spot;
+    freedom -= spot ? 1 : 4;
+    if (spot) spot_used[*spot] = true;
+  }
+  freedom -= static_cast<double>(at.lens_size) -
+             covariance.block(at.lens, at.lens, at.lens_size, at.lens_size).trace();
+  freedom -= problem.has_lever_arm ? 4 : 2;
+  for (std::size_t i = 0; i < lamp_used.size(); ++i) {
+    const double sd_m = problem.lamps[i].sd_m;
+    if (!lamp_used[i] || !(sd_m > 0)) continue;
+    freedom -= 3 - covariance.block<3, 3>(at.lamp(i), at.lamp(i)).trace() / (sd_m * sd_m);
+  }
+  freedom -= 3.0 * static_cast<double>(std::count(spot_used.begin(), spot_used.end(), true));
+  for (std::size_t i = 0; i < all.places.size(); ++i) {
+    if (problem.place_used[i]) freedom += 2;  // what a place says was not known from detections
+  }
+  return {std::sqrt(squares / std::max(freedom, 1.0)), freedom};
+}
+
+/// Until the same detections, lamps and places agree, and their noise is known.
+bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& covariance,
+            double& freedom) {
+  AdjustmentProblem& problem = all.problem;
+  constexpr int rounds = 40;
+  for (int round = 0; round < rounds; ++round) {
+    if (!problem.solve(false)) return false;
+    covariance = problem.shared_covariance();
+    bool changed = leave_out_outliers(problem, all.noise_is_stated);
+    if (!changed) changed = contradictions.settle(covariance);
+    const Noise noise = noise_of(all, covariance);
+    freedom = noise.freedom;
+    if (noise.freedom > 0) {
+      const double scale = problem.noise_scale * noise.ratio;
+      // Stated noise is taken for too small when chance makes it so once in a thousand.
+      const double chance = 3 * std::sqrt(0.5 / noise.freedom);
+      const bool larger = all.noise_is_stated && scale > 1 + chance;
+      constexpr double least = 1e-4;  // pixels
+      const double next = all.noise_is_stated ? (larger ? scale : 1) : std::max(scale, least);
+      constexpr double same = 0.01;
+      if (std::abs(next / problem.noise_scale - 1) > same) {
+        problem.noise_scale = next;
+        changed = true;
+      }
+    }
+    if (!changed) return true;
+  }
+  return true;
+}
+
+std::string undetermined_by(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                            double height_m, const AdjustmentLimits& limits, bool& has_lever_arm) {
+  const AdjustmentLayout& at = problem.layout();
+  const auto sd_of = [&](Eigen::Index first) {
+    return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(
+                         Eigen::Matrix2d(covariance.block<2, 2>(first, first)))
+                         .eigenvalues()
+                         .maxCoeff());
+  };
+  const bool zenith = sd_of(at.zenith) <= limits.zenith_rad;
+  has_lever_arm = problem.has_lever_arm && sd_of(at.lever_arm) <= limits.lever_arm_share * height_m;
+  if (zenith) return "";
+  if (problem.has_lever_arm && !has_lever_arm) {
+    return "tilt and lever arm are not told apart: a camera that leans looks like one beside its "
+           "axis; add a turn on a spot at a second height, or captures at known places of the "
+           "camera, turned";
+  }
+  return "the captures do not determine the tilt: add a turn on a spot, over 90 degrees or more, "
+         "or "
+         "captures that see more lamps at other yaws";
+}
+
+}  // namespace
+
+AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentLimits& limits) {
+  AdjustmentResult result;
+  Assembled all = assemble(input);
+  AdjustmentProblem& problem = all.problem;
+  result.captures_left_out = all.captures_left_out;
+  result.detections_left_out = static_cast<int>(problem.sightings.size());
+  result.camera = input.calibration.camera;
+  result.refined = input.lamps;
+  if (problem.captures.empty()) {
+    result.undetermined = "no capture sees two lamps of the map well enough for a fix";
+    return result;
+  }
+  Contradictions contradictions(all);
+  Eigen::MatrixXd covariance;
+  double freedom = 0;
+  bool converged = problem.solve(true) && problem.solve(true);
+  if (converged) {
+    contradictions.leave_out_the_worst();
+    leave_out_outliers(problem, all.noise_is_stated);
+    converged = settle(all, contradictions, covariance, freedom);
+  }
+  if (!converged) {
+    result.undetermined =
+        "no zenith and no places of the lamps fit the captures: is it the map of this room, and "
+        "the "
+        "calibration this camera's?";
+    return result;
+  }
+
+  const AdjustmentLayout& at = problem.layout();
+  const Eigen::VectorXd& state = problem.state();
+  double squares_px = 0, height_m = 0;
+  std::vector<bool> capture_used(problem.captures.size());
+  const std::vector<double> lengths = lengths_of(problem);
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const auto& sighting = problem.sightings[i];
+    if (!sighting.used) continue;
+    ++result.detections;
+    capture_used[sighting.capture] = true;
+    squares_px += std::pow(lengths[i] * sighting.sigma_px * problem.noise_scale, 2);
+    const auto& capture = problem.captures[sighting.capture];
+    height_m += state[at.lamp(sighting.lamp) + 2] -
+                state[(capture.spot ? at.spot(*capture.spot) : capture.own) + 2];
+  }
+  result.detections_left_out -= result.detections;
+  result.captures = static_cast<int>(std::count(capture_used.begin(), capture_used.end(), true));
+  result.captures_left_out += static_cast<int>(capture_used.size()) - result.captures;
+  height_m /= std::max(1, result.detections);
+  result.residual_px = std::sqrt(squares_px / std::max(freedom, 1.0));
+  result.noise_scale = problem.noise_scale;
+  bool has_lever_arm = false;
+  result.undetermined = undetermined_by(problem, covariance, height_m, limits, has_lever_arm);
+
+  // The calibration.
+  result.camera.intrinsics = problem.intrinsics();
+  const Eigen::Vector2d focal_px(result.camera.intrinsics[0], result.camera.intrinsics[1]);
+  const Eigen::Vector2d zenith = state.segment<2>(at.zenith);
+  result.center.model = RotationModel::tilt;
+  result.center.zenith_in_camera = zenith.homogeneous().normalized();
+  result.center.center_px =
+      Eigen::Vector2d(result.camera.intrinsics[2], result.camera.intrinsics[3]) +
+      focal_px.cwiseProduct(zenith);
+  Matrix2 center_covariance =
+      focal_px.asDiagonal() * covariance.block<2, 2>(at.zenith, at.zenith) * focal_px.asDiagonal();
+  center_covariance(1, 0) = center_covariance(0, 1);
+  result.center.covariance = center_covariance;
+  if (has_lever_arm) {
+    result.center.lever_arm_m = state.segment<2>(at.lever_arm);
+    Matrix2 arm_covariance = covariance.block<2, 2>(at.lever_arm, at.lever_arm);
+    arm_covariance(1, 0) = arm_covariance(0, 1);
+    result.center.lever_arm_covariance = arm_covariance;
+  }
+
+  // The joint covariance: of the lens' directions that of its intrinsics, without the spots.
+  const Eigen::Index intrinsics = std::ssize(result.camera.intrinsics);
+  const Eigen::Index rows = intrinsics + at.spots - at.zenith;
+  Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.shared);
+  from_state.block(0, at.lens, intrinsics, at.lens_size) = problem.freedom().directions;
+  from_state.block(intrinsics, at.zenith, at.spots - at.zenith, at.spots - at.zenith).setIdentity();
+  if (!has_lever_arm) from_state.middleRows<2>(intrinsics + 2).setZero();
+  result.refined_covariance = from_state * covariance * from_state.transpose();
+  result.refined_covariance =
+      0.5 * (result.refined_covariance + result.refined_covariance.transpose()).eval();
+  result.surveyed_covariance = result.refined_covariance;
+  const Eigen::Index first_lamp = intrinsics + 4;
+  result.surveyed_covariance.bottomRightCorner(rows - first_lamp, rows - first_lamp).setZero();
+  for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
+    Lamp& lamp = result.refined.lamps[i];
+    const Eigen::Index row = first_lamp + 3 * static_cast<Eigen::Index>(i);
+    const double surveyed_sd_m = contradictions.sd_m(i);
+    const Eigen::Vector3d correction_m = state.segment<3>(at.lamp(i)) - problem.lamps[i].surveyed_m;
+    const Eigen::Matrix3d found = result.refined_covariance.block<3, 3>(row, row);
+    const bool moved = contradictions.moved()[i];
+    if (moved) {
+      // What is wrong with its survey says nothing of the others.
+      result.surveyed_covariance.middleRows<3>(row).setZero();
+      result.surveyed_covariance.middleCols<3>(row).setZero();
+      result.surveyed_covariance.block<3, 3>(row, row) =
+          found + correction_m * correction_m.transpose();
+    } else {
+      result.surveyed_covariance.block<3, 3>(row, row) =
+          surveyed_sd_m * surveyed_sd_m * Eigen::Matrix3d::Identity();
+    }
+    if (!all.lamp_seen[i]) {
+      result.notes.push_back(fmt::format("no capture sees lamp {}: it stays where it is", lamp.id));
+      continue;
+    }
+    result.lamps.push_back(
+        {lamp.id, correction_m, found.diagonal().cwiseMax(0).cwiseSqrt(), moved});
+    if (!(surveyed_sd_m > 0)) continue;
+    lamp.position_m += correction_m;
+    lamp.sd_m = std::sqrt(found.trace() / 3);
+  }
+  if (contradictions.most()) {
+    result.notes.emplace_back(
+        "the captures contradict the survey of half the lamps or more: is its sd_m right?");
+  }
+
+  measure_places(all);
+  result.places = all.places;
+  std::size_t places_used = 0;
+  for (std::size_t i = 0; i < all.places.size(); ++i) {
+    result.places[i].wrong = !problem.place_used[i];
+    if (problem.place_used[i]) ++places_used;
+  }
+  if (places_used < 3) {
+    constexpr std::array<const char*, 3> held{
+        "where the map is, how it is turned and how large it is",
+        "how the map is turned and how large it is",
+        "how the map is turned about the line through both places"};
+    result.notes.push_back(fmt::format(
+        "{} known place{}: {} rests on the survey; captures at {} more known places would tell it",
+        places_used, places_used == 1 ? "" : "s", held.at(places_used), 3 - places_used));
+  }
+
+  const Eigen::VectorXd u = state.segment(at.lens, at.lens_size);
+  if (at.lens_size > 0) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> told(
+        Eigen::MatrixXd::Identity(at.lens_size, at.lens_size) -
+        covariance.block(at.lens, at.lens, at.lens_size, at.lens_size));
+    for (Eigen::Index i = 0; i < at.lens_size; ++i) {
+      constexpr double something = 1e-3;
+      if (!(told.eigenvalues()[i] > something)) continue;
+      const double along = told.eigenvectors().col(i).dot(u);
+      result.lens_chi_squared += along * along / told.eigenvalues()[i];
+      ++result.lens_freedom;
+    }
+    const double n = result.lens_freedom, t = 3.719;  // one in ten thousand
+    result.lens_contradicted =
+        result.lens_chi_squared > n + t * std::sqrt(2 * n) + 2.0 / 3.0 * (t * t - 1);
+  }
+  return result;
+}
+
+}  // namespace vlp

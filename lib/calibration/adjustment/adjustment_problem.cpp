@@ -1,0 +1,523 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/adjustment/adjustment_problem.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace vlp {
+namespace {
+
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using Matrix34 = Eigen::Matrix<double, 3, 4>;
+
+/// Where the camera of a capture stands, and its yaw; from the state.
+struct Placed {
+  Eigen::Vector3d position_m;
+  double cosine, sine;
+  /// Rz(-g) (P - A) - e on a spot, Rz(-g) (P - S) elsewhere.
+  Eigen::Vector3d level_of(const Eigen::Vector3d& lamp_m, const Eigen::Vector2d& arm_m) const {
+    const Eigen::Vector3d w = lamp_m - position_m;
+    return {cosine * w.x() + sine * w.y() - arm_m.x(), cosine * w.y() - sine * w.x() - arm_m.y(),
+            w.z()};
+  }
+};
+
+}  // namespace
+
+ZenithTurn turn_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x) {
+  // level_from_zenith(), the smallest turn of n to +Z, transposed.
+  const double nz = 1 / std::sqrt(1 + zenith.squaredNorm());
+  const Eigen::Vector2d n = zenith * nz;
+  const double a = n.dot(x.head<2>()), across = a / (1 + nz), lift = x.z() - across;
+  ZenithTurn turn;
+  turn.x_in_camera << x.head<2>() + n * lift, nz * x.z() - a;
+  turn.camera_from_level << 1 - n.x() * n.x() / (1 + nz), -n.x() * n.y() / (1 + nz), n.x(),
+      -n.x() * n.y() / (1 + nz), 1 - n.y() * n.y() / (1 + nz), n.y(), -n.x(), -n.y(), nz;
+  for (int i = 0; i < 2; ++i) {
+    const double d_nz = -nz * nz * nz * zenith[i];
+    const Eigen::Vector2d d_n = nz * Eigen::Vector2d::Unit(i) + d_nz * zenith;
+    const double d_a = d_n.dot(x.head<2>());
+    const double d_across = d_a / (1 + nz) - a * d_nz / ((1 + nz) * (1 + nz));
+    turn.by_zenith.col(i) << d_n * lift - n * d_across, d_nz * x.z() - d_a;
+  }
+  return turn;
+}
+
+LensFreedom::LensFreedom(const std::vector<double>& intrinsics,
+                         const std::optional<Eigen::MatrixXd>& covariance)
+    : start(Eigen::Map<const Eigen::VectorXd>(intrinsics.data(), std::ssize(intrinsics))),
+      directions(start.size(), 0) {
+  if (!covariance) return;
+  // Pixels and coefficients are made comparable by their standard deviations.
+  const Eigen::VectorXd sd = covariance->diagonal().cwiseSqrt();
+  const Eigen::VectorXd inverse_sd =
+      (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(sd.size()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse_sd.asDiagonal() * *covariance *
+                                                             inverse_sd.asDiagonal());
+  constexpr double rounding = 1e-12;
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  Eigen::Index kept = 0;
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    kept += values[i] > rounding * values[values.size() - 1] ? 1 : 0;
+  }
+  directions = sd.asDiagonal() * eigen.eigenvectors().rightCols(kept) *
+               values.tail(kept).cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+AdjustmentProblem::AdjustmentProblem(LensModel model, LensFreedom freedom, std::size_t lamp_count,
+                                     std::size_t spot_count)
+    : model_(model), freedom_(std::move(freedom)) {
+  layout_.lens_size = freedom_.directions.cols();
+  layout_.zenith = layout_.lens_size;
+  layout_.lever_arm = layout_.zenith + 2;
+  layout_.lamps = layout_.lever_arm + 2;
+  layout_.spots = layout_.lamp(lamp_count);
+  layout_.shared = layout_.spot(spot_count);
+  state_ = Eigen::VectorXd::Zero(layout_.shared);
+}
+
+void AdjustmentProblem::add_capture(const Capture& capture, const Pose& start) {
+  Capture added = capture;
+  added.own = state_.size();
+  captures.push_back(added);
+  state_.conservativeResize(state_.size() + (capture.spot ? 1 : 4));
+  if (!capture.spot) state_.segment<3>(added.own) = start.position_m;
+  state_[state_.size() - 1] = start.yaw_rad;
+}
+
+std::vector<double> AdjustmentProblem::intrinsics() const {
+  std::vector<double> values(static_cast<std::size_t>(freedom_.start.size()));
+  Eigen::Map<Eigen::VectorXd>(values.data(), std::ssize(values)) =
+      freedom_.start + freedom_.directions * state_.segment(layout_.lens, layout_.lens_size);
+  return values;
+}
+
+std::optional<Lens> AdjustmentProblem::lens() const {
+  const std::vector<double> values = intrinsics();
+  for (const double value : values) {
+    if (!std::isfinite(value)) return std::nullopt;
+  }
+  if (!(values[0] > 0 && values[1] > 0)) return std::nullopt;
+  return Lens(model_, values);
+}
+
+namespace {
+
+Placed placed(const Eigen::VectorXd& state, const AdjustmentLayout& layout,
+              const AdjustmentProblem::Capture& capture) {
+  const double yaw_rad = state[capture.own + (capture.spot ? 0 : 3)];
+  const Eigen::Index position = capture.spot ? layout.spot(*capture.spot) : capture.own;
+  return {state.segment<3>(position), std::cos(yaw_rad), std::sin(yaw_rad)};
+}
+
+}  // namespace
+
+std::optional<AdjustmentProblem::Linearized> AdjustmentProblem::linearize(const Sighting& sighting,
+                                                                          const Lens& lens) const {
+  const Capture& capture = captures[sighting.capture];
+  const Placed camera = placed(state_, layout_, capture);
+  const Eigen::Vector2d arm_m =
+      capture.spot ? Eigen::Vector2d(state_.segment<2>(layout_.lever_arm)) : Eigen::Vector2d(0, 0);
+  const Eigen::Vector3d level =
+      camera.level_of(state_.segment<3>(layout_.lamp(sighting.lamp)), arm_m);
+  const ZenithTurn turn =
+      turn_by_zenith(state_.segment<2>(layout_.zenith), capture.base_from_level * level);
+  const auto seen = lens.project_with_jacobians(turn.x_in_camera);
+  if (!seen) return std::nullopt;
+  const double weight = 1 / (sighting.sigma_px * noise_scale);
+  const Matrix23 by_camera = -weight * seen->d_pixel_d_point;
+  const Matrix23 by_level = by_camera * turn.camera_from_level * capture.base_from_level;
+  Eigen::Matrix3d level_from_world;
+  level_from_world << camera.cosine, camera.sine, 0, -camera.sine, camera.cosine, 0, 0, 0, 1;
+  Linearized at;
+  at.residual = weight * (sighting.pixel - seen->pixel);
+  at.by_lens = -weight * seen->d_pixel_d_parameters * freedom_.directions;
+  at.by_zenith = by_camera * turn.by_zenith;
+  at.by_lever_arm = -by_level.leftCols<2>();
+  at.by_lamp = by_level * level_from_world;
+  at.by_spot = -at.by_lamp;
+  const Eigen::Vector2d turned = level.head<2>() + arm_m;
+  const Eigen::Vector2d by_yaw = by_level * Eigen::Vector3d(turned.y(), -turned.x(), 0);
+  at.by_own.setZero();
+  if (capture.spot) {
+    at.by_own.col(0) = by_yaw;
+  } else {
+    at.by_own << at.by_spot, by_yaw;
+  }
+  return at;
+}
+
+Eigen::Vector3d AdjustmentProblem::place_of(const PlaceSighting& place) const {
+  const Capture& capture = captures[place.capture];
+  const Placed camera = placed(state_, layout_, capture);
+  const Eigen::Vector2d arm_m = state_.segment<2>(layout_.lever_arm);
+  const Eigen::Vector3d turned(camera.cosine * arm_m.x() - camera.sine * arm_m.y(),
+                               camera.sine * arm_m.x() + camera.cosine * arm_m.y(), 0);
+  // On a spot the position is the axis', elsewhere the camera's.
+  const double share = (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
+  return camera.position_m + share * turned;
+}
+
+namespace {
+
+/// How place_of() depends on the arm and on the yaw.
+struct PlaceDerivatives {
+  Eigen::Matrix<double, 3, 2> by_arm;
+  Eigen::Vector3d by_yaw;
+};
+
+PlaceDerivatives derivatives_of(const AdjustmentProblem& problem,
+                                const AdjustmentProblem::PlaceSighting& place) {
+  const auto& capture = problem.captures[place.capture];
+  const Placed camera = placed(problem.state(), problem.layout(), capture);
+  const Eigen::Vector2d arm_m = problem.state().segment<2>(problem.layout().lever_arm);
+  const double share = (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
+  PlaceDerivatives at;
+  at.by_arm << camera.cosine, -camera.sine, camera.sine, camera.cosine, 0, 0;
+  at.by_arm *= share;
+  at.by_yaw << share * (-camera.sine * arm_m.x() - camera.cosine * arm_m.y()),
+      share * (camera.cosine * arm_m.x() - camera.sine * arm_m.y()), 0;
+  return at;
+}
+
+bool turns_the_arm(const AdjustmentProblem& problem,
+                   const AdjustmentProblem::PlaceSighting& place) {
+  return problem.captures[place.capture].spot.has_value() != place.of_axis;
+}
+
+}  // namespace
+
+/// What Ceres minimizes. The unknowns stay in the problem's state, one vector, so that the order of
+/// their addresses, and with it Ceres' rounding, is always the same.
+struct AdjustmentCosts {
+  struct Lenses : ceres::EvaluationCallback {
+    explicit Lenses(const AdjustmentProblem& of) : problem(of) {}
+    void PrepareForEvaluation(bool, bool new_point) override {
+      if (new_point || !lens) lens = problem.lens();
+    }
+    const AdjustmentProblem& problem;
+    std::optional<Lens> lens;
+  };
+
+  static void copy(double** jacobians, int& block, const Eigen::MatrixXd& values) {
+    if (jacobians[block] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+          jacobians[block], values.rows(), values.cols()) = values;
+    }
+    ++block;
+  }
+
+  /// Blocks: the capture's own, [spot, lever arm], zenith, lamp, [lens].
+  class Seen : public ceres::CostFunction {
+   public:
+    Seen(const AdjustmentProblem& problem, const Lenses& lenses,
+         const AdjustmentProblem::Sighting& sighting)
+        : problem_(problem), lenses_(lenses), sighting_(sighting) {
+      set_num_residuals(2);
+      on_spot_ = problem.captures[sighting.capture].spot.has_value();
+      auto& sizes = *mutable_parameter_block_sizes();
+      sizes = on_spot_ ? std::vector<int32_t>{1, 3, 2, 2, 3} : std::vector<int32_t>{4, 2, 3};
+      const auto lens_size = static_cast<int32_t>(problem.layout().lens_size);
+      if (lens_size > 0) sizes.push_back(lens_size);
+    }
+    bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
+      if (!lenses_.lens) return false;
+      const auto at = problem_.linearize(sighting_, *lenses_.lens);
+      if (!at) return false;
+      Eigen::Map<Eigen::Vector2d>(residuals, 2) = at->residual;
+      if (jacobians == nullptr) return true;
+      int block = 0;
+      copy(jacobians, block, at->by_own.leftCols(on_spot_ ? 1 : 4));
+      if (on_spot_) {
+        copy(jacobians, block, at->by_spot);
+        copy(jacobians, block, at->by_lever_arm);
+      }
+      copy(jacobians, block, at->by_zenith);
+      copy(jacobians, block, at->by_lamp);
+      if (at->by_lens.cols() > 0) copy(jacobians, block, at->by_lens);
+      return true;
+    }
+
+   private:
+    const AdjustmentProblem& problem_;
+    const Lenses& lenses_;
+    const AdjustmentProblem::Sighting& sighting_;
+    bool on_spot_;
+  };
+
+  /// Unknowns less their values before, over a standard deviation.
+  class Prior : public ceres::CostFunction {
+   public:
+    Prior(Eigen::VectorXd value, double sd) : value_(std::move(value)), weight_(1 / sd) {
+      set_num_residuals(static_cast<int>(value_.size()));
+      mutable_parameter_block_sizes()->push_back(static_cast<int32_t>(value_.size()));
+    }
+    bool Evaluate(double const* const* parameters, double* residuals,
+                  double** jacobians) const override {
+      const Eigen::Index n = value_.size();
+      Eigen::Map<Eigen::VectorXd>(residuals, n) =
+          weight_ * (Eigen::Map<const Eigen::VectorXd>(parameters[0], n) - value_);
+      int block = 0;
+      if (jacobians != nullptr) {
+        copy(jacobians, block, weight_ * Eigen::MatrixXd::Identity(n, n));
+      }
+      return true;
+    }
+
+   private:
+    Eigen::VectorXd value_;
+    double weight_;
+  };
+
+  /// Blocks: the capture's own, [spot], [lever arm].
+  class Stood : public ceres::CostFunction {
+   public:
+    Stood(const AdjustmentProblem& problem, const AdjustmentProblem::PlaceSighting& place)
+        : problem_(problem), place_(place) {
+      set_num_residuals(static_cast<int>(place.size));
+      auto& sizes = *mutable_parameter_block_sizes();
+      on_spot_ = problem.captures[place.capture].spot.has_value();
+      sizes = on_spot_ ? std::vector<int32_t>{1, 3} : std::vector<int32_t>{4};
+      if (turns_the_arm(problem, place)) sizes.push_back(2);
+    }
+    bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
+      const Eigen::Vector3d misfit_m = problem_.place_of(place_) - place_.stated_m;
+      Eigen::Map<Eigen::VectorXd>(residuals, place_.size) =
+          misfit_m.head(place_.size) / place_.sd_m;
+      if (jacobians == nullptr) return true;
+      const PlaceDerivatives at = derivatives_of(problem_, place_);
+      int block = 0;
+      const auto rows = [&](const Eigen::MatrixXd& values) -> Eigen::MatrixXd {
+        return values.topRows(place_.size) / place_.sd_m;
+      };
+      if (on_spot_) {
+        copy(jacobians, block, rows(at.by_yaw));
+        copy(jacobians, block, rows(Eigen::Matrix3d::Identity()));
+      } else {
+        Matrix34 by_own;
+        by_own << Eigen::Matrix3d::Identity(), at.by_yaw;
+        copy(jacobians, block, rows(by_own));
+      }
+      if (turns_the_arm(problem_, place_)) copy(jacobians, block, rows(at.by_arm));
+      return true;
+    }
+
+   private:
+    const AdjustmentProblem& problem_;
+    const AdjustmentProblem::PlaceSighting& place_;
+    bool on_spot_;
+  };
+
+  static bool solve(AdjustmentProblem& problem, bool robust) {
+    // 95 % as good as least squares on normal noise, in two and in three dimensions about.
+    constexpr double width = 2.385;
+    const auto loss = [robust]() -> ceres::LossFunction* {
+      return robust ? new ceres::CauchyLoss(width) : nullptr;
+    };
+    Lenses lenses(problem);
+    ceres::Problem::Options how;
+    how.evaluation_callback = &lenses;
+    ceres::Problem ceres(how);
+    const AdjustmentLayout& layout = problem.layout();
+    double* const state = problem.state_.data();
+    auto order = std::make_shared<ceres::ParameterBlockOrdering>();
+    const auto add = [&](Eigen::Index at, Eigen::Index size, int group) {
+      ceres.AddParameterBlock(state + at, static_cast<int>(size));
+      order->AddElementToGroup(state + at, group);
+      return state + at;
+    };
+    std::vector<bool> spot_seen((static_cast<std::size_t>(layout.shared - layout.spots)) / 3);
+    std::vector<bool> lamp_seen(problem.lamps.size());
+    const bool has_lens = layout.lens_size > 0;
+    if (has_lens) {
+      add(layout.lens, layout.lens_size, 1);
+      ceres.AddResidualBlock(new Prior(Eigen::VectorXd::Zero(layout.lens_size), 1), nullptr,
+                             state + layout.lens);
+    }
+    add(layout.zenith, 2, 1);
+    for (const auto& sighting : problem.sightings) {
+      if (!sighting.used) continue;
+      const auto& capture = problem.captures[sighting.capture];
+      std::vector<double*> blocks{add(capture.own, capture.spot ? 1 : 4, 0)};
+      if (capture.spot) {
+        blocks.push_back(add(layout.spot(*capture.spot), 3, 1));
+        blocks.push_back(add(layout.lever_arm, 2, 1));
+      }
+      blocks.push_back(state + layout.zenith);
+      blocks.push_back(add(layout.lamp(sighting.lamp), 3, 1));
+      lamp_seen[sighting.lamp] = true;
+      if (has_lens) blocks.push_back(state + layout.lens);
+      ceres.AddResidualBlock(new Seen(problem, lenses, sighting), loss(), blocks);
+    }
+    for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
+      const auto& [surveyed_m, sd_m] = problem.lamps[i];
+      double* const lamp = state + layout.lamp(i);
+      if (!lamp_seen[i] || std::isinf(sd_m)) continue;
+      if (sd_m == 0) {
+        ceres.SetParameterBlockConstant(lamp);
+      } else {
+        ceres.AddResidualBlock(new Prior(surveyed_m, sd_m), loss(), lamp);
+      }
+    }
+    for (const auto& place : problem.places) {
+      if (!problem.place_used[place.place]) continue;
+      const auto& capture = problem.captures[place.capture];
+      std::vector<double*> blocks{state + capture.own};
+      if (!ceres.HasParameterBlock(state + capture.own)) continue;  // none of its lamps is used
+      if (capture.spot) blocks.push_back(state + layout.spot(*capture.spot));
+      if (turns_the_arm(problem, place)) blocks.push_back(add(layout.lever_arm, 2, 1));
+      ceres.AddResidualBlock(new Stood(problem, place), loss(), blocks);
+    }
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::DENSE_SCHUR;
+    options.linear_solver_ordering = order;
+    options.max_num_iterations = 100;
+    options.function_tolerance = robust ? 1e-5 : 1e-14;
+    options.gradient_tolerance = 1e-14;
+    options.parameter_tolerance = 1e-12;
+    options.num_threads = 1;  // the order of sums, and so their rounding, stays
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &ceres, &summary);
+    return summary.IsSolutionUsable() && problem.state_.allFinite();
+  }
+};
+
+bool AdjustmentProblem::solve(bool robust) { return AdjustmentCosts::solve(*this, robust); }
+
+namespace {
+
+/// A capture's own unknowns and what they are mixed with, to be eliminated.
+struct OwnBlock {
+  Eigen::Matrix4d own = Eigen::Matrix4d::Zero();
+  std::vector<Eigen::Index> columns;
+  std::vector<Eigen::Vector4d> mixed;
+
+  void add(const Eigen::MatrixXd& by_own, Eigen::Index first, const Eigen::MatrixXd& by_shared) {
+    const Eigen::MatrixXd product = by_own.transpose() * by_shared;
+    for (Eigen::Index i = 0; i < product.cols(); ++i) {
+      Eigen::Vector4d column = Eigen::Vector4d::Zero();
+      column.head(product.rows()) = product.col(i);
+      const auto place = std::find(columns.begin(), columns.end(), first + i);
+      if (place == columns.end()) {
+        columns.push_back(first + i);
+        mixed.push_back(column);
+      } else {
+        mixed[static_cast<std::size_t>(place - columns.begin())] += column;
+      }
+    }
+  }
+};
+
+/// A row block of derivatives by the shared unknowns, part by part.
+using Parts = std::vector<std::pair<Eigen::Index, Eigen::MatrixXd>>;
+
+void add_information(const Parts& parts, Eigen::MatrixXd& information) {
+  for (const auto& [row, a] : parts) {
+    for (const auto& [col, b] : parts) {
+      information.block(row, col, a.cols(), b.cols()) += a.transpose() * b;
+    }
+  }
+}
+
+}  // namespace
+
+Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
+  const AdjustmentLayout& at = layout_;
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(at.shared, at.shared);
+  constexpr double guess_rad = 1, guess_m = 10;
+  information.diagonal().segment(at.lens, at.lens_size).setOnes();
+  information.diagonal().segment<2>(at.zenith).setConstant(1 / (guess_rad * guess_rad));
+  information.diagonal().tail(at.shared - at.lever_arm).setConstant(1 / (guess_m * guess_m));
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    const double sd_m = lamps[i].sd_m;
+    if (std::isinf(sd_m)) continue;
+    information.diagonal().segment<3>(at.lamp(i)).setConstant(sd_m > 0 ? 1 / (sd_m * sd_m) : 1);
+  }
+  std::vector<OwnBlock> own(captures.size());
+  std::vector<bool> capture_used(captures.size());
+  const auto lens = this->lens();
+  Parts parts;
+  for (const Sighting& sighting : sightings) {
+    if (!sighting.used || !lens) continue;
+    const auto seen = linearize(sighting, *lens);
+    if (!seen) continue;
+    const Capture& capture = captures[sighting.capture];
+    capture_used[sighting.capture] = true;
+    parts.clear();
+    if (at.lens_size > 0) parts.emplace_back(at.lens, seen->by_lens);
+    parts.emplace_back(at.zenith, seen->by_zenith);
+    if (lamps[sighting.lamp].sd_m > 0) parts.emplace_back(at.lamp(sighting.lamp), seen->by_lamp);
+    if (capture.spot) {
+      parts.emplace_back(at.lever_arm, seen->by_lever_arm);
+      parts.emplace_back(at.spot(*capture.spot), seen->by_spot);
+    }
+    const Eigen::MatrixXd by_own = seen->by_own.leftCols(capture.spot ? 1 : 4);
+    add_information(parts, information);
+    OwnBlock& block = own[sighting.capture];
+    block.own.topLeftCorner(by_own.cols(), by_own.cols()) += by_own.transpose() * by_own;
+    for (const auto& [first, by_shared] : parts) block.add(by_own, first, by_shared);
+  }
+  for (const PlaceSighting& place : places) {
+    if (!place_used[place.place] || !capture_used[place.capture]) continue;
+    const Capture& capture = captures[place.capture];
+    const PlaceDerivatives derivatives = derivatives_of(*this, place);
+    const Eigen::Index rows = place.size;
+    parts.clear();
+    Eigen::MatrixXd by_own(rows, capture.spot ? 1 : 4);
+    if (capture.spot) {
+      by_own = derivatives.by_yaw.head(rows) / place.sd_m;
+      parts.emplace_back(at.spot(*capture.spot),
+                         Eigen::MatrixXd(Eigen::Matrix3d::Identity()).topRows(rows) / place.sd_m);
+    } else {
+      by_own << Eigen::MatrixXd(Eigen::Matrix3d::Identity()).topRows(rows),
+          derivatives.by_yaw.head(rows);
+      by_own /= place.sd_m;
+    }
+    if (turns_the_arm(*this, place)) {
+      parts.emplace_back(at.lever_arm, derivatives.by_arm.topRows(rows) / place.sd_m);
+    }
+    add_information(parts, information);
+    OwnBlock& block = own[place.capture];
+    block.own.topLeftCorner(by_own.cols(), by_own.cols()) += by_own.transpose() * by_own;
+    for (const auto& [first, by_shared] : parts) block.add(by_own, first, by_shared);
+  }
+  for (std::size_t k = 0; k < captures.size(); ++k) {
+    const OwnBlock& block = own[k];
+    const Eigen::Index size = captures[k].spot ? 1 : 4, n = std::ssize(block.columns);
+    if (n == 0) continue;
+    Eigen::MatrixXd mixed(size, n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      mixed.col(i) = block.mixed[static_cast<std::size_t>(i)].head(size);
+    }
+    const Eigen::MatrixXd taken =
+        mixed.transpose() * block.own.topLeftCorner(size, size).ldlt().solve(mixed);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j) {
+        information(block.columns[static_cast<std::size_t>(i)],
+                    block.columns[static_cast<std::size_t>(j)]) -= taken(i, j);
+      }
+    }
+  }
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  Eigen::MatrixXd covariance =
+      scale.asDiagonal() * scaled.ldlt().solve(Eigen::MatrixXd::Identity(at.shared, at.shared)) *
+      scale.asDiagonal();
+  covariance = 0.5 * (covariance + covariance.transpose()).eval();
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    if (lamps[i].sd_m > 0) continue;
+    covariance.middleRows<3>(at.lamp(i)).setZero();
+    covariance.middleCols<3>(at.lamp(i)).setZero();
+  }
+  return covariance;
+}
+
+}  // namespace vlp

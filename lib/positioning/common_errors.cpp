@@ -1,0 +1,263 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/common_errors.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <utility>
+
+namespace vlp {
+namespace {
+
+Eigen::Vector2d focal_of(const Calibration& calibration) {
+  return {calibration.camera.intrinsics[0], calibration.camera.intrinsics[1]};
+}
+
+/// Moves the zenith's normalized point, or the offset's.
+void move_zenith(Calibration& calibration, int axis, double by) {
+  RotationCenter& center = *calibration.rotation_center;
+  Eigen::Vector2d z = center.zenith_in_camera.head<2>() / center.zenith_in_camera.z();
+  z[axis] += by;
+  center.zenith_in_camera = z.homogeneous().normalized();
+  center.center_px[axis] += by * focal_of(calibration)[axis];
+}
+
+void move_offset(Calibration& calibration, int axis, double by) {
+  calibration.dispersion->offset_px[axis] += by * focal_of(calibration)[axis];
+}
+
+template <typename Move>
+void add_turns(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
+               Correction correction, Move move) {
+  constexpr double step = 1e-5;  // of second order in it: 1e-10 is left
+  for (int axis = 0; axis < 2; ++axis) {
+    Calibration less = calibration, more = calibration;
+    move(less, axis, -step);
+    move(more, axis, step);
+    turns.emplace_back((level_from_camera(more, correction) - level_from_camera(less, correction)) /
+                       (2 * step));
+  }
+}
+
+/// In units of the normalized plane.
+Eigen::Matrix2d normalized(const std::optional<Matrix2>& covariance_px,
+                           const Eigen::Vector2d& focal_px) {
+  if (!covariance_px) return Eigen::Matrix2d::Zero();
+  const Eigen::Vector2d inverse = focal_px.cwiseInverse();
+  return inverse.asDiagonal() * *covariance_px * inverse.asDiagonal();
+}
+
+/// Chi-squared that one in ten thousand exceeds (Wilson and Hilferty).
+double unlikely_chi_squared(double freedom) {
+  constexpr double quantile = 3.719;
+  const double part = 2 / (9 * freedom);
+  const double root = 1 - part + quantile * std::sqrt(part);
+  return freedom * root * root * root;
+}
+
+}  // namespace
+
+CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
+                           Correction correction)
+    : intrinsics_(std::ssize(calibration.camera.intrinsics)),
+      base_from_camera_(level_from_camera(calibration, correction)),
+      camera_from_base_(base_from_camera_.inverse()) {
+  const bool turned = calibration.rotation_center &&
+                      (correction == Correction::rotation || correction == Correction::all);
+  const bool shifted = calibration.dispersion &&
+                       (correction == Correction::dispersion || correction == Correction::all);
+  if (turned) add_turns(turns_, calibration, correction, move_zenith);
+  if (shifted) add_turns(turns_, calibration, correction, move_offset);
+  const Eigen::Index first_lamp = shared(), zenith = intrinsics_;
+  const Eigen::Index offset = intrinsics_ + (turned ? 2 : 0);
+  covariance_ =
+      Eigen::MatrixXd::Zero(first_lamp + 3 * std::ssize(lamps), first_lamp + 3 * std::ssize(lamps));
+  const auto& adjustment = calibration.adjustment;
+  const auto& report = calibration.intrinsics_report;
+  // The zenith leans against the lens: without how it does, the lens' errors would count twice.
+  const bool lens = report && report->covariance && turned &&
+                    calibration.rotation_center->by_intrinsics.has_value();
+  complete_ = adjustment.has_value() || (lens && calibration.rotation_center->covariance);
+  // Of each row, where it stands in the adjustment's covariance.
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> adjusted;
+  if (adjustment) {
+    for (Eigen::Index i = 0; i < intrinsics_; ++i) adjusted.emplace_back(i, i);
+    for (Eigen::Index i = 0; turned && i < 2; ++i) adjusted.emplace_back(zenith + i, zenith + i);
+  } else if (lens) {
+    covariance_.topLeftCorner(intrinsics_, intrinsics_) = *report->covariance;
+  }
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    const Eigen::Index row = first_lamp + 3 * static_cast<Eigen::Index>(i);
+    if (adjustment) {
+      const auto& places = adjustment->lamps;
+      const auto place = std::find_if(places.begin(), places.end(),
+                                      [&](const auto& one) { return one.id == lamps[i].id; });
+      constexpr double same_m = 1e-6;
+      if (place != places.end() && (place->position_m - lamps[i].position_m).norm() < same_m) {
+        const Eigen::Index from = intrinsics_ + 4 + 3 * (place - places.begin());
+        for (Eigen::Index k = 0; k < 3; ++k) adjusted.emplace_back(row + k, from + k);
+        continue;
+      }
+      if (place != places.end()) ++lamps_elsewhere_;
+    }
+    if (!lamps[i].sd_m) {
+      complete_ = false;
+      continue;
+    }
+    covariance_.block<3, 3>(row, row) =
+        *lamps[i].sd_m * *lamps[i].sd_m * Eigen::Matrix3d::Identity();
+  }
+  for (const auto& [row, from_row] : adjusted) {
+    for (const auto& [col, from_col] : adjusted) {
+      covariance_(row, col) = adjustment->covariance(from_row, from_col);
+    }
+  }
+  if (adjustment) {
+    stated_ = true;
+    return;
+  }
+  // From errors that are independent (lens, own of the zenith, own of the offset) to those there
+  // are.
+  const Eigen::Vector2d focal_px = focal_of(calibration);
+  Eigen::MatrixXd own = covariance_.topLeftCorner(first_lamp, first_lamp);
+  Eigen::MatrixXd passed_on = Eigen::MatrixXd::Identity(first_lamp, first_lamp);
+  if (turned) {
+    const RotationCenter& center = *calibration.rotation_center;
+    own.block<2, 2>(zenith, zenith) = normalized(center.covariance, focal_px);
+    if (center.by_intrinsics) {
+      passed_on.block(zenith, 0, 2, intrinsics_) = *center.by_intrinsics;
+    }
+  }
+  if (shifted) {
+    const Dispersion& dispersion = *calibration.dispersion;
+    own.block<2, 2>(offset, offset) = normalized(dispersion.covariance, focal_px);
+    if (dispersion.by_intrinsics) {
+      passed_on.block(offset, 0, 2, intrinsics_) = *dispersion.by_intrinsics;
+    }
+    if (turned) {
+      // The offset takes up what the zenith lacks.
+      const Eigen::Matrix2d by_zenith = dispersion.by_zenith
+                                            ? Eigen::Matrix2d(*dispersion.by_zenith)
+                                            : Eigen::Matrix2d(-Eigen::Matrix2d::Identity());
+      passed_on.middleRows<2>(offset) +=
+          by_zenith * Eigen::MatrixXd(passed_on.middleRows<2>(zenith));
+    }
+  }
+  covariance_.topLeftCorner(first_lamp, first_lamp) = passed_on * own * passed_on.transpose();
+  stated_ = covariance_.diagonal().maxCoeff() > 0;
+}
+
+CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const LevelPose& pose,
+                                             const Lens& lens,
+                                             const Eigen::Matrix3d& level_from_base) const {
+  Effect effect;
+  effect.by_shared.setZero(2, shared());
+  effect.by_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
+  const Eigen::Vector3d in_base = level_from_base.transpose() * sighting.z.homogeneous();
+  const Eigen::Vector3d ray = camera_from_base_ * in_base;
+  const Eigen::Vector3d direction = level_from_base * base_from_camera_ * ray;  // z = 1
+  // How z moves with the direction.
+  Eigen::Matrix<double, 2, 3> d_z;
+  d_z << 1, 0, -sighting.z.x(), 0, 1, -sighting.z.y();
+  d_z /= direction.z();
+  if (const auto seen = lens.project_with_jacobians(ray)) {
+    // At a pixel that stays, the ray moves within its plane of z.
+    const Eigen::Matrix2d d_ray = -seen->d_pixel_d_point.leftCols<2>().inverse();
+    const Eigen::Matrix2d d_z_d_pixel =
+        d_z * (level_from_base * base_from_camera_).leftCols<2>() * d_ray;
+    effect.by_shared.leftCols(intrinsics_).noalias() = d_z_d_pixel * seen->d_pixel_d_parameters;
+  }
+  for (std::size_t i = 0; i < turns_.size(); ++i) {
+    effect.by_shared.col(intrinsics_ + static_cast<Eigen::Index>(i)) =
+        d_z * (level_from_base * (turns_[i] * ray));
+  }
+  return effect;
+}
+
+Matrix4 CommonErrors::covariance_of(const ByShared& by_shared, std::span<const ByLamp> by_lamp,
+                                    std::span<const std::size_t> lamps) const {
+  const Eigen::Index n = shared();
+  const auto at = [&](std::size_t i) { return n + 3 * static_cast<Eigen::Index>(lamps[i]); };
+  const ByShared with_shared = by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
+  Eigen::Matrix4d sum = with_shared.lazyProduct(by_shared.transpose());
+  for (std::size_t i = 0; i < by_lamp.size(); ++i) {
+    // Half of the lamp's own, the shared ones, and the lamps before it.
+    ByLamp other = 0.5 * by_lamp[i] * covariance_.block<3, 3>(at(i), at(i));
+    other += by_shared.lazyProduct(covariance_.block(0, at(i), n, 3));
+    for (std::size_t j = 0; j < i; ++j) {
+      other += by_lamp[j] * covariance_.block<3, 3>(at(j), at(i));
+    }
+    const Eigen::Matrix4d half = other * by_lamp[i].transpose();
+    sum += half + half.transpose();
+  }
+  return sum;
+}
+
+Matrix2 CommonErrors::covariance_of(const Effect& effect, std::size_t lamp) const {
+  const Eigen::Index n = shared(), at = n + 3 * static_cast<Eigen::Index>(lamp);
+  const Effect& e = effect;
+  const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> with_shared =
+      e.by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
+  Eigen::Matrix2d sum = with_shared.lazyProduct(e.by_shared.transpose());
+  const Eigen::Matrix<double, 2, 3> mixed = e.by_shared.lazyProduct(covariance_.block(0, at, n, 3));
+  const Eigen::Matrix2d half = mixed * e.by_lamp.transpose();
+  sum +=
+      half + half.transpose() + e.by_lamp * covariance_.block<3, 3>(at, at) * e.by_lamp.transpose();
+  return sum;
+}
+
+Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<const Matrix2> common,
+                             const WeightedFix& fix) {
+  Unexplained found;
+  if (sightings.size() < 4) return found;
+  const LevelPose pose(fix.pose);
+  std::bitset<kMaxSightings> left_out;
+  for (std::size_t left = sightings.size(); left >= 3; --left) {
+    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
+    const auto each = [&](auto&& use) {
+      for (std::size_t i = 0; i < sightings.size(); ++i) {
+        if (left_out[i]) continue;
+        const Sighting& one = sightings[i];
+        const Eigen::Matrix2d by_pixel = one.d_pixel_d_z.inverse() * one.sigma_px;
+        const Eigen::Matrix2d covariance = by_pixel * by_pixel.transpose() + common[i];
+        const Prediction prediction = predict(pose, one.lamp_m);
+        use(i, covariance, prediction.d_z_d_state, Eigen::Vector2d(one.z - prediction.z));
+      }
+    };
+    each([&](std::size_t, const Eigen::Matrix2d& covariance, const auto& jacobian,
+             const Eigen::Vector2d& residual) {
+      const Eigen::Matrix<double, 4, 2> weighted = jacobian.transpose() * covariance.inverse();
+      information += weighted * jacobian;
+      gradient += weighted * residual;
+    });
+    const Eigen::LDLT<Eigen::Matrix4d> factor(information);
+    const Eigen::Vector4d step = factor.solve(gradient);
+    const Eigen::Matrix4d state_covariance = factor.solve(Eigen::Matrix4d::Identity());
+    double chi_squared = 0, worst = 0;
+    std::size_t worst_lamp = 0;
+    each([&](std::size_t i, const Eigen::Matrix2d& covariance, const auto& jacobian,
+             const Eigen::Vector2d& residual) {
+      const Eigen::Vector2d r = residual - jacobian * step;
+      chi_squared += r.dot(covariance.inverse() * r);
+      const Eigen::Matrix2d of_residual =
+          covariance - jacobian * state_covariance * jacobian.transpose();
+      const double drop = r.dot(of_residual.inverse() * r);
+      if (!(of_residual.determinant() > 0) || drop <= worst) return;
+      worst = drop;
+      worst_lamp = i;
+    });
+    if (chi_squared <= unlikely_chi_squared(2 * static_cast<double>(left) - 4)) return found;
+    // Of three that contradict each other nobody knows which is wrong; nor when most are.
+    if (left == 3 || 2 * (left - 1) <= sightings.size()) return {};
+    left_out.set(worst_lamp);
+    found.lamps[found.count++] = worst_lamp;
+  }
+  return {};
+}
+
+}  // namespace vlp

@@ -1,0 +1,91 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "../camera/lens.h"
+#include "../geometry/types.h"
+#include "../rig/calibration.h"
+#include "../rig/lamp_map.h"
+#include "correction.h"
+#include "frame_fix.h"
+#include "weighted_fix.h"
+
+namespace vlp {
+
+/// What calibration and lamp map got wrong, which all fixes of a unit have in common:
+///   cov = (J' W J)^-1 + G C G',    G = (J' W J)^-1 J' W J_c,
+/// where J_c is how the errors of what was calibrated move the normalized points z less their
+/// predictions, and C their joint covariance. What was calibrated: the lens, the zenith, the
+/// dispersion's offset, the lamps' places.
+class CommonErrors {
+ public:
+  /// C from the adjustment; without one from the steps in a row: with e_lens from the boards
+  ///   e_zenith = own + by_intrinsics e_lens,   e_offset = own + by_intrinsics e_lens + by_zenith
+  ///   e_zenith (by_zenith is -1 where it is not stated; the lens counts where by_intrinsics of the
+  /// zenith is),
+  /// and of the lamps the survey's sd_m. `lamps` are the map's, in the order of their ids. The
+  /// lamps of an adjustment are those of the map where they have the same place, to 1 um.
+  CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
+
+  /// Whether anything at all is known of them.
+  bool stated() const { return stated_; }
+  /// Whether they are known of lens, zenith and every lamp of the map: only then can a lamp be told
+  /// to be wrong.
+  bool complete() const { return complete_; }
+  /// Lamps of the adjustment that the map has elsewhere: what they have in common with the
+  /// calibration is lost.
+  int lamps_elsewhere() const { return lamps_elsewhere_; }
+
+  /// How the errors move z of one lamp, a 2-row block each.
+  struct Effect {
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> by_shared;
+    Eigen::Matrix<double, 2, 3> by_lamp;
+  };
+  /// Of a sighting by the camera `level_from_camera` = level_from_base base_from_camera, at `pose`.
+  Effect effect_on(const Sighting& sighting, const LevelPose& pose, const Lens& lens,
+                   const Eigen::Matrix3d& level_from_base) const;
+
+  /// What the errors do to a fix, by the shared ones and by each lamp's own: (X, Y, Z, yaw).
+  using ByShared = Eigen::Matrix<double, 4, Eigen::Dynamic, Eigen::ColMajor, 4, 20>;
+  using ByLamp = Eigen::Matrix<double, 4, 3>;
+  /// G C G'; `lamps` are the indices of those of `by_lamp`.
+  Matrix4 covariance_of(const ByShared& by_shared, std::span<const ByLamp> by_lamp,
+                        std::span<const std::size_t> lamps) const;
+  /// Of one sighting's z.
+  Matrix2 covariance_of(const Effect& effect, std::size_t lamp) const;
+
+  /// The joint covariance, of the intrinsics, zenith, offset (where there are such), then the
+  /// lamps.
+  const Eigen::MatrixXd& joint() const { return covariance_; }
+  Eigen::Index intrinsics() const { return intrinsics_; }
+  Eigen::Index shared() const { return intrinsics_ + std::ssize(turns_); }
+
+ private:
+  Eigen::Index intrinsics_;
+  Eigen::Matrix3d base_from_camera_, camera_from_base_;
+  /// Derivatives of base_from_camera by the zenith's and the offset's coordinates.
+  std::vector<Eigen::Matrix3d> turns_;
+  Eigen::MatrixXd covariance_;
+  bool stated_ = false, complete_ = false;
+  int lamps_elsewhere_ = 0;
+};
+
+/// The lamp that the others contradict by more than noise and common errors explain, and whether
+/// the rest is explained without it; the lamps' errors are taken as independent of one another. By
+/// the largest drop of the weighted squares of residuals (chi-squared; 1e-4 of those that are
+/// right). The lamps that are left out, none, one or several: indices in the frame.
+struct Unexplained {
+  std::array<std::size_t, kMaxSightings> lamps;
+  std::size_t count = 0;
+};
+Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<const Matrix2> common,
+                             const WeightedFix& fix);
+
+}  // namespace vlp

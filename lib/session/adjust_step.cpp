@@ -1,0 +1,181 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/adjust_step.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "calibration/rotation/rotation_fit.h"
+#include "calibration/rotation/spot_captures.h"
+#include "geometry/angles.h"
+#include "rig/input_error.h"
+#include "rig/stage.h"
+#include "session/rotation_step.h"
+
+namespace vlp {
+namespace {
+
+/// Of each image of a turn, its spot: one a height.
+std::map<std::string, std::string> spots_of(const AdjustSet& set, const AdjustStepInput& input,
+                                            AdjustStepResult& result) {
+  const SpotCaptures turn = spot_captures(set.frames, input.lamps, input.calibration.camera);
+  std::map<std::string, std::string> spots;
+  if (turn.status != SpotStatus::ok) {
+    result.warnings.push_back(fmt::format("{} is taken for no turn on the spot: {}", set.name,
+                                          explanation_of(turn.status)));
+    return spots;
+  }
+  for (const SpotCapture& capture : turn.captures) {
+    spots[capture.image] = fmt::format("height {}", capture.height + 1);
+  }
+  return spots;
+}
+
+std::optional<KnownPlace> place_of(const Capture& capture, const AdjustSet& set,
+                                   const AdjustStepInput& input, int& without_sd) {
+  if (!capture.x_m || !capture.y_m) return std::nullopt;
+  const auto sd_m = capture.place_sd_m ? capture.place_sd_m : input.place_sd_m;
+  if (!sd_m) {
+    ++without_sd;
+    return std::nullopt;
+  }
+  if (!(*sd_m > 0)) {
+    throw InputError(set.name, "a place_sd_m of 0 is that of no measurement: state what it is");
+  }
+  return KnownPlace{capture.place, {*capture.x_m, *capture.y_m}, capture.z_m, *sd_m};
+}
+
+AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& result) {
+  if (input.calibration.adjustment) {
+    throw InputError(input.calibration_file,
+                     "is adjusted already, and its captures would count twice: give the "
+                     "calibration from before");
+  }
+  AdjustmentInput all{{}, input.lamps, input.calibration};
+  for (Lamp& lamp : all.lamps.lamps) {
+    if (!lamp.sd_m) lamp.sd_m = input.map_sd_m;
+    if (!lamp.sd_m) {
+      throw InputError(input.lamps_file,
+                       fmt::format("lamp {} has no sd_m, the standard deviation of the survey: "
+                                   "state it there, for all lamps or for one, or by --map-sd-m",
+                                   lamp.id));
+    }
+  }
+  for (const AdjustSet& set : input.sets) {
+    const auto turned =
+        set.turn ? spots_of(set, input, result) : std::map<std::string, std::string>();
+    int without_sd = 0;
+    for (const Frame& frame : set.frames) {
+      const auto entry = set.captures.find(frame.image);
+      const Capture known = entry == set.captures.end() ? Capture{} : entry->second;
+      AdjustmentCapture capture{set.name + "/" + frame.image, frame.detections, known.inclination};
+      if (!known.spot.empty()) {
+        capture.spot = set.name + "/" + known.spot;
+      } else if (const auto spot = turned.find(frame.image); spot != turned.end()) {
+        capture.spot = set.name + "/" + spot->second;
+      }
+      capture.place = place_of(known, set, input, without_sd);
+      all.captures.push_back(std::move(capture));
+    }
+    if (without_sd > 0) {
+      result.warnings.push_back(
+          fmt::format("{}: the places of {} captures are left out: they have no place_sd_m; state "
+                      "it, or give --place-sd-m",
+                      set.name, without_sd));
+    }
+  }
+  return all;
+}
+
+void add_warnings(AdjustStepResult& result, bool noise_is_stated) {
+  const AdjustmentResult& found = result.found;
+  for (const auto& lamp : found.lamps) {
+    if (!lamp.moved) continue;
+    result.warnings.push_back(
+        fmt::format("lamp {} hangs {:.1f} mm from where the map has it: what the map says of it is "
+                    "left out",
+                    lamp.id, 1e3 * lamp.correction_m.norm()));
+  }
+  for (const auto& place : found.places) {
+    if (!place.wrong) continue;
+    result.warnings.push_back(
+        fmt::format("{}: the place is {:.1f} mm from where the captures were taken, and is left "
+                    "out{}",
+                    place.name, 1e3 * place.misfit_m.norm(),
+                    place.of == PlaceOf::camera
+                        ? ": is it the camera's, and not that of the axis it turns about (place: "
+                          "axis)?"
+                        : ""));
+  }
+  if (found.lens_contradicted) {
+    result.warnings.push_back(
+        fmt::format("the captures contradict the lens: its correction has a chi-squared of {:.0f}, "
+                    "{} is to be expected; is it this camera's, in focus as then?",
+                    found.lens_chi_squared, found.lens_freedom));
+  }
+  if (noise_is_stated && found.noise_scale > 1) {
+    result.warnings.push_back(
+        fmt::format("the residuals are {:.2f} times what sigma_px lets expect, and count so",
+                    found.noise_scale));
+  }
+  for (const std::string& note : found.notes) result.notes.push_back(note);
+}
+
+bool states_noise(const AdjustmentInput& input) {
+  for (const AdjustmentCapture& capture : input.captures) {
+    for (const Detection& detection : capture.detections) {
+      if (!detection.sigma_px) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry) {
+  AdjustStepResult result;
+  LampCaptures captures{{}, input.lamps, input.lamps_file, input.calibration};
+  for (const AdjustSet& set : input.sets) {
+    captures.frames.insert(captures.frames.end(), set.frames.begin(), set.frames.end());
+  }
+  const Calibration alone = camera_alone(input.calibration);
+  if (doubts_map(captures, alone, result)) return result;
+  const AdjustmentInput all = adjustment_of(input, result);
+  result.found = adjust_captures(all);
+  const AdjustmentResult& found = result.found;
+  if (!found.ok()) {
+    result.fail(StepFailure::undetermined, found.undetermined);
+    blame_map(captures, alone, result);
+    return result;
+  }
+  add_warnings(result, states_noise(all));
+  result.metrics = {{"tilt_deg", deg_from_rad(tilt_of(found.center).angle_rad)}};
+  if (const auto& arm_m = found.center.lever_arm_m) {
+    result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});
+  }
+  Adjustment adjustment{{},
+                        input.refine_map ? found.refined_covariance : found.surveyed_covariance,
+                        {},
+                        found.captures,
+                        found.detections,
+                        found.residual_px};
+  for (const AdjustSet& set : input.sets) adjustment.sets.push_back(set.name);
+  for (const Lamp& lamp : (input.refine_map ? found.refined : input.lamps).lamps) {
+    adjustment.lamps.push_back({lamp.id, lamp.position_m});
+  }
+  Calibration calibration = input.calibration;
+  calibration.camera = found.camera;
+  if (calibration.intrinsics_report && calibration.intrinsics_report->covariance) {
+    const Eigen::Index n = std::ssize(found.camera.intrinsics);
+    calibration.intrinsics_report->covariance = adjustment.covariance.topLeftCorner(n, n);
+  }
+  result.calibration = with_adjustment(std::move(calibration), found.center, std::move(adjustment),
+                                       std::move(entry));
+  return result;
+}
+
+}  // namespace vlp

@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/adjustment/adjustment.h"
+#include "captures/captures_table.h"
+#include "captures/detections_table.h"
+#include "session/step_result.h"
+
+namespace vlp {
+
+/// Captures that were taken together, and what is known of them.
+struct AdjustSet {
+  std::string name;
+  std::vector<Frame> frames;
+  CapturesTable captures;
+  /// Those without a `spot` are a turn on the spot; heights are told apart as SpotCaptures does.
+  bool turn = false;
+};
+
+struct AdjustStepInput {
+  std::vector<AdjustSet> sets;
+  LampMap lamps;
+  std::filesystem::path lamps_file;
+  Calibration calibration;
+  std::filesystem::path calibration_file;
+  /// Of lamps, and of places, that state none.
+  std::optional<double> map_sd_m, place_sd_m;
+  /// The covariance that is kept is that of the refined map, else that of the map as surveyed.
+  bool refine_map = false;
+};
+
+struct AdjustStepResult : StepResult {
+  AdjustmentResult found;
+};
+
+/// One adjustment of all sets (calibration/adjustment). Metrics: tilt_deg, and where it is known
+/// lever_arm_mm. undetermined, wrong_map. Warns of lamps that have moved, of places and of a lens
+/// that the captures contradict, of residuals that sigma_px does not explain. Throws InputError
+/// when a lamp or a place states no standard deviation, or the calibration is adjusted already.
+AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry);
+
+}  // namespace vlp

@@ -1,0 +1,178 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/adjustment/adjustment.h"
+
+#include <gmock/gmock.h>
+
+#include "calibration/adjustment/survey.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+const AdjustmentResult::LampCorrection& lamp_of(const AdjustmentResult& result, int id) {
+  for (const auto& lamp : result.lamps) {
+    if (lamp.id == id) return lamp;
+  }
+  throw std::logic_error("no such lamp");
+}
+
+std::vector<int> moved_lamps(const AdjustmentResult& result) {
+  std::vector<int> ids;
+  for (const auto& lamp : result.lamps) {
+    if (lamp.moved) ids.push_back(lamp.id);
+  }
+  return ids;
+}
+
+TEST(Adjustment, FindsAllOfItWithoutNoiseFromARightMap) {
+  Survey survey;
+  survey.five_places(1e-4);
+  survey.stand({{0.2, -0.1, 0}, 2.0});
+  const AdjustmentResult found = adjust_captures(survey.input);
+  ASSERT_TRUE(found.ok()) << found.undetermined;
+  EXPECT_EQ(found.captures, 61);
+  EXPECT_THAT(found.center.zenith_in_camera,
+              IsNear(survey.truth.calibration.rotation_center->zenith_in_camera, 1e-9));
+  ASSERT_TRUE(found.center.lever_arm_m);
+  EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-9));
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_THAT(survey.misplaced(i, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 1e-9));
+  }
+  EXPECT_LT(found.residual_px, 1e-8);
+  EXPECT_EQ(found.noise_scale, 1);
+  EXPECT_TRUE(moved_lamps(found).empty());
+}
+
+TEST(Adjustment, RefinesAMapThatIsOffByTapeMeasureOrByPaces) {
+  for (const double sd_m : {0.002, 0.02}) {
+    Random random(3);
+    Survey survey(sd_m);
+    survey.five_places(1e-4);
+    survey.add_noise(random, true, true, true);
+    const AdjustmentResult found = adjust_captures(survey.input);
+    ASSERT_TRUE(found.ok()) << found.undetermined;
+    double worst_xy_m = 0, worst_z_m = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+      const Eigen::Vector3d error_m = survey.misplaced(i, found.refined);
+      worst_xy_m = std::max(worst_xy_m, error_m.head<2>().norm());
+      worst_z_m = std::max(worst_z_m, std::abs(error_m.z()));
+      EXPECT_NEAR(*found.refined.lamps[i].sd_m, 1e-4, 1e-4);
+    }
+    RecordProperty("xy_um", static_cast<int>(1e6 * worst_xy_m));
+    EXPECT_LT(worst_xy_m, 2.5e-4) << sd_m;
+    EXPECT_LT(worst_z_m, 3e-4) << sd_m;
+    EXPECT_TRUE(moved_lamps(found).empty());
+  }
+}
+
+TEST(Adjustment, NamesALampThatHasMovedAndKeepsTheOthersFromIt) {
+  for (const double by_m : {0.01, 0.03}) {
+    Random random(4);
+    Survey survey(0.001);
+    survey.five_places(1e-4);
+    survey.add_noise(random, true, true, true);
+    survey.input.lamps.lamps[1].position_m.x() += by_m;
+    const AdjustmentResult found = adjust_captures(survey.input);
+    ASSERT_TRUE(found.ok());
+    EXPECT_EQ(moved_lamps(found), std::vector<int>{2});
+    EXPECT_THAT(survey.misplaced(1, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
+  }
+}
+
+TEST(Adjustment, DoesNotSpreadAMovedLampWithoutKnownPlaces) {
+  Survey survey(0.001);
+  survey.turn({0, 0, 0}, 12);
+  survey.turn({0.3, 0.1, 0.3}, 12);
+  survey.input.lamps.lamps[4].position_m += Eigen::Vector3d(0.02, -0.02, 0);
+  const AdjustmentResult found = adjust_captures(survey.input);
+  ASSERT_TRUE(found.ok()) << found.undetermined;
+  EXPECT_EQ(moved_lamps(found), std::vector<int>{5});
+  // With its survey out of the way nothing else is off.
+  for (std::size_t i = 0; i < 8; ++i) {
+    EXPECT_THAT(survey.misplaced(i, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 1e-7));
+  }
+  EXPECT_THAT(found.notes, testing::Contains(HasSubstr("0 known places")));
+}
+
+TEST(Adjustment, SaysThatOneHeightTellsNoTiltFromALeverArm) {
+  Survey survey;
+  for (Lamp& lamp : survey.truth.map.lamps) lamp.position_m.z() = 1.6;
+  survey.input.lamps = survey.truth.map;
+  Calibration& calibration = survey.input.calibration;
+  calibration.intrinsics_report =
+      IntrinsicsReport{40, 1000, 0, 0.2, {}, {}, lens_covariance(calibration.camera, 1, 6)};
+  survey.turn({0, 0, 0}, 12);
+  const AdjustmentResult found = adjust_captures(survey.input);
+  EXPECT_THAT(found.undetermined, HasSubstr("a second height"));
+  survey.turn({0, 0, 0.3}, 12);
+  const AdjustmentResult more = adjust_captures(survey.input);
+  ASSERT_TRUE(more.ok()) << more.undetermined;
+  EXPECT_THAT(*more.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-6));
+}
+
+TEST(Adjustment, NamesAWrongPlace) {
+  Survey survey;
+  survey.five_places(1e-4);
+  for (auto& capture : survey.input.captures) {
+    if (capture.spot == "spot-24") capture.place->xy_m.x() += 0.02;
+  }
+  const AdjustmentResult found = adjust_captures(survey.input);
+  ASSERT_TRUE(found.ok());
+  ASSERT_EQ(found.places.size(), 5U);
+  for (const auto& place : found.places) EXPECT_EQ(place.wrong, place.name == "spot-24");
+  EXPECT_THAT(found.places[2].misfit_m, IsNear(Eigen::Vector3d(-0.02, 0, 0), 1e-6));
+}
+
+TEST(Adjustment, CorrectsTheLensWithinItsCovarianceAndNamesAnotherLens) {
+  Survey survey(0.001);
+  Camera& camera = survey.input.calibration.camera;
+  const Eigen::MatrixXd covariance = lens_covariance(camera, 0.2, 6);
+  survey.input.calibration.intrinsics_report =
+      IntrinsicsReport{40, 1000, 0, 0.2, {}, {}, covariance};
+  survey.five_places(1e-4);
+  const AdjustmentResult right = adjust_captures(survey.input);
+  ASSERT_TRUE(right.ok());
+  EXPECT_FALSE(right.lens_contradicted);
+  EXPECT_LT(right.lens_chi_squared, 1e-3);
+  camera.intrinsics[0] += 30 * std::sqrt(covariance(0, 0));
+  const AdjustmentResult wrong = adjust_captures(survey.input);
+  ASSERT_TRUE(wrong.ok());
+  EXPECT_TRUE(wrong.lens_contradicted) << wrong.lens_chi_squared << " of " << wrong.lens_freedom;
+}
+
+TEST(Adjustment, LeavesOutDetectionsOfAnotherLamp) {
+  Survey survey;
+  survey.five_places(1e-4);
+  std::swap(survey.input.captures[7].detections[0].lamp,
+            survey.input.captures[7].detections[3].lamp);
+  const AdjustmentResult found = adjust_captures(survey.input);
+  ASSERT_TRUE(found.ok());
+  EXPECT_EQ(found.detections_left_out, 2);
+  EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-7));
+}
+
+TEST(Adjustment, IsTheSameToTheLastBit) {
+  Random random(5);
+  Survey survey(0.002);
+  survey.five_places(1e-4);
+  survey.add_noise(random, true, true, true);
+  const AdjustmentResult once = adjust_captures(survey.input);
+  const std::vector<double> elsewhere(12345);  // other addresses
+  const AdjustmentResult again = adjust_captures(survey.input);
+  EXPECT_EQ(once.refined_covariance, again.refined_covariance);
+  EXPECT_EQ(once.center.zenith_in_camera, again.center.zenith_in_camera);
+}
+
+TEST(Adjustment, SaysWhenNoCaptureCanBeUsed) {
+  Survey survey;
+  survey.input.captures.push_back({"alone", {{1, {400, 300}, 0.1}}});
+  const AdjustmentResult found = adjust_captures(survey.input);
+  EXPECT_THAT(found.undetermined, HasSubstr("two lamps"));
+  EXPECT_EQ(found.captures_left_out, 1);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,131 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// What fixes say of their error, over whole recalibrations: lens, survey, places, turns and check
+/// with their noise, each time anew. Boards are represented by a lens drawn from its covariance.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "calibration/adjustment/survey.h"
+#include "geometry/angles.h"
+#include "rig/stage.h"
+
+namespace vlp {
+namespace {
+
+struct Case {
+  const char* name;
+  double map_sd_m;
+  int places;
+  bool lens;
+  bool refined;
+};
+
+class Consistency : public testing::TestWithParam<Case> {};
+
+/// e' cov^-1 e over trials: its mean per state, and how often it is within 95 % of chi-squared of
+/// four.
+struct Judged {
+  double sum = 0;
+  int count = 0, inside = 0;
+
+  void add(const Eigen::Vector4d& error, const Eigen::Matrix4d& covariance) {
+    constexpr double chi_squared_95 = 9.4877;
+    const double d = error.dot(covariance.ldlt().solve(error));
+    sum += d / 4;
+    ++count;
+    inside += d <= chi_squared_95 ? 1 : 0;
+  }
+  double mean() const { return sum / count; }
+  double share() const { return static_cast<double>(inside) / count; }
+};
+
+Eigen::Vector4d error_of(const Fix& fix, const Pose& truth) {
+  Eigen::Vector4d error;
+  error << fix.estimate.pose.position_m - truth.position_m,
+      wrapped_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
+  return error;
+}
+
+/// A calibration and the map that goes with it, from one survey.
+struct Unit {
+  Calibration calibration;
+  LampMap map;
+};
+
+Unit calibrated(Survey& survey, const Case& the, Random& random) {
+  Calibration& calibration = survey.input.calibration;
+  if (the.lens) {
+    const Eigen::MatrixXd covariance = lens_covariance(calibration.camera, 0.1, 8);
+    const Eigen::MatrixXd root = covariance.llt().matrixL();
+    Eigen::VectorXd draw(covariance.rows());
+    for (double& one : draw) one = random.normal();
+    Eigen::Map<Eigen::VectorXd>(calibration.camera.intrinsics.data(), draw.size()) += root * draw;
+    calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, covariance};
+  }
+  survey.add_noise(random, true, true, true);
+  const AdjustmentResult found = adjust_captures(survey.input);
+  EXPECT_TRUE(found.ok()) << found.undetermined;
+  const LampMap map = the.refined ? found.refined : survey.input.lamps;
+  Adjustment adjustment{{},
+                        the.refined ? found.refined_covariance : found.surveyed_covariance,
+                        {"made up"},
+                        found.captures,
+                        found.detections,
+                        found.residual_px};
+  for (const Lamp& lamp : map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
+  Calibration result = calibration;
+  result.camera = found.camera;
+  return {with_adjustment(result, found.center, adjustment, {}), map};
+}
+
+TEST_P(Consistency, OfWhatFixesSayOfTheirError) {
+  const Case& the = GetParam();
+  constexpr int trials = 200;
+  Random random(20 + static_cast<std::uint64_t>(the.places));
+  const std::vector<Eigen::Vector3d> axes_m{{-0.5, -0.25, 0}, {0.5, -0.2, 0.2}, {0, 0.3, 0.1}};
+  Judged whole, common;
+  for (int trial = 0; trial < trials; ++trial) {
+    Survey survey(the.map_sd_m);
+    for (std::size_t i = 0; i < 3; ++i) {
+      survey.turn(axes_m[i], 6, static_cast<int>(i) < the.places ? 2e-4 : 0);
+    }
+    const Unit unit = calibrated(survey, the, random);
+    const Positioner positioner(unit.map, unit.calibration);
+    for (int k = 0; k < 5; ++k) {
+      const double x_m = random.uniform(-0.6, 0.6), y_m = random.uniform(-0.3, 0.3);
+      const double z_m = random.uniform(0, 0.3), yaw_rad = random.uniform(-3, 3);
+      survey.truth.camera = {{x_m, y_m, z_m}, yaw_rad};
+      const auto exact = seen_from(survey.truth, survey.sigma_px);
+      const Fix fix = positioner.locate(with_noise(exact, random));
+      const Fix without_noise = positioner.locate(exact);
+      ASSERT_TRUE(fix.ok() && without_noise.ok());
+      EXPECT_EQ(fix.rejected_lamps, 0);
+      whole.add(error_of(fix, survey.truth.camera), fix.estimate.covariance);
+      common.add(error_of(without_noise, survey.truth.camera),
+                 without_noise.estimate.covariance - without_noise.noise_covariance);
+    }
+  }
+  for (const Judged& judged : {whole, common}) {
+    EXPECT_GT(judged.mean(), 0.9);
+    EXPECT_LT(judged.mean(), 1.1);
+    EXPECT_GT(judged.share(), 0.93);
+    EXPECT_LT(judged.share(), 0.97);
+  }
+  RecordProperty("whole_permille", static_cast<int>(std::lround(1e3 * whole.mean())));
+  std::printf("%s: whole %.3f, %.1f %%; common %.3f, %.1f %%\n", the.name, whole.mean(),
+              100 * whole.share(), common.mean(), 100 * common.share());
+}
+
+INSTANTIATE_TEST_SUITE_P(Adjustment, Consistency,
+                         testing::Values(Case{"GoodMapOnePlace", 1e-4, 1, false, true},
+                                         Case{"TapedMapThreePlaces", 2e-3, 3, false, true},
+                                         Case{"TapedMapOnePlaceAndLens", 2e-3, 1, true, true},
+                                         Case{"TapedMapThreePlacesAndLens", 2e-3, 3, true, true},
+                                         Case{"SurveyedMapThreePlacesAndLens", 2e-3, 3, true,
+                                              false}),
+                         [](const auto& info) { return info.param.name; });
+
+}  // namespace
+}  // namespace vlp

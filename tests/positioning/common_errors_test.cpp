@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The part of a fix's covariance that calibration and lamp map make, against fixes made again with
+/// each of them a little off; lamps that this does not explain.
+#include "positioning/common_errors.h"
+
+#include <gtest/gtest.h>
+
+#include "positioning/positioner.h"
+#include "support/near.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+class CommonPart : public testing::Test {
+ protected:
+  SyntheticRig rig{
+      synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, -0.05, 0}, 0.4}, {}};
+
+  CommonPart() {
+    for (std::size_t i = 0; i < 8; ++i) {
+      rig.map.lamps[i].position_m.z() += 0.02 * static_cast<double>(i % 3);
+    }
+    rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
+  }
+
+  /// An adjustment with correlations all over.
+  void adjust(double size) {
+    Adjustment adjustment{{}, {}, {}, 1, 1, 0.1};
+    for (const Lamp& lamp : rig.map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
+    const Eigen::Index n = 12 + 4 + 24;
+    Random random(7);
+    Eigen::MatrixXd root(n, n);
+    for (double& one : root.reshaped()) one = 0.3 * random.normal();
+    root.diagonal().array() += 1;
+    Eigen::VectorXd scale = Eigen::VectorXd::Constant(n, 1e-4 * size);
+    scale.head<4>().setConstant(0.1 * size);
+    scale.tail<24>().setConstant(1e-3 * size);
+    adjustment.covariance = scale.asDiagonal() * root * root.transpose() * scale.asDiagonal();
+    rig.calibration.adjustment = adjustment;
+  }
+
+  static Eigen::Vector4d state_of(const Fix& fix) {
+    Eigen::Vector4d state;
+    state << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
+    return state;
+  }
+};
+
+/// G by differences of whole fixes: nothing is shared with the formula.
+TEST_F(CommonPart, IsThatOfFixesMadeWithEachParameterALittleOff) {
+  adjust(1);
+  const Adjustment adjustment = *rig.calibration.adjustment;
+  const auto detections = seen_from(rig, 0.1);
+  const auto fix_with = [&](Eigen::Index parameter, double by) {
+    SyntheticRig other = rig;
+    other.calibration.adjustment.reset();
+    RotationCenter& center = *other.calibration.rotation_center;
+    if (parameter < 12) {
+      other.calibration.camera.intrinsics[static_cast<std::size_t>(parameter)] += by;
+    } else if (parameter < 14) {
+      Eigen::Vector3d zenith = center.zenith_in_camera / center.zenith_in_camera.z();
+      zenith[parameter - 12] += by;
+      center.zenith_in_camera = zenith.normalized();
+    } else if (parameter >= 16) {
+      other.map.lamps[static_cast<std::size_t>(parameter - 16) / 3]
+          .position_m[(parameter - 16) % 3] += by;
+    }
+    return state_of(Positioner(other.map, other.calibration).locate(detections));
+  };
+  Eigen::MatrixXd by_parameters(4, 40);
+  for (Eigen::Index i = 0; i < 40; ++i) {
+    const double step = i < 4 ? 1e-3 : 1e-6;
+    by_parameters.col(i) = (fix_with(i, step) - fix_with(i, -step)) / (2 * step);
+  }
+  const Eigen::Matrix4d expected =
+      by_parameters * adjustment.covariance * by_parameters.transpose();
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
+  ASSERT_TRUE(fix.ok());
+  EXPECT_THAT(fix.estimate.covariance - fix.noise_covariance,
+              IsNear(expected, 1e-4 * expected.cwiseAbs().maxCoeff()));
+  rig.calibration.adjustment.reset();
+  const Fix noise = Positioner(rig.map, rig.calibration).locate(detections);
+  EXPECT_EQ(noise.estimate.covariance, noise.noise_covariance);
+  EXPECT_THAT(fix.noise_covariance, IsNear(noise.noise_covariance, 1e-15));
+}
+
+TEST_F(CommonPart, OfASurveyIsItsStandardDeviationThroughTheFix) {
+  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, 0.1));
+  const Matrix4 common = fix.estimate.covariance - fix.noise_covariance;
+  // Eight lamps of 2 mm around the camera: 2 / sqrt(8) and a little more.
+  EXPECT_NEAR(std::sqrt(common(0, 0)), 0.00075, 0.00008);
+}
+
+TEST_F(CommonPart, NamesALampThatNothingUncertainExplains) {
+  adjust(0.3);
+  Random random(8);
+  for (const double off_m : {0.01, 0.03}) {
+    for (std::size_t moved = 0; moved < 8; ++moved) {
+      SyntheticRig room = rig;
+      room.map.lamps[moved].position_m.x() += off_m;
+      const auto detections = with_noise(seen_from(room, 0.03), random);
+      const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
+      ASSERT_TRUE(fix.ok());
+      EXPECT_EQ(fix.rejected_lamps, 1) << off_m << " m, lamp " << moved + 1;
+      EXPECT_EQ(fix.rejected_ids[0], static_cast<int>(moved) + 1);
+      EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 0.001));
+    }
+  }
+}
+
+TEST_F(CommonPart, LeavesLampsAloneThatTheSurveyExplains) {
+  adjust(3);
+  Random random(9);
+  for (std::size_t moved = 0; moved < 8; ++moved) {
+    SyntheticRig room = rig;
+    room.map.lamps[moved].position_m.y() += 0.004;
+    const Fix fix =
+        Positioner(rig.map, rig.calibration).locate(with_noise(seen_from(room, 0.03), random));
+    ASSERT_TRUE(fix.ok());
+    EXPECT_EQ(fix.rejected_lamps, 0);
+  }
+}
+
+}  // namespace
+}  // namespace vlp
