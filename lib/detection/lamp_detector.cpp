@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "detection/identity/coherence.h"
 #include "detection/lights/background.h"
 #include "detection/lights/glow.h"
 #include "detection/lights/glow_envelope.h"
@@ -98,11 +99,18 @@ std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& 
 
 void LampDetector::measure(const cv::Mat& lines, const Background& background, Light& light) const {
   const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
+  const auto coherence = [&] {
+    return light.stripes.period_lines > 0
+               ? coherence_of(lines, shape_.turned(light.low), shape_.turned(light.high),
+                              background, light.stripes.period_lines)
+               : 0;
+  };
   if (light.glows || light.uneven) {
     // Its stripes reach further than its outline.
     const Eigen::Vector2d beyond(0, light.radius_px);
     const auto signal = line_signal(lines, low - beyond, high + beyond, background.level);
     light.stripes = stripes_of(striped_part(without_glow(signal)));
+    light.coherence = coherence();
     return;
   }
   auto better = shape_.light_of(refined(lines, light.outline, low, high, background), background);
@@ -113,6 +121,7 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
   }
   light.stripes = stripes_of(
       line_signal(lines, shape_.turned(light.low), shape_.turned(light.high), background.level));
+  light.coherence = coherence();
 }
 
 std::vector<Light> LampDetector::detect(const cv::Mat& image) const {

@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The detector on rendered captures, whose truth is known.
 #include "detection/lamp_detector.h"
+#include "detection/drawn_lamp.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 
+#include "detection/drawn_lamp.h"
 #include "detection/rendered_captures.h"
 
 namespace vlp {
@@ -94,6 +96,21 @@ TEST(LampDetector, DoesNotChooseBetweenLampsOfNearlyOneFrequency) {
   EXPECT_EQ(identified(), 0);
   map.lamps.pop_back();
   EXPECT_EQ(identified(), 1);
+}
+
+TEST(LampDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
+  const cv::Size size(300, 160);
+  const LampDetector detector(LampMap{{drawn_lamp(1, 36), drawn_lamp(2, 11)}}, drawn_camera(size));
+  const DrawnLamp few{.center = {81.3, 79.6}, .stripes = {.period_lines = 36}};
+  const DrawnLamp more{.center = {210.3, 79.6}, .stripes = {.period_lines = 11}};
+  const auto alone = detector.detect(drawn({few}, size, CV_8U, 0.5));
+  ASSERT_EQ(alone.size(), 1U);
+  EXPECT_LT(alone[0].stripes.periods, kEnoughPeriods);
+  EXPECT_EQ(alone[0].kind, LightKind::unknown);
+  EXPECT_EQ(alone[0].reason, LightReason::alone);
+  const auto both = detector.detect(drawn({few, more}, size, CV_8U, 0.5));
+  ASSERT_EQ(both.size(), 2U);
+  for (const Light& light : both) EXPECT_EQ(light.kind, LightKind::lamp);
 }
 
 TEST(LampDetector, FindsNothingInImagesWithoutLamps) {

@@ -99,6 +99,17 @@ TEST_F(RealDownlights, AreIdentifiedInEachFormat) {
   }
 }
 
+TEST_F(RealDownlights, AreIdentifiedAtTwiceTheBrightness) {
+  const Identified found = identified(data, [](const fs::path& file) {
+    cv::Mat brighter;
+    cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION)
+        .convertTo(brighter, -1, 2);
+    return encoded(brighter, ".png");
+  });
+  EXPECT_EQ(found.wrong, 0);
+  EXPECT_GE(found.lamps, 22);  // measured: 23
+}
+
 TEST_F(RealDownlights, TellTheRowTime) {
   const LampDetector detector(map(), {Readout::columns, {}, {}});
   std::vector<MeasuredPeriod> periods;

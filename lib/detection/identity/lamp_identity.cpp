@@ -4,10 +4,30 @@
 #include <limits>
 #include <vector>
 
+#include "detection/identity/coherence.h"
 #include "detection/identity/lamp_rule.h"
 #include "detection/lamp_detector.h"
 
 namespace vlp {
+namespace {
+
+/// Why a light does not flicker; nothing when it does.
+std::optional<LightReason> why_steady(const Light& light) {
+  constexpr double least_clarity = 0.5;
+  const Stripes& stripes = light.stripes;
+  if (!(stripes.contrast >= kLeastContrast)) return LightReason::even;
+  if (!(stripes.periods >= kLeastPeriods)) return LightReason::few_stripes;
+  if (!(stripes.clarity >= least_clarity)) return LightReason::unclear;
+  if (!(light.coherence >= kLeastCoherence)) return LightReason::incoherent;
+  return std::nullopt;
+}
+
+void refuse(Light& light, LightReason reason) {
+  light.lamp.reset();
+  light.reason = reason;
+}
+
+}  // namespace
 
 bool wholly_in_view(const Light& light, const cv::Size& size) {
   return light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
@@ -21,24 +41,27 @@ std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
 }
 
 void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) const {
-  constexpr double least_clarity = 0.5;
   constexpr double much_softer = 5, least_roundness = 0.45, most_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity();
   for (Light& light : lights) {
-    const Stripes& stripes = light.stripes;
-    const bool flickers = stripes.contrast >= kLeastContrast && stripes.periods >= kLeastPeriods &&
-                          stripes.clarity >= least_clarity;
-    light.kind = flickers ? LightKind::unknown : LightKind::steady;
-    if (!flickers) continue;
+    const auto steady = why_steady(light);
+    light.kind = steady ? LightKind::steady : LightKind::unknown;
+    light.reason = steady.value_or(LightReason::like_no_lamp);
+    if (steady) continue;
     if (!light.uneven) sharpest_px = std::min(sharpest_px, light.rise_px);
-    light.lamp = lamp_of(stripes);
+    light.lamp = lamp_of(light.stripes);
+    if (!readable(light.stripes)) light.reason = LightReason::irregular;
   }
   for (Light& light : lights) {
+    if (!light.lamp) continue;
     // A lamp's reflection flickers like the lamp. Where most of the edge is not the lamp's, a
     // circle through the rest is not to be trusted.
-    const bool soft = !light.uneven && light.rise_px > much_softer * sharpest_px;
     const bool strays = light.outside > most_outside;
-    if (soft || strays || light.roundness < least_roundness) light.lamp.reset();
+    if (!light.uneven && light.rise_px > much_softer * sharpest_px) {
+      refuse(light, LightReason::soft);
+    } else if (strays || light.roundness < least_roundness) {
+      refuse(light, LightReason::not_round);
+    }
   }
   // Of two lights with one identity the one with the surer centre has it.
   for (const Lamp& lamp : lamps_.lamps) {
@@ -49,12 +72,17 @@ void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) co
     const auto best = std::min_element(claims.begin(), claims.end(),
                                        [](auto* a, auto* b) { return a->sigma_px < b->sigma_px; });
     for (Light* claim : claims) {
-      if (claim != *best) claim->lamp.reset();
+      if (claim != *best) refuse(*claim, LightReason::seen_better);
     }
   }
+  const bool sure = std::any_of(lights.begin(), lights.end(), [](const Light& light) {
+    return light.lamp && light.stripes.periods >= kEnoughPeriods;
+  });
   for (Light& light : lights) {
+    if (light.lamp && !sure) refuse(light, LightReason::alone);
     if (!light.lamp) continue;
     light.kind = wholly_in_view(light, size) ? LightKind::lamp : LightKind::cut;
+    light.reason = LightReason::identified;
   }
 }
 

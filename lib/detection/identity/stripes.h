@@ -15,6 +15,10 @@ inline constexpr double kShortestPeriod_lines = 2.2;
 /// The least of what flickers, and of what can be identified: see Stripes.
 inline constexpr double kLeastContrast = 0.2, kLeastPeriods = 1.3;
 
+/// With fewer periods things that have no stripes look like a lamp now and then: a period that is
+/// seen once or twice is not seen to repeat.
+inline constexpr double kEnoughPeriods = 3;
+
 /// The share of a disc's height whose lines are used: those at the rim are short and dim.
 inline constexpr double kUsedHeight = 0.9;
 

@@ -45,6 +45,28 @@ double step_of(std::vector<Level> sample) {
   return levels >= enough ? step : 1;
 }
 
+/// Whether levels below the median are missing, because it is the least there is.
+template <typename Level>
+bool clipped(const std::vector<Level>& sample, double median) {
+  const auto below =
+      std::count_if(sample.begin(), sample.end(), [&](Level v) { return v < median; });
+  const auto above =
+      std::count_if(sample.begin(), sample.end(), [&](Level v) { return v > median; });
+  return 4 * below < above;
+}
+
+/// One pixel of five is brighter than 0.84 standard deviations, and one of ten than 1.28; or, if
+/// so many are lit, much brighter.
+template <typename Level>
+double noise_above(std::vector<Level>& sample, double median) {
+  const auto above = [&](std::size_t per_cent) {
+    const auto at = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() * per_cent / 100);
+    std::nth_element(sample.begin(), at, sample.end());
+    return *at - median;
+  };
+  return std::min(above(80) / 0.8416, above(90) / 1.2816);
+}
+
 template <typename Level>
 Background background(const cv::Mat& image) {
   std::vector<Level> sample = sample_of<Level>(image);
@@ -58,12 +80,8 @@ Background background(const cv::Mat& image) {
     squares += (median - *below) * (median - *below);
   }
   double noise = std::sqrt(squares / double(std::max<std::ptrdiff_t>(1, middle - sample.begin())));
-  if (median == 0) {
-    // Noise below is clipped: one pixel of ten is brighter than 1.28 standard deviations.
-    const auto tenth = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() * 9 / 10);
-    std::nth_element(sample.begin(), tenth, sample.end());
-    noise = std::max(noise, *tenth / 1.2816);
-  }
+  const bool no_noise_below = clipped(sample, median);
+  if (no_noise_below) noise = std::max(noise, noise_above(sample, median));
   // Grey levels are coarse: of those around, the mean and the scatter say more.
   constexpr double around = 3;
   const double least_noise = 0.3 * step;
@@ -76,7 +94,7 @@ Background background(const cv::Mat& image) {
     sum_of_squares += off * off;
   }
   const double level = median + sum / count;
-  if (median > 0) noise = std::sqrt(sum_of_squares / count - std::pow(sum / count, 2));
+  if (!no_noise_below) noise = std::sqrt(sum_of_squares / count - std::pow(sum / count, 2));
   noise = std::max(noise, least_noise);
   constexpr double clear = 4.5, least = 1.6;
   return {level, noise, level + std::max(clear * noise, least * step)};

@@ -8,7 +8,8 @@ namespace vlp {
 
 /// The dark of an image of lamps, from a sample of its pixels.
 struct Background {
-  /// Mean of the pixels around the median, and their standard deviation, in grey levels.
+  /// Mean of the pixels around the median, and their standard deviation, in grey levels. Of a
+  /// dark that is clipped, at black or above it, by what is brighter than the median.
   double level;
   double noise;
   /// Pixels above are lit: level + 4.5 noise, and at least 1.6 of the steps between the levels that

@@ -15,12 +15,28 @@ namespace vlp {
 enum class LightKind {
   lamp,     ///< wholly in the image and identified: fit for a fix
   cut,      ///< identified, but the image's edge cuts it
-  unknown,  ///< flickers, but like no lamp of the map, like two, or like one seen better elsewhere
+  unknown,  ///< flickers, but is not told to be one lamp of the map, see LightReason
   steady,   ///< does not flicker
+};
+
+/// What decided that, of lights that are not identified the first that speaks against it.
+enum class LightReason {
+  identified,    ///< a lamp, and one that is cut
+  even,          ///< steady: contrast below kLeastContrast
+  few_stripes,   ///< steady: less than kLeastPeriods
+  unclear,       ///< steady: no period explains half of what varies from line to line
+  incoherent,    ///< steady: its parts vary each in its way, see coherence_of()
+  irregular,     ///< unknown: the stripes are not readable()
+  like_no_lamp,  ///< unknown: the period is like no lamp's, or like two lamps'
+  soft,          ///< unknown: much softer than others, a reflection
+  not_round,     ///< unknown: most of its edge is not on its outline
+  seen_better,   ///< unknown: another light is that lamp, and has the surer centre
+  alone,         ///< unknown: less than kEnoughPeriods, and no lamp with more in the image
 };
 
 struct Light {
   LightKind kind;
+  LightReason reason;
   /// Of a lamp, and of one that is cut.
   std::optional<int> lamp;
   /// Image of the centre of its outline, (u, v).
@@ -31,6 +47,8 @@ struct Light {
   /// The corners of the box around the outline, top left and bottom right.
   Eigen::Vector2d low, high;
   Stripes stripes;
+  /// See coherence_of(); 0 when the stripes have no period.
+  double coherence;
   /// Whether it has no edge, and its outline is a level.
   bool glows;
   /// Whether it is lit unevenly, and its outline is a rim, see rim_of(); its roundness is the share

@@ -48,6 +48,14 @@ std::vector<EdgePoint> on_circle(const std::vector<EdgePoint>& outline,
   return 2 * clear.size() < all.size() ? all : clear;
 }
 
+/// The ratio of an ellipse's axes.
+double slenderness(const Matrix2& rim_from_circle) {
+  const double half_square = rim_from_circle.squaredNorm() / 2;
+  const double area = std::abs(rim_from_circle.determinant());
+  const double difference = std::sqrt(std::max(0.0, half_square * half_square - area * area));
+  return (half_square + difference) / area;
+}
+
 /// A circle is an ellipse, too.
 std::optional<RobustEllipse> fit_round(const std::vector<Eigen::Vector2d>& points,
                                        const std::vector<double>& weights, double tolerance,
@@ -83,6 +91,7 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
                                           const Background& background) const {
   constexpr std::size_t least_points = 5;
   constexpr int least_support = 10;
+  constexpr double most_slender = 2;  // a disc seen 60 degrees off its axis
   std::vector<Eigen::Vector2d> points, pixels;
   double brightest = 0;
   std::erase_if(outline, [&](const EdgePoint& edge) {
@@ -105,6 +114,7 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
       std::max({0.35, 8 * background.noise / brightest, 0.4 * median_rise_px(outline)});
   const auto fit = fit_round(points, weights, tolerance_px * per_px, camera_.lens.has_value());
   if (!fit || fit->count < least_support) return std::nullopt;
+  if (!camera_.lens && slenderness(fit->rim_from_circle) > most_slender) return std::nullopt;
 
   Light light{};
   const auto pixel = pixel_of(fit->center);

@@ -80,6 +80,14 @@ TEST(Background, OfBlackAndWhiteImagesIsBlackAndWhite) {
   expect_flat(cv::Mat(600, 800, CV_16U, cv::Scalar(65535)), 65535);
 }
 
+TEST(Background, IsThatAboveALevelThatNothingIsBelow) {
+  // As many times as bright as it was, an image that was black in most places.
+  const cv::Mat image = cv::max(noisy<std::uint8_t>({800, 600}, 1, 1.2, 0, 0), 1);
+  const Background background = background_of(image);
+  EXPECT_NEAR(background.noise, 1.2, 0.3);
+  EXPECT_LT(cv::countNonZero(image > background.threshold), 20);
+}
+
 TEST(Background, OfPartOfAnImageLeavesTheRestOut) {
   cv::Mat image(600, 800, CV_8U, cv::Scalar(200));
   cv::Mat part = image(cv::Rect(100, 50, 33, 41));
