@@ -38,7 +38,13 @@ struct Options {
   std::optional<double> inclination_sigma_deg;
   std::optional<std::array<double, 4>> camera_on_robot;
   bool one_lamp = false;
+  std::optional<double> max_speed_m_per_s, max_yaw_rate_deg_per_s, yaw_rate_sd_deg_per_s;
+  std::optional<double> lean_sd_deg, height_sd_m;
+  int frames_together = 1;
 };
+
+/// Faster than robots turn.
+constexpr double kMaxYawRate_deg_per_s = 180;
 
 void set_sigma(std::vector<Frame>& frames, double sigma_px) {
   for (Frame& frame : frames) {
@@ -51,9 +57,12 @@ CapturesTable captures_of(const Options& options) {
   if (!options.captures.empty()) return read_captures(options.captures);
   const bool folder = std::filesystem::is_directory(options.images.images);
   CapturesTable captures = folder ? captures_table(options.images.images) : CapturesTable{};
-  if (captures.empty() && (options.one_lamp || options.inclination_sigma_deg)) {
+  if (captures.empty() &&
+      (options.one_lamp || options.inclination_sigma_deg || options.height_sd_m ||
+       options.yaw_rate_sd_deg_per_s || options.frames_together > 1)) {
     throw std::invalid_argument(
-        "--one-lamp and --inclination-sigma-deg need captures.csv: give --captures");
+        "--one-lamp, --inclination-sigma-deg, --height-sd-m, --yaw-rate-sd-deg-per-s and --frames "
+        "need captures.csv: give --captures");
   }
   return captures;
 }
@@ -92,6 +101,15 @@ void run(const Options& options) {
   }
   input.inclination_sigma_rad = rad_from_deg(options.inclination_sigma_deg.value_or(0));
   input.one_lamp = options.one_lamp;
+  if (options.max_speed_m_per_s) {
+    input.motion = KnownMotion::up_to(
+        *options.max_speed_m_per_s,
+        rad_from_deg(options.max_yaw_rate_deg_per_s.value_or(kMaxYawRate_deg_per_s)));
+  }
+  input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
+  input.lean_sd_rad = rad_from_deg(options.lean_sd_deg.value_or(0));
+  input.height_sd_m = options.height_sd_m;
+  input.frames_together = options.frames_together;
   const LocateResult found = locate_frames(input);
   write_fixes(options.images.output, found.rows);
   tell(found);
@@ -113,10 +131,12 @@ void add_options(CLI::App& app, Options& options) {
          "Standard deviation of the lamps' pixels; taken from the residuals when neither it "
          "nor a column says it")
       ->check(CLI::Range(kMinSigma_px, kMaxSigma_px));
-  app.add_option("--captures", options.captures,
-                 "captures.csv: image, roll_rad, pitch_rad (inclination of the robot, or of the "
-                 "camera when there is no --camera-on-robot), z_m, yaw_rad; default: captures.csv "
-                 "in the folder");
+  app.add_option(
+      "--captures", options.captures,
+      "captures.csv: image, time_s, roll_rad, pitch_rad (inclination of the robot, or of "
+      "the camera when there is no --camera-on-robot), vx_m_per_s, vy_m_per_s, "
+      "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry, along the axes of the same), "
+      "z_m, yaw_rad; default: captures.csv in the folder");
   app.add_option("--inclination-sigma-deg", options.inclination_sigma_deg,
                  "Standard deviation of the inclination sensor's angles (default: left out of sd)")
       ->check(finite_not_negative());
@@ -127,6 +147,32 @@ void add_options(CLI::App& app, Options& options) {
       ->option_text("X_M Y_M Z_M YAW_DEG");
   app.add_flag("--one-lamp", options.one_lamp,
                "Where one lamp is seen, take z_m and yaw_rad from captures.csv");
+  app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s,
+                 "The camera drives, so fast at most: its velocity is estimated from each image "
+                 "(default: as captures.csv says, or else it stands)")
+      ->check(finite_positive());
+  app.add_option("--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
+                 "With --max-speed-m-per-s: it turns so fast at most (default: 180); 0: not at all")
+      ->check(finite_not_negative())
+      ->needs("--max-speed-m-per-s");
+  app.add_option("--yaw-rate-sd-deg-per-s", options.yaw_rate_sd_deg_per_s,
+                 "Standard deviation of yaw_rate_rad_per_s in captures.csv (default: as it says)")
+      ->check(finite_not_negative());
+  app.add_option(
+         "--lean-sd-deg", options.lean_sd_deg,
+         "The camera leans by an unknown angle, of this standard deviation about level: roll "
+         "and pitch are estimated from each image of three lamps or more; 90: by any "
+         "(default: level, or as captures.csv says)")
+      ->check(finite_not_negative());
+  app.add_option("--height-sd-m", options.height_sd_m,
+                 "z_m in captures.csv is known to this, which tells apart where three lamps fit "
+                 "several leans")
+      ->check(finite_positive());
+  app.add_option(
+         "--frames", options.frames_together,
+         "Captures to fix together, with one velocity, where captures.csv has time_s within "
+         "0.2 s (default: 1)")
+      ->check(CLI::Range(1, 2));
 }
 
 }  // namespace

@@ -5,13 +5,42 @@
 #include "captures/csv_reader.h"
 
 namespace vlp {
+namespace {
+
+/// Two fields of which there are both or neither.
+struct Pair {
+  std::string_view first_name, second_name;
+  std::optional<CsvTable::Column> first, second;
+
+  Pair(const CsvTable& csv, std::string_view name, std::string_view other)
+      : first_name(name),
+        second_name(other),
+        first(csv.optional(name)),
+        second(csv.optional(other)) {}
+
+  std::optional<Eigen::Vector2d> read(const CsvTable& csv, std::size_t row,
+                                      CsvTable::Column image) const {
+    const auto a = first ? csv.optional_number(row, *first) : std::nullopt;
+    const auto b = second ? csv.optional_number(row, *second) : std::nullopt;
+    if (a.has_value() != b.has_value()) {
+      std::string problem("has one of ");
+      problem.append(first_name).append(" and ").append(second_name);
+      throw csv.error(row, image, problem.append(" without the other"));
+    }
+    if (!a) return std::nullopt;
+    return Eigen::Vector2d(*a, *b);
+  }
+};
+
+}  // namespace
 
 CapturesTable read_captures(const std::filesystem::path& file) {
   const CsvTable csv(file);
   const auto image = csv.required("image");
-  const auto roll = csv.optional("roll_rad"), pitch = csv.optional("pitch_rad");
   const auto place = csv.optional("place"), place_sd = csv.optional("place_sd_m"),
              spot = csv.optional("spot");
+  const Pair lean(csv, "roll_rad", "pitch_rad"), velocity(csv, "vx_m_per_s", "vy_m_per_s");
+  const auto velocity_sd = csv.optional("velocity_sd_m_per_s");
   CapturesTable table;
   for (std::size_t row = 0; row < csv.rows(); ++row) {
     const auto field = [&](std::optional<CsvTable::Column> column) {
@@ -35,11 +64,21 @@ CapturesTable read_captures(const std::filesystem::path& file) {
       throw csv.error(row, *place_sd, "should not be negative");
     }
     if (spot) capture.spot = csv.text(row, *spot);
-    const auto roll_rad = field(roll), pitch_rad = field(pitch);
-    if (roll_rad.has_value() != pitch_rad.has_value()) {
-      throw csv.error(row, image, "has one of roll_rad and pitch_rad without the other");
+    if (const auto angles = lean.read(csv, row, image)) {
+      capture.inclination = Inclination{angles->x(), angles->y()};
     }
-    if (roll_rad) capture.inclination = Inclination{*roll_rad, *pitch_rad};
+    capture.velocity_m_per_s = velocity.read(csv, row, image);
+    capture.yaw_rate_rad_per_s = field(csv.optional("yaw_rate_rad_per_s"));
+    capture.velocity_sd_m_per_s = field(velocity_sd);
+    if (capture.velocity_sd_m_per_s) {
+      if (*capture.velocity_sd_m_per_s < 0) {
+        throw csv.error(row, *velocity_sd, "should not be negative");
+      }
+      if (!capture.velocity_m_per_s) {
+        throw csv.error(row, *velocity_sd,
+                        "is of no velocity: vx_m_per_s and vy_m_per_s are empty");
+      }
+    }
     const std::string name(csv.text(row, image));
     if (name.empty()) throw csv.error(row, image, "is empty");
     if (!table.emplace(name, capture).second) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -26,15 +27,20 @@ struct Capture {
   std::string spot;
   /// From the inclination sensor: roll_rad and pitch_rad, both or neither.
   std::optional<Inclination> inclination;
+  /// From odometry, in the level frame of the robot, or, without a mount, of the camera: vx_m_per_s
+  /// and vy_m_per_s, both or neither, and their standard deviation per component.
+  std::optional<Eigen::Vector2d> velocity_m_per_s;
+  std::optional<double> yaw_rate_rad_per_s, velocity_sd_m_per_s;
 };
 
 /// Captures by the name of their image.
 using CapturesTable = std::map<std::string, Capture>;
 
 /// Reads `captures.csv`: the column image, then any of time_s, x_m, y_m, z_m, yaw_rad, place,
-/// place_sd_m, spot, roll_rad, pitch_rad; a field may be empty. Throws InputError: see CsvTable; an
-/// image twice; one of roll_rad and pitch_rad without the other; a place that is neither camera nor
-/// axis; a place_sd_m that is negative.
+/// place_sd_m, spot, roll_rad, pitch_rad, vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s,
+/// velocity_sd_m_per_s; a field may be empty. Throws InputError: see CsvTable; an image twice; one
+/// of roll_rad and pitch_rad, or of the velocities, without the other; a place that is neither
+/// camera nor axis; a standard deviation that is negative or of no velocity.
 CapturesTable read_captures(const std::filesystem::path& file);
 
 }  // namespace vlp

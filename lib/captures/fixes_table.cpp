@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
@@ -21,12 +22,26 @@ struct FixColumns {
            csv.optional("sd_yaw_rad")},
         noise_sd{csv.optional("noise_sd_x_m"), csv.optional("noise_sd_y_m"),
                  csv.optional("noise_sd_z_m"), csv.optional("noise_sd_yaw_rad")},
-        residual_px(csv.optional("residual_px")) {}
+        residual_px(csv.optional("residual_px")),
+        time_s(csv.optional("time_s")),
+        velocity{csv.optional("vx_m_per_s"), csv.optional("vy_m_per_s")},
+        lean{csv.optional("roll_rad"), csv.optional("pitch_rad")} {}
 
   std::array<CsvTable::Column, 4> pose;
   std::array<std::optional<CsvTable::Column>, 4> sd, noise_sd;
-  std::optional<CsvTable::Column> residual_px;
+  std::optional<CsvTable::Column> residual_px, time_s;
+  std::array<std::optional<CsvTable::Column>, 2> velocity, lean;
 };
+
+std::optional<Eigen::Vector2d> pair_in(
+    const CsvTable& csv, std::size_t row,
+    const std::array<std::optional<CsvTable::Column>, 2>& columns) {
+  const auto& [first, second] = columns;
+  const auto a = first ? csv.optional_number(row, *first) : std::nullopt;
+  const auto b = second ? csv.optional_number(row, *second) : std::nullopt;
+  if (!a || !b) return std::nullopt;
+  return Eigen::Vector2d(*a, *b);
+}
 
 std::optional<Eigen::Vector4d> sd_in(
     const CsvTable& csv, std::size_t row,
@@ -53,55 +68,95 @@ FixRow::Fix fix_in(const CsvTable& csv, std::size_t row, const FixColumns& colum
   if (columns.residual_px) {
     fix.residual_px = csv.optional_number(row, *columns.residual_px).value_or(0);
   }
+  fix.velocity_m_per_s = pair_in(csv, row, columns.velocity);
+  if (const auto lean = pair_in(csv, row, columns.lean)) fix.inclination = {lean->x(), lean->y()};
   return fix;
+}
+
+constexpr int kDigits = 9;    // nanometres
+constexpr int kSdDigits = 6;  // significant
+
+/// A column that is there where a row has something in it.
+struct AddedColumn {
+  std::string_view name;
+  std::string (*text)(const FixRow&);
+};
+
+std::string time_of(const FixRow& row) { return row.time_s ? fixed(*row.time_s, kDigits) : ""; }
+
+template <int axis>
+std::string noise_sd_of(const FixRow& row) {
+  if (!row.fix || !row.fix->noise_sd) return "";
+  return significant((*row.fix->noise_sd)[axis], kSdDigits);
+}
+
+template <int axis>
+std::string velocity_of(const FixRow& row) {
+  if (!row.fix || !row.fix->velocity_m_per_s) return "";
+  return fixed((*row.fix->velocity_m_per_s)[axis], kDigits);
+}
+
+template <double Inclination::*angle>
+std::string lean_of(const FixRow& row) {
+  if (!row.fix || !row.fix->inclination) return "";
+  return fixed((*row.fix->inclination).*angle, kDigits);
+}
+
+std::string rejected_of(const FixRow& row) {
+  std::string ids;
+  for (const int id : row.rejected) {
+    if (!ids.empty()) ids += ' ';
+    ids += std::to_string(id);
+  }
+  return ids;
+}
+
+constexpr std::array<AddedColumn, 10> kAddedColumns{
+    {{"time_s", time_of},
+     {"noise_sd_x_m", noise_sd_of<0>},
+     {"noise_sd_y_m", noise_sd_of<1>},
+     {"noise_sd_z_m", noise_sd_of<2>},
+     {"noise_sd_yaw_rad", noise_sd_of<3>},
+     {"vx_m_per_s", velocity_of<0>},
+     {"vy_m_per_s", velocity_of<1>},
+     {"roll_rad", lean_of<&Inclination::roll_rad>},
+     {"pitch_rad", lean_of<&Inclination::pitch_rad>},
+     {"rejected", rejected_of}}};
+
+std::vector<AddedColumn> columns_that_some_have(const std::vector<FixRow>& rows) {
+  std::vector<AddedColumn> columns;
+  for (const AddedColumn& column : kAddedColumns) {
+    const bool some = std::any_of(rows.begin(), rows.end(),
+                                  [&](const FixRow& row) { return !column.text(row).empty(); });
+    if (some) columns.push_back(column);
+  }
+  return columns;
 }
 
 }  // namespace
 
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows) {
-  constexpr int digits = 9;     // nanometres
-  constexpr int sd_digits = 6;  // significant
   std::vector<std::string> header{"image",  "status",     "x_m",    "y_m",
                                   "z_m",    "yaw_rad",    "sd_x_m", "sd_y_m",
                                   "sd_z_m", "sd_yaw_rad", "lamps",  "residual_px"};
-  const bool noise = std::any_of(rows.begin(), rows.end(), [](const FixRow& row) {
-    return row.fix && row.fix->noise_sd.has_value();
-  });
-  const bool rejected = std::any_of(rows.begin(), rows.end(),
-                                    [](const FixRow& row) { return !row.rejected.empty(); });
-  if (noise) {
-    header.insert(header.end(),
-                  {"noise_sd_x_m", "noise_sd_y_m", "noise_sd_z_m", "noise_sd_yaw_rad"});
-  }
-  if (rejected) header.emplace_back("rejected");
+  const auto added = columns_that_some_have(rows);
+  for (const AddedColumn& column : added) header.emplace_back(column.name);
   CsvWriter csv(file, header);
-  const auto add_sd = [](std::vector<std::string>& fields,
-                         const std::optional<Eigen::Vector4d>& sd) {
-    for (int i = 0; i < 4; ++i) {
-      fields.push_back(sd ? significant((*sd)[i], sd_digits) : std::string());
-    }
-  };
   for (const FixRow& row : rows) {
     std::vector<std::string> fields{row.image, row.status};
-    if (row.fix) {
-      const Pose& pose = row.fix->pose;
-      for (const double x_m : pose.position_m) fields.push_back(fixed(x_m, digits));
-      fields.push_back(fixed(pose.yaw_rad, digits));
-    } else {
-      fields.resize(6);
-    }
-    add_sd(fields, row.fix ? row.fix->sd : std::nullopt);
-    fields.push_back(std::to_string(row.lamps));
-    fields.push_back(row.fix ? significant(row.fix->residual_px, sd_digits) : std::string());
-    if (noise) add_sd(fields, row.fix ? row.fix->noise_sd : std::nullopt);
-    if (rejected) {
-      std::string ids;
-      for (const int id : row.rejected) {
-        if (!ids.empty()) ids += ' ';
-        ids += std::to_string(id);
+    fields.resize(12);
+    fields[10] = std::to_string(row.lamps);
+    if (const auto& fix = row.fix) {
+      const Eigen::Vector3d& position_m = fix->pose.position_m;
+      const std::array<double, 4> pose{position_m.x(), position_m.y(), position_m.z(),
+                                       fix->pose.yaw_rad};
+      for (std::size_t i = 0; i < 4; ++i) {
+        fields[2 + i] = fixed(pose[i], kDigits);
+        if (fix->sd) fields[6 + i] = significant((*fix->sd)[static_cast<int>(i)], kSdDigits);
       }
-      fields.push_back(std::move(ids));
+      fields[11] = significant(fix->residual_px, kSdDigits);
     }
+    for (const AddedColumn& column : added) fields.push_back(column.text(row));
     csv.row(fields);
   }
   csv.save();
@@ -127,6 +182,7 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
       throw csv.error(row, status, "should be UTF-8");
     }
     if (read.status == "ok") read.fix = fix_in(csv, row, columns);
+    if (columns.time_s) read.time_s = csv.optional_number(row, *columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "holds no fix");
   return rows;

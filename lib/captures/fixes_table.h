@@ -26,6 +26,9 @@ struct FixRow {
     double residual_px;
     /// The part of sd that is of this image alone; nothing when nothing else is known.
     std::optional<Eigen::Vector4d> noise_sd = {};
+    /// In the world, and the lean, where they were estimated.
+    std::optional<Eigen::Vector2d> velocity_m_per_s = {};
+    std::optional<Inclination> inclination = {};
   };
   /// Nothing unless the status is "ok".
   std::optional<Fix> fix;
@@ -35,12 +38,14 @@ struct FixRow {
   std::size_t line = 0;
   /// Ids of lamps that were left out because the others contradict them.
   std::vector<int> rejected = {};
+  /// When the capture was taken, where it is known.
+  std::optional<double> time_s = {};
 };
 
 /// Writes image, status, x_m, y_m, z_m, yaw_rad, sd_x_m, sd_y_m, sd_z_m, sd_yaw_rad, lamps,
-/// residual_px, and where some row has them noise_sd_x_m, noise_sd_y_m, noise_sd_z_m,
-/// noise_sd_yaw_rad and rejected (ids, separated by blanks), whole or not at all; what there is not
-/// is left empty. Throws InputError.
+/// residual_px, and then, where a row has them, time_s, noise_sd_x_m, noise_sd_y_m, noise_sd_z_m,
+/// noise_sd_yaw_rad, vx_m_per_s, vy_m_per_s, roll_rad, pitch_rad, rejected (ids, separated by
+/// blanks), whole or not at all; what there is not is left empty. Throws InputError.
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows);
 
 /// Reads what write_fixes() writes. Only image, status, x_m, y_m, z_m and yaw_rad are needed; an sd

@@ -151,30 +151,33 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   stated_ = covariance_.diagonal().maxCoeff() > 0;
 }
 
-CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const LevelPose& pose,
-                                             const Lens& lens,
-                                             const Eigen::Matrix3d& level_from_base) const {
-  Effect effect;
-  effect.by_shared.setZero(2, shared());
-  effect.by_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
-  const Eigen::Vector3d in_base = level_from_base.transpose() * sighting.z.homogeneous();
-  const Eigen::Vector3d ray = camera_from_base_ * in_base;
-  const Eigen::Vector3d direction = level_from_base * base_from_camera_ * ray;  // z = 1
-  // How z moves with the direction.
-  Eigen::Matrix<double, 2, 3> d_z;
-  d_z << 1, 0, -sighting.z.x(), 0, 1, -sighting.z.y();
-  d_z /= direction.z();
+CommonErrors::ByRay CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_base,
+                                                const Lens& lens) const {
+  ByRay effect = ByRay::Zero(3, shared());
+  const Eigen::Vector3d ray = camera_from_base_ * ray_in_base;
   if (const auto seen = lens.project_with_jacobians(ray)) {
     // At a pixel that stays, the ray moves within its plane of z.
     const Eigen::Matrix2d d_ray = -seen->d_pixel_d_point.leftCols<2>().inverse();
-    const Eigen::Matrix2d d_z_d_pixel =
-        d_z * (level_from_base * base_from_camera_).leftCols<2>() * d_ray;
-    effect.by_shared.leftCols(intrinsics_).noalias() = d_z_d_pixel * seen->d_pixel_d_parameters;
+    const Eigen::Matrix<double, 3, 2> d_ray_in_base = base_from_camera_.leftCols<2>() * d_ray;
+    effect.leftCols(intrinsics_).noalias() = d_ray_in_base * seen->d_pixel_d_parameters;
   }
   for (std::size_t i = 0; i < turns_.size(); ++i) {
-    effect.by_shared.col(intrinsics_ + static_cast<Eigen::Index>(i)) =
-        d_z * (level_from_base * (turns_[i] * ray));
+    effect.col(intrinsics_ + static_cast<Eigen::Index>(i)) = turns_[i] * ray;
   }
+  return effect;
+}
+
+CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const LevelPose& pose,
+                                             const Lens& lens,
+                                             const Eigen::Matrix3d& level_from_base) const {
+  // How z moves with the direction, which has z = 1.
+  Eigen::Matrix<double, 2, 3> d_z;
+  d_z << 1, 0, -sighting.z.x(), 0, 1, -sighting.z.y();
+  const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
+  Effect effect;
+  effect.by_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
+  effect.by_shared = d_z_d_base.lazyProduct(
+      effect_on_ray(level_from_base.transpose() * sighting.z.homogeneous(), lens));
   return effect;
 }
 

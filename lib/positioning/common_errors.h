@@ -43,6 +43,10 @@ class CommonErrors {
   /// calibration is lost.
   int lamps_elsewhere() const { return lamps_elsewhere_; }
 
+  /// How the shared errors move the ray of a pixel, along the axes of the base (the level camera's).
+  using ByRay = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
+  ByRay effect_on_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
+
   /// How the errors move z of one lamp, a 2-row block each.
   struct Effect {
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> by_shared;

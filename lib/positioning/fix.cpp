@@ -14,7 +14,7 @@ struct Entry {
 };
 
 // In the order of the enumeration.
-constexpr std::array<Entry, 11> kStatuses{{
+constexpr std::array<Entry, 13> kStatuses{{
     {FixStatus::ok, "ok", "a fix"},
     {FixStatus::too_few_lamps, "too_few_lamps",
      "fewer than two lamps of the map are seen: one is enough only with known height and yaw"},
@@ -29,12 +29,18 @@ constexpr std::array<Entry, 11> kStatuses{{
     {FixStatus::degenerate, "degenerate",
      "the lamps are seen too close together for their noise, or no pose explains them"},
     {FixStatus::ambiguous, "ambiguous",
-     "two lamps at different heights fit two poses: a third lamp would tell"},
+     "two poses fit the lamps: another lamp would tell, or a known height or inclination"},
     {FixStatus::inconsistent, "inconsistent",
-     "the lamps contradict each other: a wrong identity, or another room's lamp map"},
+     "the lamps contradict each other: a wrong identity, another room's lamp map, or a camera that "
+     "leans, which a fix with the lean free would show (--lean-sd-deg)"},
     {FixStatus::mirrored_map, "mirrored_map",
      "the lamps fit the map's mirror image: it is drawn as seen from below, or identities are "
      "swapped"},
+    {FixStatus::undetermined, "undetermined",
+     "the lamps do not tell how the camera leans or moves, and so not where it is: it takes three "
+     "that are not in one line, or an inclination or a velocity that is better known"},
+    {FixStatus::row_time_unknown, "row_time_unknown",
+     "a camera that moves needs row_time_s and readout in its calibration"},
 }};
 
 const Entry& entry_of(FixStatus status) { return kStatuses[static_cast<std::size_t>(status)]; }

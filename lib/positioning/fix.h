@@ -3,8 +3,10 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 
+#include "body_fix.h"
 #include "camera_mount.h"
 
 namespace vlp {
@@ -19,9 +21,11 @@ enum class FixStatus {
   outside_lens,       // a pixel that no ray through the lens reaches
   lamp_below_camera,  // a lamp would have to hang at or below the camera's height
   degenerate,         // the lamps are seen too close together, or do not fit any pose
-  ambiguous,          // two lamps at different heights that two poses would explain
+  ambiguous,          // two poses would explain the lamps
   inconsistent,       // three lamps or more that contradict each other
-  mirrored_map        // they fit a mirror image of the map
+  mirrored_map,       // they fit a mirror image of the map
+  undetermined,       // lamps and what is known do not tell lean or motion, and so not the place
+  row_time_unknown    // motion wants to know when each row was read
 };
 
 /// The enumerator as a word, for example "too_few_lamps".
@@ -29,6 +33,17 @@ std::string_view name_of(FixStatus status);
 
 /// What it means and what to do, for people.
 std::string_view explanation_of(FixStatus status);
+
+/// How the body of a fix moved and leaned: the robot, or, without a mount, the camera.
+struct BodyEstimate {
+  /// In the world.
+  Eigen::Vector2d velocity_m_per_s{0, 0};
+  double yaw_rate_rad_per_s = 0;
+  Inclination inclination{0, 0};
+  /// Of (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) in metres, radians and seconds: of pixels and
+  /// of what was known before, weighed together. Zero for what was given as exact.
+  BodyCovariance covariance = BodyCovariance::Zero();
+};
 
 /// The answer to one frame. Everything below `status` holds only when that is `ok`.
 struct Fix {
@@ -50,6 +65,14 @@ struct Fix {
   std::array<int, 32> rejected_ids = {};
   /// Detections whose id is not in the lamp map; they are left out. Holds whatever the status.
   int unknown_lamps = 0;
+  /// Degrees of freedom that the pixels' residuals have: 2n - 4 for three lamps and more that are
+  /// seen from a body that stands and whose lean is known, less by what else they determine.
+  double redundancy = 0;
+  /// Where Sensors let it move or lean.
+  std::optional<BodyEstimate> body;
+  /// That of the Sensors: the middle of the exposure of the image's middle row, of which the fix
+  /// is.
+  std::optional<double> time_s;
 
   bool ok() const { return status == FixStatus::ok; }
 };

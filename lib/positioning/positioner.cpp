@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "positioning/positioner.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -44,10 +45,19 @@ std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
   return lamps;
 }
 
+bool is_sd(double value) { return std::isfinite(value) && value >= 0; }
+
+bool finite(const KnownMotion& motion) {
+  return motion.velocity_m_per_s.allFinite() && std::isfinite(motion.yaw_rate_rad_per_s) &&
+         is_sd(motion.velocity_sd_m_per_s) && is_sd(motion.yaw_rate_sd_rad_per_s);
+}
+
 bool finite(const Sensors& sensors) {
   const auto& lean = sensors.inclination;
   const auto& known = sensors.height_and_yaw;
-  return std::isfinite(sensors.inclination_sigma_rad) &&
+  const auto& height = sensors.height;
+  return is_sd(sensors.inclination_sigma_rad) && (!sensors.motion || finite(*sensors.motion)) &&
+         (!height || (std::isfinite(height->z_m) && is_sd(height->sd_m) && height->sd_m > 0)) &&
          (!lean || (std::isfinite(lean->roll_rad) && std::isfinite(lean->pitch_rad))) &&
          (!known || (std::isfinite(known->z_m) && std::isfinite(known->yaw_rad)));
 }
@@ -66,6 +76,45 @@ double distance_to_nearest(const std::vector<Lamp>& lamps, const Lamp& lamp) {
     nearest_m = std::min(nearest_m, (other.position_m - lamp.position_m).head<2>().norm());
   }
   return nearest_m;
+}
+
+bool moves(const KnownMotion& motion) {
+  return !motion.velocity_m_per_s.isZero(0) || motion.yaw_rate_rad_per_s != 0 ||
+         motion.velocity_sd_m_per_s > 0 || motion.yaw_rate_sd_rad_per_s > 0;
+}
+
+/// Whether more is to be estimated than a pose, or the lamps are not seen from one place.
+bool needs_body(const Sensors& sensors) {
+  return sensors.inclination_sigma_rad > 0 || sensors.height ||
+         (sensors.motion && moves(*sensors.motion));
+}
+
+/// The velocity turned from the level frame into the world, and the covariance with it.
+BodyEstimate in_world(const BodyFix& fix) {
+  const Eigen::Rotation2Dd world_from_level(fix.state.pose.yaw_rad);
+  const BodyMotion& motion = fix.state.motion;
+  BodyEstimate estimate{world_from_level * motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+                        motion.inclination, fix.covariance};
+  const Eigen::Matrix2d turn = world_from_level.toRotationMatrix();
+  const Eigen::Vector2d by_yaw(-estimate.velocity_m_per_s.y(), estimate.velocity_m_per_s.x());
+  BodyCovariance& covariance = estimate.covariance;
+  covariance.middleRows<2>(kBodyVelocity) =
+      (turn.lazyProduct(covariance.middleRows<2>(kBodyVelocity)) +
+       by_yaw.lazyProduct(covariance.row(kBodyYaw)))
+          .eval();
+  covariance.middleCols<2>(kBodyVelocity) =
+      (covariance.middleCols<2>(kBodyVelocity).lazyProduct(turn.transpose()) +
+       covariance.col(kBodyYaw).lazyProduct(by_yaw.transpose()))
+          .eval();
+  return estimate;
+}
+
+template <typename Frame>
+void name_rejected(const Frame& frame, Fix& fix) {
+  fix.rejected_lamps = frame.rejected_lamps;
+  const auto listed =
+      std::min(static_cast<std::size_t>(frame.rejected_lamps), fix.rejected_ids.size());
+  std::copy_n(frame.rejected_ids.begin(), listed, fix.rejected_ids.begin());
 }
 
 Fix refused(FixStatus status, int unknown_lamps) {
@@ -87,6 +136,12 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
       mount_(options.mount),
       max_residual_share_(options.max_residual_share),
       unstated_sigma_px_(options.unstated_sigma_px) {
+  body_from_camera_ = rotation_about_z(mount_ ? mount_->yaw_in_robot_rad : 0) * base_from_camera_;
+  const Camera& camera = calibration.camera;
+  if (camera.row_time_s && camera.readout) {
+    const int rows = camera.imager_px[*camera.readout == Readout::rows ? 1 : 0];
+    shutter_ = {*camera.row_time_s, (rows - 1) / 2.0, *camera.readout};
+  }
   for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
   for (const Lamp& lamp : lamps_) nearest_m_.push_back(distance_to_nearest(lamps_, lamp));
   if (mount_ &&
@@ -99,38 +154,31 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
   }
 }
 
-FixStatus Positioner::sight(std::span<const Detection> detections,
-                            const Eigen::Matrix3d& level_from_base, SightedFrame& frame) const {
-  const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
+/// Adds each detection of a lamp of the map to the frame: `add` takes it, its lamp, its ray and its
+/// standard deviation, and fills the frame's sighting.
+template <typename Frame, typename Add>
+FixStatus Positioner::look_up(std::span<const Detection> detections, Frame& frame,
+                              int& unknown_lamps, const Add& add) const {
+  const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
   for (const Detection& detection : detections) {
     const auto lamp =
         std::lower_bound(lamps_.begin(), lamps_.end(), detection.lamp,
                          [](const Lamp& candidate, int id) { return candidate.id < id; });
     if (lamp == lamps_.end() || lamp->id != detection.lamp) {
-      ++frame.unknown_lamps;
+      ++unknown_lamps;
       continue;
     }
     const auto ids_end = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
-    if (std::find(frame.ids.begin(), ids_end, lamp->id) != ids_end)
-      return FixStatus::duplicate_lamp;
+    if (std::find(ids_begin, ids_end, lamp->id) != ids_end) return FixStatus::duplicate_lamp;
     if (frame.size == max_lamps) return FixStatus::too_many_lamps;
     const double sigma_px = detection.sigma_px.value_or(unstated_sigma_px_);
     const bool plausible = sigma_px >= kMinSigma_px && sigma_px <= kMaxSigma_px;
     if (!detection.pixel.allFinite() || !plausible) return FixStatus::not_finite;
     const auto ray = lens_.unproject(detection.pixel);
     if (!ray) return FixStatus::outside_lens;
-    const Eigen::Vector3d direction = level_from_camera * ray->direction;
-    if (!(direction.z() > 0)) return FixStatus::lamp_below_camera;
-    const Eigen::Matrix<double, 3, 2> d_direction = level_from_camera * ray->d_direction_d_pixel;
-    const Eigen::Vector2d z = direction.head<2>() / direction.z();
-    const Eigen::Matrix2d d_z_d_pixel =
-        (d_direction.topRows<2>() - z * d_direction.row(2)) / direction.z();
-    frame.sightings[frame.size] = {lamp->position_m, z, lens_.focal_px().asDiagonal(), sigma_px};
-    if (detection.sigma_px) {
-      frame.sightings[frame.size].d_pixel_d_z = d_z_d_pixel.inverse();
-    } else {
-      frame.noise_is_stated = false;
-    }
+    const FixStatus added = add(detection, *lamp, *ray, sigma_px);
+    if (added != FixStatus::ok) return added;
+    if (!detection.sigma_px) frame.noise_is_stated = false;
     frame.nearest_m[frame.size] = nearest_m_[static_cast<std::size_t>(lamp - lamps_.begin())];
     frame.ids[frame.size++] = lamp->id;
   }
@@ -194,9 +242,124 @@ Matrix4 Positioner::common_covariance(const SightedFrame& frame,
   return common_.covariance_of(by_shared, {by_lamp.data(), frame.size}, {lamps.data(), frame.size});
 }
 
+/// The gain of the pixels, in standard deviations, is that of the body's least squares.
+Matrix4 Positioner::common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
+                                      const BodyFix& fix) const {
+  const PosedBody body(fix.state);
+  const Eigen::Matrix3d body_from_base = body_from_camera_ * base_from_camera_.transpose();
+  CommonErrors::ByShared by_shared = CommonErrors::ByShared::Zero(4, common_.shared());
+  std::array<CommonErrors::ByLamp, max_lamps> by_lamp;
+  std::array<std::size_t, max_lamps> lamps;
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    const BodySighting& seen = frame.sightings[i];
+    const auto d_q = body.d_lamp_in_body(seen.lamp_m, seen.time_s);
+    const Eigen::Matrix<double, 2, 3> d_pixel =
+        d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
+    const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state = d_pixel.lazyProduct(d_q);
+    const Eigen::Matrix<double, 4, 2> gain =
+        fix.covariance.topRows<4>().lazyProduct(d_pixel_d_state.transpose());
+    const Eigen::Matrix<double, 2, 3> d_pixel_d_ray = seen.whitened_pixel_from_ray * body_from_base;
+    const Eigen::Matrix<double, 4, 3> by_ray = gain * d_pixel_d_ray;
+    by_shared.noalias() +=
+        by_ray.lazyProduct(common_.effect_on_ray(body_from_base.transpose() * seen.ray, lens_));
+    by_lamp[i] = gain * d_pixel_d_state.leftCols<3>();
+    lamps[i] = index_of(frame.ids[i]);
+  }
+  return common_.covariance_of(by_shared, {by_lamp.data(), frame.size}, {lamps.data(), frame.size});
+}
+
+FixStatus Positioner::sight(std::span<const Detection> detections,
+                            const Eigen::Matrix3d& level_from_base, SightedFrame& frame) const {
+  const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
+  const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
+                       double sigma_px) {
+    const Eigen::Vector3d direction = level_from_camera * ray.direction;
+    if (!(direction.z() > 0)) return FixStatus::lamp_below_camera;
+    const Eigen::Matrix<double, 3, 2> d_direction = level_from_camera * ray.d_direction_d_pixel;
+    const Eigen::Vector2d z = direction.head<2>() / direction.z();
+    const Eigen::Matrix2d d_z_d_pixel =
+        (d_direction.topRows<2>() - z * d_direction.row(2)) / direction.z();
+    frame.sightings[frame.size] = {lamp.position_m, z, lens_.focal_px().asDiagonal(), sigma_px};
+    if (detection.sigma_px) frame.sightings[frame.size].d_pixel_d_z = d_z_d_pixel.inverse();
+    return FixStatus::ok;
+  };
+  return look_up(detections, frame, frame.unknown_lamps, add);
+}
+
+FixStatus Positioner::sight_from_body(std::span<const Detection> detections, double time_s,
+                                      BodyFrame& frame, int& unknown_lamps) const {
+  const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
+                       double sigma_px) {
+    const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
+    const auto whitened =
+        whitened_pixel_from_ray(direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
+    if (!whitened) return FixStatus::outside_lens;
+    const double read_s = shutter_ ? shutter_->time_s(detection.pixel) : 0;
+    frame.sightings[frame.size] = {lamp.position_m, direction.normalized(), *whitened, sigma_px,
+                                   time_s + read_s};
+    return FixStatus::ok;
+  };
+  return look_up(detections, frame, unknown_lamps, add);
+}
+
+std::optional<Fix> Positioner::locate_body(std::span<const Detection> detections,
+                                           const Sensors& sensors,
+                                           std::span<const EarlierFrame> earlier) const {
+  const KnownMotion motion = sensors.motion.value_or(KnownMotion());
+  if (moves(motion) && !shutter_) return refused(FixStatus::row_time_unknown, 0);
+  BodyPrior prior{{motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+                   sensors.inclination.value_or(Inclination{0, 0})},
+                  motion.velocity_sd_m_per_s,
+                  motion.yaw_rate_sd_rad_per_s,
+                  sensors.inclination_sigma_rad,
+                  sensors.height};
+  if (prior.height) prior.height->z_m -= origin_m_.z();
+  Fix fix;
+  BodyFrame frame;
+  const FixStatus seen = sight_from_body(detections, 0, frame, fix.unknown_lamps);
+  if (seen != FixStatus::ok) return refused(seen, fix.unknown_lamps);
+  frame.now = frame.size;
+  for (const EarlierFrame& before : earlier) {
+    int unknown_lamps = 0;
+    const FixStatus status =
+        sight_from_body(before.detections, -before.before_s, frame, unknown_lamps);
+    if (status != FixStatus::ok) return refused(status, fix.unknown_lamps);
+  }
+  if (frame.now < 2) return std::nullopt;
+  const Eigen::Vector3d arm_m =
+      mount_ ? mount_->position_in_robot_m : Eigen::Vector3d(Eigen::Vector3d::Zero());
+  const auto [status, solution] = fix_body_frame(frame, arm_m, prior, max_residual_share_);
+  if (status != FixStatus::ok) return refused(status, fix.unknown_lamps);
+  fix.status = status;
+  fix.noise_covariance = solution.covariance.topLeftCorner<4, 4>();
+  fix.estimate = {solution.state.pose, fix.noise_covariance};
+  if (common_.stated()) fix.estimate.covariance += common_covariance(frame, arm_m, solution);
+  fix.estimate.pose.position_m += origin_m_;
+  fix.residual_px = solution.residual_px;
+  fix.redundancy = solution.redundancy;
+  fix.lamps = static_cast<int>(frame.now);
+  name_rejected(frame, fix);
+  fix.body = in_world(solution);
+  fix.time_s = sensors.time_s;
+  return fix;
+}
+
+Fix Positioner::locate(std::span<const Detection> detections, const Sensors& sensors,
+                       std::span<const EarlierFrame> earlier) const noexcept {
+  const bool finite_times =
+      std::all_of(earlier.begin(), earlier.end(),
+                  [](const EarlierFrame& before) { return std::isfinite(before.before_s); });
+  if (!finite(sensors) || !finite_times) return refused(FixStatus::not_finite, 0);
+  if (const auto fix = locate_body(detections, sensors, earlier)) return *fix;
+  return locate(detections, sensors);
+}
+
 Fix Positioner::locate(std::span<const Detection> detections,
                        const Sensors& sensors) const noexcept {
   if (!finite(sensors)) return refused(FixStatus::not_finite, 0);
+  if (needs_body(sensors) && detections.size() > 1) {
+    if (auto fix = locate_body(detections, sensors, {})) return *fix;
+  }
   const Lean lean = sensors.inclination
                         ? lean_of(*sensors.inclination, mount_ ? mount_->yaw_in_robot_rad : 0)
                         : Lean();
@@ -230,10 +393,9 @@ Fix Positioner::locate(std::span<const Detection> detections,
   }
   fix.status = FixStatus::ok;
   fix.lamps = static_cast<int>(frame.size);
-  fix.rejected_lamps = frame.rejected_lamps;
-  std::copy_n(frame.rejected_ids.begin(),
-              std::min(static_cast<std::size_t>(frame.rejected_lamps), fix.rejected_ids.size()),
-              fix.rejected_ids.begin());
+  fix.redundancy = frame.size < 3 ? 0 : 2 * static_cast<double>(frame.size) - 4;
+  fix.time_s = sensors.time_s;
+  name_rejected(frame, fix);
   fix.unknown_lamps = frame.unknown_lamps;
   const Matrix4 common = common_.stated()
                              ? common_covariance(frame, lean.level_from_base, fix.estimate)

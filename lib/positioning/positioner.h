@@ -12,6 +12,7 @@
 #include "../rig/calibration.h"
 #include "../rig/detection.h"
 #include "../rig/lamp_map.h"
+#include "body_frame.h"
 #include "camera_mount.h"
 #include "common_errors.h"
 #include "correction.h"
@@ -37,15 +38,44 @@ struct PositionerOptions {
   double unstated_sigma_px = 1;
 };
 
+/// How a robot, or, without a mount, a camera, moves while an image is read: normal about these
+/// figures, with these standard deviations per component. 0: just so.
+struct KnownMotion {
+  /// In its level frame.
+  Eigen::Vector2d velocity_m_per_s{0, 0};
+  double yaw_rate_rad_per_s = 0;
+  double velocity_sd_m_per_s = 0;
+  double yaw_rate_sd_rad_per_s = 0;
+
+  /// Of one of which nothing is known but how fast it can be: none, give or take half of that.
+  static KnownMotion up_to(double speed_m_per_s, double yaw_rate_rad_per_s) {
+    return {{0, 0}, 0, speed_m_per_s / 2, yaw_rate_rad_per_s / 2};
+  }
+};
+
 /// What the robot knows of a frame besides the image.
 struct Sensors {
   /// From the inclination sensor (eq. 2), about the axes of the robot, or, without a mount, of the
   /// camera (its calibrated tilt taken off); level without.
   std::optional<Inclination> inclination;
-  /// Standard deviation of each of its angles; 0 leaves it out of the covariance.
+  /// Standard deviation of each of its angles, or of a lean about level that no sensor reads: with
+  /// two lamps or more, roll and pitch are then estimated along with the pose. 0: just so. 1 or
+  /// more is nothing known.
   double inclination_sigma_rad = 0;
   /// Of the camera. Makes a fix of a single lamp; not used when two or more are seen.
   std::optional<HeightAndYaw> height_and_yaw;
+  /// None: it stands. Not used for a single lamp.
+  std::optional<KnownMotion> motion = {};
+  /// Of the robot's centre, or, without a mount, of the camera. Not used for a single lamp.
+  std::optional<KnownHeight> height = {};
+  /// When the capture was taken, for Fix::time_s.
+  std::optional<double> time_s = {};
+};
+
+/// A frame that the same body saw before, on the same straight way.
+struct EarlierFrame {
+  std::span<const Detection> detections;
+  double before_s;
 };
 
 /// From identified lamps in an image to a position: the way from pixels to a fix, put together
@@ -64,10 +94,19 @@ class Positioner {
   /// The fix of one frame. Neither allocates nor throws. One lamp: fix_one_lamp(); two: in closed
   /// form; more: fix_weighted() from initial_pose(), without the lamps whose identity is wrong
   /// (fix_frame) and, where the calibration's or the survey's covariance covers every lamp, those
-  /// that all that is uncertain together does not explain (find_unexplained).
+  /// that all that is uncertain together does not explain (find_unexplained). Where the sensors let
+  /// it move or lean, or know its height, with two lamps or more: fix_body_frame().
   Fix locate(std::span<const Detection> detections, const Sensors& sensors = {}) const noexcept;
+  /// With frames from shortly before, of two lamps or more that are seen now and then: velocity,
+  /// yaw rate and lean stay the same from one to the next. Where the sensors give none, all is at
+  /// rest.
+  Fix locate(std::span<const Detection> detections, const Sensors& sensors,
+             std::span<const EarlierFrame> earlier) const noexcept;
 
  private:
+  template <typename Frame, typename Add>
+  FixStatus look_up(std::span<const Detection> detections, Frame& frame, int& unknown_lamps,
+                    const Add& add) const;
   FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
                   SightedFrame& frame) const;
   std::size_t index_of(int id) const;
@@ -75,6 +114,23 @@ class Positioner {
                           ConsistentFix& solution) const;
   Matrix4 common_covariance(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
                             const PoseEstimate& camera) const;
+  Matrix4 common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
+                            const BodyFix& fix) const;
+  FixStatus sight_from_body(std::span<const Detection> detections, double time_s, BodyFrame& frame,
+                            int& unknown_lamps) const;
+  /// Nothing when fewer than two lamps of the map are seen.
+  std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
+                                 std::span<const EarlierFrame> earlier) const;
+
+  /// When a pixel is read, from the middle row (or column) of the image.
+  struct Shutter {
+    double row_time_s, middle_row;
+    Readout readout;
+
+    double time_s(const Eigen::Vector2d& pixel) const {
+      return row_time_s * ((readout == Readout::rows ? pixel.y() : pixel.x()) - middle_row);
+    }
+  };
 
   std::vector<Lamp> lamps_;        // in the order of their ids, their places from origin_m_
   std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
@@ -82,9 +138,12 @@ class Positioner {
   Eigen::Vector3d origin_m_;
   Eigen::Matrix3d base_from_camera_;
   CommonErrors common_;
+  Eigen::Matrix3d body_from_camera_;
   std::optional<CameraMount> mount_;
   double max_residual_share_;
   double unstated_sigma_px_;
+  /// Nothing when the calibration lacks the row time or the read-out.
+  std::optional<Shutter> shutter_;
 };
 
 }  // namespace vlp

@@ -14,9 +14,9 @@ std::optional<double> residual_noise_px(std::span<const Fix> fixes) {
   for (const Fix& fix : fixes) {
     if (!fix.ok() || fix.lamps < 3) continue;
     sum_of_squares += fix.lamps * fix.residual_px * fix.residual_px;
-    degrees_of_freedom += 2 * fix.lamps - 4;
+    degrees_of_freedom += fix.redundancy;
   }
-  if (degrees_of_freedom == 0) return std::nullopt;
+  if (!(degrees_of_freedom > 0)) return std::nullopt;
   return std::clamp(std::sqrt(sum_of_squares / degrees_of_freedom), kMinSigma_px, kMaxSigma_px);
 }
 

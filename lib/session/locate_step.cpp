@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <map>
+#include <stdexcept>
 
 #include "camera/lens.h"
 #include "captures/outside_image.h"
@@ -18,27 +19,109 @@
 namespace vlp {
 namespace {
 
+std::optional<KnownMotion> motion_of(const Capture& capture, const LocateInput& input) {
+  if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return input.motion;
+  KnownMotion motion = input.motion.value_or(KnownMotion());
+  if (capture.velocity_m_per_s) {
+    motion.velocity_m_per_s = *capture.velocity_m_per_s;
+    motion.velocity_sd_m_per_s = capture.velocity_sd_m_per_s.value_or(0);
+  }
+  if (capture.yaw_rate_rad_per_s) {
+    motion.yaw_rate_rad_per_s = *capture.yaw_rate_rad_per_s;
+    motion.yaw_rate_sd_rad_per_s = input.yaw_rate_sd_rad_per_s;
+  }
+  return motion;
+}
+
 Sensors sensors_of(const std::string& image, const LocateInput& input) {
   Sensors sensors;
+  sensors.motion = input.motion;
+  sensors.inclination_sigma_rad = input.lean_sd_rad;
   const auto entry = input.captures.find(image);
   if (entry == input.captures.end()) return sensors;
   const Capture& capture = entry->second;
-  sensors.inclination = capture.inclination;
-  sensors.inclination_sigma_rad = input.inclination_sigma_rad;
+  sensors.motion = motion_of(capture, input);
+  sensors.time_s = capture.time_s;
+  if (capture.inclination) {
+    sensors.inclination = capture.inclination;
+    sensors.inclination_sigma_rad = input.inclination_sigma_rad;
+  }
   if (input.one_lamp && capture.z_m && capture.yaw_rad) {
     sensors.height_and_yaw = HeightAndYaw{*capture.z_m, *capture.yaw_rad};
+  }
+  if (input.height_sd_m && capture.z_m) {
+    sensors.height = KnownHeight{*capture.z_m, *input.height_sd_m};
   }
   return sensors;
 }
 
+/// The frames that come within this before each, latest first, by their time stamps.
+constexpr double kLongestTogether_s = 0.2;
+
+class EarlierFrames {
+ public:
+  explicit EarlierFrames(const LocateInput& input) : input_(input) {
+    if (input.frames_together < 2) return;
+    for (std::size_t i = 0; i < input.frames.size(); ++i) {
+      const auto entry = input.captures.find(input.frames[i].image);
+      if (entry == input.captures.end() || !entry->second.time_s) continue;
+      by_time_.emplace(*entry->second.time_s, i);
+    }
+  }
+  std::vector<EarlierFrame> before(const std::optional<double>& time_s) const {
+    std::vector<EarlierFrame> earlier;
+    if (!time_s) return earlier;
+    auto at = by_time_.lower_bound(*time_s);
+    while (at != by_time_.begin() &&
+           earlier.size() + 1 < static_cast<std::size_t>(input_.frames_together)) {
+      --at;
+      const double before_s = *time_s - at->first;
+      if (before_s > kLongestTogether_s) break;
+      earlier.push_back({input_.frames[at->second].detections, before_s});
+    }
+    return earlier;
+  }
+
+ private:
+  const LocateInput& input_;
+  std::multimap<double, std::size_t> by_time_;
+};
+
+/// What drove otherwise in between, or was another pass, is fixed by itself.
+Fix fix_of(const Frame& frame, const Positioner& positioner, const EarlierFrames& frames,
+           const Sensors& sensors) {
+  const auto earlier = frames.before(sensors.time_s);
+  if (!earlier.empty()) {
+    const Fix together = positioner.locate(frame.detections, sensors, earlier);
+    if (together.ok()) return together;
+  }
+  return positioner.locate(frame.detections, sensors);
+}
+
 std::vector<Fix> locate_all(const LocateInput& input, const PositionerOptions& how) {
   const Positioner positioner(input.lamps, input.calibration, how);
+  const EarlierFrames frames(input);
   std::vector<Fix> fixes;
   fixes.reserve(input.frames.size());
   for (const Frame& frame : input.frames) {
-    fixes.push_back(positioner.locate(frame.detections, sensors_of(frame.image, input)));
+    fixes.push_back(fix_of(frame, positioner, frames, sensors_of(frame.image, input)));
   }
   return fixes;
+}
+
+/// Motion wants to know when each row is read.
+void check_row_time(const LocateInput& input) {
+  const Camera& camera = input.calibration.camera;
+  const bool moves =
+      input.motion ||
+      std::any_of(input.captures.begin(), input.captures.end(), [](const auto& entry) {
+        return entry.second.velocity_m_per_s || entry.second.yaw_rate_rad_per_s;
+      });
+  if (moves && !(camera.row_time_s && camera.readout)) {
+    throw std::invalid_argument(
+        "a camera that moves needs row_time_s and readout in its calibration: vlp-intrinsics takes "
+        "--row-time-s and --readout");
+  }
 }
 
 bool states_sigma(const Frame& frame) {
@@ -48,8 +131,14 @@ bool states_sigma(const Frame& frame) {
 
 FixRow row_of(const Frame& frame, const Fix& fix, bool noise_known) {
   FixRow row{frame.image, std::string(name_of(fix.status)), {}, fix.lamps};
+  row.time_s = fix.time_s;
   if (!fix.ok()) return row;
   row.fix = {fix.estimate.pose, {}, fix.residual_px};
+  if (const auto& body = fix.body) {
+    const auto is_estimated = [&](int index) { return body->covariance(index, index) > 0; };
+    if (is_estimated(kBodyVelocity)) row.fix->velocity_m_per_s = body->velocity_m_per_s;
+    if (is_estimated(kBodyRoll)) row.fix->inclination = body->inclination;
+  }
   if (noise_known) {
     row.fix->sd = fix.estimate.covariance.diagonal().cwiseSqrt();
     if (fix.estimate.covariance != fix.noise_covariance) {
@@ -167,6 +256,7 @@ void tell_of_lamps_left_out(LocateResult& result, const LocateInput& input) {
 }  // namespace
 
 LocateResult locate_frames(const LocateInput& input) {
+  check_row_time(input);
   LocateResult result;
   PositionerOptions how = input.how;
   result.fixes = locate_all(input, how);

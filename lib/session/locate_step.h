@@ -26,6 +26,18 @@ struct LocateInput {
   double inclination_sigma_rad = 0;
   /// Where one lamp is seen, take height and yaw from `captures`.
   bool one_lamp = false;
+  /// Cameras that move and lean. Where `captures` has no velocity: how fast the camera, or the
+  /// robot, can drive and turn; nothing: it stands. Velocities in `captures` count wherever there
+  /// are some, with that standard deviation of the yaw rate.
+  std::optional<KnownMotion> motion = {};
+  double yaw_rate_sd_rad_per_s = 0;
+  /// Standard deviation of roll and pitch about level where `captures` has no inclination; 0:
+  /// level.
+  double lean_sd_rad = 0;
+  /// Standard deviation of the z_m of `captures`, which then counts.
+  std::optional<double> height_sd_m = {};
+  /// Captures that are fixed together, with one velocity: this and those before it, within 0.2 s.
+  int frames_together = 1;
 };
 
 struct LocateResult : StepResult {
@@ -36,7 +48,8 @@ struct LocateResult : StepResult {
 };
 
 /// The fix of each frame. Where not every detection states its sigma_px, one is taken from the
-/// residuals, if they show it. Warns of residuals that the stated noise does not explain, of
+/// residuals, if they show it. Throws std::invalid_argument when a camera moves whose calibration
+/// lacks row_time_s or readout. Warns of residuals that the stated noise does not explain, of
 /// detections outside the image, of images that `captures` lacks, of lamps left out. undetermined:
 /// no frame has a fix.
 LocateResult locate_frames(const LocateInput& input);

@@ -16,6 +16,10 @@ struct Drive {
   double speed_m_per_s;
 };
 
+struct Vibration {
+  double amplitude_rad, frequency_hz;
+};
+
 /// Captures of the lamps. On spots: at each height, at each spot, at each yaw, so many times; the
 /// last changes fastest. On a drive: at each height, at each yaw, so many passes along it, with a
 /// capture every interval.
@@ -29,6 +33,9 @@ struct LampCaptures {
   double yaw_jitter_rad;
   /// During each capture; on a drive also from one to the next.
   double turn_rate_rad_per_s;
+  /// How the carrier leans, from the first capture evenly to the last, and how that vibrates.
+  std::pair<double, double> roll_rad{0, 0}, pitch_rad{0, 0};
+  Vibration vibration{0, 0};
   int repeat;
   /// From one capture to the next.
   double interval_s;

@@ -62,6 +62,26 @@ void read_yaws(YamlMap& map, LampCaptures& captures) {
   for (int i = 0; i < count; ++i) captures.yaws_rad.push_back(rad_from_deg(360.0 * i / count));
 }
 
+void read_lean(YamlMap map, LampCaptures& captures) {
+  const auto ramp = [&](const std::string& key) {
+    const auto value = map.optional(key);
+    if (!value) return std::pair(0.0, 0.0);
+    for (const YamlValue& end : value->list()) end.number_within(-85, 85, "degrees");
+    const auto ends = value->numbers(2);
+    return std::pair(rad_from_deg(ends[0]), rad_from_deg(ends[1]));
+  };
+  captures.roll_rad = ramp("roll_deg");
+  captures.pitch_rad = ramp("pitch_deg");
+  if (const auto vibration = map.optional("vibration")) {
+    YamlMap keys = vibration->map();
+    captures.vibration = {
+        rad_from_deg(keys.required("amplitude_deg").number_within(0, 10, "degrees")),
+        keys.required("frequency_hz").number_within(1e-3, 1000, "Hz")};
+    keys.finish();
+  }
+  map.finish();
+}
+
 LampCaptures read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room) {
   if (scene.lamps.empty()) throw map.error("the scene has no lamps");
   LampCaptures captures;
@@ -72,6 +92,7 @@ LampCaptures read_lamp_captures(YamlMap& map, const Scene& scene, const Room& ro
   const auto rate = map.optional("turn_rate_deg_per_s");
   captures.turn_rate_rad_per_s =
       rate ? rad_from_deg(rate->number_within(-720, 720, "degrees per second")) : 0;
+  if (const auto lean = map.optional("lean")) read_lean(lean->map(), captures);
   const auto repeat = map.optional("repeat");
   captures.repeat = repeat ? repeat->integer_within(1, kMostCaptures) : 1;
   const auto known = map.optional("known");

@@ -52,10 +52,26 @@ Pose CarrierMotion::pose(double time_s) const {
   return pose;
 }
 
+Inclination CarrierMotion::inclination(double time_s) const {
+  const double angle = phase_rad + 2 * std::numbers::pi * vibration.frequency_hz * time_s;
+  return {lean.roll_rad + vibration.amplitude_rad * std::sin(angle),
+          lean.pitch_rad + vibration.amplitude_rad * std::cos(angle)};
+}
+
+Eigen::Vector2d CarrierMotion::camera_velocity_m_per_s() const {
+  const Eigen::Vector2d arm_m = Eigen::Rotation2Dd(yaw_rad) * mount.lever_arm_m;
+  return velocity_m_per_s + turn_rate_rad_per_s * Eigen::Vector2d(-arm_m.y(), arm_m.x());
+}
+
 Eigen::Isometry3d CarrierMotion::world_from_camera(double time_s) const {
   const Pose level = pose(time_s);
   Eigen::Isometry3d world_from_camera;
   world_from_camera.linear() = rotation_about_z(level.yaw_rad) * mount.level_from_camera;
+  if (!is_level()) {
+    world_from_camera.linear() = rotation_about_z(level.yaw_rad) *
+                                 level_from_inclination(inclination(time_s)) *
+                                 mount.level_from_camera;
+  }
   world_from_camera.translation() = level.position_m;
   return world_from_camera;
 }
@@ -91,6 +107,15 @@ LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index)
   shot.motion.yaw_rad =
       captures.yaws_rad[step.yaw] + jitter_rad + captures.turn_rate_rad_per_s * step.driven_s;
   shot.motion.mount = scene.mount;
+  const std::size_t last = shots_in(set) - 1;
+  const double share = last > 0 ? static_cast<double>(index) / static_cast<double>(last) : 0;
+  const auto ramp = [&](const std::pair<double, double>& ends) {
+    return ends.first + share * (ends.second - ends.first);
+  };
+  shot.motion.lean = {ramp(captures.roll_rad), ramp(captures.pitch_rad)};
+  shot.motion.vibration = captures.vibration;
+  shot.motion.phase_rad = std::remainder(
+      2 * std::numbers::pi * captures.vibration.frequency_hz * shot.time_s, 2 * std::numbers::pi);
   for (const SceneLamp& lamp : scene.lamps) {
     const double free_phase = random.uniform(0.0, 1.0);
     const double periods = lamp.phase ? *lamp.phase + lamp.frequency_hz * shot.time_s : free_phase;

@@ -21,8 +21,22 @@ struct CarrierMotion {
   double yaw_rad;
   double turn_rate_rad_per_s;
   Mount mount;
+  /// How the carrier leans about the camera, over the tilt of the mount, at time 0 but for the
+  /// vibration, which roll and pitch have a quarter of a period apart.
+  Inclination lean{0, 0};
+  Vibration vibration{0, 0};
+  /// Of the vibration at time 0.
+  double phase_rad = 0;
 
-  bool at_rest() const { return velocity_m_per_s.isZero(0) && turn_rate_rad_per_s == 0; }
+  bool at_rest() const {
+    return velocity_m_per_s.isZero(0) && turn_rate_rad_per_s == 0 && vibration.amplitude_rad == 0;
+  }
+  bool is_level() const {
+    return lean.roll_rad == 0 && lean.pitch_rad == 0 && vibration.amplitude_rad == 0;
+  }
+  Inclination inclination(double time_s) const;
+  /// Of the camera, on its arm, in the world at time 0.
+  Eigen::Vector2d camera_velocity_m_per_s() const;
   Pose pose(double time_s) const;
   Eigen::Isometry3d world_from_camera(double time_s) const;
 };

@@ -1,5 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+#include <string>
+#include <vector>
+
 #include "captures/csv_writer.h"
 #include "geometry/angles.h"
 #include "simulation/truth.h"
@@ -13,7 +16,19 @@ std::string pixel(double value_px) { return fixed(value_px, 6); }
 
 std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
                              const CaptureSet& set, const std::filesystem::path& folder) {
-  CsvWriter truth(folder / "truth.csv", {"image", "x_m", "y_m", "z_m", "yaw_rad"});
+  // What all captures of the set lack is left out.
+  bool moves = false, leans = false;
+  for (std::size_t i = 0; i < shots_in(set); ++i) {
+    const CarrierMotion motion = lamp_shot(scene, set, i).motion;
+    moves = moves || !motion.at_rest();
+    leans = leans || !motion.is_level();
+  }
+  std::vector<std::string> columns{"image", "x_m", "y_m", "z_m", "yaw_rad"};
+  if (moves) {
+    columns.insert(columns.end(), {"time_s", "vx_m_per_s", "vy_m_per_s", "yaw_rate_rad_per_s"});
+  }
+  if (leans) columns.insert(columns.end(), {"roll_rad", "pitch_rad"});
+  CsvWriter truth(folder / "truth.csv", columns);
   CsvWriter detections(folder / "true_detections.csv",
                        {"image", "lamp", "u_px", "v_px", "in_view"});
   const bool known = set.lamps->known;
@@ -27,7 +42,17 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
     const auto& [position_m, yaw_rad] = shot.motion.pose(0);
     const std::string x = length(position_m.x()), y = length(position_m.y());
     const std::string z = length(position_m.z()), time = fixed(shot.time_s, 9);
-    truth.row({shot.image, x, y, z, angle(wrapped_rad(yaw_rad))});
+    std::vector<std::string> row{shot.image, x, y, z, angle(wrapped_rad(yaw_rad))};
+    if (moves) {
+      const Eigen::Vector2d velocity_m_per_s = shot.motion.camera_velocity_m_per_s();
+      row.insert(row.end(), {time, length(velocity_m_per_s.x()), length(velocity_m_per_s.y()),
+                             angle(shot.motion.turn_rate_rad_per_s)});
+    }
+    if (leans) {
+      const Inclination lean = shot.motion.inclination(0);
+      row.insert(row.end(), {angle(lean.roll_rad), angle(lean.pitch_rad)});
+    }
+    truth.row(row);
     if (known) {
       captures.row({shot.image, time, x, y, z});
     } else {

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "positioning/positioner.h"
+#include "support/body_rig.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {
@@ -34,6 +35,47 @@ void fix(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(scene.detections));
 }
 BENCHMARK(fix)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
+
+/// The same lamps from a camera that drives at 1 m/s, turns and leans, with more and more unknown.
+void fix_of_a_body(benchmark::State& state, const Sensors& sensors, const BodyMotion& motion) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.1, -0.05, 0}, 0.4}, motion}, {}};
+  rig.map.lamps.resize(static_cast<std::size_t>(state.range(0)));
+  Random random(1);
+  const auto detections = with_noise(seen_from(rig, 0.1), random);
+  const Positioner positioner = rig.positioner();
+  if (detections.size() != rig.map.lamps.size() || !positioner.locate(detections, sensors).ok()) {
+    throw std::logic_error("no fix");
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(detections, sensors));
+}
+const BodyMotion kDriving{{0.8, -0.6}, 0, {0, 0}};
+const BodyMotion kTurning{{0.8, -0.6}, 1, {0, 0}};
+const BodyMotion kLeaning{{0.8, -0.6}, 0, {0.06, -0.08}};
+const KnownMotion kOneMeterPerSecond = KnownMotion::up_to(2, 0);
+Sensors sensors_of(double yaw_rate_sd_rad_per_s, double inclination_sigma_rad) {
+  Sensors sensors;
+  sensors.motion = kOneMeterPerSecond;
+  sensors.motion->yaw_rate_sd_rad_per_s = yaw_rate_sd_rad_per_s;
+  sensors.inclination_sigma_rad = inclination_sigma_rad;
+  return sensors;
+}
+BENCHMARK_CAPTURE(fix_of_a_body, velocity, sensors_of(0, 0), kDriving)
+    ->ArgName("lamps")
+    ->Arg(2)
+    ->Arg(4)
+    ->Arg(8);
+BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_yaw_rate, sensors_of(1, 0), kTurning)
+    ->ArgName("lamps")
+    ->Arg(4)
+    ->Arg(8);
+BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_inclination_sensor, sensors_of(0, 0.1), kLeaning)
+    ->ArgName("lamps")
+    ->Arg(4)
+    ->Arg(8);
+BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_free_lean, sensors_of(0, 1.6), kLeaning)
+    ->ArgName("lamps")
+    ->Arg(4)
+    ->Arg(8);
 
 /// solvePnP takes four points or more for its iterative method.
 void opencv_undistort_and_solve_pnp(benchmark::State& state) {

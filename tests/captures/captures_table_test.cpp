@@ -42,6 +42,21 @@ TEST(CapturesTable, TellsWhosePlaceItIsAndWhichCapturesAreOfOneSpot) {
   EXPECT_TRUE(captures.at("b").spot.empty());
 }
 
+TEST(CapturesTable, ReadsOdometry) {
+  const TemporaryFolder folder;
+  const auto captures = read_captures(folder.file(
+      "captures.csv",
+      "image,vx_m_per_s,vy_m_per_s,yaw_rate_rad_per_s,velocity_sd_m_per_s\na,1,-2,0.5,0.01\n"
+      "b,3,4,,\nc,,,,\n"));
+  const Capture& a = captures.at("a");
+  EXPECT_EQ(a.velocity_m_per_s, Eigen::Vector2d(1, -2));
+  EXPECT_EQ(a.yaw_rate_rad_per_s, 0.5);
+  EXPECT_EQ(a.velocity_sd_m_per_s, 0.01);
+  EXPECT_EQ(captures.at("b").velocity_m_per_s, Eigen::Vector2d(3, 4));
+  EXPECT_FALSE(captures.at("b").yaw_rate_rad_per_s);
+  EXPECT_FALSE(captures.at("c").velocity_m_per_s);
+}
+
 TEST(CapturesTable, RefusesWhatContradicts) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& content) {
@@ -50,6 +65,11 @@ TEST(CapturesTable, RefusesWhatContradicts) {
   EXPECT_THAT(refusal("z_m\n1\n"), HasSubstr("c.csv:1: image: this column is missing"));
   EXPECT_THAT(refusal("image\na\na\n"), HasSubstr("c.csv:3: image: 'a' stands twice"));
   EXPECT_THAT(refusal("image,roll_rad\na,0.1\n"), HasSubstr("without the other"));
+  EXPECT_THAT(refusal("image,vx_m_per_s\na,0.1\n"),
+              HasSubstr("c.csv:2: image: has one of vx_m_per_s and vy_m_per_s without the other"));
+  EXPECT_THAT(refusal("image,vx_m_per_s,vy_m_per_s,velocity_sd_m_per_s\na,1,1,-1\n"),
+              HasSubstr("c.csv:2: velocity_sd_m_per_s: should not be negative"));
+  EXPECT_THAT(refusal("image,velocity_sd_m_per_s\na,1\n"), HasSubstr("is of no velocity"));
   EXPECT_THAT(refusal("image,z_m\na,high\n"), HasSubstr("c.csv:2: z_m: should be a finite number"));
   EXPECT_THAT(refusal("image,z_m\n,1\n"), HasSubstr("c.csv:2: image: is empty"));
   EXPECT_THAT(refusal("image,place\na,robot\n"), HasSubstr("should be camera or axis"));

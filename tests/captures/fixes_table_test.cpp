@@ -45,6 +45,35 @@ TEST(FixesTable, ReadsWhatItWrites) {
   EXPECT_EQ(rows[2].line, 4);
 }
 
+TEST(FixesTable, HasMotionLeanAndTimeWhereThereAreAny) {
+  const TemporaryFolder folder;
+  const Pose pose{{1.5, -0.25, 0.125}, 3};
+  FixRow moving{"a.png", "ok", FixRow::Fix{pose, {}, 0.05}, 4};
+  moving.time_s = 0.5;
+  moving.fix->velocity_m_per_s = Eigen::Vector2d(1, -0.5);
+  moving.fix->inclination = Inclination{0.25, -0.125};
+  FixRow lost{"b.png", "too_few_lamps", {}, 1};
+  lost.time_s = 0.75;
+  write_fixes(folder / "fixes.csv", {moving, lost});
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "fixes.csv"),
+            "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,lamps,residual_px,"
+            "time_s,vx_m_per_s,vy_m_per_s,roll_rad,pitch_rad\n"
+            "a.png,ok,1.500000000,-0.250000000,0.125000000,3.000000000,,,,,4,0.05,0.500000000,"
+            "1.000000000,-0.500000000,0.250000000,-0.125000000\n"
+            "b.png,too_few_lamps,,,,,,,,,1,,0.750000000,,,,\n");
+  const auto rows = read_fixes(folder / "fixes.csv");
+  EXPECT_EQ(rows[0].time_s, 0.5);
+  EXPECT_EQ(rows[0].fix->velocity_m_per_s, Eigen::Vector2d(1, -0.5));
+  EXPECT_EQ(rows[0].fix->inclination->roll_rad, 0.25);
+  EXPECT_EQ(rows[0].fix->inclination->pitch_rad, -0.125);
+  EXPECT_EQ(rows[1].time_s, 0.75);
+  moving.time_s.reset();
+  moving.fix->inclination.reset();
+  write_fixes(folder / "fixes.csv", {moving});
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "fixes.csv"),
+              testing::HasSubstr("residual_px,vx_m_per_s,vy_m_per_s\n"));
+}
+
 TEST(FixesTable, NamesTheLineOfBadRows) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {

@@ -44,6 +44,8 @@ SyntheticRig tilted_rig() {
   for (std::size_t i = 0; i < 4; ++i)
     rig.map.lamps[i].position_m.z() += 0.1 * static_cast<double>(i);
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
+  rig.calibration.camera.row_time_s = 55e-6;
+  rig.calibration.camera.readout = Readout::rows;
   return rig;
 }
 
@@ -59,10 +61,14 @@ TEST(Positioner, DoesNotAllocate) {
   std::swap(swapped[0].lamp, swapped[6].lamp);
   for (Detection& detection : bad) detection.lamp = 1 + detection.lamp % 8;
   const Sensors sensors{Inclination{0.01, 0.02}, 0.001, HeightAndYaw{0, 0}};
+  Sensors in_hand;
+  in_hand.motion = KnownMotion::up_to(1, 1);
+  in_hand.inclination_sigma_rad = 1.6;
   for (const auto& detections : {good, swapped, bad, {}}) {
     const long before = allocations;
     for (std::size_t count = 0; count <= detections.size(); ++count) {
       (void)positioner.locate({detections.data(), count}, sensors);
+      (void)positioner.locate({detections.data(), count}, in_hand);
     }
     EXPECT_EQ(allocations, before);
   }

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "support/body_rig.h"
 #include "support/datasets.h"
 
 namespace vlp {
@@ -62,6 +63,89 @@ TEST(LocateFrames, IsUndeterminedWithoutAFix) {
   const LocateResult found = locate_frames(input);
   EXPECT_EQ(found.failure, StepFailure::undetermined);
   EXPECT_THAT(found.why, HasSubstr("no frame has a fix; the first: "));
+}
+
+/// The rig of the positioning's tests, driving along a line with a capture every 0.1 s.
+LocateInput drive(double speed_m_per_s) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  LocateInput input{{}, rig.map, rig.calibration};
+  for (int i = 0; i < 5; ++i) {
+    const double time_s = 0.1 * i;
+    rig.body = {{{speed_m_per_s * (time_s - 0.2), 0, 0}, 0.3}, {}};
+    rig.body.motion.velocity_m_per_s = Eigen::Rotation2Dd(-0.3) * Eigen::Vector2d(speed_m_per_s, 0);
+    const std::string image(1, static_cast<char>('a' + i));
+    input.frames.push_back({image, seen_from(rig, 0.05)});
+    input.captures[image].time_s = 10 + time_s;
+  }
+  return input;
+}
+
+double worst_error_m(const LocateInput& input, double speed_m_per_s) {
+  const LocateResult found = locate_frames(input);
+  double worst_m = 0;
+  for (std::size_t i = 0; i < found.rows.size(); ++i) {
+    if (!found.rows[i].fix) return 1;
+    const Eigen::Vector3d truth_m(speed_m_per_s * (0.1 * static_cast<double>(i) - 0.2), 0, 0);
+    worst_m = std::max(worst_m, (found.rows[i].fix->pose.position_m - truth_m).norm());
+  }
+  return worst_m;
+}
+
+TEST(LocateFrames, EstimatesTheVelocityWhenToldThatTheCameraDrives) {
+  LocateInput input = drive(1);
+  EXPECT_GT(worst_error_m(input, 1), 5e-3);
+  input.motion = KnownMotion::up_to(200, 200);  // of no weight
+  EXPECT_LT(worst_error_m(input, 1), 1e-6);
+  const LocateResult found = locate_frames(input);
+  EXPECT_NEAR(found.rows[1].fix->velocity_m_per_s->x(), 1, 1e-4);
+  EXPECT_NEAR(found.rows[1].fix->velocity_m_per_s->y(), 0, 1e-4);
+  EXPECT_EQ(found.rows[1].time_s, 10.1);
+  EXPECT_FALSE(found.rows[1].fix->inclination);
+}
+
+TEST(LocateFrames, TakesOdometry) {
+  LocateInput input = drive(1);
+  for (auto& [image, capture] : input.captures) {
+    capture.velocity_m_per_s = Eigen::Rotation2Dd(-0.3) * Eigen::Vector2d(1, 0);
+  }
+  EXPECT_LT(worst_error_m(input, 1), 1e-9);
+  EXPECT_FALSE(locate_frames(input).rows[0].fix->velocity_m_per_s) << "it is not estimated";
+}
+
+TEST(LocateFrames, FixesTwoFramesOfTwoLampsTogether) {
+  LocateInput input = drive(1);
+  for (Frame& frame : input.frames) frame.detections.resize(2);
+  input.motion = KnownMotion::up_to(2, 0);
+  const double alone_m = worst_error_m(input, 1);
+  const double alone_sd_m = (*locate_frames(input).rows[2].fix->sd)[2];
+  input.frames_together = 2;
+  const LocateResult found = locate_frames(input);
+  EXPECT_GT(alone_m, 1e-3);
+  EXPECT_LT(std::abs(found.rows[2].fix->pose.position_m.z()), 1e-4);
+  EXPECT_LT((*found.rows[2].fix->sd)[2], 0.2 * alone_sd_m);
+}
+
+TEST(LocateFrames, NeedsARowTimeForCamerasThatMove) {
+  LocateInput input = drive(1);
+  input.motion = KnownMotion::up_to(2, 0);
+  input.calibration.camera.row_time_s.reset();
+  EXPECT_THROW(locate_frames(input), std::invalid_argument);
+  input.motion.reset();
+  EXPECT_NO_THROW(locate_frames(input));
+  input.captures["a"].velocity_m_per_s = Eigen::Vector2d(1, 0);
+  EXPECT_THROW(locate_frames(input), std::invalid_argument);
+}
+
+TEST(LocateFrames, EstimatesALeanWhereNoSensorReadsIt) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  rig.body.motion.inclination = {0.1, -0.08};
+  LocateInput input{{{"a", seen_from(rig, 0.05)}}, rig.map, rig.calibration};
+  input.lean_sd_rad = 1.6;
+  const LocateResult found = locate_frames(input);
+  ASSERT_TRUE(found.rows[0].fix);
+  EXPECT_LT(found.rows[0].fix->pose.position_m.norm(), 1e-5);
+  EXPECT_NEAR(found.rows[0].fix->inclination->roll_rad, 0.1, 1e-5);
+  EXPECT_NEAR(found.rows[0].fix->inclination->pitch_rad, -0.08, 1e-5);
 }
 
 }  // namespace

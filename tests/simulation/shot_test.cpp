@@ -128,5 +128,32 @@ TEST(BoardShots, StayWithinTheLimitsOfTheirViews) {
   EXPECT_NEAR(most_off, 0.5, 0.01);
 }
 
+TEST(CarrierMotion, LeansTheCameraAndVibrates) {
+  const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
+  CarrierMotion motion{{1, 2, 0.5}, {0.5, 0}, 0.3, 0.2, mount};
+  EXPECT_TRUE(motion.is_level());
+  motion.lean = {0.2, -0.1};
+  EXPECT_FALSE(motion.is_level());
+  const Eigen::Isometry3d pose = motion.world_from_camera(0);
+  EXPECT_TRUE(
+      pose.linear().isApprox(rotation_about_z(0.3) * level_from_inclination({0.2, -0.1}), 1e-14));
+  EXPECT_TRUE(pose.translation().isApprox(motion.pose(0).position_m));
+  // Two thousandths of a radian at 25 Hz: a period is 0.04 s, roll and pitch a quarter of it apart.
+  motion.vibration = {0.002, 25};
+  EXPECT_FALSE(motion.at_rest());
+  EXPECT_NEAR(motion.inclination(0).roll_rad, 0.2, 1e-15);
+  EXPECT_NEAR(motion.inclination(0).pitch_rad, -0.1 + 0.002, 1e-15);
+  EXPECT_NEAR(motion.inclination(0.01).roll_rad, 0.2 + 0.002, 1e-15);
+  EXPECT_NEAR(motion.inclination(0.01).pitch_rad, -0.1, 1e-15);
+}
+
+TEST(CarrierMotion, VelocityOfTheCameraIsThatOfItsPlace) {
+  const CarrierMotion motion{
+      {1, 2, 0.5}, {0.5, -1}, 0.3, 0.7, {Eigen::Matrix3d::Identity(), {0.1, 0.2}}};
+  constexpr double step_s = 1e-6;
+  const Eigen::Vector3d moved_m = motion.pose(step_s).position_m - motion.pose(-step_s).position_m;
+  EXPECT_TRUE(motion.camera_velocity_m_per_s().isApprox(moved_m.head<2>() / (2 * step_s), 1e-8));
+}
+
 }  // namespace
 }  // namespace vlp

@@ -1,0 +1,383 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/body_fix.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "geometry/angles.h"
+#include "geometry/plane.h"
+
+namespace vlp {
+namespace {
+
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using BodyVector = Eigen::Matrix<double, kBodyStates, 1>;
+
+/// `v` turned about z, back by the angle of that unit number.
+Eigen::Vector3d turned_back(const Eigen::Vector2d& heading, const Eigen::Vector3d& v) {
+  return {heading.x() * v.x() + heading.y() * v.y(), heading.x() * v.y() - heading.y() * v.x(),
+          v.z()};
+}
+Eigen::Vector2d unit(double angle_rad) { return {std::cos(angle_rad), std::sin(angle_rad)}; }
+
+/// z x v.
+Eigen::Vector3d about_z(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0}; }
+
+/// q of a lamp on the way: seen from R along the level axes of time 0, without u t; along those of
+/// the time t; and q + arm.
+struct Way {
+  Eigen::Vector3d still, turned_level, in_body;
+  Eigen::Vector2d turn;
+};
+
+Way way_of(const PosedBody& at, const Eigen::Vector3d& lamp_m, double time_s) {
+  const BodyMotion& motion = at.state.motion;
+  Way way;
+  way.still = turned_back(at.heading, lamp_m - at.state.pose.position_m);
+  Eigen::Vector3d level = way.still;
+  level.head<2>() -= motion.velocity_m_per_s * time_s;
+  way.turn = motion.yaw_rate_rad_per_s == 0 ? Eigen::Vector2d(1, 0)
+                                            : unit(motion.yaw_rate_rad_per_s * time_s);
+  way.turned_level = turned_back(way.turn, level);
+  way.in_body = at.body_from_level * way.turned_level;
+  return way;
+}
+
+/// A derivative of q, a column per state.
+template <std::size_t count>
+using Columns = std::array<Eigen::Vector3d, count>;
+
+/// Which states are estimated, and so how many, known to the compiler.
+template <bool velocity, bool yaw_rate, bool lean>
+struct States {
+  static constexpr std::size_t kYawRate = velocity ? 6 : 4, kLean = kYawRate + (yaw_rate ? 1 : 0);
+  static constexpr std::size_t kCount = kLean + (lean ? 2 : 0);
+  static constexpr bool kHasLean = lean;
+
+  static Columns<kCount> d_in_body(const PosedBody& at, const Way& way, double time_s) {
+    const auto& body_from_level = at.body_from_level;
+    const Eigen::Vector2d back(way.turn.x() * at.heading.x() - way.turn.y() * at.heading.y(),
+                               -way.turn.x() * at.heading.y() - way.turn.y() * at.heading.x());
+    Columns<kCount> d;
+    d[0] = body_from_level * Eigen::Vector3d(-back.x(), -back.y(), 0);
+    d[1] = body_from_level * Eigen::Vector3d(back.y(), -back.x(), 0);
+    d[2] = -body_from_level.col(2);
+    d[3] = body_from_level * -about_z(turned_back(way.turn, way.still));
+    if constexpr (velocity) {
+      const Eigen::Vector2d turn = time_s * way.turn;
+      d[4] = body_from_level * Eigen::Vector3d(-turn.x(), turn.y(), 0);
+      d[5] = body_from_level * Eigen::Vector3d(-turn.y(), -turn.x(), 0);
+    }
+    if constexpr (yaw_rate) d[kYawRate] = body_from_level * (-time_s * about_z(way.turned_level));
+    if constexpr (lean) {
+      d[kLean] = Eigen::Vector3d(0, way.in_body.z(), -way.in_body.y());
+      d[kLean + 1] = way.in_body.cross(at.pitch_axis);
+    }
+    return d;
+  }
+
+  /// The index of each among all states.
+  static constexpr std::array<int, kCount> indices() {
+    std::array<int, kCount> all{0, 1, 2, 3};
+    std::size_t next = 4;
+    if (velocity) all[next++] = kBodyVelocity, all[next++] = kBodyVelocity + 1;
+    if (yaw_rate) all[next++] = kBodyYawRate;
+    if (lean) all[next++] = kBodyRoll, all[next++] = kBodyPitch;
+    return all;
+  }
+};
+
+BodyState moved(const BodyState& from, const BodyVector& step) {
+  BodyState next = from;
+  next.pose.position_m += step.head<3>();
+  next.pose.yaw_rad += step[kBodyYaw];
+  BodyMotion& motion = next.motion;
+  motion.velocity_m_per_s += step.segment<2>(kBodyVelocity);
+  motion.yaw_rate_rad_per_s += step[kBodyYawRate];
+  motion.inclination.roll_rad += step[kBodyRoll];
+  motion.inclination.pitch_rad += step[kBodyPitch];
+  return next;
+}
+
+/// Normal equations of a size that the compiler knows, in plain loops: Eigen's own products of
+/// matrices of 9 x 9 are no faster and take it minutes to compile.
+template <std::size_t n>
+struct Normal {
+  std::array<std::array<double, n>, n> information{};  // the lower half
+  std::array<double, n> gradient{};
+
+  void add_row(const std::array<double, n>& row, double residual) {
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k <= i; ++k) information[i][k] += row[i] * row[k];
+      gradient[i] += row[i] * residual;
+    }
+  }
+};
+
+/// L of A = L L^T, with the inverses of its diagonal.
+template <std::size_t n>
+struct Cholesky {
+  std::array<std::array<double, n>, n> lower;
+  std::array<double, n> inverse_diagonal;
+  bool is_positive = true;
+
+  explicit Cholesky(const Normal<n>& normal) : lower(normal.information) {
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k <= i; ++k) {
+        double sum = lower[i][k];
+        for (std::size_t m = 0; m < k; ++m) sum -= lower[i][m] * lower[k][m];
+        if (k < i) {
+          lower[i][k] = sum * inverse_diagonal[k];
+        } else {
+          is_positive = is_positive && sum > 0;
+          inverse_diagonal[i] = 1 / std::sqrt(sum);
+        }
+      }
+    }
+  }
+  std::array<double, n> solve(std::array<double, n> x) const {
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < i; ++k) x[i] -= lower[i][k] * x[k];
+      x[i] *= inverse_diagonal[i];
+    }
+    for (std::size_t i = n; i-- > 0;) {
+      for (std::size_t k = i + 1; k < n; ++k) x[i] -= lower[k][i] * x[k];
+      x[i] *= inverse_diagonal[i];
+    }
+    return x;
+  }
+};
+
+/// How heavy the priors weigh: 1 / sd of each state, zero for those that are as given.
+BodyVector weights_of(const BodyPrior& prior) {
+  const auto inverse = [](double sd) { return sd > 0 ? 1 / sd : 0; };
+  BodyVector weights = BodyVector::Zero();
+  if (prior.height) weights[2] = inverse(prior.height->sd_m);
+  weights[kBodyVelocity] = weights[kBodyVelocity + 1] = inverse(prior.velocity_sd_m_per_s);
+  weights[kBodyYawRate] = inverse(prior.yaw_rate_sd_rad_per_s);
+  weights[kBodyRoll] = weights[kBodyPitch] = inverse(prior.inclination_sd_rad);
+  return weights;
+}
+
+/// The states less what is expected of them, in standard deviations.
+BodyVector deviations_of(const BodyState& state, const BodyPrior& prior,
+                         const BodyVector& weights) {
+  const BodyMotion &motion = state.motion, &mean = prior.mean;
+  BodyVector deviations = BodyVector::Zero();
+  if (prior.height) deviations[2] = state.pose.position_m.z() - prior.height->z_m;
+  deviations.segment<2>(kBodyVelocity) = motion.velocity_m_per_s - mean.velocity_m_per_s;
+  deviations[kBodyYawRate] = motion.yaw_rate_rad_per_s - mean.yaw_rate_rad_per_s;
+  deviations[kBodyRoll] = wrapped_rad(motion.inclination.roll_rad - mean.inclination.roll_rad);
+  deviations[kBodyPitch] = wrapped_rad(motion.inclination.pitch_rad - mean.inclination.pitch_rad);
+  return deviations.cwiseProduct(weights);
+}
+
+/// The residual of a lamp in standard deviations, 1 / depth along its ray; depth <= 0: behind it.
+struct LampResidual {
+  Eigen::Vector2d value;
+  double inverse_depth;
+};
+
+LampResidual residual_of(const BodySighting& sighting, const Eigen::Vector3d& q) {
+  const double inverse_depth = 1 / sighting.ray.dot(q);
+  return {-inverse_depth * (sighting.whitened_pixel_from_ray * q), inverse_depth};
+}
+
+/// Of the lamp's pixel, by q.
+Matrix23 d_pixel(const BodySighting& sighting, const LampResidual& residual) {
+  return residual.inverse_depth *
+         (sighting.whitened_pixel_from_ray + residual.value * sighting.ray.transpose());
+}
+
+template <typename S>
+struct Linearized : Normal<S::kCount> {
+  double chi_squared = 0;
+  /// Of the pixels' residuals.
+  double sum_px2 = 0;
+  bool lamps_ahead = true;
+
+  Linearized(std::span<const BodySighting> sightings, const Eigen::Vector3d& arm_m,
+             const BodyPrior& prior, const BodyVector& weights, const PosedBody& at) {
+    for (const BodySighting& sighting : sightings) {
+      const Way way = way_of(at, sighting.lamp_m, sighting.time_s);
+      const LampResidual residual = residual_of(sighting, way.in_body - arm_m);
+      if (!(residual.inverse_depth > 0)) {
+        lamps_ahead = false;
+        return;
+      }
+      const Matrix23 d_pixel_d_q = d_pixel(sighting, residual);
+      const auto d_q = S::d_in_body(at, way, sighting.time_s);
+      for (const int axis : {0, 1}) {
+        const Eigen::Vector3d d_axis = d_pixel_d_q.row(axis);
+        std::array<double, S::kCount> row;
+        for (std::size_t i = 0; i < S::kCount; ++i) row[i] = d_axis.dot(d_q[i]);
+        this->add_row(row, residual.value[axis]);
+      }
+      const double square = residual.value.squaredNorm();
+      chi_squared += square;
+      sum_px2 += sighting.sigma_px * sighting.sigma_px * square;
+    }
+    const BodyVector deviations = deviations_of(at.state, prior, weights);
+    constexpr auto indices = S::indices();
+    for (std::size_t i = 2; i < S::kCount; ++i) {
+      const double weight = weights[indices[i]];
+      this->information[i][i] += weight * weight;
+      this->gradient[i] -= weight * deviations[indices[i]];
+    }
+    chi_squared += deviations.squaredNorm();
+  }
+};
+
+/// Below any noise and above rounding: of the distance, of a radian, of a metre or a radian per
+/// second.
+bool negligible(const BodyVector& step, double scale_m) {
+  constexpr double small_step = 1e-10, small_rate = 1e-8;
+  return step.head<3>().norm() <= small_step * scale_m && std::abs(step[kBodyYaw]) <= small_step &&
+         step.segment<3>(kBodyVelocity).cwiseAbs().maxCoeff() <= small_rate &&
+         step.tail<2>().cwiseAbs().maxCoeff() <= small_step;
+}
+
+template <typename S>
+BodyFix finished(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
+                 const BodyVector& weights, const BodyState& state, double lamps) {
+  BodyFix fix;
+  fix.state = state;
+  fix.state.pose.yaw_rad = wrapped_rad(state.pose.yaw_rad);
+  fix.chi_squared = normal.chi_squared;
+  fix.residual_px = std::sqrt(normal.sum_px2 / lamps);
+  fix.redundancy = 2 * lamps - static_cast<double>(S::kCount);
+  constexpr auto indices = S::indices();
+  for (std::size_t i = 0; i < S::kCount; ++i) {
+    std::array<double, S::kCount> column{};
+    column[i] = 1;
+    column = factor.solve(column);
+    const double weight = weights[indices[i]];
+    fix.redundancy += weight * weight * column[i];
+    for (std::size_t k = 0; k < S::kCount; ++k) {
+      fix.covariance(indices[k], indices[i]) = column[k];
+    }
+  }
+  return fix;
+}
+
+template <typename S>
+std::optional<BodyFix> solve(std::span<const BodySighting> sightings, const Eigen::Vector3d& arm_m,
+                             const BodyPrior& prior, const BodyState& start) {
+  constexpr int max_iterations = 50, max_halvings = 60;
+  // Near the minimum the sum of squares changes by less than it can be computed.
+  constexpr double rounding = 1e-12;
+  constexpr auto indices = S::indices();
+  const BodyVector weights = weights_of(prior);
+  PosedBody at(start);
+  Linearized<S> normal(sightings, arm_m, prior, weights, at);
+  if (!normal.lamps_ahead) return std::nullopt;
+  const double scale_m = (sightings.front().lamp_m - start.pose.position_m).norm();
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const Cholesky<S::kCount> factor(normal);
+    if (!factor.is_positive) return std::nullopt;
+    const auto solution = factor.solve(normal.gradient);
+    BodyVector step = BodyVector::Zero();
+    for (std::size_t i = 0; i < S::kCount; ++i) step[indices[i]] = solution[i];
+    if (!step.allFinite()) return std::nullopt;
+    for (int halving = 0;; ++halving, step /= 2) {
+      const BodyState next_state = moved(at.state, step);
+      if (negligible(step, scale_m)) {
+        const auto lamps = static_cast<double>(sightings.size());
+        std::optional<BodyFix> fix = finished<S>(normal, factor, weights, next_state, lamps);
+        if (!fix->covariance.allFinite()) fix.reset();
+        return fix;
+      }
+      const PosedBody next = S::kHasLean ? PosedBody(next_state) : PosedBody(next_state, at);
+      const Linearized<S> next_normal(sightings, arm_m, prior, weights, next);
+      if (next_normal.lamps_ahead &&
+          next_normal.chi_squared <= normal.chi_squared * (1 + rounding)) {
+        at = next, normal = next_normal;
+        break;
+      }
+      if (halving == max_halvings) return std::nullopt;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Eigen::Matrix<double, 2, 3>> whitened_pixel_from_ray(
+    const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px) {
+  const double inverse_length = 1 / ray.norm();
+  const Eigen::Vector3d unit_ray = inverse_length * ray;
+  // How the unit ray moves, across itself.
+  const Eigen::Matrix<double, 3, 2> across =
+      inverse_length * (d_ray_d_pixel - unit_ray * (unit_ray.transpose() * d_ray_d_pixel));
+  const Eigen::Matrix2d square = across.transpose() * across;
+  const Matrix23 pixel_from_ray = square.inverse() * across.transpose();
+  if (!pixel_from_ray.allFinite()) return std::nullopt;
+  return pixel_from_ray / sigma_px;
+}
+
+PosedBody::PosedBody(const BodyState& at) : state(at), heading(unit(at.pose.yaw_rad)) {
+  const Eigen::Vector2d roll = unit(at.motion.inclination.roll_rad);
+  const Eigen::Vector2d pitch = unit(at.motion.inclination.pitch_rad);
+  const double cr = roll.x(), sr = roll.y(), cp = pitch.x(), sp = pitch.y();
+  body_from_level << cp, 0, -sp, sr * sp, cr, sr * cp, cr * sp, -sr, cr * cp;
+  pitch_axis = {0, cr, -sr};
+}
+
+PosedBody::PosedBody(const BodyState& at, const PosedBody& other)
+    : state(at),
+      heading(unit(at.pose.yaw_rad)),
+      body_from_level(other.body_from_level),
+      pitch_axis(other.pitch_axis) {}
+
+Eigen::Vector3d PosedBody::lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const {
+  return way_of(*this, lamp_m, time_s).in_body;
+}
+
+Eigen::Matrix<double, 3, kBodyStates> PosedBody::d_lamp_in_body(const Eigen::Vector3d& lamp_m,
+                                                                double time_s) const {
+  const auto columns =
+      States<true, true, true>::d_in_body(*this, way_of(*this, lamp_m, time_s), time_s);
+  Eigen::Matrix<double, 3, kBodyStates> derivative;
+  for (int i = 0; i < kBodyStates; ++i) derivative.col(i) = columns[static_cast<std::size_t>(i)];
+  return derivative;
+}
+
+Matrix23 d_whitened_pixel_d_lamp(const BodySighting& sighting,
+                                 const Eigen::Vector3d& lamp_from_camera_m) {
+  return d_pixel(sighting, residual_of(sighting, lamp_from_camera_m));
+}
+
+std::optional<double> chi_squared_of(std::span<const BodySighting> sightings,
+                                     const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
+                                     const BodyState& state) {
+  const PosedBody at(state);
+  double sum = deviations_of(state, prior, weights_of(prior)).squaredNorm();
+  for (const BodySighting& sighting : sightings) {
+    const Eigen::Vector3d q = way_of(at, sighting.lamp_m, sighting.time_s).in_body - arm_in_body_m;
+    const LampResidual residual = residual_of(sighting, q);
+    if (!(residual.inverse_depth > 0)) return std::nullopt;
+    sum += residual.value.squaredNorm();
+  }
+  return sum;
+}
+
+std::optional<BodyFix> fix_body(std::span<const BodySighting> sightings,
+                                const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
+                                const BodyState& start) {
+  using Solver = std::optional<BodyFix> (*)(std::span<const BodySighting>, const Eigen::Vector3d&,
+                                            const BodyPrior&, const BodyState&);
+  static constexpr std::array<Solver, 8> solvers{
+      solve<States<false, false, false>>, solve<States<true, false, false>>,
+      solve<States<false, true, false>>,  solve<States<true, true, false>>,
+      solve<States<false, false, true>>,  solve<States<true, false, true>>,
+      solve<States<false, true, true>>,   solve<States<true, true, true>>};
+  const int index = 1 * (prior.velocity_sd_m_per_s > 0) + 2 * (prior.yaw_rate_sd_rad_per_s > 0) +
+                    4 * (prior.inclination_sd_rad > 0);
+  return solvers[static_cast<std::size_t>(index)](sightings, arm_in_body_m, prior, start);
+}
+
+}  // namespace vlp

@@ -1,0 +1,455 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/body_frame.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "geometry/angles.h"
+#include "positioning/initial_pose.h"
+#include "positioning/three_lamp_poses.h"
+
+namespace vlp {
+namespace {
+
+using Agreeing = std::bitset<kMaxSightings>;
+
+// As in fix_frame().
+constexpr double kUnexplained = 25;
+constexpr double kMuchBetter = 100;
+
+/// What a frame is solved with.
+struct Problem {
+  const Eigen::Vector3d& arm_m;
+  const BodyPrior& prior;
+
+  bool lean_is_free() const {
+    constexpr double gentle_rad = 0.15;
+    return prior.inclination_sd_rad > gentle_rad;
+  }
+};
+
+struct Starts {
+  /// `ok`, or why there is none.
+  FixStatus status = FixStatus::degenerate;
+  int count = 0;
+  std::array<BodyState, 4> states;
+};
+
+/// The lamps of now as a level camera would see them that leans as the prior says. Nothing when one
+/// is not above its horizon.
+struct LevelSightings {
+  std::array<Sighting, kMaxSightings> sightings;
+  std::size_t size = 0;
+
+  std::span<const Sighting> span() const { return {sightings.data(), size}; }
+
+  bool fill(const BodyFrame& frame, const Eigen::Matrix3d& level_from_body) {
+    for (; size < frame.now; ++size) {
+      const BodySighting& seen = frame.sightings[size];
+      const Eigen::Vector3d ray = level_from_body * seen.ray;
+      if (!(ray.z() > 0)) return false;
+      sightings[size] = {seen.lamp_m, ray.head<2>() / ray.z(), Matrix2::Identity(), seen.sigma_px};
+    }
+    return true;
+  }
+};
+
+BodyState body_of(const Pose& camera, const Problem& problem, const Eigen::Matrix3d& lean) {
+  BodyState state{camera, problem.prior.mean};
+  if (!problem.arm_m.isZero(0)) {
+    state.pose.position_m -= rotation_about_z(camera.yaw_rad) * lean * problem.arm_m;
+  }
+  return state;
+}
+
+Starts level_start(const BodyFrame& frame, const Problem& problem) {
+  const Eigen::Matrix3d lean = level_from_inclination(problem.prior.mean.inclination);
+  LevelSightings level;
+  if (!level.fill(frame, lean)) return {FixStatus::lamp_below_camera, 0, {}};
+  const InitialPose start = initial_pose(level.span());
+  if (start.status != FixStatus::ok) return {start.status, 0, {}};
+  return {FixStatus::ok, 1, {body_of(start.pose, problem, lean)}};
+}
+
+BodyState body_of(const FreePose& camera, const Problem& problem) {
+  const Eigen::Matrix3d world_from_body = camera.camera_from_world.transpose();
+  BodyState state{{camera.position_m - world_from_body * problem.arm_m,
+                   std::atan2(world_from_body(1, 0), world_from_body(0, 0))},
+                  problem.prior.mean};
+  state.motion.inclination = {std::atan2(world_from_body(2, 1), world_from_body(2, 2)),
+                              -std::asin(std::clamp(world_from_body(2, 0), -1.0, 1.0))};
+  return state;
+}
+
+bool below_lamps(const FreePose& camera, const std::array<Eigen::Vector3d, 3>& lamps_m) {
+  return std::all_of(lamps_m.begin(), lamps_m.end(), [&](const Eigen::Vector3d& lamp_m) {
+    return lamp_m.z() > camera.position_m.z();
+  });
+}
+
+/// The poses below the lamps that see three of them.
+Starts starts_of(const BodyFrame& frame, const std::array<std::size_t, 3>& lamps,
+                 const Problem& problem) {
+  std::array<Eigen::Vector3d, 3> points_m, rays;
+  for (std::size_t i = 0; i < 3; ++i) {
+    points_m[i] = frame.sightings[lamps[i]].lamp_m;
+    rays[i] = frame.sightings[lamps[i]].ray;
+  }
+  const ThreeLampPoses found = three_lamp_poses(points_m, rays);
+  Starts starts;
+  for (int i = 0; i < found.count; ++i) {
+    const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
+    if (!below_lamps(pose, points_m)) continue;
+    starts.states[static_cast<std::size_t>(starts.count++)] = body_of(pose, problem);
+  }
+  starts.status = starts.count > 0  ? FixStatus::ok
+                  : found.count > 0 ? FixStatus::lamp_below_camera
+                                    : FixStatus::degenerate;
+  return starts;
+}
+
+/// Three lamps of now that are far apart, and far from one line.
+std::array<std::size_t, 3> widest_lamps(const BodyFrame& frame) {
+  const auto best = [&](const auto& value) {
+    std::size_t found = 0;
+    for (std::size_t i = 1; i < frame.now; ++i) {
+      if (value(i) > value(found)) found = i;
+    }
+    return found;
+  };
+  const auto lamp_m = [&](std::size_t i) -> const Eigen::Vector3d& {
+    return frame.sightings[i].lamp_m;
+  };
+  const auto first = best([&](std::size_t i) { return (lamp_m(i) - lamp_m(0)).squaredNorm(); });
+  const auto second =
+      best([&](std::size_t i) { return (lamp_m(i) - lamp_m(first)).squaredNorm(); });
+  const Eigen::Vector3d side_m = lamp_m(second) - lamp_m(first);
+  const auto third =
+      best([&](std::size_t i) { return side_m.cross(lamp_m(i) - lamp_m(first)).squaredNorm(); });
+  return {first, second, third};
+}
+
+/// Across its ray, from where the body sees it to where it is.
+double distance_from_ray(const BodySighting& seen, const Problem& problem, const PosedBody& body) {
+  const Eigen::Vector3d q = body.lamp_in_body(seen.lamp_m, seen.time_s) - problem.arm_m;
+  const double depth_m = seen.ray.dot(q);
+  return depth_m > 0 ? (q - depth_m * seen.ray).norm() : std::numeric_limits<double>::infinity();
+}
+
+double distance_m(const BodyFrame& frame, const BodyState& state) {
+  double sum = 0;
+  for (const BodySighting& seen : frame.span()) {
+    sum += (seen.lamp_m - state.pose.position_m).norm();
+  }
+  return sum / static_cast<double>(frame.size);
+}
+
+bool is_determined(const BodyFrame& frame, const BodyFix& fix) {
+  constexpr double share = 0.25;
+  const double limit_m = share * distance_m(frame, fix.state);
+  return fix.covariance.diagonal().head<3>().maxCoeff() < limit_m * limit_m;
+}
+
+bool are_below_lamps(const BodyFrame& frame, const Problem& problem, const BodyState& state) {
+  double z_m = state.pose.position_m.z();
+  if (!problem.arm_m.isZero(0)) {
+    z_m += (level_from_inclination(state.motion.inclination) * problem.arm_m).z();
+  }
+  return std::all_of(frame.sightings.begin(),
+                     frame.sightings.begin() + static_cast<std::ptrdiff_t>(frame.size),
+                     [&](const BodySighting& seen) { return seen.lamp_m.z() > z_m; });
+}
+
+/// The best of the fixes from several starts, and whether another explains the frame as well.
+BodySolution best_from(const Starts& starts, const BodyFrame& frame, const Problem& problem) {
+  constexpr double hopeless = 100, small = 100, unlikely = 12, same_m = 1e-4;
+  std::array<double, 4> at_start;
+  at_start.fill(std::numeric_limits<double>::infinity());
+  if (starts.count == 1) at_start[0] = 0;
+  for (std::size_t i = 0; starts.count > 1 && static_cast<int>(i) < starts.count; ++i) {
+    const auto chi_squared =
+        chi_squared_of(frame.span(), problem.arm_m, problem.prior, starts.states[i]);
+    if (chi_squared) at_start[i] = *chi_squared;
+  }
+  const double least = *std::min_element(at_start.begin(), at_start.end());
+  std::optional<BodyFix> best;
+  double second = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; static_cast<int>(i) < starts.count; ++i) {
+    if (!(at_start[i] <= hopeless * (least + small))) continue;
+    const auto fix = fix_body(frame.span(), problem.arm_m, problem.prior, starts.states[i]);
+    if (!fix || !are_below_lamps(frame, problem, fix->state)) continue;
+    if (!best) {
+      best = fix;
+      continue;
+    }
+    const bool same = (fix->state.pose.position_m - best->state.pose.position_m).norm() < same_m;
+    if (same) continue;
+    second = std::min(second, std::max(fix->chi_squared, best->chi_squared));
+    if (fix->chi_squared < best->chi_squared) best = fix;
+  }
+  if (!best) return {FixStatus::degenerate, {}};
+  if (!is_determined(frame, *best)) return {FixStatus::undetermined, *best};
+  const double freedom = std::max(1.0, 2 * static_cast<double>(frame.size) - 4);
+  const double scale = std::max(1.0, best->chi_squared / freedom);
+  const bool ambiguous = second - best->chi_squared < unlikely * scale;
+  return {ambiguous ? FixStatus::ambiguous : FixStatus::ok, *best};
+}
+
+double excess_of(const BodyFix& fix, const BodyFrame& frame) {
+  return fix.chi_squared / static_cast<double>(2 * frame.size - 4);
+}
+
+bool has_fix(const BodySolution& solution) {
+  return solution.status == FixStatus::ok || solution.status == FixStatus::ambiguous ||
+         solution.status == FixStatus::undetermined;
+}
+
+/// From the three lamps that are widest apart, and, where motion or noise hides their pose, from
+/// others in place of the third. Nothing when all lamps are on one line.
+std::optional<BodySolution> fix_free(const BodyFrame& frame, const Problem& problem) {
+  constexpr std::size_t most_tries = 8;
+  if (frame.now < 3) return std::nullopt;
+  const auto [first, second, widest] = widest_lamps(frame);
+  if (widest == first || widest == second) return std::nullopt;
+  std::optional<BodySolution> best;
+  std::size_t third = widest;
+  for (std::size_t i = 0; i < std::min(frame.now, most_tries);
+       ++i, third = (third + 1) % frame.now) {
+    if (third == first || third == second) continue;
+    const Starts starts = starts_of(frame, {first, second, third}, problem);
+    const BodySolution solution =
+        starts.count > 0 ? best_from(starts, frame, problem) : BodySolution{starts.status, {}};
+    const bool better =
+        !best || (has_fix(solution) &&
+                  (!has_fix(*best) || solution.fix.chi_squared < best->fix.chi_squared));
+    if (better) best = solution;
+    if (has_fix(*best) && excess_of(best->fix, frame) <= kUnexplained) break;
+  }
+  return best;
+}
+
+/// The fix of all lamps, as if they were what they are said to be.
+BodySolution fix_all(const BodyFrame& frame, const Problem& problem) {
+  if (problem.lean_is_free()) {
+    if (const auto solution = fix_free(frame, problem)) return *solution;
+  }
+  const Starts start = level_start(frame, problem);
+  if (start.count == 0) return {start.status, {}};
+  return best_from(start, frame, problem);
+}
+
+/// How far across its ray a lamp may be from where the fix sees it.
+double limit_of(const BodyFrame& frame, double max_residual_share) {
+  constexpr double share_of_the_way = 0.15;
+  Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
+  const double n = static_cast<double>(frame.size);
+  for (const BodySighting& seen : frame.span()) mean_m += seen.lamp_m / n;
+  double sum = 0, nearest_m = frame.nearest_m[0];
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    sum += (frame.sightings[i].lamp_m - mean_m).squaredNorm();
+    nearest_m = std::min(nearest_m, frame.nearest_m[i]);
+  }
+  return std::min(max_residual_share * std::sqrt(sum / n), share_of_the_way * nearest_m);
+}
+
+/// Whether the motion is one that is known to be possible.
+bool prior_holds(const BodyPrior& prior, const BodyMotion& motion) {
+  constexpr double sigmas = 5;
+  const Inclination &lean = motion.inclination, &mean = prior.mean.inclination;
+  const double lean_rad = std::hypot(wrapped_rad(lean.roll_rad - mean.roll_rad),
+                                     wrapped_rad(lean.pitch_rad - mean.pitch_rad));
+  return (motion.velocity_m_per_s - prior.mean.velocity_m_per_s).norm() <=
+             sigmas * prior.velocity_sd_m_per_s &&
+         std::abs(motion.yaw_rate_rad_per_s - prior.mean.yaw_rate_rad_per_s) <=
+             sigmas * prior.yaw_rate_sd_rad_per_s &&
+         lean_rad <= sigmas * prior.inclination_sd_rad;
+}
+
+Agreeing agreeing_with(const BodyState& state, const BodyFrame& frame, const Problem& problem,
+                       double limit_m) {
+  Agreeing agreeing;
+  const PosedBody body(state);
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    agreeing[i] = distance_from_ray(frame.sightings[i], problem, body) <= limit_m;
+  }
+  return agreeing;
+}
+
+bool is_consistent(const BodySolution& solution, const BodyFrame& frame, const Problem& problem,
+                   double limit_m) {
+  return has_fix(solution) && prior_holds(problem.prior, solution.fix.state.motion) &&
+         agreeing_with(solution.fix.state, frame, problem, limit_m).count() == frame.size;
+}
+
+BodyFrame kept(const BodyFrame& frame, const Agreeing& agreeing) {
+  BodyFrame rest = frame;
+  rest.size = rest.now = 0;
+  for (std::size_t i = 0; i < frame.size; ++i) {
+    if (agreeing[i]) {
+      rest.sightings[rest.size] = frame.sightings[i];
+      rest.ids[rest.size] = frame.ids[i];
+      rest.nearest_m[rest.size++] = frame.nearest_m[i];
+      rest.now += i < frame.now;
+    } else {
+      rest.rejected_ids[static_cast<std::size_t>(rest.rejected_lamps++)] = frame.ids[i];
+    }
+  }
+  return rest;
+}
+
+/// Under the mirror image of the map.
+BodyFrame mirrored(BodyFrame frame) {
+  for (std::size_t i = 0; i < frame.size; ++i) frame.sightings[i].lamp_m.y() *= -1;
+  return frame;
+}
+
+/// The body as it stands and leans by any angle, by votes for what each three lamps say.
+std::optional<Agreeing> free_majority(const BodyFrame& frame, const Problem& problem,
+                                      double limit_m) {
+  constexpr std::size_t few = 12, at_least = 4;
+  const std::size_t n = frame.now, stride = n <= few ? 1 : n * n * n / (few * few * few);
+  Agreeing best;
+  std::size_t turn = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = i + 1; j < n; ++j) {
+      for (std::size_t k = j + 1; k < n; ++k) {
+        if (turn++ % stride != 0) continue;
+        const Starts starts = starts_of(frame, {i, j, k}, problem);
+        for (std::size_t m = 0; static_cast<int>(m) < starts.count; ++m) {
+          const Agreeing agreeing = agreeing_with(starts.states[m], frame, problem, limit_m);
+          if (agreeing.count() > best.count()) best = agreeing;
+        }
+      }
+    }
+  }
+  if (best.count() < at_least || 2 * best.count() <= frame.size) return std::nullopt;
+  return best;
+}
+
+/// The same for one that stands as level as the prior says.
+std::optional<Agreeing> level_majority(const BodyFrame& frame, const Problem& problem,
+                                       double limit_m) {
+  const Eigen::Matrix3d lean = level_from_inclination(problem.prior.mean.inclination);
+  LevelSightings level;
+  if (!level.fill(frame, lean)) return std::nullopt;
+  // The limit in z, by the scale of the lamps' spreads.
+  double sum_z = 0, sum_m = 0;
+  const Sighting& first = level.sightings[0];
+  for (const Sighting& seen : level.span()) {
+    sum_z += (seen.z - first.z).norm();
+    sum_m += (seen.lamp_m - first.lamp_m).head<2>().norm();
+  }
+  const auto majority = find_consensus(level.span(), limit_m * sum_z / sum_m);
+  if (!majority) return std::nullopt;
+  return agreeing_with(body_of(majority->pose, problem, lean), frame, problem, limit_m);
+}
+
+/// The fix of a majority of the lamps, which are all that the frame then has.
+BodySolution fix_majority(BodyFrame& frame, const Problem& problem, double max_residual_share) {
+  const BodySolution none{FixStatus::inconsistent, {}};
+  const double limit_m = limit_of(frame, max_residual_share);
+  double latest_s = 0;
+  for (const BodySighting& seen : frame.span()) {
+    latest_s = std::max(latest_s, std::abs(seen.time_s));
+  }
+  const double driven_m = 2 * problem.prior.velocity_sd_m_per_s * latest_s;
+  auto agreeing = problem.lean_is_free() ? free_majority(frame, problem, limit_m + driven_m)
+                                         : level_majority(frame, problem, limit_m + driven_m);
+  // Motion was left out: once it is known, some that seemed wrong may turn out right.
+  constexpr int rounds = 3;
+  for (int round = 0; agreeing && round < rounds; ++round) {
+    if (2 * agreeing->count() <= frame.size) return none;
+    BodyFrame rest = kept(frame, *agreeing);
+    if (rest.now < 2) return none;
+    const BodySolution solution = fix_all(rest, problem);
+    if (solution.status != FixStatus::ok) return {solution.status, solution.fix};
+    const Agreeing now_agreeing = agreeing_with(solution.fix.state, frame, problem, limit_m);
+    if (now_agreeing == *agreeing) {
+      if (!prior_holds(problem.prior, solution.fix.state.motion)) return none;
+      frame = rest;
+      return solution;
+    }
+    agreeing = now_agreeing;
+  }
+  return none;
+}
+
+/// Where the stated noise does not explain the residuals, one lamp after the other is left out that
+/// alone does explain them; nothing when that is none, or several might be it.
+std::optional<BodySolution> fix_without_moved(BodyFrame& frame, const Problem& problem,
+                                              const BodySolution& all) {
+  BodyFrame rest = frame;
+  BodySolution solution = all;
+  while (rest.size > 3 && 2 * (rest.size - 1) > frame.size) {
+    std::optional<BodyFix> best;
+    std::size_t moved = 0;
+    double second = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < rest.size; ++i) {
+      Agreeing others;
+      others.set().reset(i);
+      const BodyFrame without = kept(rest, others);
+      if (without.now < 2) continue;
+      const auto fix = fix_body(without.span(), problem.arm_m, problem.prior, solution.fix.state);
+      if (!fix) continue;
+      if (!best || fix->chi_squared < best->chi_squared) {
+        if (best) second = best->chi_squared;
+        best = fix, moved = i;
+      } else {
+        second = std::min(second, fix->chi_squared);
+      }
+    }
+    if (!best) return std::nullopt;
+    Agreeing others;
+    others.set().reset(moved);
+    rest = kept(rest, others);
+    solution.fix = *best;
+    const double excess = excess_of(*best, rest);
+    if (excess < kUnexplained) {
+      const double of_second = second / static_cast<double>(2 * rest.size - 4);
+      if (of_second < kUnexplained || kMuchBetter * excess > excess_of(all.fix, frame) ||
+          !prior_holds(problem.prior, best->state.motion) || !is_determined(rest, *best)) {
+        return std::nullopt;
+      }
+      frame = rest;
+      return BodySolution{FixStatus::ok, *best};
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+BodySolution fix_body_frame(BodyFrame& frame, const Eigen::Vector3d& arm_in_body_m,
+                            const BodyPrior& prior, double max_residual_share) {
+  const Problem problem{arm_in_body_m, prior};
+  const double limit_m = limit_of(frame, max_residual_share);
+  const BodySolution all = fix_all(frame, problem);
+  if (frame.size < 3) return all;
+  if (is_consistent(all, frame, problem, limit_m)) {
+    if (all.status != FixStatus::ok || excess_of(all.fix, frame) <= kUnexplained) return all;
+    const BodySolution mirror_image = fix_all(mirrored(frame), problem);
+    if (mirror_image.status == FixStatus::ok &&
+        kMuchBetter * excess_of(mirror_image.fix, frame) < excess_of(all.fix, frame)) {
+      return {FixStatus::mirrored_map, {}};
+    }
+    if (!frame.noise_is_stated) return all;
+    return fix_without_moved(frame, problem, all).value_or(all);
+  }
+  const BodyFrame mirror_frame = mirrored(frame);
+  const BodySolution mirror_image = fix_all(mirror_frame, problem);
+  if (mirror_image.status == FixStatus::ok &&
+      is_consistent(mirror_image, mirror_frame, problem, limit_m)) {
+    return {FixStatus::mirrored_map, {}};
+  }
+  if (frame.size < 4) return has_fix(all) ? BodySolution{FixStatus::inconsistent, {}} : all;
+  const BodySolution majority = fix_majority(frame, problem, max_residual_share);
+  if (majority.status == FixStatus::inconsistent && !has_fix(all)) return all;
+  return majority;
+}
+
+}  // namespace vlp

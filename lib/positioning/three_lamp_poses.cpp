@@ -1,0 +1,168 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/three_lamp_poses.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+namespace vlp {
+namespace {
+
+/// A real root of x^3 + b x^2 + c x + d: of three the one that is farthest from the others, or
+/// nearly so, where the cubic is steep.
+double steep_root(double b, double c, double d) {
+  const double inflection = -b / 3;
+  const double slope = c - b * b / 3;  // there
+  const double value = d + inflection * (c + inflection * (b + inflection));
+  double x = inflection;
+  if (slope < 0) {
+    // Beyond the two turning points, on the side that the root is: the cubic is monotone there.
+    x += (value > 0 ? -1 : 1) * 2 * std::sqrt(-slope / 3);
+  } else if (value != 0) {
+    // Between 0 and both of these is the root of t^3 + slope t + value.
+    const double by_cube = std::cbrt(std::abs(value));
+    x += (value > 0 ? -1 : 1) * (slope > 0 ? std::min(by_cube, std::abs(value) / slope) : by_cube);
+  }
+  for (int i = 0; i < 60; ++i) {
+    const double f = d + x * (c + x * (b + x));
+    const double df = c + x * (2 * b + 3 * x);
+    const double step = f / df;
+    if (!std::isfinite(step)) break;
+    x -= step;
+    if (std::abs(step) <= 1e-14 * std::abs(x)) break;
+  }
+  return x;
+}
+
+/// v^T A w for symmetric A.
+double form(const Eigen::Matrix3d& a, const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
+  return v.dot(a * w);
+}
+
+Eigen::Matrix3d adjugate(const Eigen::Matrix3d& a) {
+  Eigen::Matrix3d adj;  // a is symmetric, so that its cofactors are
+  adj.col(0) = a.col(1).cross(a.col(2));
+  adj.col(1) = a.col(2).cross(a.col(0));
+  adj.col(2) = a.col(0).cross(a.col(1));
+  return adj;
+}
+
+/// The two lines whose product the conic of rank two is; none when they are not real.
+int lines_of(const Eigen::Matrix3d& conic, std::array<Eigen::Vector3d, 2>& lines) {
+  const Eigen::Matrix3d adj = adjugate(conic);
+  Eigen::Index i = 0;
+  adj.diagonal().cwiseAbs().maxCoeff(&i);
+  if (!(adj(i, i) < 0)) return 0;
+  // adj = -p p^T for the lines' meeting point p; conic + [p]x has rank one: g h^T.
+  const Eigen::Vector3d p = adj.col(i) / std::sqrt(-adj(i, i));
+  Eigen::Matrix3d product = conic;
+  product(0, 1) -= p.z(), product(0, 2) += p.y(), product(1, 2) -= p.x();
+  product(1, 0) += p.z(), product(2, 0) -= p.y(), product(2, 1) += p.x();
+  Eigen::Index row = 0, column = 0;
+  product.cwiseAbs().maxCoeff(&row, &column);
+  lines = {Eigen::Vector3d(product.row(row)), Eigen::Vector3d(product.col(column))};
+  return 2;
+}
+
+struct Cones {
+  Eigen::Matrix3d m01, m02, m12;  // of d^T m d = a
+  double a01, a02, a12;
+};
+
+Cones cones_of(const std::array<Eigen::Vector3d, 3>& points_m,
+               const std::array<Eigen::Vector3d, 3>& rays) {
+  const double c01 = rays[0].dot(rays[1]), c02 = rays[0].dot(rays[2]), c12 = rays[1].dot(rays[2]);
+  Cones cones;
+  cones.m01 << 1, -c01, 0, -c01, 1, 0, 0, 0, 0;
+  cones.m02 << 1, 0, -c02, 0, 0, 0, -c02, 0, 1;
+  cones.m12 << 0, 0, 0, 0, 1, -c12, 0, -c12, 1;
+  cones.a01 = (points_m[0] - points_m[1]).squaredNorm();
+  cones.a02 = (points_m[0] - points_m[2]).squaredNorm();
+  cones.a12 = (points_m[1] - points_m[2]).squaredNorm();
+  return cones;
+}
+
+/// Newton's steps on the three equations.
+void polish(const Cones& cones, Eigen::Vector3d& distances) {
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Matrix3d jacobian;
+    const Eigen::Vector3d d01 = cones.m01 * distances, d02 = cones.m02 * distances,
+                          d12 = cones.m12 * distances;
+    jacobian << d01.transpose(), d02.transpose(), d12.transpose();
+    const Eigen::Vector3d residual(distances.dot(d01) - cones.a01, distances.dot(d02) - cones.a02,
+                                   distances.dot(d12) - cones.a12);
+    const Eigen::Vector3d step = 0.5 * (jacobian.inverse() * residual);
+    if (!step.allFinite()) return;
+    distances -= step;
+    if (step.norm() <= 1e-9 * distances.norm()) return;  // the error is its square
+  }
+}
+
+/// The frame of three points: columns along the first side, across it, and up.
+Eigen::Matrix3d frame_of(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
+                         const Eigen::Vector3d& p2) {
+  Eigen::Matrix3d frame;
+  frame.col(0) = (p1 - p0).normalized();
+  frame.col(2) = frame.col(0).cross(p2 - p0).normalized();
+  frame.col(1) = frame.col(2).cross(frame.col(0));
+  return frame;
+}
+
+}  // namespace
+
+ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
+                                const std::array<Eigen::Vector3d, 3>& rays) {
+  ThreeLampPoses found;
+  const Cones cones = cones_of(points_m, rays);
+  const Eigen::Matrix3d first = cones.a12 * cones.m01 - cones.a01 * cones.m12;
+  const Eigen::Matrix3d second = cones.a12 * cones.m02 - cones.a02 * cones.m12;
+  // det(first + x second) = 0.
+  const Eigen::Matrix3d adj1 = adjugate(first), adj2 = adjugate(second);
+  const double cubic = adj2.cwiseProduct(second).sum() / 3;
+  const double quadratic = adj2.cwiseProduct(first).sum();
+  const double linear = adj1.cwiseProduct(second).sum();
+  const double constant = adj1.cwiseProduct(first).sum() / 3;
+  const double x = steep_root(quadratic / cubic, linear / cubic, constant / cubic);
+  if (!std::isfinite(x)) return found;
+  std::array<Eigen::Vector3d, 2> lines;
+  const int count = lines_of(first + x * second, lines);
+  const Eigen::Matrix3d world_frame = frame_of(points_m[0], points_m[1], points_m[2]);
+  if (!world_frame.allFinite()) return found;
+  for (int i = 0; i < count; ++i) {
+    // Two directions span the line; the conic along a + s b is a quadratic in s.
+    const Eigen::Vector3d line = lines[static_cast<std::size_t>(i)].normalized();
+    const Eigen::Vector3d a = line.unitOrthogonal(), b = line.cross(a);
+    const double faa = form(second, a, a), fab = form(second, a, b), fbb = form(second, b, b);
+    const double discriminant = fab * fab - faa * fbb;
+    // Where two solutions meet, noise may have taken both away: the middle is near.
+    constexpr double near = 1e-2;
+    if (!(discriminant >= -near * fab * fab)) continue;
+    const double root = std::sqrt(std::max(0.0, discriminant));
+    const double q = -(fab + std::copysign(root, fab));
+    // Roots s = q / fbb and faa / q, as directions, so that none is infinite.
+    const std::array<Eigen::Vector3d, 2> ratios{fbb * a + q * b, q * a + faa * b};
+    for (const Eigen::Vector3d& ratio : std::span(ratios).first(root > 0 ? 2 : 1)) {
+      if (found.count == 4) break;
+      const Eigen::Vector3d towards = ratio.sum() < 0 ? Eigen::Vector3d(-ratio) : ratio;
+      if (!(towards.minCoeff() > 0)) continue;
+      const double scale = form(cones.m01, towards, towards) + form(cones.m02, towards, towards) +
+                           form(cones.m12, towards, towards);
+      Eigen::Vector3d distances = std::sqrt((cones.a01 + cones.a02 + cones.a12) / scale) * towards;
+      polish(cones, distances);
+      if (!(distances.minCoeff() > 0) || !distances.allFinite()) continue;
+      const std::array<Eigen::Vector3d, 3> seen{distances[0] * rays[0], distances[1] * rays[1],
+                                                distances[2] * rays[2]};
+      FreePose pose;
+      pose.camera_from_world = frame_of(seen[0], seen[1], seen[2]) * world_frame.transpose();
+      pose.position_m = points_m[0] - pose.camera_from_world.transpose() * seen[0];
+      if (!pose.position_m.allFinite()) continue;
+      found.poses[static_cast<std::size_t>(found.count++)] = pose;
+    }
+  }
+  return found;
+}
+
+}  // namespace vlp

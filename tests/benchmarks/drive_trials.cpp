@@ -1,0 +1,148 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// drive_trials [CAPTURES]: fixes of rendered cameras that drive in all directions and turn by up
+/// to 90 degrees a second, under the lamps of datasets/paper-rig, found and located as users do: as
+/// if it stood; with nothing known but the greatest speed (2.5 m/s, 180 degrees a second); with
+/// odometry good to 1 %. Each speed has the same places, and so a camera that stands to compare
+/// with. Rms errors over those of the standing camera; of the velocity its rms error and the
+/// chi-square of it per degree of freedom. Captures of fewer than four lamps are left out.
+#include <fmt/core.h>
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <cstdlib>
+#include <vector>
+
+#include "detection/lamp_detector.h"
+#include "geometry/angles.h"
+#include "positioning/positioner.h"
+#include "simulation/exposure.h"
+#include "simulation/truth.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+struct Errors {
+  double horizontal = 0, height = 0, yaw = 0, velocity = 0, chi_squared = 0, pose_chi_squared = 0;
+  int fixes = 0, refused = 0;
+
+  void add(const Fix& fix, const CarrierMotion& truth) {
+    if (!fix.ok()) {
+      ++refused;
+      return;
+    }
+    ++fixes;
+    const Pose pose = truth.pose(0);
+    Eigen::Vector4d error;
+    error << fix.estimate.pose.position_m - pose.position_m,
+        wrapped_rad(fix.estimate.pose.yaw_rad - pose.yaw_rad);
+    horizontal += error.head<2>().squaredNorm();
+    height += error[2] * error[2];
+    yaw += error[3] * error[3];
+    const Eigen::Matrix4d covariance = fix.estimate.covariance;
+    pose_chi_squared += error.dot(covariance.ldlt().solve(error)) / 4;
+    if (!fix.body || fix.body->covariance(kBodyVelocity, kBodyVelocity) == 0) return;
+    const Eigen::Vector2d off = fix.body->velocity_m_per_s - truth.camera_velocity_m_per_s();
+    const Eigen::Matrix2d of_velocity =
+        fix.body->covariance.block<2, 2>(kBodyVelocity, kBodyVelocity);
+    velocity += off.squaredNorm() / 2;
+    chi_squared += off.dot(of_velocity.ldlt().solve(off)) / 2;
+  }
+  double rms(double sum) const { return std::sqrt(sum / fixes); }
+};
+
+class Trials {
+ public:
+  explicit Trials(double row_time_s)
+      : scene_(read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml")) {
+    scene_.camera.row_time_s = row_time_s;
+  }
+
+  void run(int captures) {
+    const FrameRenderer renderer(scene_);
+    const Calibration calibration = true_calibration(scene_);
+    const LampMap lamps = lamp_map_of(scene_, false);
+    const LampDetector detector(lamps, detector_camera(calibration));
+    const Positioner positioner(lamps, calibration);
+    Errors standing;
+    for (const double speed_m_per_s : {0.0, 0.25, 0.5, 1.0, 2.0}) {
+      Random random(71);
+      std::array<Errors, 3> errors;
+      for (int i = 0; i < captures; ++i) {
+        LampShot shot = lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % 12);
+        CarrierMotion& motion = shot.motion;
+        motion.axis_m.x() = random.uniform(-0.3, 0.3);
+        motion.axis_m.y() = random.uniform(-0.12, 0.12);
+        motion.axis_m.z() = random.uniform(0, 0.3);
+        motion.yaw_rad = random.uniform(-3.1, 3.1);
+        const double direction_rad = random.uniform(-3.1, 3.1);
+        const double rate_rad_per_s = rad_from_deg(random.uniform(-90, 90));
+        std::array<double, 3> odometry{random.normal(), random.normal(), random.normal()};
+        motion.velocity_m_per_s =
+            speed_m_per_s * Eigen::Vector2d(std::cos(direction_rad), std::sin(direction_rad));
+        motion.turn_rate_rad_per_s = speed_m_per_s > 0 ? rate_rad_per_s : 0;
+        const auto detections = detections_in(renderer, detector, shot);
+        if (detections.size() < 4) continue;
+        Sensors known = {}, unknown = {};
+        unknown.motion = KnownMotion::up_to(2.5, rad_from_deg(180));
+        const double sd_m_per_s = 0.01 * speed_m_per_s;
+        const double sd_rad_per_s = 0.01 * std::abs(motion.turn_rate_rad_per_s);
+        Eigen::Vector2d velocity =
+            Eigen::Rotation2Dd(-motion.yaw_rad) * motion.camera_velocity_m_per_s();
+        velocity += sd_m_per_s * Eigen::Vector2d(odometry[0], odometry[1]);
+        known.motion = {velocity, motion.turn_rate_rad_per_s + sd_rad_per_s * odometry[2],
+                        sd_m_per_s, sd_rad_per_s};
+        errors[0].add(positioner.locate(detections), motion);
+        errors[1].add(positioner.locate(detections, unknown), motion);
+        errors[2].add(positioner.locate(detections, known), motion);
+      }
+      if (speed_m_per_s == 0) standing = errors[0];
+      print(speed_m_per_s, errors, standing);
+    }
+  }
+
+ private:
+  std::vector<Detection> detections_in(const FrameRenderer& renderer, const LampDetector& detector,
+                                       const LampShot& shot) const {
+    const cv::Mat image = expose(scene_.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
+    std::vector<Detection> detections;
+    for (const Light& light : detector.detect(image)) {
+      if (light.kind == LightKind::lamp) {
+        detections.push_back({*light.lamp, light.pixel, light.sigma_px});
+      }
+    }
+    return detections;
+  }
+
+  void print(double speed_m_per_s, const std::array<Errors, 3>& errors,
+             const Errors& standing) const {
+    constexpr std::array names{"as if standing", "speed unknown", "odometry 1 %"};
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      const Errors& e = errors[i];
+      fmt::print(
+          "{:.0f} us  {:4.2f} m/s  {:14}  {:3} fixes {:2} none  {:7.3f} mm ({:5.2f})  height "
+          "{:7.3f} mm ({:5.2f})  yaw {:.4f} deg ({:5.2f})  pose chi2 {:.2f}",
+          1e6 * *scene_.camera.row_time_s, speed_m_per_s, names[i], e.fixes, e.refused,
+          1e3 * e.rms(e.horizontal), e.rms(e.horizontal) / standing.rms(standing.horizontal),
+          1e3 * e.rms(e.height), e.rms(e.height) / standing.rms(standing.height),
+          deg_from_rad(e.rms(e.yaw)), e.rms(e.yaw) / standing.rms(standing.yaw),
+          e.pose_chi_squared / e.fixes);
+      if (e.velocity > 0) {
+        fmt::print("  v {:5.1f} mm/s chi2 {:.2f}", 1e3 * e.rms(e.velocity),
+                   e.chi_squared / e.fixes);
+      }
+      fmt::print("\n");
+    }
+  }
+
+  Scene scene_;
+};
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  const int captures = argc > 1 ? std::atoi(argv[1]) : 100;
+  for (const double row_time_s : {3e-5, 5.5e-5}) vlp::Trials(row_time_s).run(captures);
+}
