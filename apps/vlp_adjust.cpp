@@ -39,7 +39,7 @@ AdjustSet read_set(const Options& options, const std::string& set, bool turn, co
                    const Calibration& calibration) {
   const fs::path path(set);
   const bool folder = fs::is_directory(path);
-  AdjustSet read{last_name(path), {}, {}, turn || path.filename() == "rotation"};
+  AdjustSet read{last_name(path), {}, {}, turn || last_name(path) == "rotation"};
   if (folder) {
     CaptureOptions images = options.images;
     images.images = set;
@@ -50,6 +50,19 @@ AdjustSet read_set(const Options& options, const std::string& set, bool turn, co
     read.captures = captures_table(path.parent_path());
   }
   return read;
+}
+
+/// Sets of one name have the paths that they were given by: a spot is one of its set.
+void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths) {
+  std::vector<std::string> names;
+  names.reserve(sets.size());
+  for (const AdjustSet& set : sets) names.push_back(set.name);
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    if (std::count(paths.begin(), paths.end(), paths[i]) > 1) {
+      throw std::invalid_argument(paths[i] + " is named twice: its captures would count twice");
+    }
+    if (std::count(names.begin(), names.end(), names[i]) > 1) sets[i].name = paths[i];
+  }
 }
 
 void print_summary(const AdjustmentResult& found, const Calibration& before) {
@@ -77,7 +90,10 @@ void print_summary(const AdjustmentResult& found, const Calibration& before) {
     fmt::print("lens        corrected: chi-squared {:.1f}, {} expected\n", found.lens_chi_squared,
                found.lens_freedom);
   } else {
-    fmt::print("lens        taken as exact: the calibration has no covariance of it\n");
+    const bool stated = before.intrinsics_report && before.intrinsics_report->covariance;
+    fmt::print("lens        {}\n", stated ? "as it was: the captures tell nothing of it"
+                                          : "taken as exact: the calibration has no covariance of "
+                                            "it");
   }
   fmt::print("residual    {:.4f} px per axis\n", found.residual_px);
   for (const auto& place : found.places) {
@@ -127,6 +143,9 @@ void run(const CLI::App& app, const Options& options) {
   for (const std::string& set : options.turns) {
     input.sets.push_back(read_set(options, set, true, input.lamps, input.calibration));
   }
+  std::vector<std::string> paths = options.sets;
+  paths.insert(paths.end(), options.turns.begin(), options.turns.end());
+  name_apart(input.sets, paths);
   for (const AdjustSet& set : input.sets) check_lamps(set.frames, input.lamps, input.lamps_file);
   const AdjustStepResult result = solve_adjustment(input, history_entry(app, inputs));
   tell(result);

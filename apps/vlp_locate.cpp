@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <map>
@@ -63,6 +64,23 @@ CapturesTable captures_of(const Options& options) {
     throw std::invalid_argument(
         "--one-lamp, --inclination-sigma-deg, --height-sd-m, --yaw-rate-sd-deg-per-s and --frames "
         "need captures.csv: give --captures");
+  }
+  const auto some = [&](const auto& has) {
+    return std::any_of(captures.begin(), captures.end(),
+                       [&](const auto& capture) { return has(capture.second); });
+  };
+  if (options.frames_together > 1) {
+    if (!options.max_speed_m_per_s &&
+        !some([](const Capture& one) { return one.velocity_m_per_s.has_value(); })) {
+      throw std::invalid_argument(
+          "--frames needs --max-speed-m-per-s, or velocities in captures.csv");
+    }
+    if (!some([](const Capture& one) { return one.time_s.has_value(); })) {
+      throw std::invalid_argument("--frames needs time_s in captures.csv");
+    }
+  }
+  if (options.height_sd_m && !some([](const Capture& one) { return one.z_m.has_value(); })) {
+    throw std::invalid_argument("--height-sd-m needs z_m in captures.csv");
   }
   return captures;
 }
@@ -137,8 +155,10 @@ void add_options(CLI::App& app, Options& options) {
       "the camera when there is no --camera-on-robot), vx_m_per_s, vy_m_per_s, "
       "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry, along the axes of the same), "
       "z_m, yaw_rad; default: captures.csv in the folder");
-  app.add_option("--inclination-sigma-deg", options.inclination_sigma_deg,
-                 "Standard deviation of the inclination sensor's angles (default: left out of sd)")
+  app.add_option(
+         "--inclination-sigma-deg", options.inclination_sigma_deg,
+         "Standard deviation of the inclination sensor's angles: roll and pitch are then estimated "
+         "about them (default: exact)")
       ->check(finite_not_negative());
   app.add_option(
          "--camera-on-robot", options.camera_on_robot,

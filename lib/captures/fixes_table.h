@@ -26,7 +26,7 @@ struct FixRow {
     double residual_px;
     /// The part of sd that is of this image alone; nothing when nothing else is known.
     std::optional<Eigen::Vector4d> noise_sd = {};
-    /// In the world, and the lean, where they were estimated.
+    /// In the world, where it moves, and the lean, where it was estimated.
     std::optional<Eigen::Vector2d> velocity_m_per_s = {};
     std::optional<Inclination> inclination = {};
   };

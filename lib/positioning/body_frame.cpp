@@ -236,7 +236,9 @@ std::optional<BodySolution> fix_free(const BodyFrame& frame, const Problem& prob
 /// The fix of all lamps, as if they were what they are said to be.
 BodySolution fix_all(const BodyFrame& frame, const Problem& problem) {
   if (problem.lean_is_free()) {
-    if (const auto solution = fix_free(frame, problem)) return *solution;
+    if (const auto solution = fix_free(frame, problem); solution && has_fix(*solution)) {
+      return *solution;
+    }
   }
   const Starts start = level_start(frame, problem);
   if (start.count == 0) return {start.status, {}};
@@ -295,7 +297,7 @@ BodyFrame kept(const BodyFrame& frame, const Agreeing& agreeing) {
       rest.ids[rest.size] = frame.ids[i];
       rest.nearest_m[rest.size++] = frame.nearest_m[i];
       rest.now += i < frame.now;
-    } else {
+    } else if (i < frame.now) {
       rest.rejected_ids[static_cast<std::size_t>(rest.rejected_lamps++)] = frame.ids[i];
     }
   }
@@ -437,6 +439,8 @@ BodySolution fix_body_frame(BodyFrame& frame, const Eigen::Vector3d& arm_in_body
         kMuchBetter * excess_of(mirror_image.fix, frame) < excess_of(all.fix, frame)) {
       return {FixStatus::mirrored_map, {}};
     }
+    // Frames that one straight way does not explain are not of one.
+    if (frame.now < frame.size) return {FixStatus::inconsistent, {}};
     if (!frame.noise_is_stated) return all;
     return fix_without_moved(frame, problem, all).value_or(all);
   }

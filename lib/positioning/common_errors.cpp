@@ -116,25 +116,20 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
       covariance_(row, col) = adjustment->covariance(from_row, from_col);
     }
   }
-  if (adjustment) {
-    stated_ = true;
-    return;
-  }
   // From errors that are independent (lens, own of the zenith, own of the offset) to those there
   // are.
   const Eigen::Vector2d focal_px = focal_of(calibration);
-  Eigen::MatrixXd own = covariance_.topLeftCorner(first_lamp, first_lamp);
-  Eigen::MatrixXd passed_on = Eigen::MatrixXd::Identity(first_lamp, first_lamp);
-  if (turned) {
+  Eigen::MatrixXd passed_on = Eigen::MatrixXd::Identity(covariance_.rows(), covariance_.cols());
+  if (turned && !adjustment) {
     const RotationCenter& center = *calibration.rotation_center;
-    own.block<2, 2>(zenith, zenith) = normalized(center.covariance, focal_px);
+    covariance_.block<2, 2>(zenith, zenith) = normalized(center.covariance, focal_px);
     if (center.by_intrinsics) {
       passed_on.block(zenith, 0, 2, intrinsics_) = *center.by_intrinsics;
     }
   }
   if (shifted) {
     const Dispersion& dispersion = *calibration.dispersion;
-    own.block<2, 2>(offset, offset) = normalized(dispersion.covariance, focal_px);
+    covariance_.block<2, 2>(offset, offset) = normalized(dispersion.covariance, focal_px);
     if (dispersion.by_intrinsics) {
       passed_on.block(offset, 0, 2, intrinsics_) = *dispersion.by_intrinsics;
     }
@@ -147,8 +142,8 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
           by_zenith * Eigen::MatrixXd(passed_on.middleRows<2>(zenith));
     }
   }
-  covariance_.topLeftCorner(first_lamp, first_lamp) = passed_on * own * passed_on.transpose();
-  stated_ = covariance_.diagonal().maxCoeff() > 0;
+  if (turned || shifted) covariance_ = passed_on * covariance_ * passed_on.transpose();
+  stated_ = adjustment.has_value() || covariance_.diagonal().maxCoeff() > 0;
 }
 
 CommonErrors::ByRay CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_base,
@@ -256,7 +251,7 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
     });
     if (chi_squared <= unlikely_chi_squared(2 * static_cast<double>(left) - 4)) return found;
     // Of three that contradict each other nobody knows which is wrong; nor when most are.
-    if (left == 3 || 2 * (left - 1) <= sightings.size()) return {};
+    if (!(worst > 0) || left == 3 || 2 * (left - 1) <= sightings.size()) return {};
     left_out.set(worst_lamp);
     found.lamps[found.count++] = worst_lamp;
   }

@@ -43,7 +43,8 @@ class CommonErrors {
   /// calibration is lost.
   int lamps_elsewhere() const { return lamps_elsewhere_; }
 
-  /// How the shared errors move the ray of a pixel, along the axes of the base (the level camera's).
+  /// How the shared errors move the ray of a pixel, along the axes of the base (the level
+  /// camera's).
   using ByRay = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
   ByRay effect_on_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
 
@@ -67,7 +68,7 @@ class CommonErrors {
 
   /// The joint covariance, of the intrinsics, zenith, offset (where there are such), then the
   /// lamps.
-  const Eigen::MatrixXd& joint() const { return covariance_; }
+  const MatrixX& joint() const { return covariance_; }
   Eigen::Index intrinsics() const { return intrinsics_; }
   Eigen::Index shared() const { return intrinsics_ + std::ssize(turns_); }
 
@@ -76,7 +77,7 @@ class CommonErrors {
   Eigen::Matrix3d base_from_camera_, camera_from_base_;
   /// Derivatives of base_from_camera by the zenith's and the offset's coordinates.
   std::vector<Eigen::Matrix3d> turns_;
-  Eigen::MatrixXd covariance_;
+  MatrixX covariance_;
   bool stated_ = false, complete_ = false;
   int lamps_elsewhere_ = 0;
 };

@@ -60,6 +60,8 @@ struct Fix {
   double residual_px = 0;
   /// Lamps that the fix rests on.
   int lamps = 0;
+  /// Those that residual_px is of: the same, and those of earlier frames.
+  int sightings = 0;
   /// Lamps that were left out because the others contradict them, and the ids of the first of them.
   int rejected_lamps = 0;
   std::array<int, 32> rejected_ids = {};

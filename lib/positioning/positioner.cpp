@@ -326,6 +326,8 @@ std::optional<Fix> Positioner::locate_body(std::span<const Detection> detections
     if (status != FixStatus::ok) return refused(status, fix.unknown_lamps);
   }
   if (frame.now < 2) return std::nullopt;
+  // Where more than the noise is uncertain, the noise alone decides nothing.
+  if (common_.complete()) frame.noise_is_stated = false;
   const Eigen::Vector3d arm_m =
       mount_ ? mount_->position_in_robot_m : Eigen::Vector3d(Eigen::Vector3d::Zero());
   const auto [status, solution] = fix_body_frame(frame, arm_m, prior, max_residual_share_);
@@ -338,6 +340,7 @@ std::optional<Fix> Positioner::locate_body(std::span<const Detection> detections
   fix.residual_px = solution.residual_px;
   fix.redundancy = solution.redundancy;
   fix.lamps = static_cast<int>(frame.now);
+  fix.sightings = static_cast<int>(frame.size);
   name_rejected(frame, fix);
   fix.body = in_world(solution);
   fix.time_s = sensors.time_s;
@@ -392,7 +395,7 @@ Fix Positioner::locate(std::span<const Detection> detections,
     return refused(FixStatus::too_few_lamps, frame.unknown_lamps);
   }
   fix.status = FixStatus::ok;
-  fix.lamps = static_cast<int>(frame.size);
+  fix.lamps = fix.sightings = static_cast<int>(frame.size);
   fix.redundancy = frame.size < 3 ? 0 : 2 * static_cast<double>(frame.size) - 4;
   fix.time_s = sensors.time_s;
   name_rejected(frame, fix);

@@ -103,6 +103,10 @@ class Positioner {
   Fix locate(std::span<const Detection> detections, const Sensors& sensors,
              std::span<const EarlierFrame> earlier) const noexcept;
 
+  /// Lamps of the calibration's adjustment that the map has elsewhere: what fixes state is not of
+  /// them (CommonErrors).
+  int lamps_elsewhere() const { return common_.lamps_elsewhere(); }
+
  private:
   template <typename Frame, typename Add>
   FixStatus look_up(std::span<const Detection> detections, Frame& frame, int& unknown_lamps,

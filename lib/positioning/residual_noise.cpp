@@ -12,8 +12,8 @@ namespace vlp {
 std::optional<double> residual_noise_px(std::span<const Fix> fixes) {
   double sum_of_squares = 0, degrees_of_freedom = 0;
   for (const Fix& fix : fixes) {
-    if (!fix.ok() || fix.lamps < 3) continue;
-    sum_of_squares += fix.lamps * fix.residual_px * fix.residual_px;
+    if (!fix.ok() || !(fix.redundancy > 0)) continue;
+    sum_of_squares += fix.sightings * fix.residual_px * fix.residual_px;
     degrees_of_freedom += fix.redundancy;
   }
   if (!(degrees_of_freedom > 0)) return std::nullopt;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 namespace vlp {
 namespace {
@@ -117,8 +118,10 @@ ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
                                 const std::array<Eigen::Vector3d, 3>& rays) {
   ThreeLampPoses found;
   const Cones cones = cones_of(points_m, rays);
-  const Eigen::Matrix3d first = cones.a12 * cones.m01 - cones.a01 * cones.m12;
-  const Eigen::Matrix3d second = cones.a12 * cones.m02 - cones.a02 * cones.m12;
+  Eigen::Matrix3d first = cones.a12 * cones.m01 - cones.a01 * cones.m12;
+  Eigen::Matrix3d second = cones.a12 * cones.m02 - cones.a02 * cones.m12;
+  // Where a lamp is as far from both others and seen so, one of them is a pair of lines itself.
+  if (std::abs(first.determinant()) > std::abs(second.determinant())) std::swap(first, second);
   // det(first + x second) = 0.
   const Eigen::Matrix3d adj1 = adjugate(first), adj2 = adjugate(second);
   const double cubic = adj2.cwiseProduct(second).sum() / 3;
@@ -130,7 +133,7 @@ ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
   std::array<Eigen::Vector3d, 2> lines;
   const int count = lines_of(first + x * second, lines);
   const Eigen::Matrix3d world_frame = frame_of(points_m[0], points_m[1], points_m[2]);
-  if (!world_frame.allFinite()) return found;
+  if (!(world_frame.col(2).squaredNorm() > 0.5)) return found;  // on one line
   for (int i = 0; i < count; ++i) {
     // Two directions span the line; the conic along a + s b is a quadratic in s.
     const Eigen::Vector3d line = lines[static_cast<std::size_t>(i)].normalized();
@@ -155,8 +158,10 @@ ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
       if (!(distances.minCoeff() > 0) || !distances.allFinite()) continue;
       const std::array<Eigen::Vector3d, 3> seen{distances[0] * rays[0], distances[1] * rays[1],
                                                 distances[2] * rays[2]};
+      const Eigen::Matrix3d seen_frame = frame_of(seen[0], seen[1], seen[2]);
+      if (!(seen_frame.col(2).squaredNorm() > 0.5)) continue;
       FreePose pose;
-      pose.camera_from_world = frame_of(seen[0], seen[1], seen[2]) * world_frame.transpose();
+      pose.camera_from_world = seen_frame * world_frame.transpose();
       pose.position_m = points_m[0] - pose.camera_from_world.transpose() * seen[0];
       if (!pose.position_m.allFinite()) continue;
       found.poses[static_cast<std::size_t>(found.count++)] = pose;

@@ -43,7 +43,7 @@ struct IntrinsicsReport {
   /// that is not written.
   std::optional<double> uncertainty_px;
   /// Of the intrinsics, in their order.
-  std::optional<Eigen::MatrixXd> covariance = {};
+  std::optional<MatrixX> covariance = {};
 };
 
 /// How the rotation centre is applied (Chen and Guan, section 3.1, and theory of the same):
@@ -66,7 +66,7 @@ struct RotationCenter {
   std::optional<Matrix2> lever_arm_covariance = {};
   /// What an error of the intrinsics does to the zenith's normalized point (x/z, y/z), a column
   /// each: `covariance` is that of the captures alone, with the lens taken as exact.
-  std::optional<Eigen::MatrixXd> by_intrinsics = {};
+  std::optional<MatrixX> by_intrinsics = {};
 };
 
 /// The dispersion calibration (Chen and Guan, section 3.2).
@@ -83,7 +83,7 @@ struct Dispersion {
   std::optional<Matrix2> covariance = {};
   /// What an error of the intrinsics, and one of the zenith's normalized point, does to
   /// offset_px / f, a column each: `covariance` takes both as exact.
-  std::optional<Eigen::MatrixXd> by_intrinsics = {};
+  std::optional<MatrixX> by_intrinsics = {};
   std::optional<Matrix2> by_zenith = {};
 };
 
@@ -98,7 +98,7 @@ struct Adjustment {
   /// Joint, of the errors of: the intrinsics; the zenith's normalized point (x/z, y/z); the lever
   /// arm, x and y in metres; x, y and z of each of the lamps. Zero where something was taken as
   /// exact.
-  Eigen::MatrixXd covariance;
+  MatrixX covariance;
   /// The folders or tables that it rests on, without their own folders.
   std::vector<std::string> sets;
   int captures;

@@ -22,7 +22,7 @@ void remember(Calibration& calibration, const std::string& part, HistoryEntry en
 Calibration with_camera(Camera camera, std::optional<IntrinsicsReport> report, HistoryEntry entry) {
   Calibration calibration;
   calibration.camera = std::move(camera);
-  calibration.intrinsics_report = report;
+  calibration.intrinsics_report = std::move(report);
   remember(calibration, "camera", std::move(entry));
   return calibration;
 }

@@ -40,7 +40,7 @@ Sorted sorted(const LensInput& input, LensResult& result) {
 
 IntrinsicsReport report_of(const LensResult& result, const IntrinsicsInput& input) {
   const IntrinsicsSolution& solution = result.solution;
-  const Eigen::MatrixXd covariance = ProjectionUncertainty(solution).intrinsics_covariance();
+  const MatrixX covariance = ProjectionUncertainty(solution).intrinsics_covariance();
   const Eigen::Vector2d warp_m =
       solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
   return {static_cast<int>(solution.views.size()),

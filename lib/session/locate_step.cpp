@@ -50,7 +50,9 @@ Sensors sensors_of(const std::string& image, const LocateInput& input) {
     sensors.height_and_yaw = HeightAndYaw{*capture.z_m, *capture.yaw_rad};
   }
   if (input.height_sd_m && capture.z_m) {
-    sensors.height = KnownHeight{*capture.z_m, *input.height_sd_m};
+    // The table's is the camera's.
+    const double above_m = input.how.mount ? input.how.mount->position_in_robot_m.z() : 0;
+    sensors.height = KnownHeight{*capture.z_m - above_m, *input.height_sd_m};
   }
   return sensors;
 }
@@ -76,7 +78,8 @@ class EarlierFrames {
            earlier.size() + 1 < static_cast<std::size_t>(input_.frames_together)) {
       --at;
       const double before_s = *time_s - at->first;
-      if (before_s > kLongestTogether_s) break;
+      constexpr double rounding_s = 1e-6;
+      if (before_s > kLongestTogether_s + rounding_s) break;
       earlier.push_back({input_.frames[at->second].detections, before_s});
     }
     return earlier;
@@ -91,7 +94,7 @@ class EarlierFrames {
 Fix fix_of(const Frame& frame, const Positioner& positioner, const EarlierFrames& frames,
            const Sensors& sensors) {
   const auto earlier = frames.before(sensors.time_s);
-  if (!earlier.empty()) {
+  if (!earlier.empty() && sensors.motion) {
     const Fix together = positioner.locate(frame.detections, sensors, earlier);
     if (together.ok()) return together;
   }
@@ -112,11 +115,15 @@ std::vector<Fix> locate_all(const LocateInput& input, const PositionerOptions& h
 /// Motion wants to know when each row is read.
 void check_row_time(const LocateInput& input) {
   const Camera& camera = input.calibration.camera;
-  const bool moves =
-      input.motion ||
-      std::any_of(input.captures.begin(), input.captures.end(), [](const auto& entry) {
-        return entry.second.velocity_m_per_s || entry.second.yaw_rate_rad_per_s;
-      });
+  const bool moves = input.motion ||
+                     std::any_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
+                       const auto entry = input.captures.find(frame.image);
+                       if (entry == input.captures.end()) return false;
+                       const Capture& capture = entry->second;
+                       return (capture.velocity_m_per_s && !capture.velocity_m_per_s->isZero(0)) ||
+                              capture.velocity_sd_m_per_s.value_or(0) > 0 ||
+                              capture.yaw_rate_rad_per_s.value_or(0) != 0;
+                     });
   if (moves && !(camera.row_time_s && camera.readout)) {
     throw std::invalid_argument(
         "a camera that moves needs row_time_s and readout in its calibration: vlp-intrinsics takes "
@@ -129,15 +136,18 @@ bool states_sigma(const Frame& frame) {
                      [](const Detection& detection) { return detection.sigma_px.has_value(); });
 }
 
-FixRow row_of(const Frame& frame, const Fix& fix, bool noise_known) {
+FixRow row_of(const Frame& frame, const CapturesTable& captures, const Fix& fix, bool noise_known) {
   FixRow row{frame.image, std::string(name_of(fix.status)), {}, fix.lamps};
-  row.time_s = fix.time_s;
+  if (const auto entry = captures.find(frame.image); entry != captures.end()) {
+    row.time_s = entry->second.time_s;
+  }
   if (!fix.ok()) return row;
   row.fix = {fix.estimate.pose, {}, fix.residual_px};
   if (const auto& body = fix.body) {
-    const auto is_estimated = [&](int index) { return body->covariance(index, index) > 0; };
-    if (is_estimated(kBodyVelocity)) row.fix->velocity_m_per_s = body->velocity_m_per_s;
-    if (is_estimated(kBodyRoll)) row.fix->inclination = body->inclination;
+    const auto is_uncertain = [&](int index) { return body->covariance(index, index) > 0; };
+    if (is_uncertain(kBodyVelocity) || !body->velocity_m_per_s.isZero(0))
+      row.fix->velocity_m_per_s = body->velocity_m_per_s;
+    if (is_uncertain(kBodyRoll)) row.fix->inclination = body->inclination;
   }
   if (noise_known) {
     row.fix->sd = fix.estimate.covariance.diagonal().cwiseSqrt();
@@ -165,6 +175,15 @@ void warn_of_noise(LocateResult& result, const std::vector<Frame>& frames) {
       "the residuals show {:.2g} px of noise, {:.2g} px are stated: sd is too small; are "
       "calibration and lamp map right and complete?",
       *shown_px, stated_px));
+}
+
+void warn_of_map(LocateResult& result, const LocateInput& input) {
+  const int elsewhere = Positioner(input.lamps, input.calibration, input.how).lamps_elsewhere();
+  if (elsewhere == 0) return;
+  result.warnings.push_back(fmt::format(
+      "{} lamps are elsewhere than in the adjustment of the calibration, and sd does not "
+      "know how well they are: give the map that vlp-adjust --refine-map wrote with it",
+      elsewhere));
 }
 
 void warn_of_image(LocateResult& result, const LocateInput& input) {
@@ -200,9 +219,11 @@ std::optional<double> off_m(const LocateInput& input, std::size_t frame, const F
   if (detection == detections.end()) return std::nullopt;
   const auto ray = lens.unproject(detection->pixel);
   if (!ray) return std::nullopt;
-  const Sensors sensors = sensors_of(image, input);
-  const Lean lean = sensors.inclination ? lean_of(*sensors.inclination, 0) : Lean();
+  const auto inclination =
+      fix.body ? std::optional(fix.body->inclination) : sensors_of(image, input).inclination;
+  const Lean lean = inclination ? lean_of(*inclination, 0) : Lean();
   const Eigen::Vector3d level = lean.level_from_base * base_from_camera * ray->direction;
+  if (!(level.z() > 0)) return std::nullopt;
   const Pose& pose = fix.estimate.pose;
   const double height_m = lamp->position_m.z() - pose.position_m.z();
   const Eigen::Vector3d seen_m =
@@ -277,9 +298,10 @@ LocateResult locate_frames(const LocateInput& input) {
   if (stated) warn_of_noise(result, input.frames);
   result.rows.reserve(result.fixes.size());
   for (std::size_t i = 0; i < result.fixes.size(); ++i) {
-    result.rows.push_back(row_of(input.frames[i], result.fixes[i], noise_known));
+    result.rows.push_back(row_of(input.frames[i], input.captures, result.fixes[i], noise_known));
   }
   warn_of_image(result, input);
+  warn_of_map(result, input);
   warn_of_captures(result, input);
   tell_of_lamps_left_out(result, input);
   result.summary = summarize(result.rows);

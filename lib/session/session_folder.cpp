@@ -24,6 +24,8 @@ CapturesTable captures_in(const fs::path& folder) {
     capture.y_m = row.xy_m.y();
     if (row.z_m) capture.z_m = row.z_m;
     if (row.yaw_rad) capture.yaw_rad = row.yaw_rad;
+    capture.place = PlaceOf::camera;
+    capture.place_sd_m.reset();
   }
   return captures;
 }
@@ -33,7 +35,7 @@ std::optional<fs::path> truth_file(const fs::path& folder) {
   if (!fs::exists(folder / "captures.csv")) return std::nullopt;
   const CapturesTable captures = read_captures(folder / "captures.csv");
   const bool places = std::any_of(captures.begin(), captures.end(), [](const auto& capture) {
-    return capture.second.x_m && capture.second.y_m;
+    return capture.second.x_m && capture.second.y_m && capture.second.place == PlaceOf::camera;
   });
   return places ? std::optional(folder / "captures.csv") : std::nullopt;
 }
@@ -42,7 +44,7 @@ std::vector<TruthRow> truth_in(const fs::path& folder) {
   if (fs::exists(folder / "truth.csv")) return read_truth(folder / "truth.csv");
   std::vector<TruthRow> rows;
   for (const auto& [image, capture] : captures_table(folder)) {
-    if (!capture.x_m || !capture.y_m) continue;
+    if (!capture.x_m || !capture.y_m || capture.place == PlaceOf::axis) continue;
     rows.push_back({image, {*capture.x_m, *capture.y_m}, capture.z_m, capture.yaw_rad});
   }
   return rows;

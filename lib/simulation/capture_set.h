@@ -33,15 +33,15 @@ struct LampCaptures {
   double yaw_jitter_rad;
   /// During each capture; on a drive also from one to the next.
   double turn_rate_rad_per_s;
-  /// How the carrier leans, from the first capture evenly to the last, and how that vibrates.
-  std::pair<double, double> roll_rad{0, 0}, pitch_rad{0, 0};
-  Vibration vibration{0, 0};
   int repeat;
   /// From one capture to the next.
   double interval_s;
   /// Whether captures.csv tells where the camera is: exactly, as a fixture that holds the camera
   /// itself would know it.
   bool known;
+  /// How the carrier leans, from the first capture evenly to the last, and how that vibrates.
+  std::pair<double, double> roll_rad{0, 0}, pitch_rad{0, 0};
+  Vibration vibration{0, 0};
 };
 
 /// Views of the board from all sides, chosen at random.

@@ -22,8 +22,12 @@ PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const Carri
   const double end_s = shutter.end_s(rays.lines() + rays.margin_px());
   // Between two samples an arc of 450 px bulges by less than 0.1 px.
   const double step_rad = rad_from_deg(2);
+  constexpr double a_period = 16;
+  const double of_vibration =
+      motion.vibration.amplitude_rad > 0 ? a_period * motion.vibration.frequency_hz : 0;
   const int samples =
-      4 + static_cast<int>(std::abs(motion.turn_rate_rad_per_s) * (end_s - begin_s) / step_rad);
+      4 + static_cast<int>((std::abs(motion.turn_rate_rad_per_s) / step_rad + of_vibration) *
+                           (end_s - begin_s));
   constexpr double far = 1e6;
   Eigen::Array2d least = Eigen::Array2d::Constant(far), most = -least;
   for (int i = 0; i <= samples; ++i) {

@@ -69,6 +69,7 @@ KnownPoints known_points(const std::vector<Frame>& frames, const CapturesTable& 
     const auto entry = places.find(frame.image);
     if (entry == places.end() || !entry->second.x_m || !entry->second.y_m) continue;
     const Capture& place = entry->second;
+    if (place.place == PlaceOf::axis) continue;
     known.frames.push_back(frame);
     known.truth.push_back({frame.image, {*place.x_m, *place.y_m}, place.z_m, place.yaw_rad});
   }

@@ -10,6 +10,8 @@
 namespace vlp {
 namespace {
 
+using testing::HasSubstr;
+
 TEST(FixesTable, HasTheColumnsOfTheContract) {
   const TemporaryFolder folder;
   const Pose pose{{1.5, -0.25, 0.1234567891}, 3};

@@ -68,7 +68,8 @@ TEST_F(Adjust, CalibratesRefinesTheMapAndTellsFixesWhatTheyAreWorth) {
   EXPECT_THAT(result.output, HasSubstr("captures    24 used, 0 left out"));
   const LampMap map = read_lamp_map(folder / "refined.yaml");
   for (std::size_t i = 0; i < 8; ++i) {
-    EXPECT_LT((map.lamps[i].position_m - truth.lamps[i].position_m).norm(), 1e-5);
+    // The captures are exact; what is left is what the survey's 2 mm still weigh.
+    EXPECT_LT((map.lamps[i].position_m - truth.lamps[i].position_m).norm(), 1e-4);
     EXPECT_GT(*map.lamps[i].sd_m, 0);
   }
   const Calibration calibration = read_calibration(folder / "adjusted.yaml");
@@ -112,8 +113,9 @@ TEST_F(Adjust, RefusesACalibrationThatIsAdjustedAlready) {
 }
 
 TEST_F(Adjust, SaysWhatWouldDetermineIt) {
-  frames.resize(8);
-  captures = "image,spot\n0,s\n1,s\n2,s\n3,s\n4,s\n5,s\n6,s\n7,s\n";
+  frames.resize(1);
+  frames[0].detections.resize(2);
+  captures = "image,spot\n0,s\n";
   const ProgramResult result = adjust("--map-sd-m 0.01");
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.errors, HasSubstr("a second height"));

@@ -46,7 +46,7 @@ TEST_P(Help, NamesTheVersion) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Programs, Help,
-                         testing::Values("vlp-board", "vlp-calibrate", "vlp-detect",
+                         testing::Values("vlp-adjust", "vlp-board", "vlp-calibrate", "vlp-detect",
                                          "vlp-dispersion", "vlp-evaluate", "vlp-intrinsics",
                                          "vlp-limits", "vlp-locate", "vlp-rotation", "vlp-simulate",
                                          "vlp-station", "vlp-train"),

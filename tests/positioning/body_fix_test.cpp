@@ -245,9 +245,26 @@ TEST(ThreeLampPoses, HaveNoneOfLampsOnOneLine) {
       Eigen::Vector3d(-1, 0.2, 2), {0, 0.2, 2}, {1, 0.2, 2}};
   std::array<Eigen::Vector3d, 3> rays;
   for (std::size_t i = 0; i < 3; ++i) rays[i] = lamps_m[i].normalized();
-  const ThreeLampPoses found = three_lamp_poses(lamps_m, rays);
-  for (int i = 0; i < found.count; ++i) {
-    EXPECT_TRUE(found.poses[static_cast<std::size_t>(i)].position_m.allFinite());
+  EXPECT_EQ(three_lamp_poses(lamps_m, rays).count, 0);
+}
+
+/// A lamp that is as far from both others, and seen so: one of the conics is a pair of lines.
+TEST(ThreeLampPoses, HoldTheTruthOfLampsThatAreSeenAlike) {
+  for (const double up_m : {-2.0, -1.5}) {
+    for (const double aside_m : {0.0, 0.3}) {
+      const Eigen::Vector3d camera_m(0, aside_m, up_m);
+      const std::array<Eigen::Vector3d, 3> lamps_m{
+          Eigen::Vector3d(-0.5, -0.5, 0), {0.5, -0.5, 0}, {0, 0.6, 0}};
+      std::array<Eigen::Vector3d, 3> rays;
+      for (std::size_t i = 0; i < 3; ++i) rays[i] = (lamps_m[i] - camera_m).normalized();
+      const ThreeLampPoses found = three_lamp_poses(lamps_m, rays);
+      double nearest_m = 1;
+      for (int i = 0; i < found.count; ++i) {
+        const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
+        nearest_m = std::min(nearest_m, (pose.position_m - camera_m).norm());
+      }
+      EXPECT_LT(nearest_m, 1e-6) << camera_m.transpose();
+    }
   }
 }
 

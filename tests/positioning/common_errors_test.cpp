@@ -49,8 +49,12 @@ class CommonPart : public testing::Test {
 };
 
 /// G by differences of whole fixes: nothing is shared with the formula.
-TEST_F(CommonPart, IsThatOfFixesMadeWithEachParameterALittleOff) {
+class OfFixes : public CommonPart, public testing::WithParamInterface<Sensors> {};
+
+TEST_P(OfFixes, IsThatOfThoseMadeWithEachParameterALittleOff) {
   adjust(1);
+  rig.calibration.camera.row_time_s = 3e-5;
+  rig.calibration.camera.readout = Readout::rows;
   const Adjustment adjustment = *rig.calibration.adjustment;
   const auto detections = seen_from(rig, 0.1);
   const auto fix_with = [&](Eigen::Index parameter, double by) {
@@ -67,7 +71,7 @@ TEST_F(CommonPart, IsThatOfFixesMadeWithEachParameterALittleOff) {
       other.map.lamps[static_cast<std::size_t>(parameter - 16) / 3]
           .position_m[(parameter - 16) % 3] += by;
     }
-    return state_of(Positioner(other.map, other.calibration).locate(detections));
+    return state_of(Positioner(other.map, other.calibration).locate(detections, GetParam()));
   };
   Eigen::MatrixXd by_parameters(4, 40);
   for (Eigen::Index i = 0; i < 40; ++i) {
@@ -76,15 +80,33 @@ TEST_F(CommonPart, IsThatOfFixesMadeWithEachParameterALittleOff) {
   }
   const Eigen::Matrix4d expected =
       by_parameters * adjustment.covariance * by_parameters.transpose();
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections, GetParam());
   ASSERT_TRUE(fix.ok());
   EXPECT_THAT(fix.estimate.covariance - fix.noise_covariance,
               IsNear(expected, 1e-4 * expected.cwiseAbs().maxCoeff()));
   rig.calibration.adjustment.reset();
-  const Fix noise = Positioner(rig.map, rig.calibration).locate(detections);
+  const Fix noise = Positioner(rig.map, rig.calibration).locate(detections, GetParam());
   EXPECT_EQ(noise.estimate.covariance, noise.noise_covariance);
   EXPECT_THAT(fix.noise_covariance, IsNear(noise.noise_covariance, 1e-15));
 }
+
+Sensors sensors(double inclination_sigma_rad, const std::optional<KnownMotion>& motion) {
+  Sensors sensors;
+  sensors.inclination_sigma_rad = inclination_sigma_rad;
+  sensors.motion = motion;
+  return sensors;
+}
+
+std::string name_of_body(const testing::TestParamInfo<Sensors>& body) {
+  std::string name = body.param.motion ? "Driving" : "Standing";
+  if (body.param.inclination_sigma_rad > 0) name += "AndLeaning";
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Bodies, OfFixes,
+                         testing::Values(sensors(0, {}), sensors(0, KnownMotion::up_to(1, 1)),
+                                         sensors(0.1, {}), sensors(0.1, KnownMotion::up_to(1, 1))),
+                         name_of_body);
 
 TEST_F(CommonPart, OfASurveyIsItsStandardDeviationThroughTheFix) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;

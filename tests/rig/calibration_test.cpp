@@ -48,7 +48,8 @@ TEST(Calibration, MayHaveItsPartsInAnyOrder) {
 TEST(Calibration, KeepsCovariancesAndAnAdjustment) {
   Calibration calibration = sample_calibration();
   const Eigen::MatrixXd root = Eigen::MatrixXd::Random(12 + 6, 12 + 6);
-  const Eigen::MatrixXd covariance = 0.01 * root * root.transpose();
+  Eigen::MatrixXd covariance = 0.01 * root * root.transpose();
+  covariance = 0.5 * (covariance + covariance.transpose()).eval();  // to the last bit
   calibration.intrinsics_report->covariance = covariance.topLeftCorner(8, 8);
   calibration.rotation_center->by_intrinsics = root.topLeftCorner(2, 8);
   calibration.dispersion->by_zenith = Matrix2{{-1, 0.1}, {0, -1}};

@@ -93,7 +93,7 @@ double worst_error_m(const LocateInput& input, double speed_m_per_s) {
 
 TEST(LocateFrames, EstimatesTheVelocityWhenToldThatTheCameraDrives) {
   LocateInput input = drive(1);
-  EXPECT_GT(worst_error_m(input, 1), 5e-3);
+  EXPECT_GT(worst_error_m(input, 1), 4e-3);
   input.motion = KnownMotion::up_to(200, 200);  // of no weight
   EXPECT_LT(worst_error_m(input, 1), 1e-6);
   const LocateResult found = locate_frames(input);
@@ -109,7 +109,7 @@ TEST(LocateFrames, TakesOdometry) {
     capture.velocity_m_per_s = Eigen::Rotation2Dd(-0.3) * Eigen::Vector2d(1, 0);
   }
   EXPECT_LT(worst_error_m(input, 1), 1e-9);
-  EXPECT_FALSE(locate_frames(input).rows[0].fix->velocity_m_per_s) << "it is not estimated";
+  EXPECT_NEAR(locate_frames(input).rows[0].fix->velocity_m_per_s->x(), 1, 1e-9);
 }
 
 TEST(LocateFrames, FixesTwoFramesOfTwoLampsTogether) {

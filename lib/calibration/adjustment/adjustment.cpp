@@ -360,19 +360,20 @@ Noise noise_of(const Assembled& all, const Eigen::MatrixXd& covariance) {
   const AdjustmentLayout& at = problem.layout();
   const std::vector<double> lengths = lengths_of(problem);
   double squares = 0, freedom = 0;
-  std::vector<bool> capture_used(problem.captures.size()), lamp_used(problem.lamps.size());
+  std::vector<int> used(problem.captures.size());
+  std::vector<bool> lamp_used(problem.lamps.size());
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     if (!problem.sightings[i].used) continue;
     squares += lengths[i] * lengths[i];
     freedom += 2;
-    capture_used[problem.sightings[i].capture] = true;
+    ++used[problem.sightings[i].capture];
     lamp_used[problem.sightings[i].lamp] = true;
   }
   std::vector<bool> spot_used(static_cast<std::size_t>(at.shared - at.spots) / 3);
-  for (std::size_t k = 0; k < capture_used.size(); ++k) {
-    if (!capture_used[k]) continue;
+  for (std::size_t k = 0; k < used.size(); ++k) {
+    if (used[k] == 0) continue;
     const auto& spot = problem.captures[k].spot;
-    freedom -= spot ? 1 : 4;
+    freedom -= std::min(spot ? 1 : 4, 2 * used[k]);
     if (spot) spot_used[*spot] = true;
   }
   freedom -= static_cast<double>(at.lens_size) -
@@ -417,6 +418,8 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
     }
     if (!changed) return true;
   }
+  if (!problem.solve(false)) return false;
+  covariance = problem.shared_covariance();
   return true;
 }
 
@@ -459,6 +462,11 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
   Contradictions contradictions(all);
   Eigen::MatrixXd covariance;
   double freedom = 0;
+  // A lamp taken for another can be where the lens has no image of it.
+  const std::vector<double> at_start = lengths_of(problem);
+  for (std::size_t i = 0; i < at_start.size(); ++i) {
+    problem.sightings[i].used = at_start[i] < kInfinite;
+  }
   bool converged = problem.solve(true) && problem.solve(true);
   if (converged) {
     contradictions.leave_out_the_worst();
@@ -541,12 +549,10 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
       // What is wrong with its survey says nothing of the others.
       result.surveyed_covariance.middleRows<3>(row).setZero();
       result.surveyed_covariance.middleCols<3>(row).setZero();
-      result.surveyed_covariance.block<3, 3>(row, row) =
-          found + correction_m * correction_m.transpose();
-    } else {
-      result.surveyed_covariance.block<3, 3>(row, row) =
-          surveyed_sd_m * surveyed_sd_m * Eigen::Matrix3d::Identity();
     }
+    // Of one that has moved, too: fixes with this map are to find that it is wrong.
+    result.surveyed_covariance.block<3, 3>(row, row) =
+        surveyed_sd_m * surveyed_sd_m * Eigen::Matrix3d::Identity();
     if (!all.lamp_seen[i]) {
       result.notes.push_back(fmt::format("no capture sees lamp {}: it stays where it is", lamp.id));
       continue;

@@ -51,7 +51,7 @@ ZenithTurn turn_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& 
 }
 
 LensFreedom::LensFreedom(const std::vector<double>& intrinsics,
-                         const std::optional<Eigen::MatrixXd>& covariance)
+                         const std::optional<MatrixX>& covariance)
     : start(Eigen::Map<const Eigen::VectorXd>(intrinsics.data(), std::ssize(intrinsics))),
       directions(start.size(), 0) {
   if (!covariance) return;

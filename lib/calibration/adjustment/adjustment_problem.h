@@ -37,8 +37,7 @@ struct LensFreedom {
   Eigen::VectorXd start;
   Eigen::MatrixXd directions;
 
-  LensFreedom(const std::vector<double>& intrinsics,
-              const std::optional<Eigen::MatrixXd>& covariance);
+  LensFreedom(const std::vector<double>& intrinsics, const std::optional<MatrixX>& covariance);
 };
 
 class AdjustmentProblem {

@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-struct Pixel {
+struct CrossingPixel {
   Eigen::Vector2d from_guess;
   double grey;
 };
@@ -25,7 +25,7 @@ struct Crossing {
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 11 };
   using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
 
-  const std::vector<Pixel>& pixels;
+  const std::vector<CrossingPixel>& pixels;
 
   int NumResiduals() const { return static_cast<int>(pixels.size()); }
 
@@ -61,14 +61,14 @@ struct Crossing {
   }
 };
 
-std::vector<Pixel> pixels_around(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
-                                 double radius_px) {
+std::vector<CrossingPixel> pixels_around(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
+                                         double radius_px) {
   const Eigen::Vector2i low = (guess_px.array() - radius_px).ceil().cast<int>().max(0);
   const Eigen::Vector2i high = (guess_px.array() + radius_px)
                                    .floor()
                                    .cast<int>()
                                    .min(Eigen::Array2i(image.cols - 1, image.rows - 1));
-  std::vector<Pixel> pixels;
+  std::vector<CrossingPixel> pixels;
   for (int row = low.y(); row <= high.y(); ++row) {
     for (int column = low.x(); column <= high.x(); ++column) {
       const Eigen::Vector2d from_guess = Eigen::Vector2d(column, row) - guess_px;
@@ -80,7 +80,7 @@ std::vector<Pixel> pixels_around(const cv::Mat1b& image, const Eigen::Vector2d& 
 }
 
 /// Middle and contrast that go with the other parameters.
-void start_levels(const std::vector<Pixel>& pixels, Crossing::Parameters& p) {
+void start_levels(const std::vector<CrossingPixel>& pixels, Crossing::Parameters& p) {
   p[5] = 0;
   p[6] = 1;
   const Crossing crossing{pixels};

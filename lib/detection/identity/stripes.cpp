@@ -107,8 +107,7 @@ double lit_area(const std::vector<double>& signal, double middle) {
 }  // namespace
 
 bool trustworthy(const Stripes& stripes) {
-  constexpr double many = 2.5;
-  return stripes.clarity > kClear && stripes.periods > many;
+  return stripes.clarity > kClear && stripes.periods > kEnoughPeriods;
 }
 
 bool readable(const Stripes& stripes) { return stripes.regular || stripes.clarity > kClear; }

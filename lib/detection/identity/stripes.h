@@ -16,8 +16,8 @@ inline constexpr double kShortestPeriod_lines = 2.2;
 inline constexpr double kLeastContrast = 0.2, kLeastPeriods = 1.3;
 
 /// With fewer periods things that have no stripes look like a lamp now and then: a period that is
-/// seen once or twice is not seen to repeat.
-inline constexpr double kEnoughPeriods = 3;
+/// seen once or twice is hardly seen to repeat.
+inline constexpr double kEnoughPeriods = 2.5;
 
 /// The share of a disc's height whose lines are used: those at the rim are short and dim.
 inline constexpr double kUsedHeight = 0.9;
@@ -47,7 +47,7 @@ struct Stripes {
 };
 
 /// Whether the stripes are clear and many enough for what is measured to be trusted: clarity above
-/// 0.7 and 2.5 periods. Of a lamp that something hides in part they are not.
+/// 0.7 and kEnoughPeriods. Of a lamp that something hides in part they are not.
 bool trustworthy(const Stripes& stripes);
 
 /// Whether the period means anything: the stripes are regular, or clearer than that. Something that

@@ -125,7 +125,7 @@ INSTANTIATE_TEST_SUITE_P(Adjustment, Consistency,
                                          Case{"TapedMapThreePlacesAndLens", 2e-3, 3, true, true},
                                          Case{"SurveyedMapThreePlacesAndLens", 2e-3, 3, true,
                                               false}),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& one) { return one.param.name; });
 
 }  // namespace
 }  // namespace vlp
