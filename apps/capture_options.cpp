@@ -35,6 +35,12 @@ void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {
       ->option_text("rows|columns");
 }
 
+void add_max_mpx_option(CLI::App& app, double& max_mpx) {
+  app.add_option("--max-mpx", max_mpx,
+                 "Skip images of more than so many million pixels, unread (default: 200)")
+      ->check(CLI::Range(0.001, 1e6));
+}
+
 void add_detect_options(CLI::App& app, CaptureOptions& options) {
   app.add_option("--classifier", options.classifier,
                  "Lamp classifier by vlp-train, instead of the map's frequencies");
@@ -44,6 +50,7 @@ void add_detect_options(CLI::App& app, CaptureOptions& options) {
   app.add_option("--exposure-s", options.exposure_s,
                  "Exposure of the images, for the check of the lamp map (default: short)")
       ->check(finite_positive());
+  add_max_mpx_option(app, options.max_mpx);
   app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
 }
@@ -62,7 +69,7 @@ SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
                           options.calibration, options.row_time_s,
                           options.classifier,  options.readout,
                           options.exposure_s,  options.annotate,
-                          options.threads};
+                          options.threads,     options.max_mpx};
   SeenLamps seen;
   {
     Progress progress("images");

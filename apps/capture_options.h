@@ -27,6 +27,7 @@ struct CaptureOptions {
   std::optional<double> row_time_s;
   std::optional<double> exposure_s;
   int threads = all_cores();
+  double max_mpx = kUsualMaxMpx;
 };
 
 /// What --help says of the options that every program has which takes captures of lamps.
@@ -42,7 +43,10 @@ void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTe
 /// Adds --readout rows|columns.
 void add_readout_option(CLI::App& app, std::optional<Readout>& readout);
 
-/// Adds --classifier, --annotate, --readout, --exposure-s and --threads.
+/// Adds --max-mpx.
+void add_max_mpx_option(CLI::App& app, double& max_mpx);
+
+/// Adds --classifier, --annotate, --readout, --exposure-s, --max-mpx and --threads.
 void add_detect_options(CLI::App& app, CaptureOptions& options);
 
 /// What the result depends on: captures, lamp map, calibration, classifier; an empty name is an

@@ -4,7 +4,10 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "geometry/angles.h"
+#include "geometry/median.h"
 
 namespace vlp {
 
@@ -14,6 +17,11 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("views         {} used, {} dropped\n", solution.views.size(), solution.dropped.size());
   fmt::print("corners       {}, {} outliers\n", solution.corners, solution.outliers);
   fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
+  if (std::any_of(solution.edge_shifts_px.begin(), solution.edge_shifts_px.end(),
+                  [](double shift_px) { return shift_px != 0; })) {
+    fmt::print("edges         {:.3f} px towards the dark, taken out\n",
+               upper_median(solution.edge_shifts_px));
+  }
   fmt::print(
       "focal length  {:.2f}, {:.2f} px, sd {:.2f} by noise, {:.2f} by views\n"
       "centre        {:.2f}, {:.2f} px\n",
@@ -22,6 +30,14 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst, at ({:.0f}, {:.0f})\n",
              report.uncertainty_mean_px, report.uncertainty_worst_px,
              report.uncertainty_worst_at.x(), report.uncertainty_worst_at.y());
+  if (report.region_share > 0.999) {
+    fmt::print("board seen    all over the image\n");
+  } else {
+    fmt::print(
+        "board seen    in {:.0f} % of the image, for which the figures are; beyond, uncertainty "
+        "is up to {:.3g} px\n",
+        100 * report.region_share, report.uncertainty_beyond_px);
+  }
   fmt::print("true lens     {:.3f} px rms apart per axis, expected by noise, {:.3f} by views\n",
              report.expected_rms_px, report.expected_by_views_rms_px);
   if (report.halves) {

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -34,6 +35,8 @@ struct Options {
   std::optional<double> row_time_s, pixel_pitch_m;
   int threads = all_cores();
   int held_out = 0;
+  WarpChoice warp = WarpChoice::automatic;
+  double max_mpx = kUsualMaxMpx;
   std::vector<std::string> gates;
 };
 
@@ -50,7 +53,7 @@ Camera known_camera(const Options& options) {
 SeenBoards boards_in(const std::vector<std::filesystem::path>& images, const Board& board,
                      const Options& options) {
   Progress progress("images");
-  return see_boards({images, board, options.board, options.threads, options.cache},
+  return see_boards({images, board, options.board, options.threads, options.cache, options.max_mpx},
                     [&](std::size_t done, std::size_t total) { progress.update(done, total); });
 }
 
@@ -65,6 +68,17 @@ void write_exports(const Options& options, const Camera& camera) {
   if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
 }
 
+/// Throws std::invalid_argument for a format that has no lens model like the one asked for, before
+/// anything is solved or written.
+void check_exports(const Options& options) {
+  Camera camera = known_camera(options);
+  camera.imager_px = {1, 1};
+  camera.intrinsics.assign(parameter_count(camera.lens_model), 1);
+  if (!options.ros.empty()) ros_camera_info(camera);
+  if (!options.kalibr.empty()) kalibr_camchain(camera);
+  if (!options.opencv.empty()) opencv_camera(camera);
+}
+
 /// Those that there are in any case, with the limits of the command line.
 std::vector<Gate> gates_of(const Options& options) {
   return with_changes(lens_gates(), gates_of(options.gates, metric_kinds({MetricSource::lens})));
@@ -72,6 +86,7 @@ std::vector<Gate> gates_of(const Options& options) {
 
 void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = gates_of(options);
+  check_exports(options);
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
@@ -84,29 +99,39 @@ void run(const CLI::App& app, const Options& options) {
   const SeenBoards seen = boards_in(images, board, options);
   tell(seen);
   require(seen);
-  const LensResult lens =
-      solve_lens({seen.views, board, options.board, known_camera(options), options.held_out},
-                 history_entry(app, inputs));
+  const LensResult lens = solve_lens(
+      {seen.views, board, options.board, known_camera(options), options.held_out, options.warp},
+      history_entry(app, inputs));
   tell(lens);
   require(lens);
   write_calibration(options.output, lens.calibration);
   write_exports(options, lens.calibration.camera);
-  write_cameramodel(beside(options.output, ".cameramodel"), lens.solution);
+  if (has_mrcal(lens.calibration.camera.lens_model)) {
+    write_cameramodel(beside(options.output, ".cameramodel"), lens.solution);
+  } else {
+    // One of an earlier run would be of another lens.
+    std::filesystem::remove(beside(options.output, ".cameramodel"));
+  }
   write_corners(beside(options.output, ".corners.vnl"), lens.solution, lens.images);
   if (!options.plot.empty()) draw(options.plot, lens.drawing());
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
   const std::string failed = words_of_missed(check_gates(gates, lens.metrics));
-  if (!failed.empty()) {
+  if (failed.empty()) return;
+  if (std::isfinite(lens.report.uncertainty_worst_px)) {
     throw GateNotMet(fmt::format("{}; add views, next {}", failed, next_view(lens.coverage)));
   }
+  throw GateNotMet(
+      fmt::format("{}; the lens that was found has no rays in part of the image: take "
+                  "another lens model, for a wide lens --lens OPENCV_FISHEYE",
+                  failed));
 }
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("images", options.images, "Images of the board, or folders of them")->required();
   app.add_option("--board", options.board, "The board, board.yaml")->required();
   app.add_option("-o,--output", options.output,
-                 "Where to write the calibration with its camera part; mrcal's .cameramodel and "
-                 ".corners.vnl go beside it")
+                 "Where to write the calibration with its camera part; mrcal's .cameramodel "
+                 "(of lens models that mrcal has) and .corners.vnl go beside it")
       ->required();
   app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
   app.add_option("--lens", options.lens, "Lens model (default: LENSMODEL_OPENCV8)")
@@ -124,10 +149,23 @@ void add_options(CLI::App& app, Options& options) {
                  "Keep every Nth view out of the solve, and say how well the lens fits it")
       ->check(CLI::Range(2, 1000))
       ->option_text("N");
-  app.add_option("--gate", options.gates,
-                 "Change a gate: rms_px=1, uncertainty_px=2 (worst over the image), halves_px=1 "
-                 "(rms, between the lenses of two halves of the views); or ask for coverage")
-      ->option_text("NAME=VALUE ...");
+  app.add_option_function<std::string>(
+         "--warp",
+         [&options](const std::string& name) {
+           options.warp = name == "on"    ? WarpChoice::on
+                          : name == "off" ? WarpChoice::off
+                                          : WarpChoice::automatic;
+         },
+         "Solve for how the board bends (default: auto, when the corners show it)")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->option_text("auto|on|off");
+  app.add_option(
+         "--gate", options.gates,
+         "Change a gate: rms_px=1, uncertainty_px=2 (worst where the board was seen), halves_px=1 "
+         "(rms, between the lenses of two halves of the views), coverage=0.4 (of the image), "
+         "views=6 (that differ), board_tilt_deg=20 (between two views)")
+      ->delimiter(',')
+      ->option_text("NAME=VALUE,...");
   app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
   app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");
   app.add_option("--opencv", options.opencv, "Write the camera for OpenCV, too (FileStorage)");
@@ -140,6 +178,7 @@ void add_options(CLI::App& app, Options& options) {
       });
   app.add_option("--cache", options.cache,
                  "Folder to keep the corners of each image in, for the next time");
+  add_max_mpx_option(app, options.max_mpx);
   app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
 }

@@ -13,6 +13,9 @@ namespace {
 
 constexpr double kSearchedRadiusSquared = Distortion::searched_radius * Distortion::searched_radius;
 
+/// Nearer to the axis a direction away from it is not defined.
+constexpr double kOnAxis = 1e-300;
+
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
 /// d(x/z, y/z) / d(x, y, z).
@@ -39,7 +42,12 @@ Lens::Lens(LensModel model, std::span<const double> parameters) : model_(model) 
   }
   focal_px_ = {parameters[0], parameters[1]};
   center_px_ = {parameters[2], parameters[3]};
-  std::copy(parameters.begin() + 4, parameters.end(), distortion_.k.begin());
+  if (model == LensModel::fisheye) {
+    std::copy(parameters.begin() + 4, parameters.end(), fisheye_.k.begin());
+  } else {
+    std::copy(parameters.begin() + 4, parameters.end(), distortion_.k.begin());
+  }
+  valid_angle_rad_ = model == LensModel::fisheye ? fisheye_.valid_angle_rad() : 0;
   const double radius = distortion_.valid_radius();
   valid_radius_squared_ = radius * radius;
 }
@@ -50,6 +58,14 @@ std::optional<Eigen::Vector2d> Lens::project(const Eigen::Vector3d& x_in_camera)
     const double depth = x_in_camera.norm() + x_in_camera.z();
     if (!(depth > 0)) return std::nullopt;
     plane = x_in_camera.head<2>() * (2 / depth);
+  } else if (model_ == LensModel::fisheye) {
+    const double beside = x_in_camera.head<2>().norm();
+    const double angle_rad = std::atan2(beside, x_in_camera.z());
+    if (!x_in_camera.allFinite() || !(angle_rad <= valid_angle_rad_) ||
+        !(beside > 0 || x_in_camera.z() > 0)) {
+      return std::nullopt;
+    }
+    plane = x_in_camera.head<2>() * (fisheye_.distance(angle_rad) / std::max(beside, kOnAxis));
   } else {
     const Eigen::Vector2d z = x_in_camera.head<2>() / x_in_camera.z();
     if (!(x_in_camera.z() > 0) || !(z.squaredNorm() <= valid_radius_squared_)) return std::nullopt;
@@ -75,6 +91,23 @@ std::optional<Lens::Projection> Lens::project_with_jacobians(
     const Eigen::Vector2d plane = x_in_camera.head<2>() * scale;
     const Eigen::Vector3d d_depth = x_in_camera / norm + Eigen::Vector3d::UnitZ();
     result.d_pixel_d_point = scale * (Matrix23::Identity() - plane / 2 * d_depth.transpose());
+  } else if (model_ == LensModel::fisheye) {
+    const Eigen::Vector2d xy = x_in_camera.head<2>();
+    const double beside = xy.norm(), squared_norm = x_in_camera.squaredNorm();
+    const double angle_rad = std::atan2(beside, x_in_camera.z());
+    const double slope = fisheye_.slope(angle_rad);
+    const bool on_axis = beside <= kOnAxis;
+    const double scale = on_axis ? 1 / x_in_camera.z() : fisheye_.distance(angle_rad) / beside;
+    const Eigen::Vector2d way = on_axis ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(xy / beside);
+    result.d_pixel_d_point.leftCols<2>() =
+        scale * Eigen::Matrix2d::Identity() +
+        (slope * x_in_camera.z() / squared_norm - scale) * way * way.transpose();
+    result.d_pixel_d_point.col(2) = xy * (-slope / squared_norm);
+    double power = angle_rad;
+    for (int i = 0; i < 4; ++i) {
+      power *= angle_rad * angle_rad;
+      result.d_pixel_d_parameters.col(4 + i) = focal_px_.cwiseProduct(way) * power;
+    }
   } else {
     const double inverse_depth = 1 / x_in_camera.z();
     const Eigen::Vector2d z = x_in_camera.head<2>() * inverse_depth;
@@ -127,6 +160,24 @@ std::optional<Eigen::Vector2d> Lens::undistort(const Eigen::Vector2d& distorted,
   return std::nullopt;
 }
 
+std::optional<Lens::Ray> Lens::unproject_fisheye(const Eigen::Vector2d& plane) const {
+  const double distance = plane.norm();
+  const auto angle_rad = fisheye_.angle_rad(distance, valid_angle_rad_);
+  if (!angle_rad) return std::nullopt;
+  const double sine = std::sin(*angle_rad), cosine = std::cos(*angle_rad);
+  const bool on_axis = distance <= kOnAxis;
+  const Eigen::Vector2d way = on_axis ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(plane / distance);
+  const double across = on_axis ? 1 : sine / distance;
+  Ray ray;
+  ray.direction << across * plane, cosine;
+  const double slope = fisheye_.slope(*angle_rad);
+  ray.d_direction_d_pixel.topRows<2>() =
+      across * Eigen::Matrix2d::Identity() + (cosine / slope - across) * way * way.transpose();
+  ray.d_direction_d_pixel.row(2) = -sine / slope * way.transpose();
+  ray.d_direction_d_pixel *= focal_px_.cwiseInverse().asDiagonal();
+  return ray;
+}
+
 std::optional<Lens::Ray> Lens::unproject(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector2d plane = (pixel - center_px_).cwiseQuotient(focal_px_);
   if (!plane.allFinite()) return std::nullopt;
@@ -138,6 +189,7 @@ std::optional<Lens::Ray> Lens::unproject(const Eigen::Vector2d& pixel) const {
     ray.d_direction_d_pixel << d_plane_d_pixel, -plane.transpose() / 2 * d_plane_d_pixel;
     return ray;
   }
+  if (model_ == LensModel::fisheye) return unproject_fisheye(plane);
   if (model_ == LensModel::pinhole) {
     ray.direction << plane, 1;
     ray.d_direction_d_pixel << d_plane_d_pixel, 0, 0;

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "distortion.h"
+#include "fisheye.h"
 #include "lens_model.h"
 
 namespace vlp {
@@ -14,8 +15,9 @@ namespace vlp {
 /// A lens: camera rays to pixels and back. The centre of the top-left pixel is (0, 0).
 ///   OPENCVn, PINHOLE   pixel = f * distorted(x/z, y/z) + c       (Distortion; none for PINHOLE)
 ///   STEREOGRAPHIC      pixel = f * 2 (x, y) / (|p| + z) + c
-/// with f = (fx, fy), c = (cx, cy). These are mrcal's LENSMODEL_... of the same names (mrcal
-/// documentation, "Lens models"). Built once; const and safe to share between threads.
+///   OPENCV_FISHEYE     pixel = f * d(a) (x, y) / |(x, y)| + c,  a = atan2(|(x, y)|, z)  (Fisheye)
+/// with f = (fx, fy), c = (cx, cy). All but the last are mrcal's LENSMODEL_... of the same names
+/// (mrcal documentation, "Lens models"). Built once; const and safe to share between threads.
 class Lens {
  public:
   /// `parameters` in mrcal's order. Throws std::invalid_argument when their number is not
@@ -29,8 +31,8 @@ class Lens {
   const Eigen::Vector2d& center_px() const { return center_px_; }
 
   /// The pixel of a point (any length unit but zero). Nothing for a point that the lens model
-  /// does not describe: at or behind the camera's plane z = 0 (STEREOGRAPHIC: straight behind),
-  /// beyond Distortion::valid_radius, or not finite.
+  /// does not describe: at or behind the camera's plane z = 0 (STEREOGRAPHIC, OPENCV_FISHEYE:
+  /// straight behind), beyond Distortion::valid_radius or Fisheye::valid_angle_rad, or not finite.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const;
 
   struct Projection {
@@ -43,7 +45,8 @@ class Lens {
   std::optional<Projection> project_with_jacobians(const Eigen::Vector3d& x_in_camera) const;
 
   struct Ray {
-    /// Not of unit length: z = 1 but for STEREOGRAPHIC, where z <= 1 and may be negative.
+    /// Not of unit length: z = 1 but for STEREOGRAPHIC and OPENCV_FISHEYE, where z <= 1 and may be
+    /// negative.
     Eigen::Vector3d direction;
     Eigen::Matrix<double, 3, 2> d_direction_d_pixel;
   };
@@ -57,11 +60,15 @@ class Lens {
   std::optional<Eigen::Vector2d> undistort(const Eigen::Vector2d& distorted,
                                            Eigen::Matrix2d& d_distorted_d_z) const;
 
+  std::optional<Ray> unproject_fisheye(const Eigen::Vector2d& plane) const;
+
   LensModel model_;
   Eigen::Vector2d focal_px_;
   Eigen::Vector2d center_px_;
   Distortion distortion_;
   double valid_radius_squared_;
+  Fisheye fisheye_;
+  double valid_angle_rad_;
 };
 
 }  // namespace vlp

@@ -14,12 +14,13 @@ struct Entry {
 };
 
 // In the order of the enumeration.
-constexpr std::array<Entry, 6> kModels{{{LensModel::pinhole, "LENSMODEL_PINHOLE", 4},
+constexpr std::array<Entry, 7> kModels{{{LensModel::pinhole, "LENSMODEL_PINHOLE", 4},
                                         {LensModel::stereographic, "LENSMODEL_STEREOGRAPHIC", 4},
                                         {LensModel::opencv4, "LENSMODEL_OPENCV4", 8},
                                         {LensModel::opencv5, "LENSMODEL_OPENCV5", 9},
                                         {LensModel::opencv8, "LENSMODEL_OPENCV8", 12},
-                                        {LensModel::opencv12, "LENSMODEL_OPENCV12", 16}}};
+                                        {LensModel::opencv12, "LENSMODEL_OPENCV12", 16},
+                                        {LensModel::fisheye, "OPENCV_FISHEYE", 8}}};
 
 const Entry& entry_of(LensModel model) { return kModels[static_cast<std::size_t>(model)]; }
 

@@ -9,20 +9,22 @@
 
 namespace vlp {
 
-/// The lens models of mrcal that the toolbox evaluates itself. Parameters stand in mrcal's order:
-///   fx fy cx cy  then, for OPENCVn, the first n of  k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
-enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv12 };
+/// The lens models that the toolbox evaluates itself: those of mrcal, with their parameters in
+/// mrcal's order,
+///   fx fy cx cy  then, for OPENCVn, the first n of  k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4,
+/// and OPENCV_FISHEYE, which mrcal does not have:  fx fy cx cy k1 k2 k3 k4  (camera/fisheye.h).
+enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv12, fisheye };
 
-/// mrcal's name, for example "LENSMODEL_OPENCV8".
+/// mrcal's name, for example "LENSMODEL_OPENCV8", or "OPENCV_FISHEYE".
 std::string_view name_of(LensModel model);
 
-/// The model of that name; nothing when the name is not one of the six.
+/// The model of that name; nothing when the name is not one of the seven.
 std::optional<LensModel> lens_model_from_name(std::string_view name);
 
 /// Every name, separated by commas, for messages.
 std::string lens_model_names();
 
-/// Focal lengths, centre and distortion together: 4, 4, 8, 9, 12 or 16.
+/// Focal lengths, centre and distortion together: 4, 4, 8, 9, 12, 16 or 8.
 std::size_t parameter_count(LensModel model);
 
 }  // namespace vlp

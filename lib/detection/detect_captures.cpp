@@ -20,7 +20,7 @@ struct CaptureOutcome {
 
 CaptureOutcome outcome_of(const LampDetector& detector, const std::filesystem::path& file,
                           const DetectRun& run) {
-  const ImageLights found = detect_image(detector, file, run.imager_px);
+  const ImageLights found = detect_image(detector, file, run.imager_px, run.max_mpx);
   CaptureOutcome outcome;
   outcome.refused = found.refused;
   if (!outcome.refused.empty()) return outcome;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
+#include "detection/image_file.h"
 #include "detection/lamp_detector.h"
 
 namespace vlp {
@@ -32,6 +33,8 @@ struct DetectRun {
   std::optional<std::array<int, 2>> imager_px = std::nullopt;
   /// A folder that is there, for pictures of what was found in each image, see annotated().
   std::optional<std::filesystem::path> annotate = std::nullopt;
+  /// Larger images are refused unread.
+  double max_mpx = kUsualMaxMpx;
 };
 
 /// Detects in each image. An image that cannot be used is refused and does not end it; a picture

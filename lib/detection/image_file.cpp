@@ -8,7 +8,9 @@
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 
+#include "detection/image_header.h"
 #include "rig/input_error.h"
+#include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
@@ -22,6 +24,19 @@ bool is_cut_jpeg(const std::string& bytes) {
   if (!bytes.starts_with("\xff\xd8")) return false;
   const auto scan = bytes.rfind("\xff\xda"), end = bytes.rfind("\xff\xd9");
   return scan == std::string::npos || end == std::string::npos || end < scan + marker;
+}
+
+void check_size(const fs::path& file, const std::string& bytes, double max_mpx) {
+  const auto size = size_in_header(bytes);
+  if (!size) return;
+  constexpr double million = 1e6;
+  const auto [width, height] = *size;
+  if (static_cast<double>(width) * static_cast<double>(height) <= max_mpx * million) return;
+  throw InputError(
+      file, "is " + std::to_string(width) + " x " + std::to_string(height) + " px, more than the " +
+                shortest(max_mpx) +
+                " million that are allowed; --max-mpx of vlp-detect and vlp-intrinsics "
+                "allows more");
 }
 
 }  // namespace
@@ -54,11 +69,12 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   return images;
 }
 
-cv::Mat read_image(const fs::path& file) {
+cv::Mat read_image(const fs::path& file, double max_mpx) {
   std::ifstream stream(file, std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   if (bytes.empty()) throw InputError(file, "cannot be read as an image");
   if (is_cut_jpeg(bytes)) throw InputError(file, "cannot be read as an image: it is cut short");
+  check_size(file, bytes, max_mpx);
   cv::Mat image;
   try {
     image =

@@ -16,8 +16,12 @@ bool is_image_name(const std::filesystem::path& file);
 /// folder or holds none.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
 
+/// Larger images than this are taken for a mistake: decoded they fill gigabytes.
+inline constexpr double kUsualMaxMpx = 200;
+
 /// An image as grey levels of 8 or 16 bits; colour is converted, and a turn that the file asks for
-/// is not made, because the shutter does not turn. Throws InputError for what is no image.
-cv::Mat read_image(const std::filesystem::path& file);
+/// is not made, because the shutter does not turn. Throws InputError for what is no image, and,
+/// before it is decoded, for what its header says is larger than so many million pixels.
+cv::Mat read_image(const std::filesystem::path& file, double max_mpx = kUsualMaxMpx);
 
 }  // namespace vlp

@@ -64,6 +64,9 @@ std::string intrinsics_table(const IntrinsicsReport& report) {
     table.rows.push_back({"worst uncertainty of the projection, one standard deviation",
                           significant(*report.uncertainty_px, 3) + " px"});
   }
+  if (!report.region_px.empty()) {
+    table.rows.push_back({"known", "where the board was seen, region_px; elsewhere not"});
+  }
   if (report.board_warp_m) {
     const auto& [x_m, y_m] = *report.board_warp_m;
     table.rows.push_back({"deflection of the board along x, y",

@@ -90,6 +90,13 @@ IntrinsicsReport read_intrinsics_report(YamlMap map, std::size_t intrinsics) {
   if (const auto value = map.optional("covariance")) {
     report.covariance = read_joint_covariance(*value, intrinsics);
   }
+  if (const auto value = map.optional("region_px")) {
+    for (const YamlValue& corner : value->list()) {
+      const auto pixel = corner.numbers(2);
+      report.region_px.emplace_back(pixel[0], pixel[1]);
+    }
+    if (report.region_px.size() < 3) throw value->error("should have three corners or more");
+  }
   map.finish();
   return report;
 }

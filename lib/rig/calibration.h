@@ -39,11 +39,13 @@ struct IntrinsicsReport {
   double rms_px;
   /// Deflection of the board's centre from flat, along x and y (mrcal's calobject_warp).
   std::optional<std::array<double, 2>> board_warp_m;
-  /// Worst standard deviation of a projection over the image. Infinite where the lens has no ray;
+  /// Worst standard deviation of a projection over the region. Infinite where the lens has no ray;
   /// that is not written.
   std::optional<double> uncertainty_px;
   /// Of the intrinsics, in their order.
   std::optional<MatrixX> covariance = {};
+  /// Where the lens is known, a convex polygon of three corners or more; empty: all over the image.
+  std::vector<Eigen::Vector2d> region_px = {};
 };
 
 /// How the rotation centre is applied (Chen and Guan, section 3.1, and theory of the same):

@@ -60,6 +60,13 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
     emit_number(out, "uncertainty_px", *report.uncertainty_px);
   }
   if (report.covariance) emit_joint_covariance(out, *report.covariance);
+  if (!report.region_px.empty()) {
+    out << YAML::Key << "region_px" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+    for (const Eigen::Vector2d& corner : report.region_px) {
+      emit_row(out, std::array{corner.x(), corner.y()});
+    }
+    out << YAML::EndSeq;
+  }
   out << YAML::EndMap;
 }
 

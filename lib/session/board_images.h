@@ -21,6 +21,8 @@ struct BoardImages {
   int threads = 1;
   /// Folder of what was found in images before, see corner_cache(); may be empty.
   std::filesystem::path cache = {};
+  /// Larger images are refused unread.
+  double max_mpx = kUsualMaxMpx;
 };
 
 /// The board in each image that can be used, in their order.

@@ -11,7 +11,6 @@
 
 #include "detection/detect_captures.h"
 #include "detection/identity/lamp_map_check.h"
-#include "detection/image_file.h"
 #include "detection/readout.h"
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"
@@ -23,9 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Nothing for what is no image: it is reported when the lights are looked for.
-cv::Mat image_or_nothing(const fs::path& file) {
+cv::Mat image_or_nothing(const fs::path& file, double max_mpx) {
   try {
-    return read_image(file);
+    return read_image(file, max_mpx);
   } catch (const InputError&) {
     return {};
   }
@@ -146,10 +145,10 @@ void check_lamps(std::span<const Frame> frames, const LampMap& lamps, const fs::
 }
 
 Readout readout_of(std::span<const fs::path> images, const std::optional<Readout>& stated,
-                   StepResult& result) {
+                   StepResult& result, double max_mpx) {
   if (stated) return *stated;
-  const auto found =
-      find_readout(images.size(), [&](std::size_t i) { return image_or_nothing(images[i]); });
+  const auto found = find_readout(
+      images.size(), [&](std::size_t i) { return image_or_nothing(images[i], max_mpx); });
   if (!found) {
     result.warnings.emplace_back(
         "the read-out is not stated and the images do not show it: rows are taken; --readout "
@@ -175,12 +174,13 @@ SeenLamps see_lamps(const LampImages& input, const StepProgress& progress) {
   const auto images = images_in(input.folder);
   cv::setNumThreads(1);  // the images themselves go in parallel
   DetectRun run{input.threads};
+  run.max_mpx = input.max_mpx;
   std::optional<Readout> stated = input.readout;
   if (input.camera) {
     run.imager_px = input.camera->camera.imager_px;
     if (!stated) stated = input.camera->camera.readout;
   }
-  camera.readout = readout_of(images, stated, seen);
+  camera.readout = readout_of(images, stated, seen, input.max_mpx);
   if (!classifier) warn_of_map(input, camera, seen.warnings);
   if (!input.annotate.empty()) run.annotate = picture_folder(input);
   CaptureDetections found = detect_captures(

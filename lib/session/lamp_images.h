@@ -10,6 +10,7 @@
 
 #include "captures/detections_table.h"
 #include "detection/detect_lights.h"
+#include "detection/image_file.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 #include "session/step_result.h"
@@ -36,6 +37,8 @@ struct LampImages {
   std::filesystem::path annotate = {};
   /// Images at a time.
   int threads = 1;
+  /// Larger images are refused unread.
+  double max_mpx = kUsualMaxMpx;
 };
 
 /// The lamps in each image that can be used.
@@ -54,7 +57,8 @@ SeenLamps see_lamps(const LampImages& input, const StepProgress& progress = {});
 /// Along what the shutter reads: as `stated`, or else as the images show; a note, or a warning when
 /// not even they tell and rows are taken, goes to `result`.
 Readout readout_of(std::span<const std::filesystem::path> images,
-                   const std::optional<Readout>& stated, StepResult& result);
+                   const std::optional<Readout>& stated, StepResult& result,
+                   double max_mpx = kUsualMaxMpx);
 
 /// Throws InputError when no lamp has a frequency.
 void check_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);

@@ -4,15 +4,52 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
+#include "geometry/angles.h"
+#include "geometry/median.h"
 #include "report/plots/calibration_plots.h"
 #include "rig/stage.h"
 
 namespace vlp {
 namespace {
+
+std::string too_few(const SeenBoard& seen) {
+  std::string words = fmt::format("only {} tags of the board can be used", seen.tags.size());
+  if (2 * seen.overexposed > seen.unusable) {
+    words += fmt::format(", around {} more white is overexposed and runs over the corners",
+                         seen.overexposed);
+  } else if (seen.unusable > 0) {
+    words += fmt::format(", {} more are blurred, hidden or cut", seen.unusable);
+  }
+  return words;
+}
+
+/// Whether two views show the board in the same place: what both show is 1 % of the image's width
+/// apart, rms, or less, and neither shows much that the other does not.
+bool alike(const BoardView& a, const BoardView& b) {
+  constexpr double near = 0.01, shared = 0.7;
+  double squares = 0, common = 0;
+  auto other = b.seen.tags.begin();  // both by id
+  for (const SeenTag& tag : a.seen.tags) {
+    while (other != b.seen.tags.end() && other->id < tag.id) ++other;
+    if (other == b.seen.tags.end()) break;
+    if (other->id != tag.id) continue;
+    ++common;
+    for (std::size_t k = 0; k < 4; ++k) {
+      squares += (tag.corners_px[k] - other->corners_px[k]).squaredNorm() / 4;
+    }
+  }
+  const auto most = static_cast<double>(std::max(a.seen.tags.size(), b.seen.tags.size()));
+  return common >= shared * most && std::sqrt(squares / common) <= near * a.imager_px[0];
+}
+
+/// A region of more of the image than this is all of it.
+constexpr double kWhole = 0.999;
 
 /// The views that can be used, apart from those that are held out.
 struct Sorted {
@@ -20,16 +57,27 @@ struct Sorted {
 };
 
 Sorted sorted(const LensInput& input, LensResult& result) {
-  const IntrinsicsInput none{
-      BoardLattice(input.board), {}, input.views.front().imager_px, input.camera.lens_model};
+  const IntrinsicsInput none{BoardLattice(input.board),
+                             {},
+                             input.views.front().imager_px,
+                             input.camera.lens_model,
+                             input.warp};
   Sorted sorted{none, none};
   int usable = 0;
+  std::vector<const BoardView*> different;
   for (const BoardView& view : input.views) {
     if (!none.lattice.enough(view.seen)) {
-      result.skipped.push_back({view.image, fmt::format("only {} tags of the board can be used",
-                                                        view.seen.tags.size())});
+      result.skipped.push_back({view.image, too_few(view.seen)});
       continue;
     }
+    const auto like = std::find_if(different.begin(), different.end(),
+                                   [&](const BoardView* other) { return alike(view, *other); });
+    if (like != different.end()) {
+      result.skipped.push_back(
+          {view.image, "shows the board where " + (*like)->image + " does: the two count as one"});
+      continue;
+    }
+    different.push_back(&view);
     const bool held_out = input.held_out > 0 && ++usable % input.held_out == 0;
     auto& part = held_out ? sorted.held_out : sorted.solved;
     part.views.push_back(none.lattice.corners(view.seen));
@@ -41,21 +89,43 @@ Sorted sorted(const LensInput& input, LensResult& result) {
 IntrinsicsReport report_of(const LensResult& result, const IntrinsicsInput& input) {
   const IntrinsicsSolution& solution = result.solution;
   const MatrixX covariance = ProjectionUncertainty(solution).intrinsics_covariance();
-  const Eigen::Vector2d warp_m =
-      solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
+  std::optional<std::array<double, 2>> board_warp_m;
+  if (solution.solved_for.warp) {
+    const Eigen::Vector2d warp_m =
+        solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
+    board_warp_m = {warp_m.x(), warp_m.y()};
+  }
   return {static_cast<int>(solution.views.size()),
           solution.corners,
           solution.outliers,
           solution.rms_px,
-          std::array{warp_m.x(), warp_m.y()},
+          board_warp_m,
           result.report.uncertainty_worst_px,
-          covariance.allFinite() ? std::optional(covariance) : std::nullopt};
+          covariance.allFinite() ? std::optional(covariance) : std::nullopt,
+          result.report.region_share > kWhole ? ImageRegion() : result.report.region};
 }
 
 Camera camera_of(Camera camera, const BoardProblem& problem) {
   camera.imager_px = problem.imager_px;
   camera.intrinsics = problem.intrinsics;
   return camera;
+}
+
+/// Why no lens of the model fits: the model, if another one does.
+std::string why_none_fits(IntrinsicsInput input) {
+  const LensModel wanted = input.lens_model;
+  std::string words;
+  double best_px = 2;  // more is no fit
+  for (const LensModel other : {LensModel::opencv4, LensModel::opencv8, LensModel::fisheye}) {
+    if (other == wanted) continue;
+    input.lens_model = other;
+    const IntrinsicsSolution solution = solve_intrinsics(input);
+    if (!solution.ok() || solution.rms_px >= best_px) continue;
+    best_px = solution.rms_px;
+    words = fmt::format("{} cannot be this lens, but {} fits to {:.2f} px: take --lens {}",
+                        name_of(wanted), name_of(other), solution.rms_px, name_of(other));
+  }
+  return words;
 }
 
 }  // namespace
@@ -71,9 +141,11 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
   result.solution = solve_intrinsics(views.solved);
   const IntrinsicsSolution& solution = result.solution;
   if (!solution.ok()) {
+    std::string why;
+    if (solution.status == IntrinsicsStatus::no_solution) why = why_none_fits(views.solved);
+    if (why.empty()) why = explanation_of(solution.status);
     result.fail(StepFailure::undetermined,
-                fmt::format("{} views with the board: {}", views.solved.views.size(),
-                            explanation_of(solution.status)));
+                fmt::format("{} views with the board: {}", views.solved.views.size(), why));
     return result;
   }
   for (const auto& [view, rms_px] : solution.dropped) {
@@ -81,7 +153,8 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
         "{}: fits no pose that goes with the other views ({:.1f} px are left over); dropped",
         result.images[view], rms_px));
   }
-  const BoardCheck exact = check_board(input.board, input.views, solution.lens());
+  const BoardCheck exact =
+      check_board(input.board, input.views, solution.lens(), upper_median(solution.edge_shifts_px));
   if (!exact.problem.empty()) {
     result.fail(StepFailure::wrong_board, exact.problem, input.board_file);
     return result;
@@ -91,16 +164,27 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
   result.held_out = held_out_fit(solution, views.held_out);
   result.calibration = with_camera(camera_of(input.camera, solution.problem),
                                    report_of(result, views.solved), std::move(entry));
-  result.metrics = {{"rms_px", solution.rms_px},
-                    {"uncertainty_px", result.report.uncertainty_worst_px},
-                    {"coverage", result.coverage.share}};
-  if (result.report.halves) result.metrics.push_back({"halves_px", result.report.halves->rms_px});
+  result.metrics = lens_metrics(solution, result.report, result.coverage);
   const std::string title =
       fmt::format("{}, {}", input.camera.id, name_of(input.camera.lens_model));
   result.drawing = [title, solution] { return drawing_of(plot_of(title, solution)); };
   return result;
 }
 
-std::vector<Gate> lens_gates() { return {{"rms_px", 1}, {"uncertainty_px", 2}, {"halves_px", 1}}; }
+std::vector<Metric> lens_metrics(const IntrinsicsSolution& solution,
+                                 const CalibrationReport& report, const ViewCoverage& coverage) {
+  std::vector<Metric> metrics{{"rms_px", solution.rms_px},
+                              {"uncertainty_px", report.uncertainty_worst_px},
+                              {"coverage", coverage.share},
+                              {"views", static_cast<double>(solution.views.size())},
+                              {"board_tilt_deg", deg_from_rad(coverage.tilt_rad)}};
+  if (report.halves) metrics.push_back({"halves_px", report.halves->rms_px});
+  return metrics;
+}
+
+std::vector<Gate> lens_gates() {
+  return {{"rms_px", 1},     {"uncertainty_px", 2}, {"halves_px", 1},
+          {"coverage", 0.4}, {"views", 6},          {"board_tilt_deg", 20}};
+}
 
 }  // namespace vlp

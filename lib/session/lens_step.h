@@ -25,6 +25,7 @@ struct LensInput {
   Camera camera;
   /// Every so many-th view is kept out of the solve, to say how well the lens fits it; 0: none.
   int held_out = 0;
+  WarpChoice warp = WarpChoice::automatic;
 };
 
 struct LensResult : StepResult {
@@ -36,14 +37,20 @@ struct LensResult : StepResult {
   std::vector<std::string> images;
 };
 
-/// The lens from views of the board, and how far it can be trusted. Metrics: rms_px,
-/// uncertainty_px, halves_px, coverage. Throws std::invalid_argument for a board without enough
-/// rows and columns (BoardLattice). wrong_board, undetermined. Precondition: there is a view.
+/// The lens from views of the board, and how far it can be trusted; views that are alike count as
+/// one. Metrics: lens_metrics().
+/// Throws std::invalid_argument for a board without enough rows and columns (BoardLattice).
+/// wrong_board, undetermined. Precondition: there is a view.
 LensResult solve_lens(const LensInput& input, HistoryEntry entry);
+
+/// rms_px, uncertainty_px, halves_px, coverage, views, board_tilt_deg.
+std::vector<Metric> lens_metrics(const IntrinsicsSolution& solution,
+                                 const CalibrationReport& report, const ViewCoverage& coverage);
 
 /// What a lens has to reach unless other limits are asked for, by what was seen on rendered and
 /// real boards of 800 to 4000 px: more rms_px than 1 means blurred images or the wrong lens model,
-/// more uncertainty_px than 2 or halves_px than 1 too few views, too much alike.
+/// more uncertainty_px than 2 or halves_px than 1 too few views, too much alike; a board that was
+/// seen in less of the image, in fewer places, or less tilted leaves what no figure shows.
 std::vector<Gate> lens_gates();
 
 }  // namespace vlp

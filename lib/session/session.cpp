@@ -144,9 +144,10 @@ class SessionRun {
       return names;
     };
     std::vector<StepOutputs> steps;
-    steps.push_back({"lens", session_.camera()
-                                 ? std::vector<std::string>()
-                                 : with_picture({"lens.yaml", "lens.cameramodel"}, "lens.svg")});
+    std::vector<std::string> lens{"lens.yaml"};
+    if (has_mrcal(options_.lens_model)) lens.emplace_back("lens.cameramodel");
+    steps.push_back(
+        {"lens", session_.camera() ? std::vector<std::string>() : with_picture(lens, "lens.svg")});
     steps.push_back({"row-time", std::vector<std::string>{"camera.yaml"}});
     steps.push_back({"rotation", with_picture({"rotated.yaml"}, "rotation.svg")});
     steps.push_back({"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")});
@@ -273,7 +274,9 @@ class SessionRun {
                      history(camera_options(), {session_.board(), session_.boards()}));
       lens.skipped.insert(lens.skipped.begin(), seen.skipped.begin(), seen.skipped.end());
       return Work{lens, [this, lens] {
-                    write_cameramodel(out("lens.cameramodel"), lens.solution);
+                    if (has_mrcal(lens.calibration.camera.lens_model)) {
+                      write_cameramodel(out("lens.cameramodel"), lens.solution);
+                    }
                     write_picture(lens, "lens.svg");
                     write_calibration(out("lens.yaml"), lens.calibration);
                   }};

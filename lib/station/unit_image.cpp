@@ -49,7 +49,7 @@ std::string board_refusal(const SeenBoard& seen, const ImageBlur& blur,
     return std::isinf(blur.sigma_px) ? "no contrast"
                                      : fmt::format("blurred: {:.1f} px", blur.sigma_px);
   }
-  if (seen.tags.empty() && seen.foreign > 0) return "tags of another board";
+  if (seen.tags.empty() && !seen.foreign.empty()) return "tags of another board";
   if (seen.tags.empty()) return "no tags of the board";
   if (seen.tags.size() < least_tags) return fmt::format("only {} tags", seen.tags.size());
   return "";
@@ -64,7 +64,7 @@ UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& 
     if (std::isfinite(blur.sigma_px)) result.blur_px = blur.sigma_px;
     BoardView view{file.filename().string(), {image.cols, image.rows}, detector.detect(image)};
     result.refused = board_refusal(view.seen, blur, config);
-    if (!view.seen.tags.empty() || view.seen.foreign > 0) result.view = std::move(view);
+    if (!view.seen.tags.empty() || !view.seen.foreign.empty()) result.view = std::move(view);
   });
 }
 

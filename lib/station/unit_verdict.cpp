@@ -54,7 +54,7 @@ void add_problems(const Unit& unit, StationStep step, std::vector<std::string>& 
 /// Whether most of the board images show another board.
 bool other_board(const UnitStep& boards) {
   const auto other = std::count_if(boards.images.begin(), boards.images.end(), [](const auto& i) {
-    return i.second.view && i.second.view->seen.foreign > 0;
+    return i.second.view && !i.second.view->seen.foreign.empty();
   });
   return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
 }

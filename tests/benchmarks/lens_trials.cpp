@@ -56,9 +56,7 @@ void try_set(int set, Counts& counts) {
     return;
   }
   const CalibrationReport report = report_on(solution, input);
-  std::vector<Metric> metrics{{"rms_px", solution.rms_px},
-                              {"uncertainty_px", report.uncertainty_worst_px}};
-  if (report.halves) metrics.push_back({"halves_px", report.halves->rms_px});
+  const auto metrics = lens_metrics(solution, report, coverage_of(solution, input));
   if (!words_of_missed(check_gates(lens_gates(), metrics)).empty()) {
     ++counts.refused;
     return;

@@ -32,11 +32,11 @@ TEST(LensModelNames, AreReadExactly) {
 TEST(LensModelNames, AreAllListedForMessages) {
   EXPECT_EQ(lens_model_names(),
             "LENSMODEL_PINHOLE, LENSMODEL_STEREOGRAPHIC, LENSMODEL_OPENCV4, LENSMODEL_OPENCV5, "
-            "LENSMODEL_OPENCV8, LENSMODEL_OPENCV12");
+            "LENSMODEL_OPENCV8, LENSMODEL_OPENCV12, OPENCV_FISHEYE");
 }
 
 TEST(LensModelParameters, AreAsManyAsMrcals) {
-  for (const LensModel model : kEveryModel) {
+  for (const LensModel model : kMrcalModels) {
     const std::vector<double> parameters(parameter_count(model), 1.0);
     EXPECT_NO_THROW(oracle_of(model, parameters)) << name_of(model);
     EXPECT_ANY_THROW(oracle_of(model, std::vector<double>(parameters.size() + 1, 1.0)));

@@ -85,10 +85,10 @@ TEST(Lens, SaysHowManyParametersItTakes) {
                                  testing::HasSubstr("9"))));
 }
 
-TEST(Lens, SeesNothingBehindItButForTheStereographic) {
+TEST(Lens, SeesNothingBehindItButForTheWide) {
   for (const LensModel model : kEveryModel) {
     const Lens lens = plain_lens(model);
-    const bool all_round = model == LensModel::stereographic;
+    const bool all_round = model == LensModel::stereographic || model == LensModel::fisheye;
     for (const Vector3d& point : {Vector3d(0.1, 0.2, -1), Vector3d(1, 0, 0), Vector3d(1, 2, -1)}) {
       EXPECT_EQ(lens.project(point).has_value(), all_round) << name_of(model);
       EXPECT_EQ(lens.project_with_jacobians(point).has_value(), all_round) << name_of(model);

@@ -22,8 +22,19 @@ constexpr double kBounds[][2] = {{-0.35, 0.2},  {-0.1, 0.2},   {-2e-3, 2e-3}, {-
 
 std::vector<double> random_parameters(LensModel model, Random& random) {
   for (;;) {
-    std::vector<double> parameters{random.uniform(300, 900), random.uniform(300, 900),
-                                   random.uniform(350, 450), random.uniform(250, 350)};
+    std::vector<double> parameters(4);
+    for (std::size_t i = 0; i < 4; ++i) {
+      constexpr double bounds[][2] = {{300, 900}, {300, 900}, {350, 450}, {250, 350}};
+      parameters[i] = random.uniform(bounds[i][0], bounds[i][1]);
+    }
+    if (model == LensModel::fisheye) {
+      for (const double bound : {0.05, 0.02, 0.01, 0.002}) {
+        parameters.push_back(random.uniform(-bound, bound));
+      }
+      const Fisheye fisheye{{parameters[4], parameters[5], parameters[6], parameters[7]}};
+      if (fisheye.valid_angle_rad() > 1.7) return parameters;
+      continue;
+    }
     Distortion distortion;
     for (std::size_t i = 0; i + 4 < parameter_count(model); ++i) {
       distortion.k[i] = random.uniform(kBounds[i][0], kBounds[i][1]);

@@ -19,9 +19,12 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // For GoogleTest, which looks for it next to the type.
 inline void PrintTo(LensModel model, std::ostream* out) { *out << name_of(model); }
 
-inline constexpr LensModel kEveryModel[] = {LensModel::pinhole, LensModel::stereographic,
-                                            LensModel::opencv4, LensModel::opencv5,
-                                            LensModel::opencv8, LensModel::opencv12};
+inline constexpr LensModel kMrcalModels[] = {LensModel::pinhole, LensModel::stereographic,
+                                             LensModel::opencv4, LensModel::opencv5,
+                                             LensModel::opencv8, LensModel::opencv12};
+inline constexpr LensModel kEveryModel[] = {
+    LensModel::pinhole, LensModel::stereographic, LensModel::opencv4, LensModel::opencv5,
+    LensModel::opencv8, LensModel::opencv12,      LensModel::fisheye};
 inline constexpr LensModel kOpencvModels[] = {LensModel::opencv4, LensModel::opencv5,
                                               LensModel::opencv8, LensModel::opencv12};
 

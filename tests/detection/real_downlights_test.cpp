@@ -82,7 +82,7 @@ Identified identified(const fs::path& data, const Picture& picture) {
 }
 
 TEST_F(RealDownlights, AreIdentified) {
-  const Identified found = identified(data, read_image);
+  const Identified found = identified(data, [](const fs::path& file) { return read_image(file); });
   EXPECT_EQ(found.wrong, 0);
   EXPECT_GE(found.lamps, 24);  // measured: 25, all of them
 }

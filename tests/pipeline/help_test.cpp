@@ -45,14 +45,12 @@ TEST_P(Help, NamesTheVersion) {
   EXPECT_THAT(result.output, HasSubstr(std::string(GetParam()) + " 0."));
 }
 
-INSTANTIATE_TEST_SUITE_P(Programs, Help,
-                         testing::Values("vlp-adjust", "vlp-board", "vlp-calibrate", "vlp-detect",
-                                         "vlp-dispersion", "vlp-evaluate", "vlp-intrinsics",
-                                         "vlp-limits", "vlp-locate", "vlp-rotation", "vlp-simulate",
-                                         "vlp-station", "vlp-train"),
-                         [](const auto& instance) {
-                           return std::string(instance.param).substr(4);
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Programs, Help,
+    testing::Values("vlp-adjust", "vlp-board", "vlp-calibrate", "vlp-convert", "vlp-detect",
+                    "vlp-dispersion", "vlp-evaluate", "vlp-intrinsics", "vlp-limits", "vlp-locate",
+                    "vlp-rotation", "vlp-simulate", "vlp-station", "vlp-train"),
+    [](const auto& instance) { return std::string(instance.param).substr(4); });
 
 }  // namespace
 }  // namespace vlp

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "pipeline/intrinsics_program.h"
 #include "support/datasets.h"
@@ -40,7 +41,8 @@ TEST_F(IntrinsicsRefusals, RefusesOneViewAndViewsAllAlike) {
   }
   const auto alike = calibrate((folder / "images").string(), board);
   EXPECT_EQ(alike.exit_code, 3);
-  EXPECT_THAT(alike.errors, HasSubstr("all views show the board at the same angle"));
+  EXPECT_THAT(alike.errors, HasSubstr("1.png: is the same picture as 0.png; skipped"));
+  EXPECT_THAT(alike.errors, HasSubstr("1 views with the board: fewer than three"));
   EXPECT_FALSE(fs::exists(folder / "camera.yaml"));
 }
 
@@ -77,6 +79,9 @@ TEST_F(IntrinsicsRefusals, NamesWhatIsWrongWithTheBoard) {
   EXPECT_EQ(order.exit_code, 2);
   EXPECT_THAT(order.errors, HasSubstr("board.yaml: the images show cols 6, rows 5, id_order "
                                       "row-major-from-top-left"));
+  const auto cols = calibrate(images, with("cols: 6", "cols: 5"));
+  EXPECT_EQ(cols.exit_code, 2);
+  EXPECT_THAT(cols.errors, HasSubstr("board.yaml: the images show cols 6, rows 5"));
   const auto ids = calibrate(images, with("first_id: 0", "first_id: 100"));
   EXPECT_EQ(ids.exit_code, 2);
   EXPECT_THAT(ids.errors, HasSubstr("with other ids than the board has, 100 to 129"));
@@ -101,6 +106,39 @@ TEST_F(IntrinsicsRefusals, RefusesMixedSizesAndSkipsWhatIsNoImage) {
   EXPECT_THAT(mixed.errors, HasSubstr("2.png: is 640 x 480, but 0.png is 800 x 600 px"));
 }
 
+TEST_F(IntrinsicsRefusals, RefusesAFormatWithoutTheLensBeforeItSolves) {
+  const std::string kalibr = (folder / "kalibr.yaml").string();
+  const auto result =
+      calibrate(kRig + "/sample-boards", kRig + "/board.yaml", "--kalibr " + kalibr);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("Kalibr has no lens model like LENSMODEL_OPENCV8"));
+  EXPECT_FALSE(fs::exists(folder / "camera.yaml"));
+  EXPECT_FALSE(fs::exists(kalibr));
+}
+
+TEST_F(IntrinsicsRefusals, SkipsTinyAndHugeImages) {
+  const std::string images = copies({"0.png"});
+  cv::imwrite((folder / "images/1.png").string(), cv::Mat(600, 801, CV_8UC1, cv::Scalar(7)));
+  const auto huge = calibrate(images, kRig + "/board.yaml", "--max-mpx 0.4802");
+  EXPECT_THAT(huge.errors, HasSubstr("1.png: is 801 x 600 px, more than the 0.4802 million"));
+  fs::create_directory(folder / "tiny");
+  cv::imwrite((folder / "tiny/0.png").string(), cv::Mat(1, 800, CV_8UC1, cv::Scalar(7)));
+  const auto tiny = calibrate((folder / "tiny").string(), kRig + "/board.yaml");
+  EXPECT_EQ(tiny.exit_code, 3) << tiny.errors;
+  EXPECT_THAT(tiny.errors, HasSubstr("no tag of tag36h11 is seen in 1 images"));
+}
+
+TEST_F(IntrinsicsRefusals, SaysThatWhatItSeesIsOverexposed) {
+  cv::Mat image = cv::imread(kFaulty + "/sample-boards/0000.png", cv::IMREAD_GRAYSCALE), white;
+  // White runs over all but the middles of what is black.
+  cv::dilate(image, white, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
+  fs::create_directory(folder / "white");
+  cv::imwrite((folder / "white/0.png").string(), white * 3);
+  const auto result = calibrate((folder / "white").string(), kFaulty + "/board.yaml");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.errors, HasSubstr("overexposed"));
+}
+
 TEST_F(IntrinsicsRefusals, RefusesBadOptions) {
   const std::string images = kRig + "/sample-boards", board = kRig + "/board.yaml";
   EXPECT_EQ(calibrate(images, board, "--gate mean=3").exit_code, 2);
@@ -108,6 +146,8 @@ TEST_F(IntrinsicsRefusals, RefusesBadOptions) {
   EXPECT_EQ(calibrate(images, board, "--lens FISHEYE").exit_code, 2);
   EXPECT_EQ(calibrate(images, board, "--plot plot.gif").exit_code, 2);
   EXPECT_EQ(calibrate(images, board, "--held-out 1").exit_code, 2);
+  EXPECT_EQ(calibrate(images, board, "--warp maybe").exit_code, 2);
+  EXPECT_EQ(calibrate(images, board, "--gate rms_px=1,views=no").exit_code, 2);
   EXPECT_EQ(calibrate(images + "/missing.png", board).exit_code, 2);
 }
 

@@ -89,6 +89,30 @@ TEST_P(RenderedRig, GivesItsLensWhateverTheThreads) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, RenderedRig, testing::Values("paper-rig", "paper-rig-faulty"));
 
+/// Through a phone's tone curve and JPEG: edges move towards the dark.
+class CodedRig : public IntrinsicsProgram, public testing::WithParamInterface<const char*> {};
+
+TEST_P(CodedRig, GivesItsLens) {
+  std::string scene = TemporaryFolder::content_of(std::string(VLP_SOURCE_DIR "/datasets/") +
+                                                  GetParam() + "/scene.yaml");
+  const std::string before = "\nmount:";
+  scene.insert(scene.find(before), "\npicture: {gamma: 2.2, jpeg_quality: 90}\n");
+  const std::string rig = (folder / "rig").string();
+  const std::string file = folder.file("coded.yaml", scene).string();
+  ASSERT_EQ(run_program("vlp-simulate -q " + file + " --only boards -o " + rig).exit_code, 0);
+  const auto result = calibrate(rig + "/boards", rig + "/board.yaml");
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const Camera truth = read_calibration(rig + "/true_calibration.yaml").camera;
+  const Camera found = read_calibration(folder / "camera.yaml").camera;
+  const auto difference = projection_difference(Lens(truth.lens_model, truth.intrinsics),
+                                                Lens(found.lens_model, found.intrinsics),
+                                                truth.imager_px, [](const auto&) { return 1; });
+  EXPECT_LT(difference->mean_px, 0.05);
+  EXPECT_LT(difference->worst_px, 0.25);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, CodedRig, testing::Values("paper-rig", "paper-rig-faulty"));
+
 TEST_F(IntrinsicsProgram, SaysThatViewsFromTheFrontDoNotFixTheFocalLength) {
   const auto real = real_data("kalibr-aprilgrid-stereo");
   if (real.empty()) GTEST_SKIP() << "no real captures here";

@@ -53,6 +53,7 @@ void expect_same(const IntrinsicsReport& found, const IntrinsicsReport& expected
   EXPECT_EQ(found.board_warp_m, expected.board_warp_m);
   EXPECT_EQ(found.uncertainty_px, expected.uncertainty_px);
   EXPECT_EQ(found.covariance, expected.covariance);
+  EXPECT_EQ(found.region_px, expected.region_px);
 }
 
 void expect_same(const RotationCenter& found, const RotationCenter& expected) {

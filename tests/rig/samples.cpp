@@ -44,6 +44,7 @@ intrinsics_report:
   rms_px: 0.21
   board_warp_m: [0.0001, -2.5e-05]
   uncertainty_px: 0.08
+  region_px: [[10, 20], [1500, 20.5], [700, 1100]]
 rotation_center:
   model: tilt
   center_px: [801.25, 597.5]
@@ -89,7 +90,14 @@ Calibration sample_calibration() {
                         3.45e-6,
                         1e-5,
                         Readout::columns};
-  calibration.intrinsics_report = {40, 6400, 12, 0.21, std::array{1e-4, -2.5e-5}, 0.08};
+  calibration.intrinsics_report = {40,
+                                   6400,
+                                   12,
+                                   0.21,
+                                   std::array{1e-4, -2.5e-5},
+                                   0.08,
+                                   {},
+                                   {{10, 20}, {1500, 20.5}, {700, 1100}}};
   const Matrix2 covariance{{0.04, 0.01}, {0.01, 0.09}};
   const Matrix2 lever_arm_covariance{{4e-4, 0}, {0, 25e-4}};
   calibration.rotation_center = {RotationModel::tilt, {801.25, 597.5},   {0.6, 0, 0.8},

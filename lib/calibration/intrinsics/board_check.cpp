@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <vector>
 
@@ -17,10 +18,15 @@
 namespace vlp {
 namespace {
 
+/// What tone curves, overexposure and blur move an edge by, at most.
+constexpr double kMostShift_px = 1.5;
+
 /// Where tag `to` is, seen from tag `from`, whose width is 1: x right and y down on the print.
 struct Step {
   int from, to;
   Eigen::Vector2d way;
+  /// Width of `from` in the image, the mean of its edges.
+  double width_px;
 };
 
 std::optional<SeenTag> straightened(const SeenTag& tag, const std::optional<Lens>& lens) {
@@ -34,16 +40,33 @@ std::optional<SeenTag> straightened(const SeenTag& tag, const std::optional<Lens
   return straight;
 }
 
-/// From every tag to its nearest neighbours.
-std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional<Lens>& lens) {
-  constexpr std::size_t nearest = 3;
+double width_of(const SeenTag& tag) {
+  double sum_px = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    sum_px += (tag.corners_px[(k + 1) % 4] - tag.corners_px[k]).norm();
+  }
+  return sum_px / 4;
+}
+
+/// From every tag to its nearest neighbours, those among them that the board does not have; the
+/// tags' edges have gone inwards by shift_px.
+std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional<Lens>& lens,
+                           double shift_px) {
+  constexpr std::size_t nearest = 4;
   std::vector<Step> steps;
   for (const BoardView& view : views) {
     std::vector<SeenTag> tags;
-    for (const SeenTag& tag : view.seen.tags) {
-      if (const auto straight = straightened(tag, lens)) tags.push_back(*straight);
+    std::vector<double> widths_px;
+    for (const auto* seen : {&view.seen.tags, &view.seen.foreign}) {
+      for (const SeenTag& tag : *seen) {
+        const auto straight = straightened(tag, lens);
+        if (!straight) continue;
+        tags.push_back(*straight);
+        widths_px.push_back(width_of(tag));
+      }
     }
-    for (const SeenTag& tag : tags) {
+    for (std::size_t i = 0; i < tags.size(); ++i) {
+      const SeenTag& tag = tags[i];
       const std::array<PlanePair, 4> square{{{tag.corners_px[0], {-0.5, 0.5}},
                                              {tag.corners_px[1], {0.5, 0.5}},
                                              {tag.corners_px[2], {0.5, -0.5}},
@@ -56,7 +79,8 @@ std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional
         for (const auto& corner : other.corners_px) {
           middle += (tags_from_image * corner.homogeneous()).hnormalized() / 4;
         }
-        around.push_back({tag.id, other.id, middle});
+        const double width_px = widths_px[i] + 2 * shift_px;
+        around.push_back({tag.id, other.id, middle * (widths_px[i] / width_px), width_px});
       }
       std::sort(around.begin(), around.end(),
                 [](const Step& a, const Step& b) { return a.way.norm() < b.way.norm(); });
@@ -67,11 +91,35 @@ std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional
   return steps;
 }
 
+/// How steps go with a layout.
 struct Fit {
-  /// Steps that go to a neighbour, over all.
+  /// Steps that go where the layout says, over all between tags that it has.
   double share = 0;
+  std::size_t counted = 0;
   std::optional<double> pitch;
+  /// With edges that went inwards by shift_px on either side the ways between tags, in px, are
+  ///   pitch (width + 2 shift);
+  /// the line through all of them, where tags of different widths tell the two apart.
+  struct Line {
+    double pitch, pitch_sd, shift_px;
+  };
+  std::optional<Line> line;
 };
+
+std::optional<Fit::Line> line_through(const std::vector<Eigen::Vector2d>& widths_and_ways) {
+  constexpr std::size_t least = 20;
+  const auto count = static_cast<double>(widths_and_ways.size());
+  if (widths_and_ways.size() < least) return {};
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const auto& each : widths_and_ways) mean += each / count;
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  for (const auto& each : widths_and_ways) moments += (each - mean) * (each - mean).transpose();
+  if (!(moments(0, 0) > 0)) return {};
+  const double slope = moments(0, 1) / moments(0, 0);
+  const double rest = std::max(0.0, moments(1, 1) - slope * moments(0, 1));
+  return Fit::Line{slope, std::sqrt(rest / (count - 2) / moments(0, 0)),
+                   (mean.y() / slope - mean.x()) / 2};
+}
 
 Fit fit_of(const Board& board, const std::vector<Step>& steps) {
   constexpr double straight = 0.25;       // off the way, of its length
@@ -80,66 +128,178 @@ Fit fit_of(const Board& board, const std::vector<Step>& steps) {
     places[tag.id] = tag.corners_m[3] / tag_pitch_m(board);
   }
   std::vector<double> pitches;
+  std::vector<Eigen::Vector2d> widths_and_ways;
+  std::size_t counted = 0;
   for (const Step& step : steps) {
     const auto from = places.find(step.from), to = places.find(step.to);
     if (from == places.end() || to == places.end()) continue;
+    ++counted;
     const Eigen::Vector2d expected = to->second - from->second;
     const double pitch = step.way.dot(expected) / expected.squaredNorm();
-    if (expected.norm() < 1.5 &&
+    if (expected.norm() < 2.1 &&
         (step.way - pitch * expected).norm() < straight * step.way.norm() && pitch > 0) {
       pitches.push_back(pitch);
+      widths_and_ways.emplace_back(step.width_px, pitch * step.width_px);
     }
   }
   Fit fit;
   if (pitches.empty()) return fit;
-  fit.share = static_cast<double>(pitches.size()) / static_cast<double>(steps.size());
+  fit.counted = counted;
+  fit.share = static_cast<double>(pitches.size()) / static_cast<double>(counted);
   const auto middle = pitches.begin() + static_cast<std::ptrdiff_t>(pitches.size() / 2);
   std::nth_element(pitches.begin(), middle, pitches.end());
   fit.pitch = *middle;
+  std::erase_if(widths_and_ways, [&](const Eigen::Vector2d& each) {
+    constexpr double alike = 0.15;
+    return std::abs(each.y() / each.x() / *fit.pitch - 1) > alike;
+  });
+  fit.line = line_through(widths_and_ways);
   return fit;
 }
 
-/// The layout that explains the steps, if one does.
-std::optional<Board> better_order(Board board, const std::vector<Step>& steps, double enough) {
-  for (const bool swapped : {false, true}) {
-    if (swapped) std::swap(board.cols, board.rows);
-    for (const bool column_major : {false, true}) {
-      for (const auto from : {BoardCorner::bottom_left, BoardCorner::bottom_right,
-                              BoardCorner::top_left, BoardCorner::top_right}) {
-        board.id_order = {column_major, from};
-        if (fit_of(board, steps).share >= enough) return board;
+/// What most neighbours agree on: by how much the id grows from a tag to the one right of it, or
+/// below it (axis 0 or 1); 0 when they do not agree.
+int growth_along(int axis, const std::vector<Step>& steps) {
+  constexpr double aside = 0.35, most = 0.5;
+  constexpr int least_votes = 4;
+  // The very next tags are the shortest steps along the axis, from each tag.
+  std::map<int, int> votes;
+  int all = 0;
+  for (std::size_t i = 0; i < steps.size();) {
+    std::size_t end = i;
+    while (end < steps.size() && steps[end].from == steps[i].from &&
+           (end == i || steps[end].way.norm() >= steps[end - 1].way.norm())) {
+      ++end;
+    }
+    for (const double sign : {1.0, -1.0}) {
+      for (std::size_t k = i; k < end; ++k) {
+        const double along = sign * steps[k].way[axis];
+        if (along < 0 || std::abs(steps[k].way[1 - axis]) > aside * along) continue;
+        ++votes[static_cast<int>(sign) * (steps[k].to - steps[k].from)];
+        ++all;
+        break;  // nearest first
       }
     }
+    i = end;
   }
-  return {};
+  for (const auto& [growth, count] : votes) {
+    if (count >= least_votes && count > most * all) return growth;
+  }
+  return 0;
+}
+
+/// The layout that explains the steps, if one does: ids that grow by one along rows grow by the
+/// number of columns from row to row, and so with columns.
+std::optional<Board> layout_shown(Board board, const std::vector<Step>& steps) {
+  constexpr double enough = 0.8;
+  constexpr int most_tags = 1000;
+  const int right = growth_along(0, steps), down = growth_along(1, steps);
+  const bool column_major = std::abs(down) == 1 && std::abs(right) != 1;
+  const int line = std::abs(column_major ? right : down);  // tags in a row, or in a column
+  if (std::abs(column_major ? down : right) != 1 || line < 1 || line > most_tags) return {};
+  board.id_order = {column_major,
+                    right > 0 ? (down > 0 ? BoardCorner::top_left : BoardCorner::bottom_left)
+                              : (down > 0 ? BoardCorner::top_right : BoardCorner::bottom_right)};
+  // Of tags that lie on a line of ids with a neighbour; others are of the surroundings.
+  std::map<int, int> votes;
+  for (const Step& step : steps) {
+    if (std::abs(step.to - step.from) == 1 || std::abs(step.to - step.from) == line) {
+      ++votes[step.from];
+    }
+  }
+  std::erase_if(votes, [](const auto& vote) { return vote.second < 2; });
+  if (votes.empty()) return {};
+  const int least = votes.begin()->first, largest = votes.rbegin()->first;
+  const int stated = column_major ? board.cols : board.rows;
+  std::optional<Board> best;
+  double best_share = 0;
+  // Where a line of ids begins is seen from where no step crosses.
+  const auto try_first = [&](int first) {
+    if (first < 0) return;
+    Board tried = board;
+    tried.first_id = first;
+    const int lines = (largest - first) / line + 1;
+    (column_major ? tried.rows : tried.cols) = line;
+    (column_major ? tried.cols : tried.rows) =
+        line == (column_major ? board.rows : board.cols) && first == board.first_id
+            ? std::max(lines, stated)
+            : lines;
+    if (tried.cols > most_tags || tried.rows > most_tags) return;
+    const double share = fit_of(tried, steps).share;
+    if (share < enough || share <= best_share) return;
+    best = tried;
+    best_share = share;
+  };
+  if (board.first_id <= least) try_first(board.first_id);
+  for (int first = least; best_share < 1 && first > least - line; --first) try_first(first);
+  return best;
+}
+
+std::string layout_problem(const Board& board, const std::vector<Step>& steps) {
+  constexpr double enough = 0.8;
+  std::vector<Step> known;
+  const int last_id = board.first_id + board.cols * board.rows - 1;
+  const auto has = [&](int id) { return id >= board.first_id && id <= last_id; };
+  std::copy_if(steps.begin(), steps.end(), std::back_inserter(known),
+               [&](const Step& step) { return has(step.from) && has(step.to); });
+  const bool fits = known.empty() || fit_of(board, known).share >= enough;
+  const auto shown = layout_shown(board, steps);
+  if (fits && !known.empty()) {
+    // Tags that it does not have may be of another board beside it, unless they go on with it.
+    std::vector<Step> across;
+    std::copy_if(steps.begin(), steps.end(), std::back_inserter(across),
+                 [&](const Step& step) { return has(step.from) != has(step.to); });
+    constexpr std::size_t few = 10;
+    if (!shown || across.size() < few || fit_of(*shown, across).counted < across.size() ||
+        fit_of(*shown, across).share < enough) {
+      return "";
+    }
+  }
+  if (shown && shown->cols == board.cols && shown->rows == board.rows &&
+      shown->first_id == board.first_id && shown->id_order.from == board.id_order.from &&
+      shown->id_order.column_major == board.id_order.column_major) {
+    return "";
+  }
+  if (shown) {
+    std::string words = "the images show cols " + std::to_string(shown->cols);
+    words.append(", rows ").append(std::to_string(shown->rows));
+    words.append(", id_order ").append(name_of(shown->id_order));
+    if (shown->first_id != board.first_id) {
+      words.append(", first_id ").append(std::to_string(shown->first_id));
+    }
+    return words;
+  }
+  if (fits) return "";
+  return "the tags in the images do not lie as on a board of " + std::to_string(board.cols) +
+         " x " + std::to_string(board.rows) + " tags from id " + std::to_string(board.first_id) +
+         " in any id_order; is it another board?";
+}
+
+/// Whether the gap can be what board.yaml says, the edges having gone towards the dark by what
+/// tone curves, overexposure and blur do.
+bool gap_agrees(const Fit& fit, double expected, double tolerance) {
+  constexpr double sigmas = 3;
+  if (std::abs(*fit.pitch / expected - 1) <= tolerance) return true;
+  return fit.line && std::abs(fit.line->shift_px) <= kMostShift_px &&
+         std::abs(fit.line->pitch / expected - 1) <=
+             tolerance + sigmas * fit.line->pitch_sd / expected &&
+         sigmas * fit.line->pitch_sd / expected <= tolerance;
 }
 
 }  // namespace
 
 BoardCheck check_board(const Board& board, std::span<const BoardView> views,
-                       const std::optional<Lens>& lens) {
-  constexpr double enough = 0.8;
-  const auto steps = steps_in(views, lens);
+                       const std::optional<Lens>& lens, double shift_px) {
+  // More is no tone curve's, but another spacing.
+  const auto steps = steps_in(views, lens, std::clamp(shift_px, -kMostShift_px, kMostShift_px));
   constexpr std::size_t least_steps = 10;
   if (steps.size() < least_steps) return {};
+  BoardCheck check{layout_problem(board, steps), {}};
   const Fit fit = fit_of(board, steps);
-  BoardCheck check{"", fit.pitch};
-  if (fit.share < enough) {
-    const auto better = better_order(board, steps, enough);
-    if (!better) {
-      check.problem = "the tags in the images do not lie as on a board of " +
-                      std::to_string(board.cols) + " x " + std::to_string(board.rows) +
-                      " tags from id " + std::to_string(board.first_id) +
-                      " in any id_order; is it another board?";
-    } else {
-      check.problem = "the images show cols " + std::to_string(better->cols) + ", rows " +
-                      std::to_string(better->rows) + ", id_order " + name_of(better->id_order);
-    }
-    return check;
-  }
+  check.pitch = fit.pitch;
+  if (!check.problem.empty() || !fit.pitch) return check;
   const double tolerance = lens ? 0.01 : 0.05;
-  const double expected = 1 + board.tag_spacing;
-  if (std::abs(*fit.pitch / expected - 1) > tolerance) {
+  if (!gap_agrees(fit, 1 + board.tag_spacing, tolerance)) {
     const double hundreds = 100;
     const double seen = std::round((*fit.pitch - 1) * hundreds) / hundreds;
     check.problem = "tag_spacing is " + shortest(board.tag_spacing) +

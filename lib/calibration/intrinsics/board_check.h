@@ -23,8 +23,9 @@ struct BoardCheck {
 };
 
 /// lens: straightens the image when it is known, for a finer check of the spacing: 1 % of the pitch
-/// instead of 5 %.
+/// instead of 5 %. shift_px: by which the edges of the tags are known to have gone inwards
+/// (edge_shift.h).
 BoardCheck check_board(const Board& board, std::span<const BoardView> views,
-                       const std::optional<Lens>& lens);
+                       const std::optional<Lens>& lens, double shift_px = 0);
 
 }  // namespace vlp

@@ -3,6 +3,7 @@
 #include "calibration/intrinsics/board_lattice.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <cmath>
 #include <set>
 #include <stdexcept>
@@ -17,9 +18,25 @@ Eigen::Vector3d turned(const BoardPose& pose, const Eigen::Vector2d& in_board_m)
   return rotation * Eigen::Vector3d(in_board_m.x(), in_board_m.y(), 0);
 }
 
+/// Of each corner: the edges that cross there go inwards by 1 px each.
+Eigen::Vector2d inward_at(const SeenTag& tag, std::size_t k) {
+  const auto& corners = tag.corners_px;
+  const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
+  Eigen::Matrix2d normals;
+  int row = 0;
+  for (const std::size_t other : {(k + 3) % 4, (k + 1) % 4}) {
+    const Eigen::Vector2d along = (corners[other] - corners[k]).normalized();
+    Eigen::Vector2d across(-along.y(), along.x());
+    if (across.dot(middle - corners[k]) < 0) across = -across;
+    normals.row(row++) = across.transpose();
+  }
+  const Eigen::Vector2d inward = normals.inverse() * Eigen::Vector2d::Ones();
+  return inward.allFinite() ? inward : Eigen::Vector2d::Zero();
+}
+
 }  // namespace
 
-BoardLattice::BoardLattice(const Board& board) {
+BoardLattice::BoardLattice(const Board& board) : touching_(board.corner_squares) {
   constexpr double rounding = 1e-9;
   const bool uniform = std::abs(board.tag_spacing - 1) < rounding;
   if (!uniform && (board.cols < 2 || board.rows < 2)) {
@@ -53,7 +70,8 @@ std::vector<BoardLattice::Corner> BoardLattice::corners(const SeenBoard& seen) c
       all.push_back({{place.corners_m[k].x(), place.corners_m[k].y(), 0},
                      tag.corners_px[k],
                      parts_ == 1 ? 0 : k,
-                     static_cast<std::size_t>(row * cols_ + col)});
+                     static_cast<std::size_t>(row * cols_ + col),
+                     touching_ ? Eigen::Vector2d::Zero() : inward_at(tag, k)});
     }
   }
   return all;

@@ -37,6 +37,9 @@ class BoardLattice {
     Eigen::Vector3d in_board_m;
     Eigen::Vector2d pixel;
     std::size_t part, point;
+    /// Where the corner goes, per px, when the edges of its tag go inwards; 0 where squares that
+    /// touch make the corner, which stays.
+    Eigen::Vector2d inward{0, 0};
   };
   /// Every corner of what was seen, of a flat board: four of each tag, in its order.
   std::vector<Corner> corners(const SeenBoard& seen) const;
@@ -56,6 +59,7 @@ class BoardLattice {
     std::array<Eigen::Vector2d, 4> corners_m;
   };
   std::map<int, Place> places_;
+  bool touching_;
   std::size_t parts_;
   int cols_, rows_;
   double spacing_m_;

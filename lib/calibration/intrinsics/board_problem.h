@@ -39,6 +39,9 @@ struct BoardProblem {
   }
 };
 
+/// Of the points that are no outliers.
+std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem);
+
 /// What a solve may change besides the poses.
 struct SolveFor {
   bool core = false;         // fx fy cx cy
@@ -47,12 +50,13 @@ struct SolveFor {
   bool without_outliers = false;  // gives outliers a negative weight
 };
 
-/// Minimizes the residuals in place by mrcal_optimize. False when it fails: points that no lens of
-/// the model can see there, or too few for the unknowns.
+/// Minimizes the residuals in place, by mrcal_optimize, or by Ceres for the models that mrcal does
+/// not have: without regularization, outliers beyond 5 sigmas. False when it fails: points that no
+/// lens of the model can see there, or too few for the unknowns.
 bool solve(BoardProblem& problem, const SolveFor& what);
 
-/// The problem at its solution. State and Jacobian are mrcal's, packed: the state is divided by
-/// `scale`, so that its entries are of like size.
+/// The problem at its solution. State and Jacobian are packed: the state is divided by `scale`, so
+/// that its entries are of like size.
 struct Linearization {
   /// Of the points, u and v in turn, in their order; 0 for those with a negative weight.
   Eigen::VectorXd residuals_px;
@@ -64,5 +68,13 @@ struct Linearization {
   Eigen::Index intrinsics, poses;
 };
 Linearization linearized(const BoardProblem& problem, const SolveFor& what);
+
+/// Both, by either.
+bool has_mrcal(LensModel model);
+bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what);
+bool solve_by_ceres(BoardProblem& problem, const SolveFor& what);
+Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& what);
+/// The intrinsics are solved for, the warp where `what` says so.
+Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what);
 
 }  // namespace vlp

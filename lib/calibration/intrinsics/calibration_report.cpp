@@ -2,8 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/calibration_report.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
+#include "calibration/intrinsics/edge_shift.h"
 #include "calibration/intrinsics/expected_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/view_jackknife.h"
@@ -30,28 +34,43 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   const Eigen::MatrixXd by_views = covariance_by_views(solution);
   const auto expected =
       expected_difference(lens, input.imager_px, uncertainty.intrinsics_covariance());
-  CalibrationReport report{0,
+  ImageRegion region = known_region(seen_px(solution.problem), input.imager_px);
+  const double region_share = share_of_image(region, input.imager_px);
+  CalibrationReport report{std::move(region),
+                           region_share,
+                           0,
                            0,
                            {0, 0},
+                           0,
                            uncertainty.focal_sd_px(),
                            std::sqrt(by_views(0, 0)),
                            expected.rms_px,
                            expected_difference(lens, input.imager_px, by_views).rms_px,
                            {}};
-  const auto pixels = pixel_grid(input.imager_px);
-  for (const Eigen::Vector2d& pixel : pixels) {
+  double inside = 0;
+  for (const Eigen::Vector2d& pixel : pixel_grid(input.imager_px)) {
+    // Beyond the farthest corner a fisheye may end; there it refuses pixels.
+    if (lens.model() == LensModel::fisheye && !lens.unproject(pixel)) continue;
     const double sigma_px = uncertainty.worst_px(pixel);
-    report.uncertainty_mean_px += sigma_px / static_cast<double>(pixels.size());
+    if (!lies_in(report.region, pixel)) {
+      report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
+      continue;
+    }
+    ++inside;
+    report.uncertainty_mean_px += sigma_px;
     if (sigma_px <= report.uncertainty_worst_px) continue;
     report.uncertainty_worst_px = sigma_px;
     report.uncertainty_worst_at = pixel;
   }
+  report.uncertainty_mean_px /= std::max(inside, 1.0);
   const IntrinsicsSolution even = solve_intrinsics(every_other(solution, input, 0));
   const IntrinsicsSolution odd = solve_intrinsics(every_other(solution, input, 1));
   if (even.ok() && odd.ok()) {
     report.halves = projection_difference(
-        even.lens(), odd.lens(), input.imager_px,
-        [&](const Eigen::Vector2d& pixel) { return uncertainty.worst_px(pixel); });
+        even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
+          return lies_in(report.region, pixel) ? uncertainty.worst_px(pixel)
+                                               : std::numeric_limits<double>::infinity();
+        });
   }
   return report;
 }
@@ -60,8 +79,14 @@ HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& 
   const Lens lens = solution.lens();
   HeldOut fit;
   double squares = 0;
-  for (const auto& view : held_out.views) {
-    const auto corners = held_out.lattice.bent(view, solution.problem.warp_m);
+  auto views = held_out.views;
+  for (auto& view : views) {
+    view = held_out.lattice.bent(std::move(view), solution.problem.warp_m);
+  }
+  const auto shifts = edge_shifts(views, lens);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    auto& corners = views[i];
+    take_out_shift(corners, shifts[i]);
     const auto pose = view_pose(corners, lens);
     if (!pose) continue;
     ++fit.views;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "rig/calibration.h"
 
@@ -15,9 +16,14 @@ namespace vlp {
 
 /// How far a solution can be trusted.
 struct CalibrationReport {
-  /// ProjectionUncertainty::worst_px() over pixel_grid().
+  /// Where the lens is known, and its share of the image.
+  ImageRegion region;
+  double region_share;
+  /// ProjectionUncertainty::worst_px() over the pixel_grid() of the region, and the worst beyond
+  /// it.
   double uncertainty_mean_px, uncertainty_worst_px;
   Eigen::Vector2d uncertainty_worst_at;
+  double uncertainty_beyond_px;
   /// Standard deviation of fx: by the noise of the corners, and by covariance_by_views().
   double focal_sd_px, focal_sd_by_views_px;
   /// What the lens should be apart from the true one, as projection_difference() says it, rms per
@@ -50,6 +56,8 @@ struct ViewCoverage {
   /// The largest angle, over the views, by which the board's left, right, upper and lower side (as
   /// the image shows it) is nearer to the camera.
   std::array<double, 4> tilts_rad{};
+  /// The largest angle between two of the boards.
+  double tilt_rad = 0;
 };
 ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
 

@@ -51,15 +51,18 @@ std::string ros_camera_info(const Camera& camera) {
   if (model == LensModel::stereographic || model == LensModel::opencv12) {
     refuse(camera, "ROS", "LENSMODEL_OPENCV8");
   }
-  const bool rational = model == LensModel::opencv8;
-  const std::size_t count = rational ? 8 : 5;
+  const bool rational = model == LensModel::opencv8, fisheye = model == LensModel::fisheye;
+  const std::size_t count = rational ? 8 : fisheye ? 4 : 5;
   const auto& p = camera.intrinsics;
   std::string text = "image_width: " + std::to_string(camera.imager_px[0]);
   text.append("\nimage_height: ").append(std::to_string(camera.imager_px[1]));
   text.append("\ncamera_name: ").append(in_quotes(camera.id));
   text.append("\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: ")
       .append(list_of(matrix_of(camera)));
-  text.append("\ndistortion_model: ").append(rational ? "rational_polynomial" : "plumb_bob");
+  text.append("\ndistortion_model: ")
+      .append(rational  ? "rational_polynomial"
+              : fisheye ? "equidistant"
+                        : "plumb_bob");
   text.append("\ndistortion_coefficients:\n  rows: 1\n  cols: ").append(std::to_string(count));
   text.append("\n  data: ").append(list_of(distortions_of(camera, count)));
   text.append("\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: ");
@@ -69,12 +72,15 @@ std::string ros_camera_info(const Camera& camera) {
 }
 
 std::string kalibr_camchain(const Camera& camera) {
-  if (camera.lens_model != LensModel::pinhole && camera.lens_model != LensModel::opencv4) {
-    refuse(camera, "Kalibr", "LENSMODEL_OPENCV4");
+  const bool fisheye = camera.lens_model == LensModel::fisheye;
+  if (!fisheye && camera.lens_model != LensModel::pinhole &&
+      camera.lens_model != LensModel::opencv4) {
+    refuse(camera, "Kalibr", "LENSMODEL_OPENCV4 or OPENCV_FISHEYE");
   }
   const std::vector<double> core(camera.intrinsics.begin(), camera.intrinsics.begin() + 4);
   std::string text = "cam0:\n  camera_model: pinhole\n  intrinsics: " + list_of(core);
-  text.append("\n  distortion_model: radtan\n  distortion_coeffs: ");
+  text.append("\n  distortion_model: ").append(fisheye ? "equidistant" : "radtan");
+  text.append("\n  distortion_coeffs: ");
   text.append(list_of(distortions_of(camera, 4)));
   text.append("\n  resolution: [").append(std::to_string(camera.imager_px[0])).append(", ");
   text.append(std::to_string(camera.imager_px[1])).append("]\n  rostopic: /cam0/image_raw\n");
@@ -87,8 +93,20 @@ std::string opencv_camera(const Camera& camera) {
   }
   std::string text = "%YAML:1.0\n---\nimage_width: " + std::to_string(camera.imager_px[0]);
   text.append("\nimage_height: ").append(std::to_string(camera.imager_px[1])).append("\n");
+  if (camera.lens_model == LensModel::fisheye) text.append("distortion_model: fisheye\n");
   text.append(opencv_matrix("camera_matrix", 3, matrix_of(camera)));
   text.append(opencv_matrix("distortion_coefficients", 1, distortions_of(camera, 4)));
+  return text;
+}
+
+std::string mrcal_cameramodel(const Camera& camera) {
+  if (camera.lens_model == LensModel::fisheye) refuse(camera, "mrcal", "LENSMODEL_OPENCV8");
+  std::string text = "{\n    'lensmodel':  '";
+  text.append(name_of(camera.lens_model)).append("',\n    'intrinsics': ");
+  text.append(list_of(camera.intrinsics));
+  text.append(",\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ");
+  text.append(std::to_string(camera.imager_px[0])).append(", ");
+  text.append(std::to_string(camera.imager_px[1])).append(" ]\n}\n");
   return text;
 }
 

@@ -11,11 +11,16 @@ namespace vlp {
 /// A camera as others write it, in YAML. All of them have pixel centres at whole numbers, as here.
 /// Each throws std::invalid_argument for a lens model that the format does not have.
 
-/// ROS camera_info: plumb_bob for PINHOLE, OPENCV4 and OPENCV5, rational_polynomial for OPENCV8.
+/// ROS camera_info: plumb_bob for PINHOLE, OPENCV4 and OPENCV5, rational_polynomial for OPENCV8,
+/// equidistant for OPENCV_FISHEYE.
 std::string ros_camera_info(const Camera& camera);
-/// Kalibr's camchain: pinhole with radtan, for PINHOLE and OPENCV4.
+/// Kalibr's camchain: pinhole with radtan, for PINHOLE and OPENCV4, or with equidistant, for
+/// OPENCV_FISHEYE.
 std::string kalibr_camchain(const Camera& camera);
 /// OpenCV's FileStorage: camera_matrix and distortion_coefficients, for all but STEREOGRAPHIC.
+/// Those of OPENCV_FISHEYE are for cv::fisheye; distortion_model says so.
 std::string opencv_camera(const Camera& camera);
+/// mrcal's .cameramodel, the camera alone, for all but OPENCV_FISHEYE.
+std::string mrcal_cameramodel(const Camera& camera);
 
 }  // namespace vlp

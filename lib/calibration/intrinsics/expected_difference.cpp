@@ -8,8 +8,8 @@
 #include <limits>
 #include <vector>
 
-#include "calibration/intrinsics/cross_matrix.h"
 #include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/rotation_vector.h"
 
 namespace vlp {
 namespace {

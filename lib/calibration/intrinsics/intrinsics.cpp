@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-IntrinsicsSolution failure(IntrinsicsStatus status) { return {status, {}, {}, {}, 0, 0, 0}; }
+IntrinsicsSolution failure(IntrinsicsStatus status) { return {status, {}, {}, {}, {}, 0, 0, 0}; }
 
 }  // namespace
 
@@ -38,7 +38,9 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
   starts.resize(std::min(starts.size(), most_starts));
   for (const double focal_px : starts) {
     IntrinsicsSolver solver(input);
-    if (!solver.start(focal_px) || !solver.refine() || !solver.finish()) continue;
+    if (!solver.start(focal_px) || !solver.refine() || !solver.take_out_shifts() ||
+        !solver.finish())
+      continue;
     if (solver.all_alike()) return failure(IntrinsicsStatus::all_alike);
     IntrinsicsSolution solution = solver.solution();
     if (2 * solution.views.size() > input.views.size()) return solution;

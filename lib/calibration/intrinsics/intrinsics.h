@@ -12,12 +12,17 @@
 
 namespace vlp {
 
+/// Whether the board's warp is solved for. `automatic`: when it takes away more of the squared
+/// residuals than 20 times their mean, which chance does once in 20,000.
+enum class WarpChoice { automatic, on, off };
+
 /// What is solved: the corners of each view, of one camera.
 struct IntrinsicsInput {
   BoardLattice lattice;
   std::vector<std::vector<BoardLattice::Corner>> views;
   std::array<int, 2> imager_px;
   LensModel lens_model;
+  WarpChoice warp = WarpChoice::automatic;
 };
 
 enum class IntrinsicsStatus {
@@ -43,6 +48,9 @@ struct IntrinsicsSolution {
     double rms_px;
   };
   std::vector<Dropped> dropped;
+  /// How far the edges of the tags had gone towards the dark in each of `views`, in the mean; it is
+  /// taken out of the corners (edge_shifts()).
+  std::vector<double> edge_shifts_px;
   /// Root of the sum of the squared residuals over 2 x corners, those that are no outliers: per
   /// axis.
   double rms_px;
@@ -50,7 +58,8 @@ struct IntrinsicsSolution {
 
   bool ok() const { return status == IntrinsicsStatus::ok; }
   Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
-  static constexpr SolveFor solved_for{true, true, true, false};
+  /// Intrinsics, and the warp or not.
+  SolveFor solved_for{true, true, true, false};
 };
 
 /// Solves for lens, poses and the board's warp, with no guess of the focal length:
@@ -58,7 +67,8 @@ struct IntrinsicsSolution {
 ///  2. STEREOGRAPHIC with every pose, and the poses again with that lens, until they stay;
 ///  3. the model wanted, regularized as mrcal does it, and the poses again; views that fit no pose
 ///     are dropped;
-///  4. all of it with the board's warp, without outliers.
+///  4. the shift of the tags' edges taken out (edge_shifts()), and the model again;
+///  5. all of it with the board's warp, or without (WarpChoice), and without outliers.
 /// Planar flips cannot live: both poses of every view are tried with each lens (view_pose()).
 /// Depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
+
+#include "calibration/intrinsics/edge_shift.h"
 
 namespace vlp {
 namespace {
@@ -19,6 +22,7 @@ Eigen::Vector3d normal_of(const BoardPose& pose) {
 
 IntrinsicsSolver::IntrinsicsSolver(const IntrinsicsInput& input) : input_(input) {
   for (std::size_t i = 0; i < input.views.size(); ++i) used_.push_back(i);
+  edge_shifts_px_.assign(input.views.size(), 0);
 }
 
 bool IntrinsicsSolver::start(double focal_px) {
@@ -40,6 +44,11 @@ bool IntrinsicsSolver::start(double focal_px) {
 bool IntrinsicsSolver::refine() {
   constexpr int rounds = 6;
   problem_.lens_model = input_.lens_model;
+  if (input_.lens_model == LensModel::fisheye) {
+    // 2 tan(a / 2) = a (1 + a^2 / 12 + ...): the same lens.
+    problem_.intrinsics.insert(problem_.intrinsics.end(),
+                               {1 / 12.0, 1 / 120.0, 17 / 20160.0, 31 / 362880.0});
+  }
   // Zero would be a stationary point of some of them.
   constexpr double tiny = 1e-6;
   problem_.intrinsics.resize(parameter_count(input_.lens_model), tiny);
@@ -55,19 +64,67 @@ bool IntrinsicsSolver::refine() {
   return solve({true, distortions, false, false});
 }
 
+bool IntrinsicsSolver::take_out_shifts() {
+  constexpr int rounds = 2;
+  const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
+  for (int round = 0; round < rounds; ++round) {
+    auto views = input_.views;
+    for (auto& view : views) view = input_.lattice.bent(std::move(view), problem_.warp_m);
+    const auto shifts = edge_shifts(views, lens());
+    if (std::all_of(shifts.begin(), shifts.end(),
+                    [](const EdgeShift& shift) { return shift.by.isZero(0); })) {
+      return true;
+    }
+    for (std::size_t view = 0; view < input_.views.size(); ++view) {
+      edge_shifts_px_[view] += take_out_shift(input_.views[view], shifts[view]);
+    }
+    for (std::size_t i = 0; i < used_.size(); ++i) {
+      for (const auto& corner : input_.views[used_[i]]) {
+        problem_.points[(i * parts + corner.part) * count + corner.point].head<2>() = corner.pixel;
+      }
+    }
+    if (!solve({true, true, false, false})) return false;
+  }
+  return true;
+}
+
+bool IntrinsicsSolver::solve_all() {
+  constexpr double much = 20;
+  solved_for_.warp = false;
+  if (input_.warp != WarpChoice::on && !solve(solved_for_)) return false;
+  if (input_.warp == WarpChoice::off) return true;
+  const IntrinsicsSolution flat = solution();
+  const BoardProblem before = problem_;
+  solved_for_.warp = true;
+  if (!solve(solved_for_)) return false;
+  if (input_.warp == WarpChoice::on) return true;
+  const IntrinsicsSolution bent = solution();
+  const auto squares = [](const IntrinsicsSolution& solution) {
+    return solution.rms_px * solution.rms_px * 2 * solution.corners;
+  };
+  if (squares(flat) - squares(bent) > much * bent.rms_px * bent.rms_px) return true;
+  problem_ = before;
+  solved_for_.warp = false;
+  return true;
+}
+
 bool IntrinsicsSolver::finish() {
-  if (!solve(IntrinsicsSolution::solved_for)) return false;
+  if (!solve_all()) return false;
+  // On a board that bends the first shifts were those of a flat one.
+  if (solved_for_.warp && (!take_out_shifts() || !solve(solved_for_))) return false;
   // Without noise what is left is the regularization's, and would be taken for outliers.
   constexpr double exact_px = 0.005;
   if (solution().rms_px < exact_px) return true;
-  SolveFor without_outliers = IntrinsicsSolution::solved_for;
+  SolveFor without_outliers = solved_for_;
   without_outliers.without_outliers = true;
   return solve(without_outliers) && std::isfinite(solution().rms_px);
 }
 
 IntrinsicsSolution IntrinsicsSolver::solution() const {
-  IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, 0, 0, 0};
+  IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, {}, 0, 0, 0};
   double squares = 0;
+  result.solved_for = solved_for_;
+  for (const std::size_t view : used_) result.edge_shifts_px.push_back(edge_shifts_px_[view]);
   const auto residuals = residuals_of(problem_);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const double weight = problem_.points[i].z();

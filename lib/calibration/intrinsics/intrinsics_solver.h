@@ -14,7 +14,6 @@ class IntrinsicsSolver {
  public:
   static constexpr std::size_t kLeastViews = 3;
 
-  /// `input` outlives it.
   explicit IntrinsicsSolver(const IntrinsicsInput& input);
 
   /// Stage 2, from a focal length.
@@ -22,6 +21,8 @@ class IntrinsicsSolver {
   /// Stage 3.
   bool refine();
   /// Stage 4.
+  bool take_out_shifts();
+  /// Stage 5.
   bool finish();
 
   IntrinsicsSolution solution() const;
@@ -31,6 +32,8 @@ class IntrinsicsSolver {
  private:
   Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
   bool solve(SolveFor what);
+  /// Solves with the warp where it is to be, and says so in solved_for_.
+  bool solve_all();
   /// Poses of every view through this lens; views without one wait for another lens.
   void seed(const Lens& lens);
   /// The problem of the views used, at their seeds.
@@ -43,7 +46,10 @@ class IntrinsicsSolver {
   /// Views that were dropped because a worse one had spoilt the lens, and that fit it now.
   bool take_back();
 
-  const IntrinsicsInput& input_;
+  IntrinsicsInput input_;
+  /// What was taken out of the views of the input.
+  std::vector<double> edge_shifts_px_;
+  SolveFor solved_for_{true, true, true, false};
   PoseSeeds seeds_;
   std::vector<std::size_t> used_;
   std::vector<IntrinsicsSolution::Dropped> dropped_;

@@ -101,7 +101,7 @@ class Silence {
 
 }  // namespace
 
-bool solve(BoardProblem& problem, const SolveFor& what) {
+bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what) {
   const Arguments the(problem, what);
   if (the.measurements < the.states) return false;
   Eigen::VectorXd state(the.states), residuals(the.measurements);
@@ -116,7 +116,7 @@ bool solve(BoardProblem& problem, const SolveFor& what) {
   return stats.rms_reproj_error__pixels >= 0 && residuals.allFinite();
 }
 
-Linearization linearized(const BoardProblem& problem, const SolveFor& what) {
+Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& what) {
   const Arguments the(problem, what);
   const int entries =
       _mrcal_num_j_nonzero(the.frames, 0, problem.cols, problem.rows, 1, 0, the.frames, 0, 0,

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/mrcal_files.h"
 
+#include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/numpy_archive.h"
 #include "captures/csv_writer.h"
 #include "rig/file.h"
@@ -12,7 +13,8 @@ namespace {
 constexpr int kDigits = 17;
 
 /// All that mrcal.optimize() takes, at the solution.
-std::string optimization_inputs(const BoardProblem& problem) {
+std::string optimization_inputs(const IntrinsicsSolution& solution) {
+  const BoardProblem& problem = solution.problem;
   const std::size_t boards = problem.poses.size();
   const auto rows = static_cast<std::size_t>(problem.rows);
   const auto cols = static_cast<std::size_t>(problem.cols);
@@ -42,7 +44,7 @@ std::string optimization_inputs(const BoardProblem& problem) {
   archive.add("do_optimize_intrinsics_distortions", problem.intrinsics.size() > 4);
   archive.add("do_optimize_extrinsics", true);
   archive.add("do_optimize_frames", true);
-  archive.add("do_optimize_calobject_warp", true);
+  archive.add("do_optimize_calobject_warp", solution.solved_for.warp);
   archive.add("do_apply_regularization", problem.intrinsics.size() > 4);
   archive.add("do_apply_outlier_rejection", true);
   archive.add("verbose", false);
@@ -57,6 +59,7 @@ std::string optimization_inputs(const BoardProblem& problem) {
 
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
+  const ImageRegion region = known_region(seen_px(problem), problem.imager_px);
   std::string text = "{\n    'lensmodel':  '";
   text.append(name_of(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {
@@ -65,8 +68,14 @@ void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSoluti
   text += "],\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ";
   text.append(std::to_string(problem.imager_px[0])).append(", ");
   text.append(std::to_string(problem.imager_px[1])).append(" ],\n    'icam_intrinsics': 0,\n");
-  text.append("    'optimization_inputs': b'")
-      .append(optimization_inputs(problem))
+  text.append("    'valid_intrinsics_region': [");
+  for (std::size_t i = 0; i <= region.size() && !region.empty(); ++i) {  // closed
+    const Eigen::Vector2d& corner = region[i % region.size()];
+    text.append(" [ ").append(significant(corner.x(), kDigits)).append(", ");
+    text.append(significant(corner.y(), kDigits)).append(" ],");
+  }
+  text.append(" ],\n    'optimization_inputs': b'")
+      .append(optimization_inputs(solution))
       .append("',\n}\n");
   write_file(file, text);
 }

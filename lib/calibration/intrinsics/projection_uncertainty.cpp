@@ -7,20 +7,10 @@
 #include <cmath>
 #include <limits>
 
-#include "calibration/intrinsics/cross_matrix.h"
+#include "calibration/intrinsics/rotation_vector.h"
 
 namespace vlp {
 namespace {
-
-/// exp(r + dr) = exp(J dr) exp(r), to first order in dr: the left Jacobian of the rotations.
-Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& r) {
-  const double angle = r.norm();
-  constexpr double tiny = 1e-6;
-  if (angle < tiny) return Eigen::Matrix3d::Identity() + cross_matrix(r) / 2;
-  const Eigen::Matrix3d k = cross_matrix(r / angle);
-  return Eigen::Matrix3d::Identity() + (1 - std::cos(angle)) / angle * k +
-         (1 - std::sin(angle) / angle) * k * k;
-}
 
 double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& residuals_px) {
   double sum = 0, squares = 0, count = 0;
@@ -39,7 +29,7 @@ double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& re
 ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
     : lens_(solution.lens()), determined_(false) {
   const BoardProblem& problem = solution.problem;
-  const Linearization at = linearized(problem, IntrinsicsSolution::solved_for);
+  const Linearization at = linearized(problem, solution.solved_for);
   const Eigen::SparseMatrix<double>& jt = at.jacobian_transposed;
   const Eigen::SparseMatrix<double> normal = jt * jt.transpose();
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);

@@ -30,11 +30,17 @@ ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInp
     }
   }
   coverage.share = static_cast<double>(covered.size()) / (cols * rows);
+  std::vector<Eigen::Vector3d> normals;
   for (const BoardPose& pose : solution.problem.poses) {
     // Away from the camera; where it leans to, the board is nearer.
     const Eigen::Vector3d normal =
         Eigen::AngleAxisd(pose.rotation.norm(), pose.rotation.normalized()) *
         Eigen::Vector3d::UnitZ();
+    for (const Eigen::Vector3d& other : normals) {
+      coverage.tilt_rad =
+          std::max(coverage.tilt_rad, std::atan2(normal.cross(other).norm(), normal.dot(other)));
+    }
+    normals.push_back(normal);
     const double x_rad = std::atan2(normal.x(), normal.z());
     const double y_rad = std::atan2(normal.y(), normal.z());
     auto& [left, right, upper, lower] = coverage.tilts_rad;

@@ -54,7 +54,7 @@ Share share_of(const Linearization& at, const Layout& layout, Eigen::Index first
 
 Eigen::MatrixXd covariance_by_views(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const Linearization at = linearized(problem, IntrinsicsSolution::solved_for);
+  const Linearization at = linearized(problem, solution.solved_for);
   const auto views = static_cast<Eigen::Index>(solution.views.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());

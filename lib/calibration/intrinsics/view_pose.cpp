@@ -6,8 +6,10 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+#include <utility>
+#include <vector>
 
-#include "calibration/intrinsics/cross_matrix.h"
+#include "calibration/intrinsics/rotation_vector.h"
 
 namespace vlp {
 namespace {
@@ -93,13 +95,24 @@ Placed placed(const cv::Mat& rotation, const cv::Mat& translation) {
 }  // namespace
 
 std::optional<ViewPose> view_pose(Corners corners, const Lens& lens) {
-  std::vector<cv::Point3d> in_board;
-  std::vector<cv::Point2d> normalized;
+  // Through a camera turned towards the board, which may be seen at 90 degrees off the axis.
+  std::vector<std::pair<const BoardLattice::Corner*, Eigen::Vector3d>> rays;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const auto& corner : corners) {
     const auto ray = lens.unproject(corner.pixel);
-    if (!ray || ray->direction.z() < 1e-3 * ray->direction.norm()) continue;
-    const Eigen::Vector2d z = ray->direction.hnormalized();
-    in_board.emplace_back(corner.in_board_m.x(), corner.in_board_m.y(), 0);
+    if (!ray) continue;
+    rays.emplace_back(&corner, ray->direction.normalized());
+    middle += rays.back().second;
+  }
+  const Eigen::Matrix3d turned_from_camera =
+      Eigen::Quaterniond::FromTwoVectors(middle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  std::vector<cv::Point3d> in_board;
+  std::vector<cv::Point2d> normalized;
+  for (const auto& [corner, ray] : rays) {
+    const Eigen::Vector3d turned = turned_from_camera * ray;
+    if (turned.z() < 1e-3) continue;
+    const Eigen::Vector2d z = turned.hnormalized();
+    in_board.emplace_back(corner->in_board_m.x(), corner->in_board_m.y(), 0);
     normalized.emplace_back(z.x(), z.y());
   }
   if (in_board.size() < 4) return {};
@@ -108,7 +121,10 @@ std::optional<ViewPose> view_pose(Corners corners, const Lens& lens) {
                       translations, false, cv::SOLVEPNP_IPPE);
   std::optional<ViewPose> best;
   for (std::size_t i = 0; i < rotations.size(); ++i) {
-    const auto pose = refined(corners, lens, placed(rotations[i], translations[i]));
+    const Placed turned = placed(rotations[i], translations[i]);
+    const auto pose = refined(corners, lens,
+                              {turned_from_camera.transpose() * turned.rotation,
+                               turned_from_camera.transpose() * turned.translation_m});
     if (pose && (!best || pose->rms_px < best->rms_px)) best = pose;
   }
   return best;

@@ -52,6 +52,17 @@ bool inside(const SeenTag& tag, const cv::Mat& image) {
   });
 }
 
+/// By the pixels of its bounding box, which reach into the white around it.
+bool overexposed(const SeenTag& tag, const cv::Mat1b& levels) {
+  constexpr double white = 254, enough = 0.1;
+  std::vector<cv::Point2f> corners;
+  for (const auto& corner : tag.corners_px) {
+    corners.emplace_back(static_cast<float>(corner.x()), static_cast<float>(corner.y()));
+  }
+  const cv::Rect box = cv::boundingRect(corners) & cv::Rect(0, 0, levels.cols, levels.rows);
+  return !box.empty() && cv::countNonZero(levels(box) >= white) > enough * box.area();
+}
+
 }  // namespace
 
 BoardDetector::BoardDetector(const Board& board)
@@ -72,6 +83,9 @@ std::optional<SeenTag> BoardDetector::exact(const SeenTag& tag, const GreyLevels
 }
 
 SeenBoard BoardDetector::detect(const cv::Mat& image) const {
+  // No tag is narrower, and libapriltag reads beyond images of a row or two.
+  constexpr int least_px = 10;
+  if (std::min(image.cols, image.rows) < least_px) return {};
   const cv::Mat1b levels = eight_bits(image);
   std::map<int, std::vector<SeenTag>> found;
   SeenBoard seen;
@@ -79,7 +93,7 @@ SeenBoard BoardDetector::detect(const cv::Mat& image) const {
     if (ids_.contains(tag.id)) {
       found[tag.id].push_back(tag);
     } else {
-      ++seen.foreign;
+      seen.foreign.push_back(tag);
     }
   }
   const GreyLevels grey{levels, touching_ ? smooth(levels) : cv::Mat1f()};
@@ -99,7 +113,9 @@ SeenBoard BoardDetector::detect(const cv::Mat& image) const {
   for (const auto& [id, same] : found) {
     const bool used = std::any_of(seen.tags.begin(), seen.tags.end(),
                                   [id = id](const SeenTag& tag) { return tag.id == id; });
-    seen.unusable += used ? 0 : 1;
+    if (used) continue;
+    ++seen.unusable;
+    seen.overexposed += overexposed(same.front(), levels) ? 1 : 0;
   }
   return seen;
 }

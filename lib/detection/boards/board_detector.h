@@ -30,11 +30,13 @@ struct SeenTag {
 struct SeenBoard {
   /// By id, each once.
   std::vector<SeenTag> tags;
-  /// Tags of the family that the board does not have.
-  int foreign = 0;
+  /// Tags of the family that the board does not have, in the order found; corners to 1 or 2 px.
+  std::vector<SeenTag> foreign = {};
   /// Tags of the board that are left out: seen twice, or with a corner that cannot be found to a
-  /// fraction of a pixel (at the image's edge, hidden, blurred away).
+  /// fraction of a pixel (at the image's edge, hidden, blurred away, overexposed).
   int unusable = 0;
+  /// Of these, tags with a tenth of their pixels or more at the image's brightest level, white.
+  int overexposed = 0;
 };
 
 /// Finds a board's tags. Boards without corner squares by libapriltag, with corners where the

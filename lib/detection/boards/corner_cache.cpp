@@ -20,22 +20,26 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string settings_of(const Board& board) {
-  return fmt::format("{} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+  return fmt::format("2 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                      board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
                      board.border_bits, board.corner_squares, board.first_id,
                      name_of(board.id_order));
 }
 
-/// A row per tag; the first row, with id -1, holds the image's size and the two counts.
+/// A row per tag, then one per foreign tag; the first row, with id -1, holds the image's size and
+/// the three counts.
 void write_view(const fs::path& file, const BoardView& view) {
   CsvWriter csv(file, {"id", "u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"});
   csv.row({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
-           std::to_string(view.seen.foreign), std::to_string(view.seen.unusable), "0", "0", "0",
-           "0"});
-  for (const SeenTag& tag : view.seen.tags) {
-    const auto& [a, b, c, d] = tag.corners_px;
-    csv.row({std::to_string(tag.id), shortest(a.x()), shortest(a.y()), shortest(b.x()),
-             shortest(b.y()), shortest(c.x()), shortest(c.y()), shortest(d.x()), shortest(d.y())});
+           std::to_string(view.seen.foreign.size()), std::to_string(view.seen.unusable),
+           std::to_string(view.seen.overexposed), "0", "0", "0"});
+  for (const auto* tags : {&view.seen.tags, &view.seen.foreign}) {
+    for (const SeenTag& tag : *tags) {
+      const auto& [a, b, c, d] = tag.corners_px;
+      csv.row({std::to_string(tag.id), shortest(a.x()), shortest(a.y()), shortest(b.x()),
+               shortest(b.y()), shortest(c.x()), shortest(c.y()), shortest(d.x()),
+               shortest(d.y())});
+    }
   }
   csv.save();
 }
@@ -47,14 +51,18 @@ BoardView read_view(const fs::path& file, const std::string& image) {
   };
   if (csv.rows() == 0 || at(0, "id") != -1) throw InputError(file, "is not of the cache");
   BoardView view{image, {static_cast<int>(at(0, "u0")), static_cast<int>(at(0, "v0"))}, {}};
-  view.seen.foreign = static_cast<int>(at(0, "u1"));
   view.seen.unusable = static_cast<int>(at(0, "v1"));
-  for (std::size_t row = 1; row < static_cast<std::size_t>(csv.rows()); ++row) {
-    view.seen.tags.push_back({static_cast<int>(at(row, "id")),
-                              {{{at(row, "u0"), at(row, "v0")},
-                                {at(row, "u1"), at(row, "v1")},
-                                {at(row, "u2"), at(row, "v2")},
-                                {at(row, "u3"), at(row, "v3")}}}});
+  view.seen.overexposed = static_cast<int>(at(0, "u2"));
+  const auto rows = static_cast<std::size_t>(csv.rows());
+  const auto foreign = static_cast<std::size_t>(at(0, "u1"));
+  if (foreign >= rows) throw InputError(file, "is not of the cache");
+  for (std::size_t row = 1; row < rows; ++row) {
+    auto& tags = row < rows - foreign ? view.seen.tags : view.seen.foreign;
+    tags.push_back({static_cast<int>(at(row, "id")),
+                    {{{at(row, "u0"), at(row, "v0")},
+                      {at(row, "u1"), at(row, "v1")},
+                      {at(row, "u2"), at(row, "v2")},
+                      {at(row, "u3"), at(row, "v3")}}}});
   }
   return view;
 }

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "captures/in_parallel.h"
-#include "detection/image_file.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -20,11 +19,11 @@ struct ViewOutcome {
 };
 
 BoardView view_of(const BoardDetector& detector, const std::filesystem::path& file,
-                  const BoardCache& cache) {
+                  const BoardCache& cache, double max_mpx) {
   if (cache.find) {
     if (auto known = cache.find(file)) return *known;
   }
-  const cv::Mat image = read_image(file);
+  const cv::Mat image = read_image(file, max_mpx);
   BoardView view{file.filename().string(), {image.cols, image.rows}, detector.detect(image)};
   if (cache.keep) cache.keep(file, view);
   return view;
@@ -32,9 +31,9 @@ BoardView view_of(const BoardDetector& detector, const std::filesystem::path& fi
 
 /// One bad image does not end a run, whatever is bad about it.
 ViewOutcome outcome_of(const BoardDetector& detector, const std::filesystem::path& file,
-                       const BoardCache& cache) {
+                       const BoardCache& cache, double max_mpx) {
   try {
-    return {view_of(detector, file, cache), ""};
+    return {view_of(detector, file, cache, max_mpx), ""};
   } catch (const InputError& error) {
     return {{}, error.what()};
   } catch (const std::exception& error) {
@@ -49,12 +48,12 @@ ViewOutcome outcome_of(const BoardDetector& detector, const std::filesystem::pat
 FoundBoards detect_boards(const BoardDetector& detector,
                           const std::vector<std::filesystem::path>& images, int threads,
                           const BoardCache& cache,
-                          const std::function<void(std::size_t done)>& progress) {
+                          const std::function<void(std::size_t done)>& progress, double max_mpx) {
   std::vector<ViewOutcome> outcomes(images.size());
   std::mutex counting;
   std::size_t done = 0;
   in_parallel(images.size(), threads, [&](std::size_t i) {
-    outcomes[i] = outcome_of(detector, images[i], cache);
+    outcomes[i] = outcome_of(detector, images[i], cache, max_mpx);
     const std::lock_guard lock(counting);
     progress(++done);
   });

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "detection/boards/board_detector.h"
+#include "detection/image_file.h"
 
 namespace vlp {
 
@@ -34,12 +35,14 @@ struct FoundBoards {
   std::vector<std::string> refused;
 };
 
-/// Detects the board in each image, so many at a time. An image that cannot be read is refused and
-/// does not end it. The result does not depend on the threads. `progress` gets the images done so
-/// far; its calls do not overlap, while those of `cache`, whose functions may be empty, do.
+/// Detects the board in each image, so many at a time. An image that cannot be read, or has more
+/// than max_mpx million pixels and is not in the cache, is refused and does not end it. The result
+/// does not depend on the threads. `progress` gets the images done so far; its calls do not
+/// overlap, while those of `cache`, whose functions may be empty, do.
 FoundBoards detect_boards(const BoardDetector& detector,
                           const std::vector<std::filesystem::path>& images, int threads,
                           const BoardCache& cache,
-                          const std::function<void(std::size_t done)>& progress);
+                          const std::function<void(std::size_t done)>& progress,
+                          double max_mpx = kUsualMaxMpx);
 
 }  // namespace vlp

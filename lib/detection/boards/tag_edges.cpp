@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-struct Pixel {
+struct EdgePixel {
   double along, across_px, grey;
 };
 
@@ -24,7 +24,7 @@ struct Edge {
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 8 };
   using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
 
-  const std::vector<Pixel>& pixels;
+  const std::vector<EdgePixel>& pixels;
 
   int NumResiduals() const { return static_cast<int>(pixels.size()); }
 
@@ -64,7 +64,8 @@ struct Band {
   double inside_px, outside_px;
 };
 
-std::vector<Pixel> pixels_beside(const cv::Mat1b& image, const Parabola& edge, const Band& band) {
+std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image, const Parabola& edge,
+                                     const Band& band) {
   constexpr double free_px = 2.5;  // of the corners, which are round
   const double end_px = edge.half_px - free_px;
   const Eigen::Vector2d wide = edge.along.cwiseAbs() * edge.half_px +
@@ -72,7 +73,7 @@ std::vector<Pixel> pixels_beside(const cv::Mat1b& image, const Parabola& edge, c
   const Eigen::Array2i last(image.cols - 1, image.rows - 1);
   const Eigen::Vector2i low = (edge.middle - wide).array().ceil().cast<int>().max(0);
   const Eigen::Vector2i high = (edge.middle + wide).array().floor().cast<int>().min(last);
-  std::vector<Pixel> pixels;
+  std::vector<EdgePixel> pixels;
   for (int row = low.y(); row <= high.y(); ++row) {
     for (int column = low.x(); column <= high.x(); ++column) {
       const Eigen::Vector2d at = Eigen::Vector2d(column, row) - edge.middle;
@@ -85,9 +86,9 @@ std::vector<Pixel> pixels_beside(const cv::Mat1b& image, const Parabola& edge, c
 }
 
 /// Middle and contrast of pixels, roughly: those well inside against those well outside.
-void start_levels(const std::vector<Pixel>& pixels, Edge::Parameters& p) {
+void start_edge_levels(const std::vector<EdgePixel>& pixels, Edge::Parameters& p) {
   double in = 0, out = 0, ins = 0, outs = 0;
-  for (const Pixel& pixel : pixels) {
+  for (const EdgePixel& pixel : pixels) {
     (pixel.across_px < 0 ? in : out) += pixel.grey;
     (pixel.across_px < 0 ? ins : outs) += 1;
   }
@@ -108,7 +109,7 @@ bool fit(Parabola& edge, const cv::Mat1b& image, const Band& band) {
   if (pixels.size() < least_pixels) return false;
   Edge::Parameters p = Edge::Parameters::Zero();
   p[3] = usual_blur_px;
-  start_levels(pixels, p);
+  start_edge_levels(pixels, p);
   const Edge step{pixels};
   ceres::TinySolver<Edge> solver;
   solver.options.max_num_iterations = most_steps;

@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "calibration/intrinsics/synthetic_views.h"
 
 namespace vlp {
@@ -63,10 +66,69 @@ TEST_P(BoardCheckOf, AnotherOrderIsNamed) {
   EXPECT_THAT(problem(board), HasSubstr("cols 6, rows 5"));
 }
 
-TEST_P(BoardCheckOf, AnotherBoardIsCalledSo) {
+TEST_P(BoardCheckOf, OtherNumbersOfTagsAreNamed) {
+  for (const int cols : {4, 5, 7}) {
+    Board board = views_.board;
+    board.cols = cols;
+    EXPECT_THAT(problem(board), HasSubstr("the images show cols 6, rows 5, id_order "
+                                          "row-major-from-bottom-left"))
+        << cols;
+  }
+}
+
+/// As the detector gives them: tags with ids that the board does not have are foreign.
+TEST_P(BoardCheckOf, TagsThatTheBoardLacksCountToo) {
   Board board = views_.board;
-  board.cols = 7;
-  EXPECT_THAT(problem(board), HasSubstr("is it another board?"));
+  board.rows = 4;
+  for (BoardView& view : seen_) {
+    auto& [tags, foreign, unusable, overexposed] = view.seen;
+    std::copy_if(tags.begin(), tags.end(), std::back_inserter(foreign),
+                 [](const SeenTag& tag) { return tag.id >= 24; });
+    std::erase_if(tags, [](const SeenTag& tag) { return tag.id >= 24; });
+  }
+  EXPECT_THAT(problem(board), HasSubstr("the images show cols 6, rows 5"));
+  board.first_id = 100;
+  board.rows = 5;
+  EXPECT_THAT(problem(board), HasSubstr("cols 6, rows 5, id_order row-major-from-bottom-left, "
+                                        "first_id 0"));
+}
+
+TEST_P(BoardCheckOf, TagsOfTheSurroundingsDoNotMatter) {
+  for (const int id : {100, 31}) {
+    auto views = seen_;
+    for (BoardView& view : views) {
+      SeenTag stray = view.seen.tags.front();
+      stray.id = id;
+      for (auto& corner : stray.corners_px) corner += Eigen::Vector2d(-150, 40);
+      view.seen.foreign.push_back(stray);
+    }
+    EXPECT_THAT(check_board(views_.board, views, {}).problem, IsEmpty()) << id;
+  }
+}
+
+TEST_P(BoardCheckOf, ABoardBesideItDoesNotMatter) {
+  for (BoardView& view : seen_) {
+    Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
+    for (const SeenTag& tag : view.seen.tags) {
+      for (const auto& corner : tag.corners_px) {
+        low = low.cwiseMin(corner);
+        high = high.cwiseMax(corner);
+      }
+    }
+    for (SeenTag tag : view.seen.tags) {
+      tag.id += 30;
+      for (auto& corner : tag.corners_px) corner.x() += 1.1 * (high - low).x();
+      view.seen.foreign.push_back(tag);
+    }
+  }
+  EXPECT_THAT(problem(views_.board), IsEmpty());
+}
+
+TEST_P(BoardCheckOf, AnotherBoardIsCalledSo) {
+  for (BoardView& view : seen_) {
+    for (SeenTag& tag : view.seen.tags) tag.id = tag.id * 7 % 30;
+  }
+  EXPECT_THAT(problem(views_.board), HasSubstr("is it another board?"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Boards, BoardCheckOf, testing::Bool(),

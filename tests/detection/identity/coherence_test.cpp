@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-const cv::Size kSize(200, 160);
+const cv::Size kPictureSize(200, 160);
 
 double coherence_in(const cv::Mat& image, const DrawnLamp& lamp) {
   const Eigen::Vector2d half(lamp.radius_px, lamp.radius_px);
@@ -22,7 +22,7 @@ double coherence_in(const cv::Mat& image, const DrawnLamp& lamp) {
 }
 
 double coherence_of_drawn(const DrawnLamp& lamp) {
-  return coherence_in(drawn({lamp}, kSize, CV_16U, 0.5), lamp);
+  return coherence_in(drawn({lamp}, kPictureSize, CV_16U, 0.5), lamp);
 }
 
 TEST(Coherence, IsNearOneOfALampHoweverItIsLit) {
@@ -43,7 +43,7 @@ TEST(Coherence, IsLostWhenBarsLean) {
     DrawnLamp lamp;
     lamp.stripes.period_lines = 0.9 * lamp.radius_px;  // two periods
     const double slope = std::tan(degrees * std::numbers::pi / 180);
-    cv::Mat1d image(kSize);
+    cv::Mat1d image(kPictureSize);
     for (int row = 0; row < image.rows; ++row) {
       for (int column = 0; column < image.cols; ++column) {
         const Eigen::Vector2d away = Eigen::Vector2d(column, row) - lamp.center;

@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-const cv::Size kSize(400, 360);
+const cv::Size kGlowSize(400, 360);
 
 DrawnLamp glow(double level, const DrawnStripes& stripes = {}) {
   return {.center = {198.7, 181.2}, .level = level, .stripes = stripes, .glow = DrawnGlow()};
@@ -30,7 +30,7 @@ std::optional<Light> glow_in(const cv::Mat& image) {
   const auto largest = std::max_element(blobs.begin(), blobs.end(),
                                         [&](auto& a, auto& b) { return size(a) < size(b); });
   if (largest == blobs.end()) return std::nullopt;
-  return glow_of(image, *largest, background, LightShape(drawn_camera(kSize)));
+  return glow_of(image, *largest, background, LightShape(drawn_camera(kGlowSize)));
 }
 
 /// Glows not as bright as white, and up to five times too bright, with several stripes.
@@ -53,7 +53,7 @@ TEST(Glow, IsFoundWithItsCentreAndItsStripes) {
   double chi_square = 0, worst_px = 0, count = 0;
   for (const int depth : {CV_8U, CV_16U}) {
     for_each_case({0, 0.5, 1.5}, [&](const DrawnLamp& lamp, double noise) {
-      const cv::Mat image = drawn({lamp}, kSize, depth, noise);
+      const cv::Mat image = drawn({lamp}, kGlowSize, depth, noise);
       const auto light = glow_in(image);
       ASSERT_TRUE(light);
       EXPECT_TRUE(light->glows);
@@ -77,7 +77,7 @@ TEST(Glow, IsIdentified) {
   for_each_case({0, 0.5}, [](const DrawnLamp& lamp, double noise) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 17.5)}};
     const auto lights =
-        LampDetector(map, drawn_camera(kSize)).detect(drawn({lamp}, kSize, CV_8U, noise));
+        LampDetector(map, drawn_camera(kGlowSize)).detect(drawn({lamp}, kGlowSize, CV_8U, noise));
     ASSERT_EQ(lights.size(), 1U);
     EXPECT_TRUE(lights[0].glows);
     EXPECT_NEAR(lights[0].stripes.period_lines / lamp.stripes.period_lines, 1, 0.02);
@@ -90,9 +90,9 @@ TEST(Glow, HasNoEdge) {
   for (const int depth : {CV_8U, CV_16U}) {
     for (const double blur_px : {0.6, 1.0}) {
       const DrawnLamp disc{.center = {198.7, 181.2}, .blur_px = blur_px};
-      EXPECT_FALSE(glow_in(drawn({disc}, kSize, depth)));
+      EXPECT_FALSE(glow_in(drawn({disc}, kGlowSize, depth)));
       for (const Light& light :
-           LampDetector({}, drawn_camera(kSize)).detect(drawn({disc}, kSize, depth))) {
+           LampDetector({}, drawn_camera(kGlowSize)).detect(drawn({disc}, kGlowSize, depth))) {
         EXPECT_FALSE(light.glows);
       }
     }

@@ -1,0 +1,84 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-convert: a camera in the file of one tool to that of another.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "app.h"
+#include "calibration/intrinsics/camera_exports.h"
+#include "calibration/intrinsics/camera_imports.h"
+#include "history.h"
+#include "rig/file.h"
+#include "rig/stage.h"
+
+namespace vlp {
+namespace {
+
+struct Options {
+  std::string input, output, to = "calibration", lens, camera_id;
+};
+
+std::string text_of(const Options& options, const Camera& camera) {
+  if (options.to == "mrcal") return mrcal_cameramodel(camera);
+  if (options.to == "opencv") return opencv_camera(camera);
+  return options.to == "ros" ? ros_camera_info(camera) : kalibr_camchain(camera);
+}
+
+void run(const CLI::App& app, const Options& options) {
+  check_output(options.output, {options.input});
+  FittedCamera fitted{read_any_camera(options.input), 0, 1};
+  const std::string was(name_of(fitted.camera.lens_model));
+  if (!options.lens.empty()) {
+    fitted = with_lens_model(fitted.camera, *lens_model_from_name(options.lens));
+  }
+  Camera& camera = fitted.camera;
+  if (!options.camera_id.empty()) camera.id = options.camera_id;
+  if (options.to == "calibration") {
+    write_calibration(options.output, with_camera(camera, {}, history_entry(app, {options.input})));
+  } else {
+    write_file(options.output, text_of(options, camera));
+  }
+  if (options.to == "calibration") {
+    fmt::print("kept          the camera alone; vlp-rotation and vlp-dispersion add the rest\n");
+  }
+  fmt::print("camera        {}, {} x {} px\n", camera.id, camera.imager_px[0], camera.imager_px[1]);
+  if (was == name_of(camera.lens_model)) {
+    fmt::print("lens          {}, unchanged\n", was);
+  } else {
+    fmt::print(
+        "lens          {}, fitted to {}: {:.3g} px apart at worst, over {:.1f} % of the image\n",
+        name_of(camera.lens_model), was, fitted.worst_px, 100 * fitted.share);
+  }
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Converts a camera from the file of one tool to that of another: a calibration of this\n"
+      "toolbox, mrcal's .cameramodel, OpenCV's FileStorage (also cv::fisheye), ROS camera_info,\n"
+      "Kalibr's camchain. The input's content tells its format. The numbers stay as they are "
+      "where\n"
+      "both have the lens model; otherwise --lens fits one that the other has.\n\n"
+      "Example, from the project's folder:\n"
+      "  build/bin/vlp-convert datasets/paper-rig/rendered/true_calibration.yaml --to ros -o "
+      "ros.yaml\n",
+      "vlp-convert");
+  vlp::Options options;
+  app.add_option("input", options.input, "File with a camera")->required();
+  app.add_option("-o,--output", options.output, "Where to write it")->required();
+  app.add_option("--to", options.to, "Format to write (default: calibration)")
+      ->check(CLI::IsMember({"calibration", "mrcal", "opencv", "ros", "kalibr"}))
+      ->option_text("calibration|mrcal|opencv|ros|kalibr");
+  app.add_option("--lens", options.lens,
+                 "Lens model to fit, which is said how well (default: as it is)")
+      ->check([](const std::string& name) {
+        return vlp::lens_model_from_name(name) ? std::string()
+                                               : "the models are: " + vlp::lens_model_names();
+      });
+  app.add_option("--camera-id", options.camera_id, "Name of the camera (default: as it is)");
+  return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
+}

@@ -1,0 +1,258 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/board_problem.h"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/rotation_vector.h"
+#include "camera/lens.h"
+
+namespace vlp {
+namespace {
+
+/// Of a lattice point, by all that moves it.
+struct PointProjection {
+  Eigen::Vector2d pixel;
+  Lens::Projection by_lens;
+  Eigen::Matrix<double, 2, 6> by_pose;
+  Eigen::Matrix2d by_warp;
+};
+
+/// A point of the lattice and how the warp lifts it.
+struct LatticePoint {
+  Eigen::Vector2d in_board_m, lift;
+};
+
+LatticePoint lattice_point(const BoardProblem& problem, std::size_t index) {
+  const auto cols = static_cast<std::size_t>(problem.cols);
+  const Eigen::Array2d node(static_cast<double>(index % cols), static_cast<double>(index / cols));
+  const Eigen::Array2d last(problem.cols - 1, problem.rows - 1);
+  return {problem.spacing_m * node.matrix(), (1 - (2 * node / last - 1).square()).matrix()};
+}
+
+std::optional<PointProjection> projected(const Lens& lens, const LatticePoint& point,
+                                         const Eigen::Matrix3d& rotation,
+                                         const Eigen::Matrix3d& left, const BoardPose& pose,
+                                         const Eigen::Vector2d& warp_m) {
+  Eigen::Vector3d in_board;
+  in_board << point.in_board_m, warp_m.dot(point.lift);
+  const Eigen::Vector3d turned = rotation * in_board;
+  const auto by_lens = lens.project_with_jacobians(turned + pose.translation_m);
+  if (!by_lens) return {};
+  PointProjection result{by_lens->pixel, *by_lens, {}, {}};
+  result.by_pose << -by_lens->d_pixel_d_point * cross_matrix(turned) * left,
+      by_lens->d_pixel_d_point;
+  result.by_warp = by_lens->d_pixel_d_point * rotation.col(2) * point.lift.transpose();
+  return result;
+}
+
+/// The residuals, projected minus seen, of one board's points that are no outliers. Parameters:
+/// intrinsics, pose, warp.
+class BoardCost : public ceres::CostFunction {
+ public:
+  BoardCost(const BoardProblem& problem, std::size_t pose) : problem_(problem) {
+    const std::size_t count = problem.points_of_a_board();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (problem.points[pose * count + i].z() > 0) seen_.push_back(pose * count + i);
+    }
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.intrinsics.size()));
+    mutable_parameter_block_sizes()->push_back(6);
+    mutable_parameter_block_sizes()->push_back(2);
+    set_num_residuals(static_cast<int>(2 * seen_.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    if (!(parameters[0][0] > 0) || !(parameters[0][1] > 0)) return false;
+    const std::span<const double> intrinsics(parameters[0], problem_.intrinsics.size());
+    if (!std::all_of(intrinsics.begin(), intrinsics.end(),
+                     [](double value) { return std::isfinite(value); })) {
+      return false;
+    }
+    const Lens lens(problem_.lens_model, intrinsics);
+    const BoardPose pose{Eigen::Vector3d(parameters[1]), Eigen::Vector3d(parameters[1] + 3)};
+    const Eigen::Matrix3d rotation = rotation_by(pose.rotation),
+                          left = left_jacobian(pose.rotation);
+    const Eigen::Vector2d warp_m(parameters[2]);
+    const auto columns = static_cast<Eigen::Index>(intrinsics.size());
+    const std::size_t count = problem_.points_of_a_board();
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    for (std::size_t k = 0; k < seen_.size(); ++k) {
+      const auto point =
+          projected(lens, lattice_point(problem_, seen_[k] % count), rotation, left, pose, warp_m);
+      if (!point) return false;
+      const auto row = static_cast<Eigen::Index>(2 * k);
+      Eigen::Map<Eigen::Vector2d>(residuals + row) =
+          point->pixel - problem_.points[seen_[k]].head<2>();
+      if (jacobians == nullptr) continue;
+      const auto rows = static_cast<Eigen::Index>(2 * seen_.size());
+      if (jacobians[0] != nullptr) {
+        Eigen::Map<Rows>(jacobians[0], rows, columns).middleRows<2>(row) =
+            point->by_lens.d_pixel_d_parameters;
+      }
+      if (jacobians[1] != nullptr) {
+        Eigen::Map<Rows>(jacobians[1], rows, 6).middleRows<2>(row) = point->by_pose;
+      }
+      if (jacobians[2] != nullptr) {
+        Eigen::Map<Rows>(jacobians[2], rows, 2).middleRows<2>(row) = point->by_warp;
+      }
+    }
+    return true;
+  }
+
+ private:
+  const BoardProblem& problem_;
+  std::vector<std::size_t> seen_;
+};
+
+bool solve_once(BoardProblem& problem, const SolveFor& what) {
+  std::vector<std::array<double, 6>> poses;
+  for (const BoardPose& pose : problem.poses) {
+    poses.push_back({pose.rotation.x(), pose.rotation.y(), pose.rotation.z(),
+                     pose.translation_m.x(), pose.translation_m.y(), pose.translation_m.z()});
+  }
+  std::vector<double> intrinsics = problem.intrinsics;
+  Eigen::Vector2d warp_m = problem.warp_m;
+  ceres::Problem equations;
+  auto order = std::make_unique<ceres::ParameterBlockOrdering>();
+  std::size_t residuals = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    auto cost = std::make_unique<BoardCost>(problem, i);
+    if (cost->num_residuals() == 0) return false;
+    residuals += static_cast<std::size_t>(cost->num_residuals());
+    equations.AddResidualBlock(cost.release(), nullptr, intrinsics.data(), poses[i].data(),
+                               warp_m.data());
+    order->AddElementToGroup(poses[i].data(), 0);
+  }
+  if (residuals < intrinsics.size() + 6 * poses.size()) return false;
+  order->AddElementToGroup(intrinsics.data(), 1);
+  order->AddElementToGroup(warp_m.data(), 1);
+  if (!what.warp) equations.SetParameterBlockConstant(warp_m.data());
+  if (!what.core) {
+    equations.SetParameterBlockConstant(intrinsics.data());
+  } else if (!what.distortions && intrinsics.size() > 4) {
+    std::vector<int> fixed;
+    for (int i = 4; i < static_cast<int>(intrinsics.size()); ++i) fixed.push_back(i);
+    equations.SetManifold(intrinsics.data(),
+                          new ceres::SubsetManifold(static_cast<int>(intrinsics.size()), fixed));
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_SCHUR;
+  options.linear_solver_ordering.reset(order.release());
+  options.max_num_iterations = 100;
+  options.function_tolerance = 1e-12;
+  options.parameter_tolerance = 1e-12;
+  options.gradient_tolerance = 1e-12;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &equations, &summary);
+  if (!summary.IsSolutionUsable()) return false;
+  problem.intrinsics = intrinsics;
+  problem.warp_m = warp_m;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    problem.poses[i] = {Eigen::Vector3d(poses[i].data()), Eigen::Vector3d(poses[i].data() + 3)};
+  }
+  return true;
+}
+
+/// Marks corners beyond 5 sigmas on either axis; true when there are any.
+bool mark_outliers(BoardProblem& problem) {
+  constexpr double sigmas = 5, outlier = -1;
+  const auto residuals = residuals_of(problem);
+  double squares = 0, count = 0;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (!(problem.points[i].z() > 0) || !residuals[i].allFinite()) continue;
+    squares += residuals[i].squaredNorm();
+    count += 2;
+  }
+  const double limit_px = sigmas * std::sqrt(squares / std::max(count, 1.0));
+  bool any = false;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (!(problem.points[i].z() > 0)) continue;
+    if (residuals[i].cwiseAbs().maxCoeff() <= limit_px) continue;
+    problem.points[i].z() = outlier;
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (const Eigen::Vector3d& point : problem.points) {
+    if (point.z() > 0) pixels.emplace_back(point.head<2>());
+  }
+  return pixels;
+}
+
+bool has_mrcal(LensModel model) { return model != LensModel::fisheye; }
+
+bool solve(BoardProblem& problem, const SolveFor& what) {
+  return has_mrcal(problem.lens_model) ? solve_by_mrcal(problem, what)
+                                       : solve_by_ceres(problem, what);
+}
+
+Linearization linearized(const BoardProblem& problem, const SolveFor& what) {
+  return has_mrcal(problem.lens_model) ? linearized_by_mrcal(problem, what)
+                                       : linearized_by_us(problem, what);
+}
+
+bool solve_by_ceres(BoardProblem& problem, const SolveFor& what) {
+  if (!solve_once(problem, what)) return false;
+  constexpr int rounds = 10;
+  for (int round = 0; what.without_outliers && round < rounds && mark_outliers(problem); ++round) {
+    if (!solve_once(problem, what)) return false;
+  }
+  return true;
+}
+
+Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what) {
+  const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
+  const auto boards = static_cast<Eigen::Index>(problem.poses.size());
+  const Eigen::Index warp = intrinsics + 6 * boards, states = warp + (what.warp ? 2 : 0);
+  const auto rows = static_cast<Eigen::Index>(2 * problem.points.size());
+  const std::size_t count = problem.points_of_a_board();
+  const Lens lens(problem.lens_model, problem.intrinsics);
+  Linearization result;
+  result.residuals_px = Eigen::VectorXd::Zero(rows);
+  result.intrinsics = 0;
+  result.poses = intrinsics;
+  result.scale = Eigen::VectorXd::Zero(states);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t i = 0; i < problem.points.size(); ++i) {
+    if (!(problem.points[i].z() > 0)) continue;
+    const BoardPose& pose = problem.poses[i / count];
+    const auto point =
+        projected(lens, lattice_point(problem, i % count), rotation_by(pose.rotation),
+                  left_jacobian(pose.rotation), pose, problem.warp_m);
+    if (!point) continue;
+    const auto row = static_cast<Eigen::Index>(2 * i);
+    result.residuals_px.segment<2>(row) = point->pixel - problem.points[i].head<2>();
+    const auto add = [&](Eigen::Index first, const auto& block) {
+      for (Eigen::Index r = 0; r < 2; ++r) {
+        for (Eigen::Index c = 0; c < block.cols(); ++c) {
+          entries.emplace_back(static_cast<int>(first + c), static_cast<int>(row + r), block(r, c));
+          result.scale[first + c] += block(r, c) * block(r, c);
+        }
+      }
+    };
+    add(0, point->by_lens.d_pixel_d_parameters);
+    add(intrinsics + 6 * static_cast<Eigen::Index>(i / count), point->by_pose);
+    if (what.warp) add(warp, point->by_warp);
+  }
+  for (double& each : result.scale) each = each > 0 ? 1 / std::sqrt(each) : 1;
+  result.jacobian_transposed.resize(states, rows);
+  result.jacobian_transposed.setFromTriplets(entries.begin(), entries.end());
+  result.jacobian_transposed = result.scale.asDiagonal() * result.jacobian_transposed;
+  return result;
+}
+
+}  // namespace vlp

@@ -1,0 +1,259 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/camera_imports.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <locale>
+#include <regex>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calibration/intrinsics/projection_difference.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw InputError(file, "cannot be read");
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// What follows 'key': in a Python literal.
+std::string python_value(const fs::path& file, const std::string& text, const std::string& key) {
+  const std::regex pattern("['\"]" + key +
+                           "['\"]\\s*:\\s*(\\[[^\\]]*\\]|\\([^)]*\\)|'[^']*'|\"[^\"]*\")");
+  std::smatch match;
+  if (!std::regex_search(text, match, pattern)) throw InputError(file, "lacks '" + key + "'");
+  const std::string value = match[1];
+  return value.substr(1, value.size() - 2);
+}
+
+std::vector<double> python_numbers(const fs::path& file, const std::string& text,
+                                   const std::string& key) {
+  std::vector<double> numbers;
+  std::string list = python_value(file, text, key);
+  std::replace(list.begin(), list.end(), ',', ' ');
+  std::istringstream stream(list);
+  stream.imbue(std::locale::classic());
+  for (double number = 0; stream >> number;) numbers.push_back(number);
+  if (!stream.eof()) throw InputError(file, "'" + key + "' should be numbers");
+  return numbers;
+}
+
+Camera camera_from_mrcal(const fs::path& file, const std::string& text) {
+  // What the solve went in is long, and not looked at.
+  const std::string head = text.substr(0, text.find("'optimization_inputs'"));
+  const std::string name = python_value(file, head, "lensmodel");
+  const auto model = lens_model_from_name(name);
+  if (!model) {
+    throw InputError(file, "has lens model " + name + "; the models are: " + lens_model_names());
+  }
+  const auto imager = python_numbers(file, head, "imagersize");
+  constexpr double largest = 1e6;
+  if (imager.size() != 2 || !(imager[0] >= 1 && imager[1] >= 1) ||
+      !(imager[0] <= largest && imager[1] <= largest)) {
+    throw InputError(file, "'imagersize' should be the image's width and height in pixels");
+  }
+  Camera camera;
+  camera.lens_model = *model;
+  camera.imager_px = {static_cast<int>(imager[0]), static_cast<int>(imager[1])};
+  camera.intrinsics = python_numbers(file, head, "intrinsics");
+  return camera;
+}
+
+std::vector<double> yaml_numbers(const YAML::Node& node) {
+  const YAML::Node list = node.IsMap() ? node["data"] : node;
+  if (!list || !list.IsSequence()) throw std::invalid_argument("a list of numbers is missing");
+  return list.as<std::vector<double>>();
+}
+
+/// The last two of OpenCV's 14 tilt the sensor. All zero: a pinhole.
+LensModel model_of(const std::string& name, std::vector<double>& distortions) {
+  constexpr std::size_t with_tilt = 14, without = 12;
+  if (name == "fisheye" || name == "equidistant") {
+    if (distortions.size() != 4) throw std::invalid_argument(name + " takes four coefficients");
+    return LensModel::fisheye;
+  }
+  if (!name.empty() && name != "plumb_bob" && name != "rational_polynomial" && name != "radtan" &&
+      name != "none") {
+    throw std::invalid_argument("there is no distortion model like " + name + " here");
+  }
+  if (distortions.size() == with_tilt && distortions[12] == 0 && distortions[13] == 0) {
+    distortions.resize(without);
+  }
+  if (std::all_of(distortions.begin(), distortions.end(), [](double k) { return k == 0; })) {
+    distortions.clear();
+  }
+  switch (distortions.size()) {
+    case 0:
+      return LensModel::pinhole;
+    case 4:
+      return LensModel::opencv4;
+    case 5:
+      return LensModel::opencv5;
+    case 8:
+      return LensModel::opencv8;
+    case without:
+      return LensModel::opencv12;
+    default:
+      throw std::invalid_argument(
+          "distortions should be 0, 4, 5, 8 or 12 numbers, the sensor not tilted");
+  }
+}
+
+Camera camera_from_yaml(const YAML::Node& document) {
+  const YAML::Node kalibr = document["cam0"];
+  Camera camera;
+  std::vector<double> distortions;
+  if (kalibr) {
+    if (const auto model = kalibr["camera_model"].as<std::string>(); model != "pinhole") {
+      throw std::invalid_argument("camera_model " + model + " is not known here, pinhole is");
+    }
+    camera.intrinsics = yaml_numbers(kalibr["intrinsics"]);
+    const auto model = kalibr["distortion_model"].as<std::string>("none");
+    if (model != "none") distortions = yaml_numbers(kalibr["distortion_coeffs"]);
+    camera.lens_model = model_of(model, distortions);
+    camera.imager_px = kalibr["resolution"].as<std::array<int, 2>>();
+  } else {
+    const auto matrix = yaml_numbers(document["camera_matrix"]);
+    if (matrix.size() != 9) throw std::invalid_argument("camera_matrix should be 3 x 3");
+    if (matrix[1] != 0) throw std::invalid_argument("camera_matrix is skewed");
+    camera.intrinsics = {matrix[0], matrix[4], matrix[2], matrix[5]};
+    distortions = yaml_numbers(document["distortion_coefficients"]);
+    std::string model = document["distortion_model"].as<std::string>("");
+    if (model.empty() && document["fisheye_model"].as<int>(0) != 0) model = "fisheye";
+    camera.lens_model = model_of(model, distortions);
+    camera.imager_px = {document["image_width"].as<int>(), document["image_height"].as<int>()};
+    if (const YAML::Node name = document["camera_name"]) camera.id = name.as<std::string>();
+  }
+  camera.intrinsics.insert(camera.intrinsics.end(), distortions.begin(), distortions.end());
+  return camera;
+}
+
+/// Pixels of the new lens against those of rays, and the normal equations of its parameters.
+struct LensFit {
+  double squares = 0, worst_px = 0;
+  int count = 0;
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd right;
+};
+
+LensFit lens_fit_at(const std::vector<double>& parameters, LensModel model,
+                    const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>>& rays) {
+  const Lens lens(model, parameters);
+  const auto size = static_cast<Eigen::Index>(parameters.size());
+  LensFit step;
+  step.normal = Eigen::MatrixXd::Zero(size, size);
+  step.right = Eigen::VectorXd::Zero(size);
+  for (const auto& [pixel, ray] : rays) {
+    const auto at = lens.project_with_jacobians(ray);
+    if (!at) continue;
+    const Eigen::Vector2d off = pixel - at->pixel;
+    step.squares += off.squaredNorm();
+    step.worst_px = std::max(step.worst_px, off.norm());
+    ++step.count;
+    step.normal += at->d_pixel_d_parameters.transpose() * at->d_pixel_d_parameters;
+    step.right += at->d_pixel_d_parameters.transpose() * off;
+  }
+  return step;
+}
+
+}  // namespace
+
+Camera read_any_camera(const fs::path& file) {
+  std::string text = text_of(file);
+  Camera camera;
+  if (text.find("'lensmodel'") != std::string::npos ||
+      text.find("\"lensmodel\"") != std::string::npos) {
+    camera = camera_from_mrcal(file, text);
+  } else {
+    if (text.starts_with("<?xml")) {
+      throw InputError(file, "is XML, which is not read: have OpenCV write it as .yaml");
+    }
+    // "%YAML:1.0" of OpenCV is no directive of YAML.
+    if (text.starts_with("%YAML:")) text.erase(0, text.find('\n'));
+    try {
+      const YAML::Node document = YAML::Load(text);
+      if (!document.IsMap()) throw InputError(file, "holds no camera");
+      if (document["format"]) return read_calibration(file).camera;
+      camera = camera_from_yaml(document);
+    } catch (const YAML::Exception& error) {
+      throw InputError(file, "holds no camera that is known here: " + error.msg);
+    } catch (const std::invalid_argument& error) {
+      throw InputError(file, error.what());
+    }
+  }
+  if (camera.id.empty()) camera.id = "camera";
+  if (camera.imager_px[0] < 1 || camera.imager_px[1] < 1) {
+    throw InputError(file, "the image has no size");
+  }
+  try {
+    const Lens lens(camera.lens_model, camera.intrinsics);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(file, error.what());
+  }
+  return camera;
+}
+
+FittedCamera with_lens_model(const Camera& camera, LensModel model) {
+  if (camera.lens_model == model) return {camera, 0, 1};
+  const Lens from(camera.lens_model, camera.intrinsics);
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;
+  const auto pixels = pixel_grid(camera.imager_px);
+  for (const Eigen::Vector2d& pixel : pixels) {
+    if (const auto ray = from.unproject(pixel)) rays.emplace_back(pixel, ray->direction);
+  }
+  FittedCamera fitted{camera, 0, 0};
+  fitted.camera.lens_model = model;
+  auto& parameters = fitted.camera.intrinsics;
+  parameters.resize(4);
+  parameters.resize(parameter_count(model), 0);
+  constexpr int most_steps = 200;
+  constexpr double settled = 1e-12;
+  double damping = 1e-3;
+  LensFit at = lens_fit_at(parameters, model, rays);
+  for (int i = 0; i < most_steps && at.count > 0; ++i) {
+    Eigen::MatrixXd damped = at.normal;
+    damped.diagonal() *= 1 + damping;
+    const Eigen::VectorXd change = damped.ldlt().solve(at.right);
+    std::vector<double> next = parameters;
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] += change[static_cast<Eigen::Index>(k)];
+    const bool possible = change.allFinite() && next[0] > 0 && next[1] > 0;
+    LensFit trial = possible ? lens_fit_at(next, model, rays) : LensFit{};
+    const bool better = trial.count > 0 && trial.count >= at.count &&
+                        (trial.count > at.count || trial.squares < at.squares);
+    if (!better) {
+      damping *= 10;
+      if (damping > 1e12) break;
+      continue;
+    }
+    const bool done = trial.count == at.count && at.squares - trial.squares <= settled * at.squares;
+    parameters = next;
+    at = std::move(trial);
+    damping = std::max(damping / 10, 1e-12);
+    if (done) break;
+  }
+  fitted.worst_px = at.worst_px;
+  fitted.share = static_cast<double>(at.count) / static_cast<double>(pixels.size());
+  if (at.count == 0 || !std::isfinite(at.worst_px)) {
+    throw std::invalid_argument(std::string(name_of(model)) + " has no lens near " +
+                                std::string(name_of(camera.lens_model)));
+  }
+  return fitted;
+}
+
+}  // namespace vlp

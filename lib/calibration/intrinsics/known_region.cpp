@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/known_region.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+/// Positive where c lies clockwise of a to b, as the image shows it (y down).
+double side(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+  const Eigen::Vector2d u = b - a, v = c - a;
+  return u.x() * v.y() - u.y() * v.x();
+}
+
+/// Andrew's monotone chain (1979).
+ImageRegion hull_of(std::vector<Eigen::Vector2d> points) {
+  std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
+    return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
+  });
+  const auto chain = [](auto first, auto last) {
+    ImageRegion part;
+    for (; first != last; ++first) {
+      while (part.size() > 1 && side(part[part.size() - 2], part.back(), *first) <= 0) {
+        part.pop_back();
+      }
+      part.push_back(*first);
+    }
+    return part;
+  };
+  if (points.size() < 3) return {};
+  ImageRegion hull = chain(points.begin(), points.end());
+  const ImageRegion back = chain(points.rbegin(), points.rend());
+  hull.pop_back();
+  hull.insert(hull.end(), back.begin(), back.end() - 1);
+  return hull.size() < 3 ? ImageRegion() : hull;
+}
+
+/// What of a polygon lies where sign * (x[axis] - limit) <= 0 (Sutherland and Hodgman, 1974).
+ImageRegion cut(const ImageRegion& region, int axis, double limit, double sign) {
+  ImageRegion rest;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    const Eigen::Vector2d &from = region[i], &to = region[(i + 1) % region.size()];
+    const double from_out = sign * (from[axis] - limit), to_out = sign * (to[axis] - limit);
+    if (from_out <= 0) rest.push_back(from);
+    if ((from_out < 0 && to_out > 0) || (from_out > 0 && to_out < 0)) {
+      Eigen::Vector2d crossing = from + (to - from) * (from_out / (from_out - to_out));
+      crossing[axis] = limit;
+      rest.push_back(crossing);
+    }
+  }
+  return rest;
+}
+
+}  // namespace
+
+ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
+                         const std::array<int, 2>& imager_px) {
+  constexpr double margin = 0.04;
+  const Eigen::Vector2d last(imager_px[0] - 1, imager_px[1] - 1);
+  const double margin_px = margin * last.norm();
+  // The hull grown by a square, whose corners reach an image's corner as its edges are reached.
+  std::vector<Eigen::Vector2d> grown;
+  for (const Eigen::Vector2d& corner : hull_of(corners_px)) {
+    for (const double x : {-margin_px, margin_px}) {
+      for (const double y : {-margin_px, margin_px})
+        grown.emplace_back(corner + Eigen::Vector2d(x, y));
+    }
+  }
+  ImageRegion region = hull_of(std::move(grown));
+  for (const int axis : {0, 1}) {
+    region = cut(region, axis, 0, -1);
+    region = cut(region, axis, last[axis], 1);
+  }
+  constexpr double whole = 0.985;
+  if (share_of_image(region, imager_px) < whole) return region;
+  return {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
+}
+
+bool lies_in(const ImageRegion& region, const Eigen::Vector2d& pixel) {
+  constexpr double rounding = 1e-6;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    if (side(region[i], region[(i + 1) % region.size()], pixel) < -rounding) return false;
+  }
+  return region.size() > 2;
+}
+
+double share_of_image(const ImageRegion& region, const std::array<int, 2>& imager_px) {
+  double twice = 0;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    twice += side({0, 0}, region[i], region[(i + 1) % region.size()]);
+  }
+  return twice / 2 / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
+}
+
+}  // namespace vlp

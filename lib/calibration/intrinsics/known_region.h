@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace vlp {
+
+/// A convex part of an image, by its corners in turn, clockwise as the image shows it.
+using ImageRegion = std::vector<Eigen::Vector2d>;
+
+/// Where a lens is known: the convex hull of the corners that it rests on, and around it a margin
+/// of 4 % of the image's diagonal, the image's edges permitting; the whole image when that leaves
+/// less than 1.5 % of it. Beyond it no corner contradicts a
+/// lens model that is wrong. Empty without three corners that are not on a line.
+ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
+                         const std::array<int, 2>& imager_px);
+
+/// Whether a pixel lies in it or on its edge.
+bool lies_in(const ImageRegion& region, const Eigen::Vector2d& pixel);
+
+/// Its area as a share of the image's, from the centre of its first pixel to that of its last.
+double share_of_image(const ImageRegion& region, const std::array<int, 2>& imager_px);
+
+}  // namespace vlp

@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cmath>
+
+namespace vlp {
+
+/// v x w = cross_matrix(v) w.
+inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+/// The rotation about r by its length, exp(r).
+inline Eigen::Matrix3d rotation_by(const Eigen::Vector3d& r) {
+  const double angle = r.norm();
+  if (!(angle > 0)) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
+}
+
+/// exp(r + dr) = exp(J dr) exp(r), to first order in dr: the left Jacobian of the rotations.
+inline Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& r) {
+  const double angle = r.norm();
+  constexpr double tiny = 1e-6;
+  if (angle < tiny) return Eigen::Matrix3d::Identity() + cross_matrix(r) / 2;
+  const Eigen::Matrix3d k = cross_matrix(r / angle);
+  return Eigen::Matrix3d::Identity() + (1 - std::cos(angle)) / angle * k +
+         (1 - std::sin(angle) / angle) * k * k;
+}
+
+}  // namespace vlp

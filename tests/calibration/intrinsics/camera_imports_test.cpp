@@ -1,0 +1,94 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Cameras in the files of other tools, there and back.
+#include "calibration/intrinsics/camera_imports.h"
+
+#include <gmock/gmock.h>
+
+#include "calibration/intrinsics/camera_exports.h"
+#include "rig/input_error.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+Camera camera_of(LensModel model) {
+  const std::vector<double> distortions{-0.2,   0.05,  1e-4, -2e-4, 0.01,  0.02,
+                                        -0.003, 0.001, 1e-4, 2e-5,  -1e-4, 3e-5};
+  Camera camera{"camera", {800, 600}, model, {520.25, 521, 402.3, 297.4}, {}, {}, {}};
+  camera.intrinsics.insert(
+      camera.intrinsics.end(), distortions.begin(),
+      distortions.begin() + static_cast<std::ptrdiff_t>(parameter_count(model) - 4));
+  if (model == LensModel::fisheye) {
+    camera.intrinsics = {290, 291, 402, 297, 0.03, -0.012, 0.004, -0.0006};
+  }
+  return camera;
+}
+
+class CameraFiles : public testing::Test {
+ protected:
+  const TemporaryFolder folder_;
+
+  void comes_back(const Camera& camera, const std::string& text, LensModel as) const {
+    const Camera back = read_any_camera(folder_.file("camera.txt", text));
+    EXPECT_EQ(back.lens_model, as);
+    EXPECT_EQ(back.imager_px, camera.imager_px);
+    std::vector<double> expected = camera.intrinsics;
+    expected.resize(parameter_count(as), 0);
+    EXPECT_EQ(back.intrinsics, expected);
+  }
+  std::string refusal(const std::string& text) const {
+    try {
+      read_any_camera(folder_.file("camera.txt", text));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+};
+
+TEST_F(CameraFiles, ComeBackToTheLastDigit) {
+  for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
+                                LensModel::opencv8, LensModel::opencv12, LensModel::fisheye}) {
+    const Camera camera = camera_of(model);
+    comes_back(camera, opencv_camera(camera), model);
+    if (model != LensModel::fisheye) comes_back(camera, mrcal_cameramodel(camera), model);
+    if (model == LensModel::opencv12) continue;
+    const bool five = model == LensModel::opencv4;  // ROS writes k3, too
+    comes_back(camera, ros_camera_info(camera), five ? LensModel::opencv5 : model);
+    if (model == LensModel::opencv5 || model == LensModel::opencv8) continue;
+    comes_back(camera, kalibr_camchain(camera), model);
+  }
+}
+
+TEST_F(CameraFiles, ThatAreNotKnownAreRefused) {
+  EXPECT_THAT(refusal("a: 1\n"), testing::HasSubstr("camera.txt: "));
+  EXPECT_THAT(refusal("[1, 2]\n"), testing::HasSubstr("holds no camera"));
+  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_CAHVOR', 'imagersize': [1, 2] }"),
+              testing::HasSubstr("has lens model LENSMODEL_CAHVOR; the models are"));
+  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [10, 20], "
+                      "'intrinsics': [ 1, 2, 3 ] }"),
+              testing::HasSubstr("takes 4 parameters, not 3"));
+  EXPECT_THAT(refusal("cam0: {camera_model: omni}\n"), testing::HasSubstr("omni is not known"));
+  std::string skewed = opencv_camera(camera_of(LensModel::opencv5));
+  skewed.replace(skewed.find("[520.25, 0,"), 11, "[520.25, 3,");
+  EXPECT_THAT(refusal(skewed), testing::HasSubstr("camera_matrix is skewed"));
+}
+
+TEST_F(CameraFiles, AreFittedWhereTheModelsDiffer) {
+  // A model that holds the other is met exactly, another one as well as it can.
+  const auto exact = with_lens_model(camera_of(LensModel::opencv4), LensModel::opencv8);
+  EXPECT_LT(exact.worst_px, 1e-6);
+  EXPECT_EQ(exact.share, 1);
+  const auto near = with_lens_model(camera_of(LensModel::opencv8), LensModel::fisheye);
+  EXPECT_LT(near.worst_px, 1);
+  EXPECT_GT(near.worst_px, 1e-6);
+  const auto same = with_lens_model(camera_of(LensModel::opencv8), LensModel::opencv8);
+  EXPECT_EQ(same.camera.intrinsics, camera_of(LensModel::opencv8).intrinsics);
+  // Beyond 90 degrees no perspective model goes.
+  const auto half = with_lens_model(camera_of(LensModel::fisheye), LensModel::opencv4);
+  EXPECT_LT(half.share, 1);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Tags that a tone curve has shrunk.
+#include "calibration/intrinsics/edge_shift.h"
+
+#include <gtest/gtest.h>
+
+#include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/synthetic_views.h"
+
+namespace vlp {
+namespace {
+
+/// The tag with its edges moved inwards: each corner where the moved lines cross.
+SeenTag shrunk(const SeenTag& tag, double shift_px) {
+  SeenTag result = tag;
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const auto& corner : tag.corners_px) middle += corner / 4;
+  for (std::size_t k = 0; k < 4; ++k) {
+    Eigen::Matrix2d normals;
+    Eigen::Vector2d offsets;
+    for (int i = 0; i < 2; ++i) {
+      const Eigen::Vector2d& other = tag.corners_px[(k + (i == 0 ? 1 : 3)) % 4];
+      const Eigen::Vector2d along = (other - tag.corners_px[k]).normalized();
+      Eigen::Vector2d inward(-along.y(), along.x());
+      if (inward.dot(middle - tag.corners_px[k]) < 0) inward = -inward;
+      normals.row(i) = inward.transpose();
+      offsets[i] = inward.dot(tag.corners_px[k]) + shift_px;
+    }
+    result.corners_px[k] = normals.inverse() * offsets;
+  }
+  return result;
+}
+
+/// A board of separate tags, with gaps as wide as a tag, or narrower.
+class ShrunkTags : public testing::TestWithParam<double> {
+ protected:
+  Board board() const {
+    Board board = synthetic_board(false);
+    board.tag_spacing = GetParam();
+    return board;
+  }
+  std::vector<BoardView> shrunk_views(int count, double noise_px, double shift_px) const {
+    const SyntheticViews views{board(), synthetic_lens()};
+    const BoardLattice lattice(views.board);
+    Random random(31);
+    std::vector<BoardView> seen;
+    while (static_cast<int>(seen.size()) < count) {
+      SeenBoard view = views.random_view(random, noise_px);
+      if (!lattice.enough(view)) continue;
+      for (SeenTag& tag : view.tags) tag = shrunk(tag, shift_px);
+      seen.push_back({"", views.imager_px, view});
+    }
+    return seen;
+  }
+  IntrinsicsInput input_of(const std::vector<BoardView>& seen) const {
+    IntrinsicsInput input{BoardLattice(board()), {}, {800, 600}, LensModel::opencv8};
+    for (const BoardView& view : seen) input.views.push_back(input.lattice.corners(view.seen));
+    return input;
+  }
+};
+
+TEST_P(ShrunkTags, IsFoundInEachView) {
+  const auto input = input_of(shrunk_views(6, 0, 0.3));
+  for (const EdgeShift& shift : edge_shifts(input.views, synthetic_lens())) {
+    EXPECT_NEAR(shift.at(shift.middle), 0.3, 0.005);
+  }
+  for (const EdgeShift& shift :
+       edge_shifts(input_of(shrunk_views(6, 0, 0)).views, synthetic_lens())) {
+    EXPECT_NEAR(shift.at(shift.middle), 0, 1e-6);
+  }
+}
+
+TEST_P(ShrunkTags, IsTakenOutOfTheLens) {
+  const auto input = input_of(shrunk_views(16, 0.03, 0.35));
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok());
+  ASSERT_EQ(solution.edge_shifts_px.size(), 16U);
+  for (const double shift_px : solution.edge_shifts_px) EXPECT_NEAR(shift_px, 0.35, 0.03);
+  EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
+  const auto difference =
+      projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
+  ASSERT_TRUE(difference);
+  EXPECT_LT(difference->mean_px, 0.03);
+}
+
+TEST_P(ShrunkTags, IsNoOtherSpacing) {
+  const auto seen = shrunk_views(10, 0.03, 0.4);
+  EXPECT_EQ(check_board(board(), seen, {}).problem, "");
+  EXPECT_EQ(check_board(board(), seen, synthetic_lens()).problem, "");
+  Board other = board();
+  other.tag_spacing += 0.06;
+  EXPECT_NE(check_board(other, seen, synthetic_lens()).problem, "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Spacings, ShrunkTags, testing::Values(1.0, 0.4),
+                         [](const auto& gap) { return gap.param == 1 ? "OneTag" : "Narrow"; });
+
+TEST(EdgeShifts, OfTouchingSquaresAreNone) {
+  const SyntheticViews views{synthetic_board(true), synthetic_lens()};
+  Random random(3);
+  const auto input = views.input(4, random, 0.1);
+  for (const EdgeShift& shift : edge_shifts(input.views, views.lens)) {
+    EXPECT_TRUE(shift.by.isZero(0));
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,115 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Lenses of 190 degrees from the corners of boards.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
+#include "calibration/intrinsics/synthetic_views.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::array kWideImager{1000, 1000};
+
+Lens wide_lens() {
+  return {LensModel::fisheye, std::array{290.0, 291.0, 501.0, 498.0, 0.03, -0.012, 0.004, -0.0006}};
+}
+
+/// Views with the board anywhere up to 85 degrees off the axis, its far tags beyond 90.
+IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double noise_px,
+                           const Eigen::Vector2d& warp_m = {0, 0}) {
+  SyntheticViews views{synthetic_board(kalibr), wide_lens(), kWideImager};
+  views.warp_m = warp_m;
+  IntrinsicsInput input{BoardLattice(views.board), {}, kWideImager, LensModel::fisheye};
+  while (static_cast<int>(input.views.size()) < count) {
+    const double off_axis = random.uniform(0, 1.5), around = random.uniform(-3.14, 3.14);
+    const double lean = random.uniform(-0.6, 0.6), lean_y = random.uniform(-0.6, 0.6);
+    const double roll = random.uniform(-3.14, 3.14), distance_m = random.uniform(0.12, 0.3);
+    const Eigen::Matrix3d towards =
+        Eigen::AngleAxisd(around, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
+        Eigen::AngleAxisd(off_axis, Eigen::Vector3d::UnitY());
+    const Eigen::Matrix3d rotation =
+        towards * Eigen::AngleAxisd(lean, Eigen::Vector3d::UnitX()).toRotationMatrix() *
+        Eigen::AngleAxisd(lean_y, Eigen::Vector3d::UnitY()) *
+        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
+    const SeenBoard seen = views.view(rotation, distance_m * towards.col(2), random, noise_px);
+    if (seen.tags.size() > 5 && input.lattice.enough(seen)) {
+      input.views.push_back(input.lattice.corners(seen));
+    }
+  }
+  return input;
+}
+
+/// Over the pixels up to so far off the axis.
+ProjectionDifference up_to(double degrees, const Lens& found) {
+  return *projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
+    const auto ray = wide_lens().unproject(pixel);
+    const double cosine = ray ? ray->direction.normalized().z() : -1;
+    return cosine > std::cos(degrees * std::numbers::pi / 180) ? 1.0 : INFINITY;
+  });
+}
+
+class WideLens : public testing::TestWithParam<bool> {};
+
+TEST_P(WideLens, OfExactCornersIsExact) {
+  Random random(17);
+  const auto input = wide_input(GetParam(), 20, random, 0, {0.0004, -0.0003});
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok()) << explanation_of(solution.status);
+  EXPECT_EQ(solution.views.size(), 20U);
+  // The shift of the edges is looked for on a flat board.
+  EXPECT_LT(solution.rms_px, GetParam() ? 1e-3 : 0.02);
+  EXPECT_LT(up_to(94, solution.lens()).worst_px, GetParam() ? 1e-3 : 0.03);
+  const Eigen::Vector2d warp_m =
+      solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
+  EXPECT_LT((warp_m - Eigen::Vector2d(0.0004, -0.0003)).norm(), 1e-5);
+}
+
+TEST_P(WideLens, IsKnownBeyondNinetyDegrees) {
+  Random random(18);
+  const auto input = wide_input(GetParam(), 40, random, 0.05);
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok());
+  EXPECT_NEAR(solution.rms_px, 0.05, 0.005);
+  EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
+  EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.1);
+  const CalibrationReport report = report_on(solution, input);
+  EXPECT_LT(report.uncertainty_worst_px, 0.4);  // at the rim, beyond 94 degrees
+  ASSERT_TRUE(report.halves);
+  EXPECT_LT(report.halves->rms_px, 0.1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Boards, WideLens, testing::Bool(),
+                         [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
+
+// Twenty seeds: the parameters scatter as their covariance says.
+TEST(WideLensScatter, IsThatOfTheCovariance) {
+  constexpr int seeds = 20;
+  double focal = 0, center = 0;
+  for (int seed = 0; seed < seeds; ++seed) {
+    Random random(100 + static_cast<std::uint64_t>(seed));
+    const auto input = wide_input(false, 15, random, 0.1);
+    const IntrinsicsSolution solution = solve_intrinsics(input);
+    ASSERT_TRUE(solution.ok());
+    const Eigen::MatrixXd covariance = ProjectionUncertainty(solution).intrinsics_covariance();
+    const auto normalized = [&](Eigen::Index i, double truth) {
+      const double error = solution.problem.intrinsics[static_cast<std::size_t>(i)] - truth;
+      return error * error / covariance(i, i) / seeds;
+    };
+    focal += normalized(0, 290);
+    center += normalized(2, 501);
+  }
+  // Chi-squared of 20 freedoms, over 20: from 0.37 to 2.0 in 99 of 100 cases.
+  EXPECT_GT(focal, 0.37);
+  EXPECT_LT(focal, 2.0);
+  EXPECT_GT(center, 0.37);
+  EXPECT_LT(center, 2.0);
+}
+
+}  // namespace
+}  // namespace vlp

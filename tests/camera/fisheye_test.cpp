@@ -1,0 +1,94 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "camera/fisheye.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "camera/random_lens.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+/// As of a lens of 190 degrees on 1000 x 1000 px.
+Lens wide_lens() {
+  return {LensModel::fisheye, std::array{290.0, 291.0, 501.0, 498.0, 0.03, -0.012, 0.004, -0.0006}};
+}
+
+Eigen::Vector3d ray_at(double off_axis_rad, double around_rad) {
+  return {std::sin(off_axis_rad) * std::cos(around_rad),
+          std::sin(off_axis_rad) * std::sin(around_rad), std::cos(off_axis_rad)};
+}
+
+TEST(Fisheye, IsThePolynomialOfTheAngle) {
+  const Lens lens = wide_lens();
+  for (const double degrees : {0.001, 1.0, 45.0, 89.0, 90.0, 91.0, 95.0}) {
+    const double a = degrees * kDegree;
+    const double d = a + 0.03 * std::pow(a, 3) - 0.012 * std::pow(a, 5) + 0.004 * std::pow(a, 7) -
+                     0.0006 * std::pow(a, 9);
+    const auto pixel = lens.project(5 * ray_at(a, 0.7));
+    ASSERT_TRUE(pixel) << degrees;
+    EXPECT_THAT(*pixel, IsNear(Eigen::Vector2d(501 + 290 * d * std::cos(0.7),
+                                               498 + 291 * d * std::sin(0.7)),
+                               1e-10));
+  }
+}
+
+TEST(Fisheye, ComesBackToTheRayBeyondNinetyDegrees) {
+  Random random(4);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Lens lens(LensModel::fisheye, random_parameters(LensModel::fisheye, random));
+    const double off_axis_rad = random.uniform(0, 97 * kDegree);
+    const Eigen::Vector3d ray = ray_at(off_axis_rad, random.uniform(-3, 3));
+    const auto pixel = lens.project(ray);
+    ASSERT_TRUE(pixel);
+    const auto back = lens.unproject(*pixel);
+    ASSERT_TRUE(back);
+    ASSERT_LT(angle_rad(back->direction, ray), 1e-11);
+    ASSERT_THAT(lens.project(back->direction).value(), IsNear(*pixel, 1e-8));
+  }
+}
+
+TEST(Fisheye, HasItsJacobiansBeyondNinetyDegrees) {
+  const Lens lens = wide_lens();
+  constexpr double step = 1e-5;
+  for (const double degrees : {0.01, 30.0, 89.9, 94.0}) {
+    const Eigen::Vector3d point = 3 * ray_at(degrees * kDegree, 2.2);
+    const auto at = lens.project_with_jacobians(point);
+    ASSERT_TRUE(at);
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d off = step * Eigen::Vector3d::Unit(i);
+      const Eigen::Vector2d by = (*lens.project(point + off) - *lens.project(point - off)) / 2e-5;
+      EXPECT_THAT(Eigen::Vector2d(at->d_pixel_d_point.col(i)), IsNear(by, 1e-6)) << degrees;
+    }
+    const auto ray = lens.unproject(at->pixel);
+    ASSERT_TRUE(ray);
+    for (int i = 0; i < 2; ++i) {
+      const Eigen::Vector2d off = 1e-3 * Eigen::Vector2d::Unit(i);
+      const Eigen::Vector3d by = (lens.unproject(at->pixel + off)->direction -
+                                  lens.unproject(at->pixel - off)->direction) /
+                                 2e-3;
+      EXPECT_THAT(Eigen::Vector3d(ray->d_direction_d_pixel.col(i)), IsNear(by, 1e-9)) << degrees;
+    }
+  }
+}
+
+TEST(Fisheye, EndsWhereItFolds) {
+  const Fisheye fisheye{{-0.1, 0, 0, 0}};  // d' = 1 - 0.3 a^2
+  const double fold_rad = std::sqrt(1 / 0.3);
+  EXPECT_NEAR(fisheye.valid_angle_rad(), fold_rad, 1e-12);
+  const Lens lens(LensModel::fisheye, std::array{300.0, 300.0, 400.0, 300.0, -0.1, 0.0, 0.0, 0.0});
+  EXPECT_TRUE(lens.project(ray_at(fold_rad - 1e-6, 1)));
+  EXPECT_FALSE(lens.project(ray_at(fold_rad + 1e-6, 1)));
+  const double edge_px = 300 * fisheye.distance(fold_rad);
+  EXPECT_TRUE(lens.unproject({400 + edge_px - 1e-3, 300}));
+  EXPECT_FALSE(lens.unproject({400 + edge_px + 1e-3, 300}));
+  EXPECT_EQ(Fisheye{}.valid_angle_rad(), std::numbers::pi);
+}
+
+}  // namespace
+}  // namespace vlp
