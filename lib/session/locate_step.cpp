@@ -8,6 +8,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "calibration/intrinsics/known_region.h"
 #include "camera/lens.h"
 #include "captures/outside_image.h"
 #include "geometry/median.h"
@@ -195,6 +196,30 @@ void warn_of_image(LocateResult& result, const LocateInput& input) {
       outside, width, height));
 }
 
+/// A lens that boards showed in part of the image is only known there.
+void warn_of_region(LocateResult& result, const LocateInput& input) {
+  const auto& report = input.calibration.intrinsics_report;
+  if (!report || report->region_px.empty()) return;
+  std::size_t outside = 0, fixes = 0;
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    if (!result.fixes[i].ok()) continue;
+    ++fixes;
+    const auto& detections = input.frames[i].detections;
+    const auto seen =
+        std::count_if(detections.begin(), detections.end(),
+                      [&](const Detection& one) { return !lies_in(report->region_px, one.pixel); });
+    if (seen == 0) continue;
+    ++outside;
+    result.details.push_back(fmt::format("{}: {} of {} lamps are where the lens is not known",
+                                         input.frames[i].image, seen, detections.size()));
+  }
+  if (outside == 0) return;
+  result.warnings.push_back(fmt::format(
+      "{} of {} fixes rest on lamps where no board was seen (region_px of the calibration): the "
+      "lens may be wrong there; add views of the board there",
+      outside, fixes));
+}
+
 void warn_of_captures(LocateResult& result, const LocateInput& input) {
   const auto& captures = input.captures;
   const auto without = std::count_if(
@@ -301,6 +326,7 @@ LocateResult locate_frames(const LocateInput& input) {
     result.rows.push_back(row_of(input.frames[i], input.captures, result.fixes[i], noise_known));
   }
   warn_of_image(result, input);
+  warn_of_region(result, input);
   warn_of_map(result, input);
   warn_of_captures(result, input);
   tell_of_lamps_left_out(result, input);

@@ -50,8 +50,8 @@ struct LocateResult : StepResult {
 /// The fix of each frame. Where not every detection states its sigma_px, one is taken from the
 /// residuals, if they show it. Throws std::invalid_argument when a camera moves whose calibration
 /// lacks row_time_s or readout. Warns of residuals that the stated noise does not explain, of
-/// detections outside the image, of images that `captures` lacks, of lamps left out. undetermined:
-/// no frame has a fix.
+/// detections outside the image or where the lens is not known (region_px), of images that
+/// `captures` lacks, of lamps left out. undetermined: no frame has a fix.
 LocateResult locate_frames(const LocateInput& input);
 
 }  // namespace vlp

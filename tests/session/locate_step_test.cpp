@@ -57,6 +57,17 @@ TEST(LocateFrames, UsesInclinationsWhereThereAreSome) {
   EXPECT_THAT(found.warnings, testing::Contains(HasSubstr("images are not in captures.csv")));
 }
 
+TEST(LocateFrames, WarnsOfLampsWhereTheLensIsNotKnown) {
+  LocateInput input = example();
+  IntrinsicsReport& report = input.calibration.intrinsics_report.emplace();
+  report.region_px = {{-1e4, -1e4}, {1e4, -1e4}, {1e4, 1e4}, {-1e4, 1e4}};
+  EXPECT_THAT(locate_frames(input).warnings, IsEmpty());
+  const double right_px = input.frames[0].detections[0].pixel.x() - 1;
+  report.region_px = {{-1e4, -1e4}, {right_px, -1e4}, {right_px, 1e4}, {-1e4, 1e4}};
+  EXPECT_THAT(locate_frames(input).warnings,
+              ElementsAre(HasSubstr("fixes rest on lamps where no board was seen")));
+}
+
 TEST(LocateFrames, IsUndeterminedWithoutAFix) {
   LocateInput input = example();
   for (Frame& frame : input.frames) frame.detections.resize(1);
