@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "calibration/passed_on.h"
 #include "geometry/frames.h"
 #include "positioning/positioner.h"
 #include "report/plots/calibration_plots.h"
@@ -84,6 +85,32 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
       1e3 * arm_m.norm(), 1e3 * beside_m.norm()));
 }
 
+/// How the offset moves with lens and zenith, where these say how well they are known.
+void pass_on(Dispersion& dispersion, std::span<const StationCapture> captures,
+             const LampCaptures& input, DispersionMethod method, DispersionCircle circle) {
+  const auto offset_with = [&](const Calibration& moved) -> std::optional<Eigen::Vector2d> {
+    const DispersionFit fit = fit_dispersion(captures, input.lamps, moved, method, circle);
+    if (fit.status != DispersionStatus::ok) return {};
+    return fit.dispersion.offset_px.cwiseQuotient(focal_px_of(moved.camera));
+  };
+  if (const auto& report = input.calibration.intrinsics_report; report && report->covariance) {
+    dispersion.by_intrinsics = jacobian_of(
+        [&](const Eigen::VectorXd& error) {
+          return offset_with(with_lens_error(input.calibration, error));
+        },
+        *report->covariance);
+  }
+  if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
+    const Eigen::Vector2d per_px = focal_px_of(input.calibration.camera).cwiseInverse();
+    const auto by_zenith = jacobian_of(
+        [&](const Eigen::VectorXd& error) {
+          return offset_with(with_zenith_error(input.calibration, error));
+        },
+        per_px.asDiagonal() * *center->covariance * per_px.asDiagonal());
+    if (by_zenith) dispersion.by_zenith = *by_zenith;
+  }
+}
+
 }  // namespace
 
 DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,
@@ -132,6 +159,7 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   if (const auto& world_m = fit.world_offset_m) {
     result.metrics.push_back({"world_mm", millimetres * world_m->norm()});
   }
+  pass_on(result.fit.dispersion, captures, input, method, circle);
   result.calibration = with_dispersion(input.calibration, fit.dispersion, std::move(entry));
   result.drawing = [fit] { return drawing_of(plot_of("Fixes at a known station", fit)); };
   return result;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calibration/levelling/map_doubt.h"
+#include "calibration/passed_on.h"
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/turning_axis.h"
 #include "geometry/angles.h"
@@ -30,8 +31,7 @@ std::string name_of(RotationMethod method) {
   return "";
 }
 
-RotationFit fit_of(const SpotCaptures& spot, const CircleCenters& circles, const Camera& camera,
-                   RotationMethod method) {
+RotationFit fit_of(const SpotCaptures& spot, const Camera& camera, RotationMethod method) {
   switch (method) {
     case RotationMethod::axis:
       return fit_turning_axis(spot, camera);
@@ -40,7 +40,22 @@ RotationFit fit_of(const SpotCaptures& spot, const CircleCenters& circles, const
     case RotationMethod::circle:
       break;
   }
-  return circles.mean;
+  return fit_circle_centers(spot, camera).mean;
+}
+
+/// How the zenith moves with the lens, where that says how well it is known.
+std::optional<MatrixX> by_intrinsics(const LampCaptures& input, RotationMethod method) {
+  const auto& report = input.calibration.intrinsics_report;
+  if (!report || !report->covariance) return {};
+  const auto zenith_with = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::Vector2d> {
+    const Camera camera = with_lens_error(camera_alone(input.calibration), error).camera;
+    const SpotCaptures spot = spot_captures(input.frames, input.lamps, camera);
+    if (spot.status != SpotStatus::ok) return {};
+    const RotationFit fit = fit_of(spot, camera, method);
+    if (!fit.converged) return {};
+    return zenith_point(fit.center);
+  };
+  return jacobian_of(zenith_with, *report->covariance);
 }
 
 /// A height in metres, without a sign where it rounds to zero.
@@ -126,7 +141,7 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
     return result;
   }
   result.circles = fit_circle_centers(result.spot, camera);
-  result.fit = fit_of(result.spot, result.circles, camera, method);
+  result.fit = fit_of(result.spot, camera, method);
   if (!result.fit.converged) {
     result.fail(StepFailure::undetermined,
                 "no rotation centre fits the captures: take them on one spot at each height, over "
@@ -134,6 +149,7 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
                 "are right");
     return result;
   }
+  result.fit.center.by_intrinsics = by_intrinsics(input, method);
   add_metrics(result);
   add_warnings(result);
   result.calibration = with_rotation_center(input.calibration, result.fit.center, std::move(entry));

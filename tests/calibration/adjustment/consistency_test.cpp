@@ -4,12 +4,11 @@
 /// with their noise, each time anew. Boards are represented by a lens drawn from its covariance.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "calibration/adjustment/survey.h"
-#include "geometry/angles.h"
 #include "rig/stage.h"
+#include "support/judged.h"
 
 namespace vlp {
 namespace {
@@ -24,30 +23,6 @@ struct Case {
 
 class Consistency : public testing::TestWithParam<Case> {};
 
-/// e' cov^-1 e over trials: its mean per state, and how often it is within 95 % of chi-squared of
-/// four.
-struct Judged {
-  double sum = 0;
-  int count = 0, inside = 0;
-
-  void add(const Eigen::Vector4d& error, const Eigen::Matrix4d& covariance) {
-    constexpr double chi_squared_95 = 9.4877;
-    const double d = error.dot(covariance.ldlt().solve(error));
-    sum += d / 4;
-    ++count;
-    inside += d <= chi_squared_95 ? 1 : 0;
-  }
-  double mean() const { return sum / count; }
-  double share() const { return static_cast<double>(inside) / count; }
-};
-
-Eigen::Vector4d error_of(const Fix& fix, const Pose& truth) {
-  Eigen::Vector4d error;
-  error << fix.estimate.pose.position_m - truth.position_m,
-      wrapped_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
-  return error;
-}
-
 /// A calibration and the map that goes with it, from one survey.
 struct Unit {
   Calibration calibration;
@@ -57,12 +32,7 @@ struct Unit {
 Unit calibrated(Survey& survey, const Case& the, Random& random) {
   Calibration& calibration = survey.input.calibration;
   if (the.lens) {
-    const Eigen::MatrixXd covariance = lens_covariance(calibration.camera, 0.1, 8);
-    const Eigen::MatrixXd root = covariance.llt().matrixL();
-    Eigen::VectorXd draw(covariance.rows());
-    for (double& one : draw) one = random.normal();
-    Eigen::Map<Eigen::VectorXd>(calibration.camera.intrinsics.data(), draw.size()) += root * draw;
-    calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, covariance};
+    draw_lens(calibration, lens_covariance(calibration.camera, 0.1, 8), random);
   }
   survey.add_noise(random, true, true, true);
   const AdjustmentResult found = adjust_captures(survey.input);

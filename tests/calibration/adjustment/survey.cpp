@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/adjustment/survey.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <numbers>
 
@@ -98,6 +99,14 @@ Eigen::MatrixXd lens_covariance(const Camera& camera, double sigma_px, int rays_
   constexpr double coefficient_sd = 0.01;
   information.diagonal().segment(4, n - 4).array() += 1 / (coefficient_sd * coefficient_sd);
   return information.inverse().topLeftCorner(n, n);
+}
+
+void draw_lens(Calibration& calibration, const Eigen::MatrixXd& covariance, Random& random) {
+  const Eigen::MatrixXd root = covariance.llt().matrixL();
+  Eigen::VectorXd draw(covariance.rows());
+  for (double& one : draw) one = random.normal();
+  Eigen::Map<Eigen::VectorXd>(calibration.camera.intrinsics.data(), draw.size()) += root * draw;
+  calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, covariance};
 }
 
 }  // namespace vlp

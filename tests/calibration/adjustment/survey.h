@@ -40,4 +40,7 @@ struct Survey {
 /// of a board are, from projections of a grid of rays with noise of this size.
 Eigen::MatrixXd lens_covariance(const Camera& camera, double sigma_px, int rays_across);
 
+/// Adds to the intrinsics an error of this covariance, which the calibration then states.
+void draw_lens(Calibration& calibration, const Eigen::MatrixXd& covariance, Random& random);
+
 }  // namespace vlp

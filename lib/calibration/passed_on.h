@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+
+#include "geometry/types.h"
+#include "rig/calibration.h"
+
+/// What a step in a row makes of the errors of the steps before it, which it takes as exact: what
+/// RotationCenter::by_intrinsics, Dispersion::by_intrinsics and Dispersion::by_zenith say.
+namespace vlp {
+
+/// Two numbers that are solved for, when what the solve takes as exact is off by `error`; nothing
+/// when it finds none.
+using SolvedWith = std::function<std::optional<Eigen::Vector2d>(const Eigen::VectorXd& error)>;
+
+/// d solved / d error, a column for each error. From one solve for each column of the lower
+/// Cholesky factor L of the errors' covariance,
+///   J = (f(L_1) - f(0), f(L_2) - f(0), ...) L^-1,
+/// so that errors are tried as large as they are, and those that are known only together, as
+/// coefficients of a lens are, move together. Nothing where a solve finds nothing or the covariance
+/// is not positive definite.
+std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const MatrixX& covariance);
+
+/// With errors added to the intrinsics; the zenith stays, and center_px with it.
+Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
+
+/// With an error added to the zenith's normalized point (x/z, y/z). Precondition: there is a
+/// rotation centre.
+Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& error);
+
+/// The zenith's normalized point.
+Eigen::Vector2d zenith_point(const RotationCenter& center);
+
+/// fx, fy.
+Eigen::Vector2d focal_px_of(const Camera& camera);
+
+}  // namespace vlp

@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "geometry/angles.h"
+#include "positioning/fix.h"
+
+namespace vlp {
+
+/// Errors of fixes against their covariances, over trials: the mean of e' cov^-1 e per state, and
+/// how often it is within 95 % of chi-squared of four.
+struct Judged {
+  double sum = 0;
+  int count = 0, inside = 0;
+
+  void add(const Eigen::Vector4d& error, const Eigen::Matrix4d& covariance) {
+    constexpr double chi_squared_95 = 9.4877;
+    const double d = error.dot(covariance.ldlt().solve(error));
+    sum += d / 4;
+    ++count;
+    inside += d <= chi_squared_95 ? 1 : 0;
+  }
+  double mean() const { return sum / count; }
+  double share() const { return static_cast<double>(inside) / count; }
+};
+
+/// X, Y, Z in metres, yaw in radians.
+inline Eigen::Vector4d error_of(const Fix& fix, const Pose& truth) {
+  Eigen::Vector4d error;
+  error << fix.estimate.pose.position_m - truth.position_m,
+      wrapped_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
+  return error;
+}
+
+}  // namespace vlp
