@@ -91,6 +91,13 @@ void print_ratios(const Evaluation& evaluation) {
     if (stated->height) fmt::print(", height {:.3f}", *stated->height);
     if (stated->yaw) fmt::print(", yaw {:.3f}", *stated->yaw);
     fmt::print(" (rms; 1: the stated sd are right)\n");
+    constexpr double percent = 100;
+    fmt::print("within 95 % horizontal {:.1f} %", percent * stated->within_95);
+    if (const auto& share = stated->height_within_95) {
+      fmt::print(", height {:.1f} %", percent * *share);
+    }
+    if (const auto& share = stated->yaw_within_95) fmt::print(", yaw {:.1f} %", percent * *share);
+    fmt::print(" (errors within 1.96 sd; of one unit they go together)\n");
   }
   if (const auto& limit = evaluation.limit) {
     fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} (1: the best there can be)\n",

@@ -83,6 +83,9 @@ Json json_of(const StatedRatio& stated) {
   Json json{{"horizontal", stated.horizontal}, {"fixes", stated.fixes}};
   if (stated.height) json["height"] = *stated.height;
   if (stated.yaw) json["yaw"] = *stated.yaw;
+  json["within_95"] = stated.within_95;
+  if (stated.height_within_95) json["height_within_95"] = *stated.height_within_95;
+  if (stated.yaw_within_95) json["yaw_within_95"] = *stated.yaw_within_95;
   return json;
 }
 

@@ -12,28 +12,33 @@
 namespace vlp {
 namespace {
 
-/// Root of the mean of squares.
-class Rms {
+/// Of errors in units of their standard deviations: root of the mean of squares, share within 95 %.
+class Ratios {
  public:
   void add(double value) {
     squares_ += value * value;
     ++count_;
+    if (std::abs(value) <= kWithin95) ++within_;
   }
   std::optional<double> value() const {
     return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_)))
                       : std::nullopt;
   }
+  std::optional<double> within_95() const {
+    return count_ > 0 ? std::optional(static_cast<double>(within_) / static_cast<double>(count_))
+                      : std::nullopt;
+  }
 
  private:
   double squares_ = 0;
-  std::size_t count_ = 0;
+  std::size_t count_ = 0, within_ = 0;
 };
 
 }  // namespace
 
 std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
                                         const std::vector<FixError>& errors) {
-  Rms horizontal, height, yaw;
+  Ratios horizontal, height, yaw;
   std::size_t stated = 0;
   for (const FixError& error : errors) {
     const auto& sd = fixes[error.fix].fix->sd;
@@ -45,7 +50,9 @@ std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
     if (error.yaw_rad) yaw.add(*error.yaw_rad / (*sd)[3]);
   }
   if (stated == 0) return std::nullopt;
-  return StatedRatio{*horizontal.value(), stated, height.value(), yaw.value()};
+  return StatedRatio{
+      *horizontal.value(), stated,         height.value(), yaw.value(), *horizontal.within_95(),
+      height.within_95(),  yaw.within_95()};
 }
 
 std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,

@@ -19,7 +19,14 @@ struct StatedRatio {
   double horizontal;  // of x and y
   std::size_t fixes;
   std::optional<double> height, yaw;
+  /// Shares of the errors within kWithin95 standard deviations, of x and y, height, yaw: 0.95 when
+  /// these are honest and the errors normal. Errors of one calibration and map go together: over
+  /// one unit the share may be far from that, over many it may not.
+  double within_95;
+  std::optional<double> height_within_95, yaw_within_95;
 };
+/// Standard deviations that 95 % of a normal distribution lie within.
+inline constexpr double kWithin95 = 1.959964;
 /// Nothing when no fix states a sd. Not for errors against a path, which lack the part along it.
 std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
                                         const std::vector<FixError>& errors);

@@ -31,6 +31,9 @@ TEST(StatedRatio, IsOneWhenErrorsAreAsStated) {
   EXPECT_NEAR(ratio->horizontal, 1, 0.015);  // three standard errors
   EXPECT_NEAR(*ratio->height, 2, 0.05);      // stated too small by a factor of two
   EXPECT_FALSE(ratio->yaw);
+  EXPECT_NEAR(ratio->within_95, 0.95, 0.006);
+  EXPECT_NEAR(*ratio->height_within_95, std::erf(kWithin95 / 2 / std::sqrt(2)), 0.015);
+  EXPECT_FALSE(ratio->yaw_within_95);
   fixes.resize(1);
   fixes[0].fix->sd.reset();
   EXPECT_FALSE(stated_ratio(fixes, {errors[0]}));
