@@ -33,6 +33,9 @@ StationFixes::StationFixes(std::span<const StationCapture> captures, const LampM
                            const Calibration& calibration)
     : captures_(captures), map_(map), calibration_(calibration) {
   calibration_.dispersion.reset();
+  // What the captures have in common is not asked for.
+  calibration_.intrinsics_report.reset();
+  calibration_.adjustment.reset();
   const Positioner positioner(map_, calibration_);
   for (const StationCapture& capture : captures_) {
     const Fix fix = fix_of(positioner, capture);
@@ -51,7 +54,7 @@ std::vector<std::optional<StationFixes::At>> StationFixes::at(
     if (!fix.ok()) continue;
     const Pose& pose = fix.estimate.pose;
     fixes[i] = At{pose.position_m.head<2>() - captures_[i].station_m,
-                  fix.estimate.covariance.topLeftCorner<2, 2>(), pose.yaw_rad,
+                  fix.noise_covariance.topLeftCorner<2, 2>(), pose.yaw_rad,
                   lamps_height(captures_[i], map_) - pose.position_m.z()};
   }
   return fixes;

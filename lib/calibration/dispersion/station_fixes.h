@@ -17,6 +17,7 @@ class StationFixes {
   struct At {
     /// Fix minus station.
     Eigen::Vector2d error_m;
+    /// Of this capture's noise alone: what all have in common does not scatter them.
     Eigen::Matrix2d covariance;
     double yaw_rad;
     /// Of the lamps it rests on, above it.
