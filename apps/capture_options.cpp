@@ -3,6 +3,7 @@
 #include "capture_options.h"
 
 #include <fmt/core.h>
+#include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "detection/image_file.h"
+#include "detection/lights/lights_table.h"
 #include "progress.h"
 #include "step_outcome.h"
 
@@ -63,6 +65,7 @@ SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
                     const std::optional<Calibration>& calibration) {
   for (const auto& image : images_in(options.images)) {
     check_output(options.output, {image.string()});
+    if (!options.lights.empty()) check_output(options.lights, {image.string()});
   }
   const LampImages images{options.images,      lamps,
                           options.lamps,       calibration,
@@ -77,6 +80,10 @@ SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   tell(seen);
+  for (const auto& [image, lights] : seen.lights) {
+    for (const Light& light : lights) spdlog::debug("{}: {}", image, line_of(light));
+  }
+  if (!options.lights.empty()) write_lights(options.lights, seen.lights);
   require(seen);
   return seen;
 }

@@ -22,6 +22,8 @@ struct CaptureOptions {
   std::string classifier;
   /// Where pictures of what was found go; empty: none are made.
   std::string annotate;
+  /// Where lights.csv goes; empty: nowhere.
+  std::string lights;
   std::optional<Readout> readout;
   /// Of a camera without a calibration.
   std::optional<double> row_time_s;
@@ -53,8 +55,9 @@ void add_detect_options(CLI::App& app, CaptureOptions& options);
 /// input that was not given.
 std::vector<std::string> inputs_of(const CaptureOptions& options);
 
-/// The lamps in a folder of images, with progress, and with what there is to say of it. `output`
-/// must not be one of the images. Throws as see_lamps(), and when that fails.
+/// The lamps in a folder of images, with progress, and with what there is to say of it. Neither
+/// `output` nor `lights` may be one of the images. Throws as see_lamps(), and when that fails, with
+/// `lights` written.
 SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
                     const std::optional<Calibration>& calibration);
 

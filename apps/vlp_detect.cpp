@@ -7,16 +7,26 @@
 #include <algorithm>
 #include <optional>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "app.h"
 #include "capture_options.h"
 #include "captures/detections_table.h"
+#include "detection/lights/lights_table.h"
 
 namespace vlp {
 namespace {
 
 void run(const CaptureOptions& options) {
-  check_output(options.output, {options.lamps, options.calibration, options.classifier});
+  const std::vector<std::string> inputs{options.lamps, options.calibration, options.classifier};
+  check_output(options.output, inputs);
+  if (!options.lights.empty()) {
+    check_output(options.lights, inputs);
+    if (options.lights == options.output) {
+      throw std::invalid_argument("--output and --lights name one file");
+    }
+  }
   std::optional<Calibration> calibration;
   if (!options.calibration.empty()) {
     calibration = read_calibration(options.calibration);
@@ -27,12 +37,17 @@ void run(const CaptureOptions& options) {
   write_detections(options.output, found.frames);
   const auto empty = std::count_if(found.frames.begin(), found.frames.end(),
                                    [](const Frame& frame) { return frame.detections.empty(); });
-  const auto [identified, cut, unknown, steady] = found.lights;
+  const auto count = [&](LightKind kind) { return count_of(found.lights, kind); };
   fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images, found.skipped.size(),
              empty);
-  fmt::print("lamps       {}\n", identified);
-  fmt::print("left out    {} cut by the image's edge, {} unknown, {} steady\n", cut, unknown,
-             steady);
+  fmt::print("lamps       {}\n", count(LightKind::lamp));
+  fmt::print("left out    {} cut by the image's edge, {} unknown, {} steady, {} without form\n",
+             count(LightKind::cut), count(LightKind::unknown), count(LightKind::steady),
+             count(LightKind::formless));
+  for (const auto& [kind, reason, lights] : reasons_of(found.lights)) {
+    fmt::print("  {:<8}  {}, {}: {}\n", lights, name_of(kind), name_of(reason),
+               explanation_of(reason));
+  }
 }
 
 }  // namespace
@@ -60,6 +75,9 @@ int main(int argc, char** argv) {
       ->check(vlp::finite_positive())
       ->excludes("--calibration");
   app.add_option("-o,--output", options.output, "Where to write detections.csv")->required();
+  app.add_option(
+      "--lights", options.lights,
+      "Where to write lights.csv: every light, what it is and why, and what was measured");
   vlp::add_detect_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

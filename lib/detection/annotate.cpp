@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/annotate.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "detection/lights/lights_table.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 
@@ -28,6 +31,8 @@ cv::Scalar color_of(LightKind kind) {
       return {60, 60, 255};
     case LightKind::steady:
       return {255, 160, 60};
+    case LightKind::formless:
+      return {170, 170, 170};
   }
   return {};
 }
@@ -39,9 +44,9 @@ std::string label_of(const Light& light) {
     case LightKind::cut:
       return std::to_string(*light.lamp) + " cut";
     case LightKind::unknown:
-      return "unknown";
     case LightKind::steady:
-      return "steady";
+    case LightKind::formless:
+      return fmt::format("{}: {}", name_of(light.kind), name_of(light.reason));
   }
   return {};
 }

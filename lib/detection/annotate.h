@@ -12,8 +12,9 @@
 namespace vlp {
 
 /// A picture of what was found, to look at: the image, brightened, with the outline points of each
-/// light, its centre, and what it is. Lamps are green, cut ones yellow, unknown lights red, steady
-/// ones blue. `image` has one channel of 8 or 16 bits.
+/// light, its centre, what it is, and why it is no lamp. Lamps are green, cut ones yellow, unknown
+/// lights red, steady ones blue,
+/// formless ones grey. `image` has one channel of 8 or 16 bits.
 cv::Mat annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout);
 
 /// Writes it as PNG into `folder`, whole or not at all, named like the image with `.png` added.

@@ -14,24 +14,25 @@ namespace {
 
 struct CaptureOutcome {
   std::vector<Detection> lamps;
-  std::array<int, 4> lights{};
+  std::vector<Light> lights;
   std::string refused;
 };
 
 CaptureOutcome outcome_of(const LampDetector& detector, const std::filesystem::path& file,
                           const DetectRun& run) {
-  const ImageLights found = detect_image(detector, file, run.imager_px, run.max_mpx);
+  ImageLights found = detect_image(detector, file, run.imager_px, run.max_mpx);
   CaptureOutcome outcome;
   outcome.refused = found.refused;
   if (!outcome.refused.empty()) return outcome;
   if (run.annotate) {
     write_annotated(*run.annotate, file, annotated(found.image, found.lights, detector.readout()));
   }
-  for (const Light& light : found.lights) {
-    ++outcome.lights[static_cast<std::size_t>(light.kind)];
+  for (Light& light : found.lights) {
+    light.outline = {};
     if (light.kind != LightKind::lamp) continue;
     outcome.lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
   }
+  outcome.lights = std::move(found.lights);
   return outcome;
 }
 
@@ -58,10 +59,9 @@ CaptureDetections detect_captures(const LampDetector& detector,
       result.refused.push_back(std::move(outcome.refused));
       continue;
     }
-    for (std::size_t kind = 0; kind < outcome.lights.size(); ++kind) {
-      result.lights[kind] += outcome.lights[kind];
-    }
-    result.frames.push_back({images[i].filename().string(), std::move(outcome.lamps)});
+    const std::string name = images[i].filename().string();
+    result.frames.push_back({name, std::move(outcome.lamps)});
+    result.lights.push_back({name, std::move(outcome.lights)});
   }
   return result;
 }

@@ -12,6 +12,7 @@
 #include "captures/detections_table.h"
 #include "detection/image_file.h"
 #include "detection/lamp_detector.h"
+#include "detection/lights/lights_table.h"
 
 namespace vlp {
 
@@ -19,8 +20,8 @@ namespace vlp {
 struct CaptureDetections {
   /// Lamps fit for a fix, by image, maybe none.
   std::vector<Frame> frames;
-  /// Lights of each LightKind, in its order.
-  std::array<int, 4> lights{};
+  /// All lights of each frame's image, without outlines.
+  std::vector<LightsOfImage> lights;
   /// Images that could not be used, and why, in one line each.
   std::vector<std::string> refused;
   int images = 0;

@@ -31,6 +31,21 @@ int most_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_tim
   return static_cast<int>(std::ceil(most)) + spare;
 }
 
+/// Of a steady light, see Light::clipped.
+double clipped_share(const cv::Mat& lines, const Eigen::Vector2d& low,
+                     const Eigen::Vector2d& high) {
+  const Eigen::Vector2d middle = (low + high) / 2, size = (high - low) / 2;
+  const cv::Rect box(
+      cv::Point(static_cast<int>(std::lround(middle.x() - size.x() / 2)),
+                static_cast<int>(std::lround(middle.y() - size.y() / 2))),
+      cv::Size(static_cast<int>(std::lround(size.x())), static_cast<int>(std::lround(size.y()))));
+  const cv::Mat pixels = lines(box & cv::Rect({0, 0}, lines.size()));
+  if (pixels.empty()) return 0;
+  double brightest = 0;
+  cv::minMaxLoc(pixels, nullptr, &brightest);
+  return double(cv::countNonZero(pixels >= brightest)) / double(pixels.total());
+}
+
 /// How far two centres are apart, per axis.
 double apart(const Light& a, const Light& b) {
   return (a.pixel - b.pixel).norm() / std::numbers::sqrt2;
@@ -99,19 +114,19 @@ std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& 
 
 void LampDetector::measure(const cv::Mat& lines, const Background& background, Light& light) const {
   const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
-  const auto coherence = [&] {
-    return light.stripes.period_lines > 0
-               ? coherence_of(lines, shape_.turned(light.low), shape_.turned(light.high),
-                              background, light.stripes.period_lines)
-               : 0;
+  const auto judge = [&](const std::vector<double>& signal) {
+    const Eigen::Vector2d from = shape_.turned(light.low), to = shape_.turned(light.high);
+    light.stripes = stripes_of(signal);
+    if (light.stripes.period_lines > 0) {
+      light.coherence = coherence_of(lines, from, to, background, light.stripes.period_lines);
+    }
+    if (light.stripes.contrast < kLeastContrast) light.clipped = clipped_share(lines, from, to);
   };
   if (light.glows || light.uneven) {
     // Its stripes reach further than its outline.
     const Eigen::Vector2d beyond(0, light.radius_px);
     const auto signal = line_signal(lines, low - beyond, high + beyond, background.level);
-    light.stripes = stripes_of(striped_part(without_glow(signal)));
-    light.coherence = coherence();
-    return;
+    return judge(striped_part(without_glow(signal)));
   }
   auto better = shape_.light_of(refined(lines, light.outline, low, high, background), background);
   if (better && 2 * better->outline.size() > light.outline.size()) {
@@ -119,9 +134,7 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
     better->outside = light.outside;
     light = std::move(*better);
   }
-  light.stripes = stripes_of(
-      line_signal(lines, shape_.turned(light.low), shape_.turned(light.high), background.level));
-  light.coherence = coherence();
+  judge(line_signal(lines, shape_.turned(light.low), shape_.turned(light.high), background.level));
 }
 
 std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
@@ -133,8 +146,11 @@ std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
   for (const Blob& blob : blobs) {
     for (LightPart& part : parts_of(lines, blob, background)) parts.push_back(std::move(part));
   }
-  std::vector<Light> lights = joined(std::move(parts), shape_, background);
+  std::vector<Light> lights = joined(parts, shape_, background);
   for (Light& light : lights) measure(lines, background, light);
+  for (Light& light : formless_lights(std::move(parts), lights, shape_, lines.size())) {
+    lights.push_back(std::move(light));
+  }
   std::sort(lights.begin(), lights.end(), [](const Light& a, const Light& b) {
     return a.pixel.y() != b.pixel.y() ? a.pixel.y() < b.pixel.y() : a.pixel.x() < b.pixel.x();
   });

@@ -11,7 +11,7 @@ double clear_stripes(const cv::Mat& image, Readout readout) {
   const LampDetector detector({}, {readout, {}, {}});
   double sum = 0;
   for (const Light& light : detector.detect(image)) {
-    if (light.kind == LightKind::steady) continue;
+    if (!flickers(light)) continue;
     sum += light.stripes.clarity * light.stripes.contrast * light.roundness;
   }
   return sum;

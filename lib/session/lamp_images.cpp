@@ -113,6 +113,20 @@ void warn_of_map(const LampImages& input, const DetectorCamera& detector,
   warn_of_rest(unreadable.size(), "lamps with stripes that can hardly be seen", warnings);
 }
 
+/// With the reason that most of the lights have.
+std::string why_no_lamp(const SeenLamps& seen) {
+  const auto count = [&](LightKind kind) { return count_of(seen.lights, kind); };
+  std::string why = fmt::format(
+      "no lamp was identified wholly in view in {} images ({} skipped; {} lamps are cut by the "
+      "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
+      seen.images, seen.skipped.size(), count(LightKind::cut), count(LightKind::unknown),
+      count(LightKind::steady), count(LightKind::formless));
+  const auto reasons = reasons_of(seen.lights);
+  if (reasons.empty()) return why + ": are lamps lit and in view, and the exposure long enough?";
+  const auto& [kind, reason, lights] = reasons.front();
+  return why + fmt::format("; most often, {} times: {}", lights, explanation_of(reason));
+}
+
 /// Made when it is not there.
 fs::path picture_folder(const LampImages& input) {
   std::error_code error;
@@ -188,19 +202,12 @@ SeenLamps see_lamps(const LampImages& input, const StepProgress& progress) {
         if (progress) progress(done, images.size());
       });
   seen.images = found.images;
-  seen.lights = found.lights;
   seen.frames = std::move(found.frames);
+  seen.lights = std::move(found.lights);
   seen.skipped = skipped_images(images, found.refused);
   if (seen.frames.empty()) throw nothing_usable(input.folder, images.size(), seen);
-  const auto [identified, cut, unknown, steady] = seen.lights;
-  if (identified == 0) {
-    seen.fail(
-        StepFailure::undetermined,
-        fmt::format("no lamp was identified wholly in view in {} images ({} skipped; {} lamps "
-                    "are cut by the image's edge, {} lights flicker unlike any lamp of the "
-                    "map, {} are steady): are lamp map, row time and read-out (or "
-                    "classifier) right, and is the exposure short?",
-                    seen.images, seen.skipped.size(), cut, unknown, steady));
+  if (count_of(seen.lights, LightKind::lamp) == 0) {
+    seen.fail(StepFailure::undetermined, why_no_lamp(seen));
   }
   return seen;
 }

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -11,6 +10,7 @@
 #include "captures/detections_table.h"
 #include "detection/detect_lights.h"
 #include "detection/image_file.h"
+#include "detection/lights/lights_table.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 #include "session/step_result.h"
@@ -44,8 +44,8 @@ struct LampImages {
 /// The lamps in each image that can be used.
 struct SeenLamps : StepResult {
   std::vector<Frame> frames;
-  /// Lights of each LightKind, in its order.
-  std::array<int, 4> lights{};
+  /// All lights of each frame's image, without outlines.
+  std::vector<LightsOfImage> lights;
   int images = 0;
 };
 

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <string>
 
 #include "captures/csv_reader.h"
 #include "support/datasets.h"
@@ -66,6 +68,56 @@ TEST_F(Detect, DrawsWhatItFinds) {
   const auto refused = detect(kRig + "/sample", "--annotate " + kRig + "/sample");
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.errors, HasSubstr("holds the images"));
+}
+
+TEST_F(Detect, SaysOfEachLightWhatItIsAndWhy) {
+  const std::string clutter = std::string(VLP_SOURCE_DIR) + "/datasets/clutter/rendered";
+  const fs::path lights = folder / "lights.csv";
+  const auto found =
+      run_program("vlp-detect --verbose '" + clutter + "/sample' --lamps " + clutter +
+                  "/lamps.yaml --calibration " + clutter + "/true_calibration.yaml -o " +
+                  (folder / "found.csv").string() + " --lights " + lights.string());
+  ASSERT_EQ(found.exit_code, 0) << found.errors;
+  const CsvTable table(lights), lamps(folder / "found.csv");
+  std::map<std::string, std::size_t> kinds;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string kind(table.text(row, table.required("kind")));
+    ++kinds[kind];
+    const bool identified = kind == "lamp" || kind == "cut";
+    EXPECT_EQ(identified, table.text(row, table.required("reason")) == "identified");
+    EXPECT_EQ(identified, !table.text(row, table.required("lamp")).empty());
+  }
+  EXPECT_EQ(kinds["lamp"], lamps.rows());
+  EXPECT_EQ(kinds["steady"], 2U) << "the steady lamp and the window";
+  EXPECT_EQ(kinds["unknown"], 1U) << "the reflection of lamp 5";
+  EXPECT_THAT(found.output, HasSubstr("1         unknown, soft: it is much softer than others"));
+  EXPECT_THAT(found.errors, HasSubstr(") lamp 5: its stripes are that lamp's; radius 28.6 px"));
+}
+
+TEST_F(Detect, WritesLightsWhereThereIsNoLamp) {
+  const fs::path lights = folder / "lights.csv";
+  const auto result = detect(kRig + "/sample-boards", "--lights " + lights.string());
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.errors, HasSubstr("; most often, "));
+  EXPECT_FALSE(fs::exists(folder / "found.csv"));
+  const CsvTable table(lights);
+  EXPECT_GT(table.rows(), 0U);
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    EXPECT_EQ(table.text(row, table.required("lamp")), "");
+  }
+}
+
+TEST_F(Detect, RefusesToWriteLightsOverOtherFiles) {
+  const auto refused = [&](const fs::path& lights, const std::string& message) {
+    const auto result = detect(kRig + "/sample", "--lights " + lights.string());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.errors, HasSubstr(message));
+    EXPECT_FALSE(fs::exists(folder / "found.csv"));
+  };
+  refused(folder / "found.csv", "--output and --lights name one file");
+  refused(kRig + "/lamps.yaml", "lamps.yaml: is an input, too");
+  refused(kRig + "/sample/0000.png", "0000.png: is an input, too");
+  refused(folder / "none" / "lights.csv", "lights.csv");
 }
 
 TEST_F(Detect, NeedsOnlyTheRowTimeOfACamera) {

@@ -13,9 +13,11 @@ namespace {
 
 /// Why a light does not flicker; nothing when it does.
 std::optional<LightReason> why_steady(const Light& light) {
-  constexpr double least_clarity = 0.5;
+  constexpr double least_clarity = 0.5, mostly = 0.5;
   const Stripes& stripes = light.stripes;
-  if (!(stripes.contrast >= kLeastContrast)) return LightReason::even;
+  if (!(stripes.contrast >= kLeastContrast)) {
+    return light.clipped > mostly ? LightReason::clipped : LightReason::even;
+  }
   if (!(stripes.periods >= kLeastPeriods)) return LightReason::few_stripes;
   if (!(stripes.clarity >= least_clarity)) return LightReason::unclear;
   if (!(light.coherence >= kLeastCoherence)) return LightReason::incoherent;
@@ -44,6 +46,7 @@ void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) co
   constexpr double much_softer = 5, least_roundness = 0.45, most_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity();
   for (Light& light : lights) {
+    if (light.kind == LightKind::formless) continue;
     const auto steady = why_steady(light);
     light.kind = steady ? LightKind::steady : LightKind::unknown;
     light.reason = steady.value_or(LightReason::like_no_lamp);

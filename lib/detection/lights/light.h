@@ -17,11 +17,13 @@ enum class LightKind {
   cut,      ///< identified, but the image's edge cuts it
   unknown,  ///< flickers, but is not told to be one lamp of the map, see LightReason
   steady,   ///< does not flicker
+  formless  ///< bright, but without a round outline, so that it has no centre
 };
 
 /// What decided that, of lights that are not identified the first that speaks against it.
 enum class LightReason {
   identified,    ///< a lamp, and one that is cut
+  clipped,       ///< steady: contrast below kLeastContrast, and most of it as bright as can be
   even,          ///< steady: contrast below kLeastContrast
   few_stripes,   ///< steady: less than kLeastPeriods
   unclear,       ///< steady: no period explains half of what varies from line to line
@@ -32,8 +34,12 @@ enum class LightReason {
   not_round,     ///< unknown: most of its edge is not on its outline
   seen_better,   ///< unknown: another light is that lamp, and has the surer centre
   alone,         ///< unknown: less than kEnoughPeriods, and no lamp with more in the image
+  at_edge,       ///< formless: the image's edge cuts it
+  small,         ///< formless: its outline has less than twice kLeastOutlinePoints
+  no_outline     ///< formless: neither a circle nor an ellipse fits its outline
 };
 
+/// One that is formless has its box, `pixel` in the middle, and its edge; no stripes, no sigma.
 struct Light {
   LightKind kind;
   LightReason reason;
@@ -49,6 +55,9 @@ struct Light {
   Stripes stripes;
   /// See coherence_of(); 0 when the stripes have no period.
   double coherence;
+  /// Share of the pixels in the middle of a steady light that are as bright as the brightest there:
+  /// of one that is clipped, most.
+  double clipped;
   /// Whether it has no edge, and its outline is a level.
   bool glows;
   /// Whether it is lit unevenly, and its outline is a rim, see rim_of(); its roundness is the share
@@ -64,5 +73,10 @@ struct Light {
   /// As (column, row) of the lines that the shutter reads: (v, u) for a read-out along columns.
   std::vector<EdgePoint> outline;
 };
+
+/// Whether it may be a lamp, of this map or another.
+inline bool flickers(const Light& light) {
+  return light.kind != LightKind::steady && light.kind != LightKind::formless;
+}
 
 }  // namespace vlp

@@ -35,6 +35,16 @@ bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std:
          on_circle >= least_gain * std::max(of_a, of_b);
 }
 
+/// Why a part has no form.
+LightReason reason_of(const LightPart& part, const cv::Size& size) {
+  const cv::Rect& box = part.box;
+  const bool inside = box.x > 0 && box.y > 0 && box.br().x < size.width && box.br().y < size.height;
+  if (!inside) return LightReason::at_edge;
+  // What is not of the light itself takes up some of the points.
+  const bool small = part.outline.size() < 2 * kLeastOutlinePoints;
+  return small ? LightReason::small : LightReason::no_outline;
+}
+
 /// No two lights overlap: the one with more of an outline stands, the other is a piece of it.
 std::vector<Light> without_pieces(std::vector<Light> found) {
   std::stable_sort(found.begin(), found.end(), [](const Light& a, const Light& b) {
@@ -52,7 +62,7 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
 
 }  // namespace
 
-std::vector<Light> joined(std::vector<LightPart> parts, const LightShape& shape,
+std::vector<Light> joined(std::vector<LightPart>& parts, const LightShape& shape,
                           const Background& background) {
   // A lamp is in a few pieces; an image of thousands of them shows something else.
   constexpr int most_tries = 2000;
@@ -75,7 +85,32 @@ std::vector<Light> joined(std::vector<LightPart> parts, const LightShape& shape,
   for (LightPart& part : parts) {
     if (part.light) found.push_back(std::move(*part.light));
   }
+  std::erase_if(parts, [](const LightPart& part) { return part.light.has_value(); });
   return without_pieces(std::move(found));
+}
+
+std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vector<Light>& lights,
+                                   const LightShape& shape, const cv::Size& size) {
+  constexpr int least_px = 5;
+  std::vector<Light> formless;
+  for (LightPart& part : parts) {
+    const cv::Rect& box = part.box;
+    if (std::min(box.width, box.height) < least_px) continue;
+    Light light{};
+    light.kind = LightKind::formless;
+    light.reason = reason_of(part, size);
+    light.low = shape.turned({box.x - 0.5, box.y - 0.5});
+    light.high = shape.turned({box.br().x - 0.5, box.br().y - 0.5});
+    light.pixel = (light.low + light.high) / 2;
+    light.radius_px = (light.high - light.low).mean() / 2;
+    const bool inside = std::any_of(lights.begin(), lights.end(), [&](const Light& other) {
+      return (light.pixel - other.pixel).norm() < other.radius_px;
+    });
+    if (inside) continue;
+    light.outline = std::move(part.outline);
+    formless.push_back(std::move(light));
+  }
+  return formless;
 }
 
 }  // namespace vlp

@@ -20,8 +20,14 @@ struct LightPart {
 };
 
 /// The lights that the parts are of: what stands in the way splits a lamp, but its parts lie on one
-/// circle. Of lights that overlap the one with more of an outline stands.
-std::vector<Light> joined(std::vector<LightPart> parts, const LightShape& shape,
+/// circle. Of lights that overlap the one with more of an outline stands. What is left in `parts`
+/// has no form.
+std::vector<Light> joined(std::vector<LightPart>& parts, const LightShape& shape,
                           const Background& background);
+
+/// Parts without a form, but those inside one of `lights`, as lights, with the reason. What is less
+/// than five pixels wide or high is a speck, and no light. `size` is that of the lines.
+std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vector<Light>& lights,
+                                   const LightShape& shape, const cv::Size& size);
 
 }  // namespace vlp

@@ -89,8 +89,6 @@ std::optional<Eigen::Vector2d> LightShape::pixel_of(const Eigen::Vector2d& plane
 
 std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
                                           const Background& background) const {
-  constexpr std::size_t least_points = 5;
-  constexpr int least_support = 10;
   constexpr double most_slender = 2;  // a disc seen 60 degrees off its axis
   std::vector<Eigen::Vector2d> points, pixels;
   double brightest = 0;
@@ -103,7 +101,7 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
     brightest = std::max(brightest, edge.level);
     return !plane;
   });
-  if (points.size() < least_points) return std::nullopt;
+  if (points.size() < kLeastOutlinePoints) return std::nullopt;
   std::vector<double> weights;
   weights.reserve(outline.size());
   for (const EdgePoint& edge : outline) weights.push_back(std::pow(edge.level / brightest, 2));
@@ -113,7 +111,7 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   const double tolerance_px =
       std::max({0.35, 8 * background.noise / brightest, 0.4 * median_rise_px(outline)});
   const auto fit = fit_round(points, weights, tolerance_px * per_px, camera_.lens.has_value());
-  if (!fit || fit->count < least_support) return std::nullopt;
+  if (!fit || fit->count < static_cast<int>(kLeastOutlinePoints)) return std::nullopt;
   if (!camera_.lens && slenderness(fit->rim_from_circle) > most_slender) return std::nullopt;
 
   Light light{};

@@ -13,6 +13,9 @@
 
 namespace vlp {
 
+/// With less points on it a circle or an ellipse is not beyond doubt.
+inline constexpr std::size_t kLeastOutlinePoints = 10;
+
 /// What a detector knows of the camera. The row time is needed for identities.
 struct DetectorCamera {
   Readout readout;
