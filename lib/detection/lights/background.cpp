@@ -45,14 +45,21 @@ double step_of(std::vector<Level> sample) {
   return levels >= enough ? step : 1;
 }
 
-/// Whether levels below the median are missing, because it is the least there is.
+/// Whether levels below the median are missing, because it is the least there is: with noise, which
+/// fills the levels next to the dark more than those that one pixel of ten is above. What is lit
+/// does not, and a dark without noise has nothing below, either.
 template <typename Level>
-bool clipped(const std::vector<Level>& sample, double median) {
+bool clipped(std::vector<Level>& sample, double median, double step) {
+  const auto tenth = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() * 9 / 10);
+  std::nth_element(sample.begin(), tenth, sample.end());
+  const double next = median + std::max(step, (*tenth - median) / 2);
   const auto below =
       std::count_if(sample.begin(), sample.end(), [&](Level v) { return v < median; });
   const auto above =
       std::count_if(sample.begin(), sample.end(), [&](Level v) { return v > median; });
-  return 4 * below < above;
+  const auto near =
+      std::count_if(sample.begin(), sample.end(), [&](Level v) { return v > median && v <= next; });
+  return 4 * below < above && 10 * near >= above;
 }
 
 /// One pixel of five is brighter than 0.84 standard deviations, and one of ten than 1.28; or, if
@@ -80,7 +87,7 @@ Background background(const cv::Mat& image) {
     squares += (median - *below) * (median - *below);
   }
   double noise = std::sqrt(squares / double(std::max<std::ptrdiff_t>(1, middle - sample.begin())));
-  const bool no_noise_below = clipped(sample, median);
+  const bool no_noise_below = clipped(sample, median, step);
   if (no_noise_below) noise = std::max(noise, noise_above(sample, median));
   // Grey levels are coarse: of those around, the mean and the scatter say more.
   constexpr double around = 3;

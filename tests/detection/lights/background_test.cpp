@@ -88,6 +88,20 @@ TEST(Background, IsThatAboveALevelThatNothingIsBelow) {
   EXPECT_LT(cv::countNonZero(image > background.threshold), 20);
 }
 
+TEST(Background, WithoutNoiseIsNotTakenForClippedWhenMuchIsLit) {
+  for (const int type : {CV_8U, CV_16U}) {
+    for (const double dark : {0.0, 9.0}) {
+      for (const int lit_rows : {60, 150, 240}) {  // of 600: a tenth to two fifths
+        cv::Mat image(600, 800, type, cv::Scalar(dark));
+        image.rowRange(100, 100 + lit_rows) = 200;
+        image.row(100) = 60;  // an edge that is not sharp
+        SCOPED_TRACE(testing::Message() << type << ", " << dark << ", " << lit_rows);
+        expect_flat(image, dark);
+      }
+    }
+  }
+}
+
 TEST(Background, OfPartOfAnImageLeavesTheRestOut) {
   cv::Mat image(600, 800, CV_8U, cv::Scalar(200));
   cv::Mat part = image(cv::Rect(100, 50, 33, 41));
