@@ -14,6 +14,8 @@
 #include <memory>
 #include <thread>
 
+#include "help_formatter.h"
+
 namespace vlp {
 namespace {
 
@@ -80,6 +82,10 @@ void check_plot(const std::string& plot, const std::string& output,
 
 int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run) {
   bool quiet = false, verbose = false;
+  const auto formatter = std::make_shared<HelpFormatter>();
+  app.formatter(formatter);
+  const std::function<bool(CLI::App*)> every = [](CLI::App*) { return true; };
+  for (CLI::App* command : app.get_subcommands(every)) command->formatter(formatter);
   auto* quiet_flag = app.add_flag("-q,--quiet", quiet, "Only errors on stderr, nothing on stdout");
   app.add_flag("-v,--verbose", verbose, "Details on stderr")->excludes(quiet_flag);
   app.set_version_flag("--version", app.get_name() + " " + VLP_VERSION);

@@ -43,9 +43,9 @@ void check_output(const std::string& output, const std::vector<std::string>& inp
 void check_plot(const std::string& plot, const std::string& output,
                 const std::vector<std::string>& inputs);
 
-/// The common shell of a program: adds --quiet, --verbose and --version to `app`, parses, and calls
-/// `run`. Messages go through spdlog to stderr. Bad usage and bad input end with one line and
-/// exit code 2, Undetermined with 3, GateNotMet with 1.
+/// The common shell of a program: adds --quiet, --verbose and --version to `app`, makes its --help
+/// fit 80 columns, parses, and calls `run`. Messages go through spdlog to stderr. Bad usage and bad
+/// input end with one line and exit code 2, Undetermined with 3, GateNotMet with 1.
 int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run);
 
 }  // namespace vlp

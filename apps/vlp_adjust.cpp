@@ -167,11 +167,11 @@ int main(int argc, char** argv) {
       "turning on one spot), x_m, y_m, z_m with place (camera or axis: whose place it is) and\n"
       "place_sd_m. A set called rotation is a turn on the spot.\n\n"
       "Example, from the project's folder:\n"
-      "  build/bin/vlp-adjust datasets/example/detections.csv --turn datasets/example/turning.csv "
-      "\\\n"
+      "  build/bin/vlp-adjust datasets/example/detections.csv \\\n"
+      "    --turn datasets/example/turning.csv \\\n"
       "    --lamps datasets/example/lamps.yaml --map-sd-m 0.002 \\\n"
-      "    --calibration datasets/example/calibration.yaml -o adjusted.yaml --refine-map "
-      "refined.yaml\n",
+      "    --calibration datasets/example/calibration.yaml -o adjusted.yaml \\\n"
+      "    --refine-map refined.yaml\n",
       "vlp-adjust");
   vlp::Options options;
   app.add_option("sets", options.sets,

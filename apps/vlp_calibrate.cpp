@@ -111,19 +111,21 @@ int main(int argc, char** argv) {
       "and outputs are as before is not run again; killed, the same command goes on.\n\n"
       "SESSION, which is only read, holds\n"
       "  lamps.yaml            the lamps, with their frequencies\n"
-      "  boards/, board.yaml   images of the board, and what it is; or camera.yaml, the camera\n"
-      "                        part of a calibration\n"
+      "  boards/, board.yaml   images of the board, and what it is; or camera.yaml,\n"
+      "                        the camera part of a calibration\n"
       "  rotation/             captures while the camera turns on the spot\n"
-      "  dispersion/           at known places, turning; captures.csv says where (optional)\n"
-      "  check/                to locate; with truth.csv, or places in captures.csv, also the\n"
-      "                        errors and the report (optional)\n"
+      "  dispersion/           at known places, turning; captures.csv says where\n"
+      "                        (optional)\n"
+      "  check/                to locate; with truth.csv, or places in captures.csv,\n"
+      "                        also the errors and the report (optional)\n"
       "  line-*/               along a straight line each, with places (optional)\n"
       "  classifier.yaml       of vlp-train, to tell the lamps apart (optional)\n"
       "  gates.yaml            what the figures have to keep to (optional)\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml \\\n"
       "    --only boards,rotation,dispersion,check -o out/session\n"
-      "  build/bin/vlp-calibrate out/session --row-time-s 3e-5 --readout rows -o out/results\n",
+      "  build/bin/vlp-calibrate out/session --row-time-s 3e-5 --readout rows \\\n"
+      "    -o out/results\n",
       "vlp-calibrate");
   vlp::Options options;
   auto& how = options.how;

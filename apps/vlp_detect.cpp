@@ -60,7 +60,8 @@ int main(int argc, char** argv) {
       "Example, from the project's folder:\n"
       "  build/bin/vlp-detect datasets/paper-rig/rendered/sample \\\n"
       "    --lamps datasets/paper-rig/rendered/lamps.yaml \\\n"
-      "    --calibration datasets/paper-rig/rendered/true_calibration.yaml -o detections.csv\n",
+      "    --calibration datasets/paper-rig/rendered/true_calibration.yaml \\\n"
+      "    -o detections.csv\n",
       "vlp-detect");
   vlp::CaptureOptions options;
   app.add_option("images", options.images, "Folder of images: PNG, JPEG, BMP, TIFF or PGM")

@@ -135,8 +135,9 @@ int main(int argc, char** argv) {
       "apart from errors of lamp map and station by captures at different yaws.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-dispersion datasets/example/station.csv \\\n"
-      "    --lamps datasets/example/lamps.yaml --calibration datasets/example/calibration.yaml \\\n"
-      "    --station 0.1 0 -o calibration.yaml\n",
+      "    --lamps datasets/example/lamps.yaml \\\n"
+      "    --calibration datasets/example/calibration.yaml --station 0.1 0 \\\n"
+      "    -o calibration.yaml\n",
       "vlp-dispersion");
   vlp::Options options;
   vlp::add_capture_options(app, options.images,

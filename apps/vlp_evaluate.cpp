@@ -260,13 +260,13 @@ int main(int argc, char** argv) {
       "What fixes are worth: their errors against a truth, a path or a commanded line, and gates\n"
       "for them. Exit code 1 when a gate is not met.\n\n"
       "Example, from the project's folder:\n"
-      "  build/bin/vlp-locate datasets/example/detections.csv --lamps datasets/example/lamps.yaml "
-      "\\\n"
+      "  build/bin/vlp-locate datasets/example/detections.csv \\\n"
+      "    --lamps datasets/example/lamps.yaml \\\n"
       "    --calibration datasets/example/calibration.yaml -o fixes.csv\n"
       "  build/bin/vlp-evaluate fixes.csv --truth datasets/example/truth.csv \\\n"
       "    --gate mean_mm=0.2,p90_mm=0.4 --gate missing=0 --json evaluation.json \\\n"
-      "    --calibration datasets/example/calibration.yaml --lamps datasets/example/lamps.yaml \\\n"
-      "    --report report.html\n",
+      "    --calibration datasets/example/calibration.yaml \\\n"
+      "    --lamps datasets/example/lamps.yaml --report report.html\n",
       "vlp-evaluate");
   vlp::Options options;
   vlp::add_options(app, options);

@@ -116,8 +116,8 @@ int main(int argc, char** argv) {
       "pixel noise, whatever the method.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-limits --lamps datasets/example/lamps.yaml \\\n"
-      "    --calibration datasets/example/calibration.yaml --height-m 0 --noise-px 0.05 \\\n"
-      "    --tilt-deg 0.01 --lamp-map-mm 0.1 --picture limits.png\n",
+      "    --calibration datasets/example/calibration.yaml --height-m 0 \\\n"
+      "    --noise-px 0.05 --tilt-deg 0.01 --lamp-map-mm 0.1 --picture limits.png\n",
       "vlp-limits");
   vlp::Options options;
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();

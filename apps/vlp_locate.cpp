@@ -204,8 +204,8 @@ int main(int argc, char** argv) {
       "of\n"
       "images.\n\n"
       "Example, from the project's folder:\n"
-      "  build/bin/vlp-locate datasets/example/detections.csv --lamps datasets/example/lamps.yaml "
-      "\\\n"
+      "  build/bin/vlp-locate datasets/example/detections.csv \\\n"
+      "    --lamps datasets/example/lamps.yaml \\\n"
       "    --calibration datasets/example/calibration.yaml -o fixes.csv\n",
       "vlp-locate");
   vlp::Options options;

@@ -44,9 +44,10 @@ int main(int argc, char** argv) {
       "sits beside the axis cannot be told from one that leans; captures at two heights or more,\n"
       "in the same folder, tell both.\n\n"
       "Example, from the project's folder:\n"
-      "  build/bin/vlp-rotation datasets/example/turning.csv --lamps datasets/example/lamps.yaml "
-      "\\\n"
-      "    --calibration datasets/example/calibration.yaml -o rotated.yaml --plot rotation.png\n",
+      "  build/bin/vlp-rotation datasets/example/turning.csv \\\n"
+      "    --lamps datasets/example/lamps.yaml \\\n"
+      "    --calibration datasets/example/calibration.yaml -o rotated.yaml \\\n"
+      "    --plot rotation.png\n",
       "vlp-rotation");
   vlp::Options options;
   vlp::add_capture_options(

@@ -77,7 +77,8 @@ int main(int argc, char** argv) {
       "with\n"
       "the truth beside the images. An interrupted run goes on where it stopped.\n\n"
       "Example, from the project's folder:\n"
-      "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only sample -o out/paper-rig\n",
+      "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only sample \\\n"
+      "    -o out/paper-rig\n",
       "vlp-simulate");
   vlp::Options options;
   app.add_option("scene", options.scene, "Scene file, .yaml")->required();

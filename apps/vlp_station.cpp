@@ -77,8 +77,8 @@ int main(int argc, char** argv) {
       "Example, from the project's folder:\n"
       "  mkdir -p out && cp -rT datasets/station out/station\n"
       "  build/bin/vlp-simulate datasets/station/scene.yaml -o out/station/unit\n"
-      "  build/bin/vlp-station run --station out/station/station.yaml --camera-id 0001 \\\n"
-      "    --batch out/station/unit\n"
+      "  build/bin/vlp-station run --station out/station/station.yaml \\\n"
+      "    --camera-id 0001 --batch out/station/unit\n"
       "  build/bin/vlp-station list --station out/station/station.yaml\n",
       "vlp-station");
   app.require_subcommand(1);

@@ -121,7 +121,8 @@ int main(int argc, char** argv) {
       "Example, from the project's folder:\n"
       "  build/bin/vlp-train datasets/paper-rig/rendered/sample --row-time \\\n"
       "    --lamps datasets/paper-rig/rendered/lamps.yaml \\\n"
-      "    --calibration datasets/paper-rig/rendered/true_calibration.yaml -o calibration.yaml\n",
+      "    --calibration datasets/paper-rig/rendered/true_calibration.yaml \\\n"
+      "    -o calibration.yaml\n",
       "vlp-train");
   vlp::Options options;
   app.add_option(

@@ -1,7 +1,10 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// --help: every program has one, and its example works as typed.
+/// --help: every program has one that fits a terminal, and its example works as typed.
 #include <gmock/gmock.h>
+
+#include <sstream>
+#include <vector>
 
 #include "support/program.h"
 #include "support/temporary_folder.h"
@@ -22,6 +25,25 @@ std::string example_in(const std::string& help) {
   return example;
 }
 
+std::vector<std::string> lines_of(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+/// The names on the left below "Subcommands:".
+std::vector<std::string> commands_in(const std::string& help) {
+  std::vector<std::string> commands;
+  bool below = false;
+  for (const std::string& line : lines_of(help)) {
+    if (!line.starts_with(' ')) below = line == "Subcommands:" || line == "SUBCOMMANDS:";
+    const bool name = below && line.starts_with("  ") && line.size() > 2 && line[2] != ' ';
+    if (name) commands.push_back(line.substr(2, line.find(' ', 2) - 2));
+  }
+  return commands;
+}
+
 class Help : public testing::TestWithParam<const char*> {};
 
 TEST_P(Help, HasAnExampleThatWorksAsTyped) {
@@ -37,6 +59,21 @@ TEST_P(Help, HasAnExampleThatWorksAsTyped) {
   std::filesystem::create_directory_symlink(VLP_PROGRAMS_DIR, folder / "build/bin");
   const auto result = run_program("cd '" + (folder / "").string() + "' && " + example);
   EXPECT_EQ(result.exit_code, 0) << example << result.errors;
+}
+
+TEST_P(Help, FitsIn80Columns) {
+  const std::string program = GetParam();
+  std::vector<std::string> commands = commands_in(run_program(program + " --help").output);
+  EXPECT_EQ(commands.empty(), program != "vlp-station");
+  commands.emplace_back("");  // the program itself
+  for (const std::string& command : commands) {
+    const auto help = run_program(program + " " + command + " --help");
+    ASSERT_EQ(help.exit_code, 0) << command;
+    EXPECT_THAT(help.output, HasSubstr("--help")) << command;
+    for (const std::string& line : lines_of(help.output)) {
+      EXPECT_LE(line.size(), 80U) << command << ": " << line;
+    }
+  }
 }
 
 TEST_P(Help, NamesTheVersion) {

@@ -1,0 +1,23 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace vlp {
+
+/// --help in 80 columns: descriptions of options wrap within their column. In the description of a
+/// program, lines that begin with a space (examples, lists) stay as they are and have to fit; what
+/// stands between them and blank lines is a paragraph, and wraps. In the footer each line wraps
+/// from where its second column begins.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_description(const CLI::App* app) const override;
+  std::string make_usage(const CLI::App* app, std::string name) const override;
+  std::string make_footer(const CLI::App* app) const override;
+  std::string make_subcommand(const CLI::App* command) const override;
+  std::string make_option(const CLI::Option* option, bool is_positional) const override;
+};
+
+}  // namespace vlp
