@@ -48,9 +48,9 @@ struct IntrinsicsReport {
   std::vector<Eigen::Vector2d> region_px = {};
 };
 
-/// How the rotation centre is applied (Chen and Guan, section 3.1, and theory of the same):
-/// `shift` subtracts it in the undistorted plane (eq. 9), `tilt` turns every ray so that the
-/// zenith becomes +Z, which is right at other places and heights, too.
+/// How the rotation centre is applied (Chen and Guan, section 3.1; lib/THEORY.md, "Rotation
+/// centre"): `shift` subtracts it in the undistorted plane (eq. 9), `tilt` turns every ray so that
+/// the zenith becomes +Z, which is right at other places and heights, too.
 enum class RotationModel { shift, tilt };
 
 struct RotationCenter {

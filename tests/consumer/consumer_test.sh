@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs the project, then builds the README's example of a robot's loop against the installed
+# Installs the project, then builds the example of a robot's loop in lib/README.md against the installed
 # tree: with its CMake package, and with pkg-config for this very processor (-march=native), which
 # changes the layout of Eigen's own types. Both programs run.
 set -euo pipefail
@@ -13,8 +13,8 @@ mkdir -p "$scratch/robot"
 cmake --install "$build_dir" --prefix "$scratch/installed" >"$scratch/install.log"
 
 cp "$source_dir"/tests/consumer/robot/* "$scratch/robot"
-# The one C++ block of the README.
-sed -n '/^```cpp$/,/^```$/{/^```/!p}' "$source_dir/README.md" >"$scratch/robot/robot.cpp"
+# Its one C++ block.
+sed -n '/^```cpp$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/robot/robot.cpp"
 grep -q 'int main' "$scratch/robot/robot.cpp"
 
 cmake -G Ninja -S "$scratch/robot" -B "$scratch/with-cmake" -DCMAKE_PREFIX_PATH="$scratch/installed" \

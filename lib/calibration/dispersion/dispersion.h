@@ -77,9 +77,9 @@ struct DispersionFit {
   Circle before = {{0, 0}, 0}, after = {{0, 0}, 0};
 };
 
-/// The dispersion calibration (Chen and Guan, section 3.2; theory, "Dispersion circle"). A level
-/// camera of yaw g_k, H_k below the lamps, whose normalized points z are too large by delta, and a
-/// station or map that is wrong by m, put
+/// The dispersion calibration (Chen and Guan, section 3.2; lib/THEORY.md, "Dispersion circle"). A
+/// level camera of yaw g_k, H_k below the lamps, whose normalized points z are too large by delta,
+/// and a station or map that is wrong by m, put
 ///   fix_k - station = -H_k e^{j g_k} delta + m.
 /// Method `paper` (eq. 10 to 13 with the scale f / H and the turn by the yaw that they lack) takes
 /// the circle's centre D for the whole of it: offset_px = -f e^{-jg} D / H, corrected until the

@@ -7,9 +7,9 @@
 
 namespace vlp {
 
-/// One centre of rotation for all lamps in the undistorted image (theory, "Rotation centre", method
-/// `joint`): the circles of eq. 9 with an angle per capture that all lamps share. Minimizes the
-/// squared distances, in the image, of the lamps from
+/// One centre of rotation for all lamps in the undistorted image (lib/THEORY.md, "Rotation centre",
+/// method `joint`): the circles of eq. 9 with an angle per capture that all lamps share. Minimizes
+/// the squared distances, in the image, of the lamps from
 ///   z_ik = c + e^{-jg_k} q_ih
 /// over the centre c, the angles, and a place q of each lamp at each height. Exact for a level
 /// camera and captures at one height; on a tilted one c is too far out, as for `circle`

@@ -11,9 +11,9 @@ namespace vlp {
 /// share of their height over the camera: 0.3 degrees of tilt.
 inline constexpr double kLooseLeverArm = 0.005;
 
-/// The direction in the camera about which all lamp rays turn (theory, "Rotation centre", method
-/// `axis`); lens and tilt are exact. Minimizes the squared distances, in the image, of the lamps
-/// from
+/// The direction in the camera about which all lamp rays turn (lib/THEORY.md, "Rotation centre",
+/// method `axis`); lens and tilt are exact. Minimizes the squared distances, in the image, of the
+/// lamps from
 ///   project(camera_from_level(zenith) (Rz(-g_k) (p_i - A_h) - e, Z_i - z_h))
 /// over the zenith, a yaw g_k per capture, the place p_i of each lamp on the ceiling (the map only
 /// says what to start from, so that its errors do not matter; the heights Z_i are the map's), the

@@ -61,7 +61,7 @@ struct LampUnreadable {
   double period_lines;
   /// Periods on the lamp.
   double periods;
-  /// |sinc(frequency exposure)|, what is left of the stripes (theory, "Identity").
+  /// |sinc(frequency exposure)|, what is left of the stripes (lib/THEORY.md, "Identity").
   double contrast;
 };
 

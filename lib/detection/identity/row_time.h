@@ -35,7 +35,7 @@ struct RowTimeResult {
 };
 
 /// The row time from lights of lamps whose frequencies the map knows: a lamp of frequency f has a
-/// period of 1 / (f row_time) lines (theory, "Identity"), so that for lamp k of light i
+/// period of 1 / (f row_time) lines (lib/THEORY.md, "Identity"), so that for lamp k of light i
 ///
 ///     log row_time = -log period_i - log f_k.
 ///

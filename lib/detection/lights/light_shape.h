@@ -28,9 +28,9 @@ struct DetectorCamera {
 
 /// The shape of lights by their outline. Edge points go through the lens into the level plane; a
 /// circle is fitted there robustly, and its centre is projected back, because the centre of an
-/// outline in the image is not the image of the centre (theory, "Lamp centroid"). Without a lens an
-/// ellipse is fitted in the image, no more than twice as long as wide: a disc that is seen up to 60
-/// degrees off its axis.
+/// outline in the image is not the image of the centre (lib/THEORY.md, "Lamp centroid"). Without a
+/// lens an ellipse is fitted in the image, no more than twice as long as wide: a disc that is seen
+/// up to 60 degrees off its axis.
 class LightShape {
  public:
   explicit LightShape(const DetectorCamera& camera) : camera_(camera) {}
