@@ -12,7 +12,8 @@ namespace vlp {
 /// The whole of a text file. Throws InputError when it cannot be read, is a folder, is empty, is
 /// longer than `max_bytes`, holds control characters (a binary file), or when its last line has
 /// no end: that is how a file cut short looks.
-std::string read_text_file(const std::filesystem::path& path, std::size_t max_bytes);
+[[gnu::visibility("hidden")]] std::string read_text_file(const std::filesystem::path& path,
+                                                         std::size_t max_bytes);
 
 /// A file in the making that appears as a whole or not at all: a temporary file beside it, fsync,
 /// rename. Whatever interrupts it, `path` holds the old content or the new. A symbolic link is
@@ -21,12 +22,12 @@ std::string read_text_file(const std::filesystem::path& path, std::size_t max_by
 class WholeFile {
  public:
   /// Each throws InputError when the file cannot be written.
-  explicit WholeFile(const std::filesystem::path& path);
-  void write(std::string_view content);
-  void save();
+  [[gnu::visibility("hidden")]] explicit WholeFile(const std::filesystem::path& path);
+  [[gnu::visibility("hidden")]] void write(std::string_view content);
+  [[gnu::visibility("hidden")]] void save();
 
   /// Without save() nothing has happened to `path`.
-  ~WholeFile();
+  [[gnu::visibility("hidden")]] ~WholeFile();
   WholeFile(const WholeFile&) = delete;
   WholeFile& operator=(const WholeFile&) = delete;
 
@@ -36,6 +37,7 @@ class WholeFile {
 };
 
 /// Replaces `path` by `content` as a whole (WholeFile). Throws InputError.
-void write_file(const std::filesystem::path& path, std::string_view content);
+[[gnu::visibility("hidden")]] void write_file(const std::filesystem::path& path,
+                                              std::string_view content);
 
 }  // namespace vlp

@@ -7,6 +7,8 @@
 #include "lamp_map.h"
 #include "yaml_reader.h"
 
+// Not installed: nothing for the shared library to show.
+#pragma GCC visibility push(hidden)
 namespace vlp {
 
 /// The parts that more than one kind of document holds. Each asks `map` for the keys that are the
@@ -20,3 +22,4 @@ Camera read_camera(YamlMap& map);
 void check_lamp(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item);
 
 }  // namespace vlp
+#pragma GCC visibility pop

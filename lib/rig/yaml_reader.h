@@ -13,6 +13,8 @@
 
 #include "input_error.h"
 
+// Not installed: nothing for the shared library to show.
+#pragma GCC visibility push(hidden)
 namespace vlp {
 
 class YamlMap;
@@ -80,3 +82,4 @@ class YamlMap {
 YamlMap read_yaml(const std::filesystem::path& file, const std::string& format);
 
 }  // namespace vlp
+#pragma GCC visibility pop

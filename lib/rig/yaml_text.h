@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+// Not installed: nothing for the shared library to show.
+#pragma GCC visibility push(hidden)
 namespace vlp {
 
 /// The fewest digits that read back as the same double. With an exponent it has a point, too
@@ -28,3 +30,4 @@ std::size_t line_of(const YAML::Mark& mark);
 std::size_t utf8_length(std::string_view text);
 
 }  // namespace vlp
+#pragma GCC visibility pop

@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+// Not installed: nothing for the shared library to show.
+#pragma GCC visibility push(hidden)
 namespace vlp {
 
 /// Pieces of a YAML::Emitter document. Numbers are written with the fewest digits that read
@@ -27,3 +29,4 @@ void emit_numbers(YAML::Emitter& out, std::string_view key,
 void emit_row(YAML::Emitter& out, std::span<const double> values);
 
 }  // namespace vlp
+#pragma GCC visibility pop
