@@ -33,7 +33,7 @@ std::vector<std::string> lines_of(const std::string& text) {
 }
 
 /// The names on the left below "Subcommands:".
-std::vector<std::string> commands_in(const std::string& help) {
+std::vector<std::string> subcommands_in(const std::string& help) {
   std::vector<std::string> commands;
   bool below = false;
   for (const std::string& line : lines_of(help)) {
@@ -63,7 +63,7 @@ TEST_P(Help, HasAnExampleThatWorksAsTyped) {
 
 TEST_P(Help, FitsIn80Columns) {
   const std::string program = GetParam();
-  std::vector<std::string> commands = commands_in(run_program(program + " --help").output);
+  std::vector<std::string> commands = subcommands_in(run_program(program + " --help").output);
   EXPECT_EQ(commands.empty(), program != "vlp-station");
   commands.emplace_back("");  // the program itself
   for (const std::string& command : commands) {
