@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station_guide.h"
 
+#include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -63,10 +64,19 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
     changed = false;
     if (came(unit, arrivals, sources.any())) last = Clock::now();
     sources.feed(unit, watched);
-    if (sources.ended(unit)) break;
+    if (sources.ended(unit)) {
+      unit.end_early("the frames ended");
+      break;
+    }
     const std::chrono::duration<double> idle = Clock::now() - last;
-    if (options.idle_s && idle.count() > *options.idle_s) break;
-    if (terminal.key(arrivals.empty() ? look_every_ms : 0) == 'q') break;
+    if (options.idle_s && idle.count() > *options.idle_s) {
+      unit.end_early(fmt::format("no image came for {:g} s", *options.idle_s));
+      break;
+    }
+    if (terminal.key(arrivals.empty() ? look_every_ms : 0) == 'q') {
+      unit.end_early("the operator ended the run");
+      break;
+    }
     if (interrupted()) {
       throw std::runtime_error("left before the verdict; the same command goes on where it was");
     }

@@ -9,14 +9,22 @@
 #include <filesystem>
 
 #include "app.h"
+#include "captures/printable.h"
 #include "rig/input_error.h"
 #include "station/control_chart.h"
+#include "station/database_name.h"
 #include "station/export_runs.h"
+#include "station/publish_run.h"
 #include "station/station_config.h"
 #include "station/station_screen.h"
 
 namespace vlp {
 namespace {
+
+constexpr const char* kAny = "any";
+
+/// To stdout; what records hold of names is not for the terminal to obey.
+void say(const std::string& text) { fmt::print("{}", printable(text)); }
 
 Records records_of(const StationRecordsOptions& options) {
   if (options.station.empty() == options.records.empty()) {
@@ -24,17 +32,25 @@ Records records_of(const StationRecordsOptions& options) {
   }
   const std::string where =
       options.records.empty() ? read_station(options.station).records : options.records;
-  const bool is_server = where.find("://") != std::string::npos;
-  if (!is_server && !std::filesystem::exists(where))
-    throw InputError(where, "there are no records");
+  if (!is_server(where) && !std::filesystem::exists(where)) {
+    throw InputError(name_of_database(where), "there are no records");
+  }
   return Records(where);
+}
+
+/// A filter in which "any" is not asked for.
+RunFilter asked(RunFilter filter) {
+  for (std::string* text : {&filter.station, &filter.verdict, &filter.kind}) {
+    if (*text == kAny) text->clear();
+  }
+  return filter;
 }
 
 /// The run that is named, or the last that the filter lets through.
 RunRecord run_of(Records& records, const StationRecordsOptions& options) {
   std::string run = options.run;
   if (run.empty()) {
-    const auto runs = records.list(options.filter);
+    const auto runs = records.list(asked(options.filter));
     if (runs.empty()) throw std::invalid_argument("there is no such run");
     run = runs.back().run;
   }
@@ -43,43 +59,93 @@ RunRecord run_of(Records& records, const StationRecordsOptions& options) {
   return *record;
 }
 
+/// What a trend is of unless it is asked for more: units that passed, of the station.
+RunFilter comparable(const StationRecordsOptions& options) {
+  RunFilter filter = options.filter;
+  if (filter.verdict.empty()) filter.verdict = name_of(Verdict::pass);
+  if (filter.kind.empty()) filter.kind = "unit";
+  if (filter.station.empty() && !options.station.empty()) {
+    filter.station = read_station(options.station).station;
+  }
+  return asked(filter);
+}
+
+/// Records that several stations share, when nothing says of which.
+void check_one_station(const std::vector<TrendPoint>& points,
+                       const StationRecordsOptions& options) {
+  if (!options.station.empty() || !options.filter.station.empty()) return;
+  for (const TrendPoint& point : points) {
+    if (point.station == points.front().station) continue;
+    throw std::invalid_argument(
+        fmt::format("there are runs of {} and of {}: say of which with "
+                    "--of-station, or of all with --of-station any",
+                    points.front().station, point.station));
+  }
+}
+
 }  // namespace
 
 void list_runs(const StationRecordsOptions& options) {
   Records records = records_of(options);
-  const auto runs = records.list(options.filter);
-  fmt::print("{:<34} {:<20} {:<8} {:<7} {}\n", "run", "ended (UTC)", "verdict", "kind", "camera");
+  const auto runs = records.list(asked(options.filter));
+  constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}\n";
+  say(fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
   for (const RunSummary& run : runs) {
-    fmt::print("{:<34} {:<20} {:<8} {:<7} {}\n", run.run, run.ended_utc, run.verdict, run.kind,
-               run.camera);
+    say(fmt::format(line, run.run, run.ended_utc, run.verdict, run.kind, run.station, run.camera,
+                    run.causes.substr(0, run.causes.find('\n'))));
   }
-  const auto passed = std::count_if(runs.begin(), runs.end(),
-                                    [](const auto& run) { return run.verdict == "PASS"; });
-  fmt::print("\n{} runs, {} passed\n", runs.size(), passed);
+  const auto count = [&](Verdict verdict, const std::string& kind) {
+    return std::count_if(runs.begin(), runs.end(), [&](const RunSummary& run) {
+      return run.verdict == name_of(verdict) && (kind == kAny || run.kind == kind);
+    });
+  };
+  fmt::print("\n{} runs, {} passed, {} failed, {} invalid", runs.size(), count(Verdict::pass, kAny),
+             count(Verdict::fail, kAny), count(Verdict::invalid, kAny));
+  // Of the units that were judged.
+  const auto passed = count(Verdict::pass, "unit"), judged = passed + count(Verdict::fail, "unit");
+  constexpr double percent = 100;
+  if (judged > 0) {
+    fmt::print(": yield {:.1f} % of {}", percent * double(passed) / double(judged), judged);
+  }
+  fmt::print("\n");
 }
 
 void show_run(const StationRecordsOptions& options) {
   Records records = records_of(options);
   const RunRecord record = run_of(records, options);
-  for (const ScreenLine& line : verdict_screen(record)) fmt::print("{}\n", line.text);
+  for (const ScreenLine& line : verdict_screen(record)) say(fmt::format("{}\n", line.text));
   fmt::print("\nfigures without a gate\n");
   for (const CheckedMetric& figure : record.figures) {
     if (figure.limit || !figure.value) continue;
-    fmt::print("{:<24}{:>12.4g} {}\n", figure.name, *figure.value, figure.unit);
+    say(fmt::format("{:<24}{:>12.4g} {}\n", figure.name, *figure.value, figure.unit));
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
   fmt::print("\n");
   for (const RunField& field : run_fields()) {
-    if (field.label != nullptr) fmt::print("{:<11}{}\n", field.label, record.*field.text);
+    if (field.label != nullptr) say(fmt::format("{:<11}{}\n", field.label, record.*field.text));
   }
   fmt::print("images     {}, {} used\n", record.images.size(), used);
+}
+
+void restore_run(const StationRecordsOptions& options) {
+  if (options.station.empty() && options.output.empty()) {
+    throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
+  }
+  Records records = records_of(options);
+  const RunRecord record = run_of(records, options);
+  const std::string contradiction = contradiction_of(record);
+  if (!contradiction.empty()) throw InputError(record.run, contradiction);
+  const std::filesystem::path results = options.output.empty()
+                                            ? read_station(options.station).results
+                                            : std::filesystem::path(options.output);
+  say(fmt::format("{}\n", publish_run(record, {}, results).string()));
 }
 
 void export_runs(const StationRecordsOptions& options) {
   Records records = records_of(options);
   std::vector<RunRecord> runs;
-  for (const RunSummary& run : records.list(options.filter)) {
+  for (const RunSummary& run : records.list(asked(options.filter))) {
     if (auto record = records.find(run.run)) runs.push_back(std::move(*record));
   }
   write_runs(options.output, runs);
@@ -95,7 +161,9 @@ void show_trend(const StationRecordsOptions& options) {
     throw std::invalid_argument("there is no figure " + options.figure + "; there are: " + names);
   }
   Records records = records_of(options);
-  const auto points = records.trend(options.figure, options.filter);
+  const RunFilter filter = comparable(options);
+  const auto points = records.trend(options.figure, filter);
+  check_one_station(points, options);
   constexpr std::size_t least = 2;
   if (points.size() < least) {
     throw Undetermined(
@@ -109,12 +177,15 @@ void show_trend(const StationRecordsOptions& options) {
   fmt::print("{} of {} runs\nmean      {:.4g}\nlimits    {:.4g} to {:.4g}\n", options.figure,
              points.size(), chart.mean, chart.lower, chart.upper);
   for (const std::size_t i : chart.outside) {
-    fmt::print("outside   {} {} {:.4g}\n", points[i].run, points[i].camera, values[i]);
+    say(fmt::format("outside   {} {} {:.4g}\n", points[i].run, points[i].camera, values[i]));
   }
   for (const std::size_t i : chart.drifting) {
-    fmt::print("drift     {} {} {:.4g}: the eighth or more in a row on one side\n", points[i].run,
-               points[i].camera, values[i]);
+    say(fmt::format("drift     {} {} {:.4g}: the eighth or more in a row on one side\n",
+                    points[i].run, points[i].camera, values[i]));
   }
+  if (chart.outside.empty() && chart.drifting.empty()) return;
+  throw GateNotMet(fmt::format("{}: {} of the runs outside the limits, {} in a drift",
+                               options.figure, chart.outside.size(), chart.drifting.size()));
 }
 
 }  // namespace vlp

@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <stdexcept>
 
 #include "app.h"
 #include "detection/image_file.h"
@@ -21,18 +22,46 @@ namespace fs = std::filesystem;
 
 const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 
-/// Record, files, and what the operator and the caller get to know.
+/// Record, verdict, files. The verdict is said whatever cannot be written.
 void conclude(const RunRecord& record, const std::vector<ReportPicture>& pictures, Records& records,
               const StationConfig& config, Terminal& terminal) {
-  finish_run(record, pictures, records, config.results);
-  terminal.print(verdict_screen(record));
-  spdlog::info("run {}: {}", record.run, (config.results / record.camera / record.run).string());
+  auto lines = verdict_screen(record);
+  try {
+    records.keep(record);
+  } catch (const InputError&) {
+    lines.push_back({"NOT RECORDED: do it again when the records can be written", Tone::bad});
+    terminal.print(lines);
+    throw;
+  }
+  terminal.print(lines);
+  try {
+    const fs::path folder = publish_run(record, pictures, config.results);
+    spdlog::info("run {}: {}", record.run, folder.string());
+  } catch (const InputError& error) {
+    throw std::runtime_error(
+        fmt::format("{}; the verdict {} is recorded: 'vlp-station restore {}' writes the files",
+                    error.what(), record.verdict, record.run));
+  }
 }
 
-void fail_unless_passed(const RunRecord& record) {
+/// What can be known before the first image.
+void prepare(Unit& unit, const StationConfig& config, Records& records) {
+  records.check_writable();
+  check_results(config.results, unit.camera_id());
+  unit.refuse_images_of_others([&records, camera = unit.camera_id()](const std::string& sha256) {
+    return records.owner_of(sha256, camera);
+  });
+}
+
+/// Throws GateNotMet or Undetermined, by the verdict.
+void throw_unless_passed(const RunRecord& record, const std::string& failed) {
   if (record.passed()) return;
-  throw GateNotMet(fmt::format("camera {} fails: {}", record.camera,
-                               record.causes.substr(0, record.causes.find('\n'))));
+  if (!record.invalid()) throw GateNotMet(failed + ": " + record.first_cause());
+  throw Undetermined(
+      fmt::format("camera {} is not judged: {}", record.camera, record.first_cause()));
+}
+void throw_unless_passed(const RunRecord& record) {
+  throw_unless_passed(record, "camera " + record.camera + " fails");
 }
 
 void add_folders(Unit& unit, const fs::path& folder) {
@@ -48,24 +77,26 @@ void add_folders(Unit& unit, const fs::path& folder) {
 void run_batch(const StationRunOptions& options, const StationConfig& config, Records& records) {
   const std::string run = new_run();
   Unit unit(config, options.camera_id, kProgram, options.threads);
+  prepare(unit, config, records);
   add_folders(unit, options.batch);
   unit.advance(true);
   const RunRecord record = record_of(unit, run, kProgram);
   Terminal terminal;
   conclude(record, unit.pictures(), records, config, terminal);
-  fail_unless_passed(record);
+  throw_unless_passed(record);
 }
 
 void run_watched(const StationRunOptions& options, const StationConfig& config, Records& records) {
   StepSources sources(options.sources, config.type.imager_px);
   Unit unit(config, options.camera_id, kProgram, options.threads);
+  prepare(unit, config, records);
   WatchedRun watched(unit, records);
   Terminal terminal;
   if (const auto& finished = watched.finished()) {
     terminal.print(verdict_screen(*finished));
     spdlog::info("run {} had its verdict before it was put away; the same command begins another",
                  finished->run);
-    return fail_unless_passed(*finished);
+    return throw_unless_passed(*finished);
   }
   spdlog::info("run {}; images go to {}/STEP", watched.run(), watched.folder().string());
   guide_unit(options, unit, watched, sources, terminal);
@@ -73,7 +104,7 @@ void run_watched(const StationRunOptions& options, const StationConfig& config, 
   const RunRecord record = record_of(unit, watched.run(), kProgram);
   conclude(record, unit.pictures(), records, config, terminal);
   watched.put_away();
-  fail_unless_passed(record);
+  throw_unless_passed(record);
 }
 
 }  // namespace
@@ -89,6 +120,8 @@ void run_verify(const StationRunOptions& options) {
   const StationConfig config = read_station(options.station);
   if (!config.golden) throw InputError(options.station, "has no golden unit: add the key 'golden'");
   Records records(config.records);
+  records.check_writable();
+  check_results(config.results, config.golden->camera_id);
   const fs::path arrived = config.captures / config.golden->camera_id;
   const bool batch = !options.batch.empty();
   const auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
@@ -96,9 +129,7 @@ void run_verify(const StationRunOptions& options) {
   Terminal terminal;
   conclude(record, pictures, records, config, terminal);
   if (!batch) put_away(arrived, record.run);
-  if (record.passed()) return;
-  throw GateNotMet(fmt::format("station {} has moved: {}", record.station,
-                               record.causes.substr(0, record.causes.find('\n'))));
+  throw_unless_passed(record, "station " + record.station + " has moved");
 }
 
 }  // namespace vlp

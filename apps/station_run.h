@@ -19,11 +19,12 @@ struct StationRunOptions {
   int threads = 1;
 };
 
-/// vlp-station run: a unit to its verdict. Throws GateNotMet when it fails.
+/// vlp-station run: a unit to its verdict. Throws GateNotMet when it fails, Undetermined when the
+/// run is invalid.
 void run_unit(const StationRunOptions& options);
 
 /// vlp-station verify: the golden unit, from the folder `batch` or from where its images arrive.
-/// Throws GateNotMet when the station has moved.
+/// Throws GateNotMet when the station has moved, Undetermined when that is not known.
 void run_verify(const StationRunOptions& options);
 
 }  // namespace vlp

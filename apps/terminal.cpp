@@ -16,6 +16,8 @@
 #include <memory>
 #include <thread>
 
+#include "captures/printable.h"
+
 namespace vlp {
 namespace {
 
@@ -93,7 +95,7 @@ void Terminal::draw(const std::vector<ScreenLine>& lines) {
   for (std::size_t i = 0; i < shown; ++i) {
     // The last line, with the keys, stays.
     const auto& [line, tone] = i + 1 == shown ? lines.back() : lines[i];
-    text += toned(line.substr(0, columns), tone) + "\x1b[K\n";
+    text += toned(printable(line).substr(0, columns), tone) + "\x1b[K\n";
   }
   show(text, shown);
 }
@@ -101,7 +103,7 @@ void Terminal::draw(const std::vector<ScreenLine>& lines) {
 void Terminal::print(const std::vector<ScreenLine>& lines) {
   std::string text;
   for (const auto& [line, tone] : lines) {
-    text += toned(line, tone) + (interactive_ ? "\x1b[K\n" : "\n");
+    text += toned(printable(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
   }
   if (!interactive_) return fmt::print("{}", text);
   show(text, lines.size());

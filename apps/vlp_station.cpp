@@ -53,11 +53,11 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
   command->add_option("--records", options.records,
                       "Or its records: a file of SQLite, or postgresql://USER@HOST/NAME");
   command->add_option("--camera-id", options.filter.camera, "Only of this camera");
-  command->add_option("--of-station", options.filter.station, "Only of the station of this name");
+  command->add_option("--of-station", options.filter.station, "Only of the station of this name, or any");
   command->add_option("--verdict", options.filter.verdict, "Only with this verdict")
-      ->check(CLI::IsMember({"PASS", "FAIL"}));
+      ->check(CLI::IsMember({"PASS", "FAIL", "INVALID", "any"}));
   command->add_option("--kind", options.filter.kind, "Only units, or only golden units")
-      ->check(CLI::IsMember({"unit", "golden"}));
+      ->check(CLI::IsMember({"unit", "golden", "any"}));
   command->add_option("--last", options.filter.last, "Only the last so many")
       ->check(CLI::Range(1, 1'000'000));
   return command;
@@ -70,9 +70,12 @@ int main(int argc, char** argv) {
   CLI::App app(
       "A factory's calibration station. 'run' takes a camera through boards, rotation, dispersion "
       "and\n"
-      "check to PASS or FAIL (exit code 1), as its images arrive or from full folders (--batch);\n"
+      "check to PASS, FAIL (exit code 1: the camera) or INVALID (3: the station, the operator, an "
+      "early\n"
+      "end: do it again), as its images arrive or from full folders (--batch);\n"
       "'verify' measures a reference camera; 'list', 'show', 'export' and 'trend' tell of the "
-      "records.\n"
+      "records,\n"
+      "'restore' writes a run's files again.\n"
       "vlp-station COMMAND --help tells more.\n\n"
       "Example, from the project's folder:\n"
       "  mkdir -p out && cp -rT datasets/station out/station\n"
@@ -92,10 +95,19 @@ int main(int argc, char** argv) {
   auto* show =
       vlp::add_records(app, "show", "All of one run, the last unless it is named", records);
   show->add_option("run", records.run, "Name of the run");
+  auto* restore = vlp::add_records(
+      app, "restore", "Write the calibration and the report of a run again, from its record",
+      records);
+  restore->add_option("run", records.run, "Name of the run")->required();
+  restore->add_option("-o,--output", records.output,
+                      "The folder of results (default: the station's); in it CAMERA/RUN/");
   auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
   exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
   auto* trend = vlp::add_records(
-      app, "trend", "A figure over the runs, with the limits of a control chart", records);
+      app, "trend",
+      "A figure over the runs, with the limits of a control chart; exit code 1 for an alarm. Of units "
+      "of the station that passed, unless --verdict, --kind or --of-station says otherwise",
+      records);
   trend->add_option("figure", records.figure, "Which: rms_px, check_mean_mm, ...")->required();
   trend->add_option("-o,--output", records.output, "Draw it, .png or .svg");
   return vlp::run_app(app, argc, argv, [&] {
@@ -103,6 +115,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("verify")) vlp::run_verify(run);
     if (app.got_subcommand("list")) vlp::list_runs(records);
     if (app.got_subcommand("show")) vlp::show_run(records);
+    if (app.got_subcommand("restore")) vlp::restore_run(records);
     if (app.got_subcommand("export")) vlp::export_runs(records);
     if (app.got_subcommand("trend")) vlp::show_trend(records);
   });

@@ -42,6 +42,8 @@ struct MetricKind {
   Direction asked = Direction::at_most;
   /// That a limit can be: 1 of a share.
   double largest = 1e6;
+  /// Whether it tells of the camera; otherwise of what it was measured with, or how.
+  bool of_camera = true;
 };
 
 /// Those of some sources; what explains others comes before them.

@@ -3,6 +3,7 @@
 #include "report/report.h"
 
 #include <algorithm>
+#include <array>
 
 #include "captures/csv_writer.h"
 #include "report/calibration_sections.h"
@@ -29,15 +30,40 @@ std::string quantity(const std::optional<double>& value, const std::string& unit
   return value ? with_unit(significant(*value, 4), unit) : "none";
 }
 
-std::vector<std::string> row_of(const CheckedMetric& gate) {
-  const std::string result = gate.met() ? "met" : "NOT\u00a0MET";
+std::vector<std::string> row_of(const CheckedMetric& gate, bool may_be_out_of_reach) {
+  const bool out_of_reach = may_be_out_of_reach && !gate.value;
+  const std::string result = gate.met()     ? "met"
+                             : out_of_reach ? "not\u00a0reached"
+                                            : "NOT\u00a0MET";
   return {gate.name, quantity(gate.value, gate.unit),
           words_of(gate.asked) + kSpace + quantity(gate.limit, gate.unit), result};
 }
 
-std::string verdict(const std::vector<CheckedMetric>& gates, const std::string& caution) {
+std::string gates_table(const Report& report) {
+  HtmlTable table{"Gates", {"gate", "figure", "limit", "result"}, {}};
+  for (const auto& gate : report.gates) {
+    const bool given = report.verdict.has_value();
+    if (!gate.met() && (gate.value || !given)) table.marked.push_back(table.rows.size());
+    table.rows.push_back(row_of(gate, given));
+  }
+  return table.rows.empty() ? "" : html_table(table);
+}
+
+std::string verdict_box(const char* look, const std::string& word, const std::string& content) {
+  return std::string("<div class=\"verdict ") + look + "\"><strong>" + html_text(word) +
+         "</strong>" + content + "</div>\n";
+}
+
+std::string box_of(const ReportVerdict& verdict) {
+  constexpr std::array looks{"pass", "fail", "none"};
+  std::string causes;
+  for (const std::string& cause : verdict.causes) causes += html_element("p", cause);
+  return verdict_box(looks.at(static_cast<std::size_t>(verdict.look)), verdict.word, causes);
+}
+
+std::string verdict_of_gates(const std::vector<CheckedMetric>& gates, const std::string& caution) {
   if (gates.empty()) {
-    return "<div class=\"verdict none\"><strong>NO VERDICT</strong>No gates were set.</div>\n";
+    return verdict_box("none", "NO VERDICT", "No gates were set.");
   }
   const auto missed =
       std::count_if(gates.begin(), gates.end(), [](const auto& gate) { return !gate.met(); });
@@ -47,22 +73,33 @@ std::string verdict(const std::vector<CheckedMetric>& gates, const std::string& 
                                  ? "Every figure is within its limit (" + count + of_gates + ")."
                                  : std::to_string(missed) + " of " + count + of_gates +
                                        (missed == 1 ? " is" : " are") + " not met.";
-  HtmlTable table{"Gates", {"gate", "figure", "limit", "result"}, {}};
-  for (const auto& gate : gates) {
-    if (!gate.met()) table.marked.push_back(table.rows.size());
-    table.rows.push_back(row_of(gate));
-  }
-  return std::string("<div class=\"verdict ") + (missed == 0 ? "pass" : "fail") + "\"><strong>" +
-         (missed == 0 ? "PASS" : "FAIL") + "</strong>" + reason +
-         (caution.empty() ? "" : html_element("p", caution)) + "</div>\n" + html_table(table);
+  return verdict_box(missed == 0 ? "pass" : "fail", missed == 0 ? "PASS" : "FAIL",
+                     reason + (caution.empty() ? "" : html_element("p", caution)));
+}
+
+std::string verdict(const Report& report) {
+  return (report.verdict ? box_of(*report.verdict)
+                         : verdict_of_gates(report.gates, report.caution)) +
+         gates_table(report);
+}
+
+std::string refused_of(const Report& report) {
+  if (report.refused.empty()) return "";
+  HtmlTable table{"", {"image", "why it was not used"}, {}};
+  for (const auto& [image, reason] : report.refused) table.rows.push_back({image, reason});
+  return html_table(table);
 }
 
 std::string figures_of(const Report& report) {
   std::string html;
   if (!report.figures.empty()) {
-    HtmlTable table{"", {"figure", "value", "95 % confidence interval"}, {}};
+    const bool intervals = std::any_of(report.figures.begin(), report.figures.end(),
+                                       [](const auto& figure) { return !figure.interval.empty(); });
+    HtmlTable table{"", {"figure", "value"}, {}};
+    if (intervals) table.header.emplace_back("95 % confidence interval");
     for (const auto& [label, value, unit, interval] : report.figures) {
-      table.rows.push_back({label, with_unit(value, unit), with_unit(interval, unit)});
+      table.rows.push_back({label, with_unit(value, unit)});
+      if (intervals) table.rows.back().push_back(with_unit(interval, unit));
     }
     html += html_table(table);
   }
@@ -100,8 +137,7 @@ std::string report_html(const Report& report) {
          "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n" +
          html_element("title", report.title) + "<style>" + std::string(kReportStyle) +
          "</style>\n</head>\n<body>\n<header>\n" + html_element("h1", report.title) +
-         "</header>\n<main>\n" + verdict(report.gates, report.caution) +
-         section("Figures", figures_of(report)) +
+         "</header>\n<main>\n" + verdict(report) + section("Figures", figures_of(report)) +
          section("Camera", camera + pictures(ReportPart::camera)) +
          section("Rotation centre", rotation + pictures(ReportPart::rotation)) +
          section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
@@ -109,6 +145,7 @@ std::string report_html(const Report& report) {
          section("Distribution of the errors", pictures(ReportPart::distribution)) +
          section("Moving tracks", pictures(ReportPart::tracks)) +
          section("More pictures", pictures(ReportPart::other)) +
+         section("Images that were not used", refused_of(report)) +
          section("History", history_of(report)) + "</main>\n</body>\n</html>\n";
 }
 

@@ -20,6 +20,20 @@ struct ReportFigure {
   std::string interval;
 };
 
+/// A verdict that was given elsewhere, and why.
+struct ReportVerdict {
+  std::string word;
+  /// How the box looks.
+  enum class Look { pass, fail, none } look = Look::none;
+  /// The root first; empty when there is nothing to be said.
+  std::vector<std::string> causes;
+};
+
+/// An image that was not used, and why.
+struct ReportRefusal {
+  std::string image, reason;
+};
+
 /// What a person at a calibration station gets to see. What is empty is left out.
 struct Report {
   std::string title;
@@ -35,11 +49,14 @@ struct Report {
   std::optional<HistoryEntry> evaluation;
   /// What the verdict does not see, said beside it; for example of captures without a fix.
   std::string caution = {};
+  /// In place of the gates' own; a gate without a figure was then not reached.
+  std::optional<ReportVerdict> verdict = {};
+  std::vector<ReportRefusal> refused = {};
 };
 
 /// One HTML page that needs nothing else: style and pictures are inside, there is no script.
-/// Verdict, figures, camera, rotation centre, dispersion, fixes, distribution, tracks, history; for
-/// a screen, a phone and A4 paper. Same report, same bytes.
+/// Verdict, figures, camera, rotation centre, dispersion, fixes, distribution, tracks, refused
+/// images, history; for a screen, a phone and A4 paper. Same report, same bytes.
 std::string report_html(const Report& report);
 
 }  // namespace vlp

@@ -18,17 +18,21 @@ ControlChart control_chart(std::span<const double> values) {
   const auto count = static_cast<double>(values.size());
   double ranges = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    chart.mean += values[i] / count;
+    // From the first, so that the mean of equal values is their value to the last bit.
+    chart.mean += (values[i] - values.front()) / count;
     if (i > 0) ranges += std::abs(values[i] - values[i - 1]);
   }
+  chart.mean += values.front();
   const double range = values.size() > 1 ? ranges / (count - 1) : 0;
   chart.lower = chart.mean - limits_per_range * range;
   chart.upper = chart.mean + limits_per_range * range;
   std::size_t in_a_row = 0;
+  int last_side = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (values[i] < chart.lower || values[i] > chart.upper) chart.outside.push_back(i);
-    const bool same = i > 0 && (values[i] > chart.mean) == (values[i - 1] > chart.mean);
-    in_a_row = same ? in_a_row + 1 : 1;
+    const int side = values[i] > chart.mean ? 1 : values[i] < chart.mean ? -1 : 0;
+    in_a_row = side == 0 ? 0 : side == last_side ? in_a_row + 1 : 1;
+    last_side = side;
     if (in_a_row >= long_run) chart.drifting.push_back(i);
   }
   return chart;

@@ -63,7 +63,8 @@ std::vector<std::string> unseen(std::span<const Frame> frames, const LampMap& ma
   std::vector<std::string> faults;
   for (const Lamp& lamp : map.lamps) {
     if (seen.contains(lamp.id)) continue;
-    faults.push_back(fmt::format("lamp {} is never seen: is it lit?", lamp.id));
+    faults.push_back(
+        fmt::format("lamp {} is never seen: is it lit, and not overexposed?", lamp.id));
   }
   return faults;
 }

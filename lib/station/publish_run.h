@@ -3,20 +3,22 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "report/report_picture.h"
-#include "station/records.h"
+#include "station/run_record.h"
 
 namespace vlp {
 
-/// Keeps the record, then writes RESULTS/CAMERA/RUN/: calibration.yaml when the unit passed,
-/// failed-calibration.yaml when it failed and came so far; report.html, last. Throws InputError.
-void finish_run(const RunRecord& record, const std::vector<ReportPicture>& pictures,
-                Records& records, const std::filesystem::path& results);
+/// That the results of a camera's run can be written, before it is begun: the folder is there, takes
+/// a file, and has room. Throws InputError.
+void check_results(const std::filesystem::path& results, const std::string& camera);
 
-/// The second half of it, which can be done at any time. What is there stays: a report has pictures
-/// that the record has not. The folder that it went to.
+/// Writes of RESULTS/CAMERA/RUN/ what is not there: calibration.yaml when the unit passed,
+/// failed-calibration.yaml or invalid-calibration.yaml when it did not and came so far;
+/// report.html, last, which without `pictures` has none. The folder. It can be done at any time, and
+/// again. Throws InputError, for a calibration that is there and is another, too.
 std::filesystem::path publish_run(const RunRecord& record,
                                   const std::vector<ReportPicture>& pictures,
                                   const std::filesystem::path& results);

@@ -14,8 +14,9 @@
 namespace vlp {
 namespace {
 
-/// Version 2: a figure has its unit.
-constexpr int kSchema = 2;
+/// Version 2: a figure has its unit. Version 3: images are found by their digest; a verdict can be
+/// INVALID.
+constexpr int kSchema = 3;
 
 constexpr const char* kFigures =  // gate: no limit is no gate
     "CREATE TABLE IF NOT EXISTS figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
@@ -28,14 +29,21 @@ constexpr const char* kImages =
     "step VARCHAR(16) NOT NULL, image VARCHAR(255) NOT NULL, sha256 TEXT NOT NULL, "
     "refused TEXT NOT NULL, PRIMARY KEY (run, step, image))";
 
+constexpr const char* kImagesByDigest =
+    "CREATE INDEX IF NOT EXISTS images_by_sha256 ON images (sha256)";
+
 std::vector<std::string> tables() {
   std::string runs = "CREATE TABLE IF NOT EXISTS runs (run VARCHAR(64) PRIMARY KEY";
   for (const RunField& field : run_fields().subspan(1)) {
     runs.append(", ").append(field.name).append(" TEXT NOT NULL");
   }
   runs += ")";
-  return {"CREATE TABLE IF NOT EXISTS vlp_schema (version INTEGER PRIMARY KEY)", runs, kFigures,
-          kImages, "CREATE INDEX IF NOT EXISTS runs_by_camera ON runs (camera)"};
+  return {"CREATE TABLE IF NOT EXISTS vlp_schema (version INTEGER PRIMARY KEY)",
+          runs,
+          kFigures,
+          kImages,
+          "CREATE INDEX IF NOT EXISTS runs_by_camera ON runs (camera)",
+          kImagesByDigest};
 }
 
 /// Of the figures of version 1, which did not keep them. It stays as it is, whatever becomes of the
@@ -54,8 +62,11 @@ void from_1_to_2(soci::session& sql) {
   sql << kUnitsOfVersion1;
 }
 
+/// An older program, which counts what is INVALID as failed, is refused from here on.
+void from_2_to_3(soci::session& sql) { sql << kImagesByDigest; }
+
 /// From each version to the next; the first is of version 1.
-constexpr std::array kMigrations{from_1_to_2};
+constexpr std::array kMigrations{from_1_to_2, from_2_to_3};
 static_assert(kMigrations.size() + 1 == kSchema);
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "rig/input_error.h"
+#include "station/database_name.h"
 #include "station/record_tables.h"
 
 namespace vlp {
@@ -17,29 +18,6 @@ namespace {
 
 /// In seconds. Others that write a run need some milliseconds each.
 constexpr int kPatience_s = 30;
-
-bool is_server(const std::string& where) { return where.find("://") != std::string::npos; }
-
-/// The database for a message, a server without user and passwords, wherever they stand. Throws
-/// InputError for what cannot be read; that may have a password anywhere.
-std::string name_of_database(const std::string& where) {
-  if (!is_server(where)) return where;
-  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
-      PQconninfoParse(where.c_str(), nullptr), PQconninfoFree);
-  if (!options) {
-    throw InputError(where.substr(0, where.find("://")) + "://...",
-                     "is not of the form postgresql://USER@HOST/NAME");
-  }
-  std::string host, port, name;
-  for (const PQconninfoOption* option = options.get(); option->keyword != nullptr; ++option) {
-    const std::string keyword = option->keyword;
-    if (option->val == nullptr) continue;
-    if (keyword == "host") host = option->val;
-    if (keyword == "port") port = std::string(":") + option->val;
-    if (keyword == "dbname") name = option->val;
-  }
-  return "postgresql://" + host + port + "/" + name;
-}
 
 /// What a connection has to be told each time that it is made.
 void set_up(soci::session& sql) {
@@ -55,7 +33,7 @@ void set_up(soci::session& sql) {
 
 void open(soci::session& sql, const std::string& where) {
   if (is_server(where)) {
-    sql.open(soci::postgresql, where);
+    sql.open(soci::postgresql, connection_of(where));
   } else {
     sql.open(soci::sqlite3, "dbname=\"" + where + "\" timeout=" + std::to_string(kPatience_s));
   }
@@ -92,7 +70,12 @@ struct Records::Database {
       std::string what = error.what();
       std::replace_if(
           what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
-      throw InputError(name, "the records: " + what);
+      const bool away = name.starts_with("postgresql://") && !sql.is_connected();
+      throw InputError(name,
+                       away ? "the server of the records cannot be reached; when it answers, the "
+                              "same command goes on: " +
+                                  what
+                            : "the records: " + what);
     } catch (const std::exception& error) {
       throw InputError(name, error.what());
     }
@@ -189,6 +172,25 @@ void Records::keep(const RunRecord& record) {
   });
 }
 
+void Records::check_writable() {
+  database_->run([&] {
+    soci::transaction transaction(database_->sql);
+    database_->sql << "UPDATE vlp_schema SET version = version";
+    transaction.rollback();
+  });
+}
+
+std::string Records::owner_of(const std::string& sha256, const std::string& other_than_camera) {
+  return database_->run([&] {
+    std::string camera, run;
+    database_->sql << "SELECT runs.camera, runs.run FROM images JOIN runs ON runs.run = images.run "
+                      "WHERE images.sha256 = :sha256 AND images.refused = '' AND runs.camera <> "
+                      ":camera ORDER BY runs.run LIMIT 1",
+        soci::into(camera), soci::into(run), soci::use(sha256), soci::use(other_than_camera);
+    return run.empty() ? std::string() : "camera " + camera + ": run " + run;
+  });
+}
+
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
   return database_->run([&] {
     RunSummary row;
@@ -196,12 +198,14 @@ std::vector<RunSummary> Records::list(const RunFilter& filter) {
     soci::statement statement(database_->sql);
     statement.exchange(soci::into(row.run));
     statement.exchange(soci::into(row.kind));
+    statement.exchange(soci::into(row.station));
     statement.exchange(soci::into(row.camera));
     statement.exchange(soci::into(row.ended_utc));
     statement.exchange(soci::into(row.verdict));
+    statement.exchange(soci::into(row.causes));
     bind(statement, filter);
     statement.alloc();
-    statement.prepare("SELECT run, kind, camera, ended_utc, verdict FROM runs " +
+    statement.prepare("SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
                       condition(filter) + " ORDER BY ended_utc, run");
     statement.define_and_bind();
     statement.execute();
@@ -216,6 +220,7 @@ std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilte
     std::vector<TrendPoint> rows;
     soci::statement statement(database_->sql);
     statement.exchange(soci::into(row.run));
+    statement.exchange(soci::into(row.station));
     statement.exchange(soci::into(row.camera));
     statement.exchange(soci::into(row.verdict));
     statement.exchange(soci::into(row.value));
@@ -223,7 +228,8 @@ std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilte
     statement.exchange(soci::use(figure));
     statement.alloc();
     statement.prepare(
-        "SELECT runs.run, runs.camera, runs.verdict, figures.value FROM runs JOIN figures ON "
+        "SELECT runs.run, runs.station, runs.camera, runs.verdict, figures.value FROM runs JOIN "
+        "figures ON "
         "figures.run = runs.run " +
         condition(filter) +
         " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, "

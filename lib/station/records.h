@@ -20,12 +20,12 @@ struct RunFilter {
 
 /// A run as it is listed.
 struct RunSummary {
-  std::string run, kind, camera, ended_utc, verdict;
+  std::string run, kind, station, camera, ended_utc, verdict, causes;
 };
 
 /// A figure of one run.
 struct TrendPoint {
-  std::string run, camera, verdict;
+  std::string run, station, camera, verdict;
   double value;
 };
 
@@ -46,6 +46,11 @@ class Records {
   void keep(const RunRecord& record);
   /// All of one run; nothing when it is not kept.
   std::optional<RunRecord> find(const std::string& run);
+  /// Throws InputError when no run could be kept now.
+  void check_writable();
+  /// "camera 0001: run RUN" of the first run of another camera that uses an image of this digest;
+  /// empty when there is none.
+  std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
   /// From the first to the last.
   std::vector<RunSummary> list(const RunFilter& filter);
   std::vector<TrendPoint> trend(const std::string& figure, const RunFilter& filter);

@@ -33,6 +33,22 @@ std::string utc(const char* format) {
 
 }  // namespace
 
+void RunRecord::judge(const std::vector<Cause>& why) {
+  verdict = name_of(verdict_of(why));
+  causes.clear();
+  for (const Cause& cause : why) causes.append(cause.text).append("\n");
+}
+
+std::string contradiction_of(const RunRecord& record) {
+  if (!record.passed()) return "";
+  const std::string changed = "the record says PASS, but ", hand = ": it was changed by hand";
+  if (!record.causes.empty()) return changed + "names a cause" + hand;
+  for (const CheckedMetric& figure : record.figures) {
+    if (figure.limit && !figure.met()) return changed + words_of(figure) + hand;
+  }
+  return "";
+}
+
 std::string new_run() {
   std::random_device random;
   return utc("%Y%m%dT%H%M%SZ-") + fmt::format("{:08x}{:08x}", random(), random());
@@ -93,7 +109,6 @@ std::span<const RunField> run_fields() {
 }
 
 RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program) {
-  const auto causes = unit.causes();
   const auto calibration = unit.calibration();
   RunRecord record{.run = run,
                    .kind = "unit",
@@ -101,7 +116,7 @@ RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersi
                    .camera = unit.camera_id(),
                    .begun_utc = begun_utc(run),
                    .ended_utc = now_utc(),
-                   .verdict = causes.empty() ? "PASS" : "FAIL",
+                   .verdict = "",
                    .causes = "",
                    .program = program.program + " " + program.version,
                    .libraries = library_versions(),
@@ -109,7 +124,7 @@ RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersi
                    .calibration = calibration ? calibration_text(*calibration) : "",
                    .figures = unit.figures(),
                    .images = {}};
-  for (const std::string& cause : causes) record.causes.append(cause).append("\n");
+  record.judge(unit.causes());
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
       std::string refused = image.refused;

@@ -20,7 +20,7 @@ struct RunRecord {
   std::string station, camera;
   /// As 2026-11-21T13:45:01Z.
   std::string begun_utc, ended_utc;
-  /// "PASS" or "FAIL", and why, one cause to a line.
+  /// name_of() a Verdict, and why, one cause to a line, the root first.
   std::string verdict, causes;
   /// Program with version, and the libraries that the result rests on with theirs.
   std::string program, libraries;
@@ -35,8 +35,17 @@ struct RunRecord {
   };
   std::vector<Image> images;
 
-  bool passed() const { return verdict == "PASS"; }
+  bool passed() const { return verdict == name_of(Verdict::pass); }
+  bool invalid() const { return verdict == name_of(Verdict::invalid); }
+  /// Why it did not pass, in a line; empty when it did.
+  std::string first_cause() const { return causes.substr(0, causes.find('\n')); }
+  /// Sets verdict and causes.
+  void judge(const std::vector<Cause>& why);
 };
+
+/// What cannot be in a record as it was written: PASS though a gate is not met, or for a cause.
+/// Somebody has changed it. Empty otherwise.
+std::string contradiction_of(const RunRecord& record);
 
 /// A text of a record: a column of the table of runs and a key of their JSON.
 struct RunField {

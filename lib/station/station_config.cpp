@@ -7,6 +7,7 @@
 #include "captures/digest.h"
 #include "geometry/angles.h"
 #include "rig/yaml_reader.h"
+#include "station/database_name.h"
 
 namespace vlp {
 namespace {
@@ -97,10 +98,9 @@ GoldenUnit read_golden(YamlMap map, Files& files) {
 /// A database: a file beside the station, or a server.
 std::string records_of(const YamlValue& value, const fs::path& file) {
   const std::string where = value.text();
-  if (where.starts_with("postgresql://")) return where;
-  if (where.find("://") != std::string::npos) {
-    throw value.error("should name a file, or be postgresql://...");
-  }
+  if (where.starts_with("postgresql://") || where.starts_with("postgres://")) return where;
+  if (is_server(where)) throw value.error("should name a file, or be postgresql://...");
+  name_of_database(where);  // a file's
   return path_of(value, file).string();
 }
 

@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <array>
+#include <span>
 #include <sstream>
 
 #include "station/guidance.h"
@@ -38,7 +39,7 @@ ScreenLine gate_line(const CheckedMetric& figure) {
   const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
   const std::string limit = fmt::format(
       "{} {:.4g}", figure.asked == Direction::at_least ? ">=" : "<=", figure.limit.value_or(0));
-  const char* outcome = figure.met() ? "met" : figure.value ? "NOT MET" : "not reached";
+  const char* outcome = figure.met() ? "met" : "NOT MET";
   return {
       fmt::format("{:<24}{:>12}{:>14} {:<4} {}", figure.name, value, limit, figure.unit, outcome),
       figure.met() ? Tone::plain : Tone::bad};
@@ -50,6 +51,12 @@ const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #     
 const std::array kFail{"  #####    #     #####   #    ", "  #       # #      #     #    ",
                        "  ####   #####     #     #    ", "  #      #   #     #     #    ",
                        "  #      #   #   #####   #####"};
+
+const std::array kInvalid{"  ###  #   #  #   #    #    #      ###  #### ",
+                          "   #   ##  #  #   #   # #   #       #   #   #",
+                          "   #   # # #  #   #  #####  #       #   #   #",
+                          "   #   #  ##   # #   #   #  #       #   #   #",
+                          "  ###  #   #    #    #   #  #####  ###  #### "};
 
 }  // namespace
 
@@ -84,7 +91,7 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
   }
   if (state.refused_in_a_row > 1) {
     add_wrapped(lines, "Refused",
-                fmt::format("{} in a row; after {} the unit fails", state.refused_in_a_row,
+                fmt::format("{} in a row; after {} the run ends", state.refused_in_a_row,
                             unit.config().refuse.in_a_row),
                 Tone::bad);
   }
@@ -100,24 +107,40 @@ std::string last_image_line(const Unit& unit, StationStep step, const std::strin
 }
 
 std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
-  const Tone tone = record.passed() ? Tone::good : Tone::bad;
+  const std::string contradiction = contradiction_of(record);
+  const bool passed = record.passed() && contradiction.empty();
+  const Tone tone = passed ? Tone::good : Tone::bad;
   std::vector<ScreenLine> lines{
       {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
+  std::string not_reached;
   for (const CheckedMetric& figure : record.figures) {
-    if (figure.limit) lines.push_back(gate_line(figure));
+    if (!figure.limit) continue;
+    if (figure.value) {
+      lines.push_back(gate_line(figure));
+    } else {
+      not_reached.append(not_reached.empty() ? "" : ", ").append(figure.name);
+    }
   }
+  if (!not_reached.empty()) add_wrapped(lines, "Gates", "not reached: " + not_reached, Tone::plain);
   std::istringstream causes(record.causes);
   if (!record.causes.empty()) lines.push_back({""});
   for (std::string cause; std::getline(causes, cause);) {
     add_wrapped(lines, "Cause", cause, Tone::bad);
   }
+  if (!contradiction.empty()) add_wrapped(lines, "Cause", contradiction, Tone::bad);
   // Last, so that it stands on a terminal of 24 lines, too.
   lines.push_back({""});
-  for (const char* row : record.passed() ? kPass : kFail) lines.push_back({row, tone});
+  const std::span<const char* const> banner = passed             ? std::span(kPass)
+                                              : record.invalid() ? std::span(kInvalid)
+                                                                 : std::span(kFail);
+  if (contradiction.empty()) {
+    for (const char* row : banner) lines.push_back({row, tone});
+  }
   lines.push_back({""});
-  lines.push_back({fmt::format("{}   camera {}   {}", record.verdict, record.camera, record.station)
-                       .substr(0, kColumns),
-                   Tone::heading});
+  const std::string word = contradiction.empty() ? record.verdict : "NO VERDICT";
+  lines.push_back(
+      {fmt::format("{}   camera {}   {}", word, record.camera, record.station).substr(0, kColumns),
+       Tone::heading});
   return lines;
 }
 

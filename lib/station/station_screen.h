@@ -26,7 +26,7 @@ std::vector<ScreenLine> station_screen(const Unit& unit);
 /// The same in one line, of the image that came last.
 std::string last_image_line(const Unit& unit, StationStep step, const std::string& image);
 
-/// The gates with figure and limit, the causes, and PASS or FAIL, large.
+/// The gates with figure and limit, the causes, the root first, and PASS, FAIL or INVALID, large.
 std::vector<ScreenLine> verdict_screen(const RunRecord& record);
 
 }  // namespace vlp

@@ -30,7 +30,10 @@ void Unit::advance(bool all_in) {
     UnitStep& state = at(step);
     if (!calibration_before(step)) return;
     const auto waiting = std::exchange(state.waiting, {});
-    if (!waiting.empty()) look(step, waiting);
+    if (!waiting.empty()) {
+      look(step, waiting);
+      count_refusals(step);
+    }
     if (state.result && (state.result->ok() || !all_in)) continue;
     state.enough = has_enough(step);
     if (!state.enough && !all_in) return;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +15,7 @@
 #include "session/step_history.h"
 #include "station/station_step.h"
 #include "station/unit_step.h"
+#include "station/verdict.h"
 
 namespace vlp {
 
@@ -29,8 +31,11 @@ class Unit {
   Unit(const Unit&) = delete;
   Unit& operator=(const Unit&) = delete;
 
-  /// Images of a step that came, or changed. One that comes when the step is done is not used.
-  void add(StationStep step, const std::vector<std::filesystem::path>& files);
+  /// Images of a step that came, or changed. One that comes when the step is done is not used. Nobody
+  /// knows in which order those were taken that came together: of them, refusals count as in a row
+  /// when none is used. `more_to_come`: others came with them, which the next call has.
+  void add(StationStep step, const std::vector<std::filesystem::path>& files,
+           bool more_to_come = false);
   /// An image that is there no more. What was refused because of it is taken.
   void remove(StationStep step, const std::string& name);
   /// The file of a refused image is there no more, but it was of the unit: the refusal stays, not
@@ -41,6 +46,14 @@ class Unit {
   /// Solves what has enough; with `all_in`, nothing more comes, and what there is has to do: then,
   /// a captures.csv that cannot be read throws InputError, and is the step's problem before.
   void advance(bool all_in);
+  /// Whose an image is already, by its SHA-256, for people; empty when it is nobody's. Those of
+  /// another are refused by this name.
+  void refuse_images_of_others(std::function<std::string(const std::string& sha256)> owner) {
+    owner_ = std::move(owner);
+  }
+  /// Nothing more comes although a step has not enough; `why` for people, as "the operator ended
+  /// the run".
+  void end_early(std::string why) { ended_ = std::move(why); }
 
   const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
   /// The first step that is not done; nothing when all are.
@@ -55,8 +68,10 @@ class Unit {
   std::vector<CheckedMetric> figures() const;
   /// For the report: of lens, rotation centre and dispersion, as far as it came. Waits for them.
   std::vector<ReportPicture> pictures() const;
-  /// Why the unit fails, the root first; empty when it passes.
-  std::vector<std::string> causes() const;
+  /// Why the unit does not pass, the root first; empty when it does. What the station or the
+  /// operator did comes before what was measured with it, so that verdict_of() blames the camera
+  /// for nothing else than what it is.
+  std::vector<Cause> causes() const;
   const StationConfig& config() const { return config_; }
   const std::string& camera_id() const { return camera_id_; }
 
@@ -65,6 +80,7 @@ class Unit {
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
   void look(StationStep step, const std::vector<std::filesystem::path>& files);
   void take(StationStep step, UnitImage image);
+  void count_refusals(StationStep step);
   std::pair<Superfluous, std::string> superfluity(StationStep step, const UnitImage& image) const;
   void drop(StationStep step, const std::string& name);
   void forget_after(StationStep step);
@@ -77,6 +93,8 @@ class Unit {
   std::string camera_id_;
   ProgramVersion program_;
   int threads_;
+  std::string ended_ = {};
+  std::function<std::string(const std::string&)> owner_ = {};
   std::unique_ptr<BoardDetector> boards_;
   std::array<UnitStep, 4> steps_;
 };

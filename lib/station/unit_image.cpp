@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "captures/digest.h"
 #include "detection/image_file.h"
@@ -38,10 +40,38 @@ UnitImage looked_at(const std::filesystem::path& file, const Camera& type, const
   return result;
 }
 
+/// Share of the pixels of a part of an image of 8 or 16 bits that are at full scale.
+double white_share(const cv::Mat& image, cv::Rect part) {
+  constexpr double full_8 = 255, full_16 = 65535;
+  part &= cv::Rect({}, image.size());
+  if (part.empty()) return 0;
+  const cv::Mat white = image(part) >= (image.depth() == CV_8U ? full_8 : full_16);
+  return cv::countNonZero(white) / static_cast<double>(part.area());
+}
+
+/// The box around the tags; all of the image without any.
+cv::Rect part_with_tags(const SeenBoard& seen, const cv::Mat& image) {
+  std::vector<cv::Point2f> corners;
+  for (const SeenTag& tag : seen.tags) {
+    for (const auto& corner : tag.corners_px) {
+      corners.emplace_back(static_cast<float>(corner.x()), static_cast<float>(corner.y()));
+    }
+  }
+  return corners.empty() ? cv::Rect({}, image.size()) : cv::boundingRect(corners);
+}
+
+/// More of a board than this at full scale moves its edges.
+constexpr double kMostWhite = 0.25;
+
 /// Why a board in an image cannot be used; empty when it can.
-std::string board_refusal(const SeenBoard& seen, const ImageBlur& blur,
+std::string board_refusal(const SeenBoard& seen, const ImageBlur& blur, double white,
                           const StationConfig& config) {
   constexpr std::size_t least_tags = 4;
+  constexpr double percent = 100;
+  if (white > kMostWhite) {
+    return fmt::format("overexposed: {:.0f} % of the {} is at full scale", percent * white,
+                       seen.tags.empty() ? "image" : "board");
+  }
   if (seen.tags.size() < least_tags && blur.bright_share < config.refuse.dark_share) {
     return "too dark";
   }
@@ -63,7 +93,8 @@ UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& 
     const ImageBlur blur = image_blur(image);
     if (std::isfinite(blur.sigma_px)) result.blur_px = blur.sigma_px;
     BoardView view{file.filename().string(), {image.cols, image.rows}, detector.detect(image)};
-    result.refused = board_refusal(view.seen, blur, config);
+    result.refused = board_refusal(view.seen, blur,
+                                   white_share(image, part_with_tags(view.seen, image)), config);
     if (!view.seen.tags.empty() || !view.seen.foreign.empty()) result.view = std::move(view);
   });
 }
@@ -71,13 +102,27 @@ UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& 
 UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& config,
                         const LampDetector& detector) {
   return looked_at(file, config.type, [&](const cv::Mat& image, UnitImage& result) {
+    // A lamp fills its box to a share of pi / 4, and is dark for half of the time.
+    constexpr double least_white = 0.65;
+    int overexposed = 0;
     for (const Light& light : detector.detect(image)) {
       result.lights_cut += light.kind == LightKind::cut ? 1 : 0;
       result.lights_unknown += light.kind == LightKind::unknown ? 1 : 0;
+      const cv::Point low(static_cast<int>(light.low.x()), static_cast<int>(light.low.y()));
+      const cv::Point high(static_cast<int>(light.high.x()), static_cast<int>(light.high.y()));
+      const bool white = white_share(image, {low, high}) > least_white;
+      overexposed += light.kind == LightKind::unknown && white ? 1 : 0;
       if (light.kind != LightKind::lamp) continue;
       result.lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
     }
     if (result.lamps.size() >= 2) return;
+    if (overexposed > 0) {
+      result.refused = fmt::format(
+          "overexposed: {} of {} lights are at full scale all over, {} of "
+          "the lamps seen",
+          overexposed, result.lights_unknown, result.lamps.size());
+      return;
+    }
     result.refused = fmt::format("{} of the lamps seen ({} cut by the image's edge, {} unlike any)",
                                  result.lamps.size(), result.lights_cut, result.lights_unknown);
   });

@@ -39,12 +39,14 @@ struct UnitImage {
   int lights_cut = 0, lights_unknown = 0;
 };
 
-/// What a board image shows, refused when it cannot be read, is too dark or blurred, or shows too
-/// little of the board. One bad image ends nothing: it is refused with the reason.
+/// What a board image shows, refused when it cannot be read, is too dark, overexposed (a quarter of
+/// the board at full scale) or blurred, or shows too little of the board. One bad image ends
+/// nothing: it is refused with the reason.
 UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& config,
                         const BoardDetector& detector);
 
-/// The same of lamps: refused when it cannot be read or shows fewer than two of them.
+/// The same of lamps: refused when it cannot be read or shows fewer than two of them; said is
+/// whether they are at full scale all over, where no stripes can be seen.
 UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& config,
                         const LampDetector& detector);
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Unit: the images of a step as they come and go.
 #include <tuple>
+#include <utility>
 
 #include "captures/in_parallel.h"
 #include "station/unit.h"
@@ -10,12 +11,24 @@ namespace vlp {
 
 namespace fs = std::filesystem;
 
-void Unit::add(StationStep step, const std::vector<fs::path>& files) {
+void Unit::add(StationStep step, const std::vector<fs::path>& files, bool more_to_come) {
   UnitStep& state = at(step);
   if (files.empty()) return;
   state.folder = files.front().parent_path();
-  if (calibration_before(step)) return look(step, files);
-  state.waiting.insert(state.waiting.end(), files.begin(), files.end());
+  if (!calibration_before(step)) {
+    state.waiting.insert(state.waiting.end(), files.begin(), files.end());
+    return;
+  }
+  look(step, files);
+  if (!more_to_come) count_refusals(step);
+}
+
+/// In a row, of all that came together.
+void Unit::count_refusals(StationStep step) {
+  UnitStep& state = at(step);
+  const int refused = std::exchange(state.refused_together, 0);
+  const bool used = std::exchange(state.used_together, false);
+  state.refused_in_a_row = used ? 0 : state.refused_in_a_row + refused;
 }
 
 void Unit::look(StationStep step, const std::vector<fs::path>& files) {
@@ -29,6 +42,8 @@ void Unit::look(StationStep step, const std::vector<fs::path>& files) {
                       : look_at_board(files[i], config_, *boards_);
   });
   for (UnitImage& image : images) {
+    const std::string owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : "";
+    if (!owner.empty()) image.refused = "already of " + owner;
     at(step).last = image.file.filename().string();
     take(step, std::move(image));
   }
@@ -43,7 +58,8 @@ void Unit::take(StationStep step, UnitImage image) {
   }
   const bool used = image.refused.empty();
   const bool fault = !used && image.superfluous == Superfluous::no && !state.done();
-  if (used || fault) state.refused_in_a_row = fault ? state.refused_in_a_row + 1 : 0;
+  state.refused_together += fault ? 1 : 0;
+  state.used_together = state.used_together || used;
   state.images.emplace(name, std::move(image));
   if (!used) return;
   state.result.reset();
@@ -53,6 +69,12 @@ void Unit::take(StationStep step, UnitImage image) {
 /// Whether and why a good image is not needed.
 std::pair<Superfluous, std::string> Unit::superfluity(StationStep step,
                                                       const UnitImage& image) const {
+  for (const UnitStep& any : steps_) {
+    for (const auto& [name, other] : any.images) {
+      if (!other.refused.empty() || other.sha256 != image.sha256) continue;
+      return {Superfluous::same_pose, "same image as " + name};
+    }
+  }
   const double near_px = config_.refuse.same_pose_share * config_.type.imager_px[0];
   for (const auto& [name, other] : this->step(step).images) {
     if (!other.refused.empty()) continue;

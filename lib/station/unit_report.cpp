@@ -11,6 +11,20 @@
 namespace vlp {
 namespace {
 
+ReportVerdict box_of(const RunRecord& record) {
+  using Look = ReportVerdict::Look;
+  const std::string contradiction = contradiction_of(record);
+  ReportVerdict verdict{record.verdict,
+                        record.passed()    ? Look::pass
+                        : record.invalid() ? Look::none
+                                           : Look::fail,
+                        {}};
+  if (!contradiction.empty()) verdict = {"NO VERDICT", Look::none, {contradiction}};
+  std::istringstream causes(record.causes);
+  for (std::string cause; std::getline(causes, cause);) verdict.causes.push_back(cause);
+  return verdict;
+}
+
 std::string meaning_of(const CheckedMetric& figure) {
   const auto kind = metric_kind(figure.name);
   return kind ? kind->meaning : "a figure of another version of the program";
@@ -22,16 +36,19 @@ std::string unit_report(const RunRecord& record, const std::filesystem::path& ca
                         const std::vector<ReportPicture>& pictures) {
   Report report;
   report.title = "Camera " + record.camera + " on " + record.station;
-  std::istringstream causes(record.causes);
-  for (std::string cause; std::getline(causes, cause);) report.notes.push_back("Cause: " + cause);
-  const auto faults = static_cast<double>(report.notes.size());
-  report.gates.push_back({"causes to fail", "", faults, 0, Direction::at_most});
+  report.verdict = box_of(record);
   constexpr int digits = 4;
   for (const CheckedMetric& figure : record.figures) {
-    if (figure.limit) report.gates.push_back(figure);
-    if (!figure.value) continue;
-    report.figures.push_back({figure.name + ": " + meaning_of(figure),
-                              significant(*figure.value, digits), figure.unit, ""});
+    const std::string name = figure.name + ": " + meaning_of(figure);
+    if (figure.limit) {
+      report.gates.push_back(figure);
+      report.gates.back().name = name;
+    } else if (figure.value) {
+      report.figures.push_back({name, significant(*figure.value, digits), figure.unit, ""});
+    }
+  }
+  for (const auto& [step, image, sha256, refused] : record.images) {
+    if (!refused.empty()) report.refused.push_back({step + "/" + image, refused});
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });

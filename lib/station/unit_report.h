@@ -11,9 +11,10 @@
 
 namespace vlp {
 
-/// The page for people that tells of a run (report.html): verdict, gates, causes, figures, the
-/// calibration with its history, and the pictures of its steps. `calibration`: the file with the
-/// record's calibration; empty when there is none. Throws InputError.
+/// The page for people that tells of a run (report.html): verdict and causes, gates, other figures,
+/// the calibration with its history, the pictures of its steps, the images that were refused.
+/// `calibration`: the file with the record's calibration; empty when there is none. Throws
+/// InputError.
 std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration,
                         const std::vector<ReportPicture>& pictures);
 

@@ -32,6 +32,9 @@ struct UnitStep {
   StepPicture picture = {};
   /// Of the images refused one after another, the last ones.
   int refused_in_a_row = 0;
+  /// Of the images that came together, of which more are to come.
+  int refused_together = 0;
+  bool used_together = false;
   /// The image that came last.
   std::string last = {};
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "station/guidance.h"
 #include "station/lamp_faults.h"
@@ -18,8 +19,20 @@ std::string kind_of(const UnitImage& image) {
   return image.refused.substr(0, image.refused.find(':'));
 }
 
-/// "12 of 36 images refused: 10 blurred, 2 too dark"; empty when most are used.
-std::string refusals(const UnitStep& state) {
+/// What became of the images of a step that did not come to its end.
+struct Refusals {
+  /// "12 of 36 images refused: 10 blurred, 2 too dark"; empty when most are used.
+  std::string text = {};
+  /// More are blurred than all else, so many that it is not a shaky hand.
+  bool blurred = false;
+};
+
+/// So many images tell of the camera; fewer may be an accident.
+int enough_to_blame(const StationConfig& config) {
+  return std::min(config.refuse.in_a_row, (config.enough.board_views + 1) / 2);
+}
+
+Refusals refusals(const UnitStep& state, const StationConfig& config) {
   std::map<std::string, int> reasons;
   int refused = 0;
   for (const auto& [name, image] : state.images) {
@@ -27,28 +40,35 @@ std::string refusals(const UnitStep& state) {
     ++refused;
     ++reasons[kind_of(image)];
   }
-  if (refused == 0 || refused < state.used()) return "";
+  if (refused == 0 || refused < state.used()) return {};
   std::string text;
   for (const auto& [reason, count] : reasons) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, reason);
   }
-  return fmt::format("{} of {} images refused: {}", refused, state.images.size(), text);
+  const int blurred = reasons.contains("blurred") ? reasons.at("blurred") : 0;
+  return {fmt::format("{} of {} images refused: {}", refused, state.images.size(), text),
+          2 * blurred > refused && blurred >= enough_to_blame(config)};
 }
 
 /// What stands in the way of a step that did not end well.
-void add_problems(const Unit& unit, StationStep step, std::vector<std::string>& causes) {
+void add_problems(const Unit& unit, StationStep step, const std::string& ended,
+                  std::vector<Cause>& causes) {
   const UnitStep& state = unit.step(step);
   if (state.done()) return;
-  const std::string refused = refusals(state);
-  if (!refused.empty()) {
-    causes.push_back(fmt::format("{} ({}): {}", name_of(step), count_of(unit, step), refused));
+  const Refusals refused = refusals(state, unit.config());
+  if (!refused.text.empty()) {
+    causes.push_back({fmt::format("{} ({}): {}", name_of(step), count_of(unit, step), refused.text),
+                      refused.blurred});
   }
-  if (state.result && !state.result->ok() && state.used() > 0) {
-    causes.push_back(fmt::format("{}: {}", name_of(step), state.result->why));
-  } else if (!state.enough && refused.empty()) {
-    causes.push_back(fmt::format("{}: not enough images, or too much alike ({})", name_of(step),
-                                 count_of(unit, step)));
-  }
+  const bool failed = state.result && !state.result->ok() && state.used() > 0;
+  if (failed) causes.push_back({fmt::format("{}: {}", name_of(step), state.result->why)});
+  const bool said = failed || !refused.text.empty();
+  if (state.enough || (said && ended.empty())) return;
+  const std::string count = count_of(unit, step);
+  causes.push_back(
+      {ended.empty()
+           ? fmt::format("{}: not enough images, or too much alike ({})", name_of(step), count)
+           : fmt::format("{}: {} before there was enough ({})", name_of(step), ended, count)});
 }
 
 /// Whether most of the board images show another board.
@@ -61,6 +81,32 @@ bool other_board(const UnitStep& boards) {
 
 bool has_value(const StepResult& result, const std::string& figure) {
   return value_of(result.metrics, figure).has_value();
+}
+
+/// Whether there are views enough to tell blur from a shaky hand.
+bool blur_is_known(const UnitStep& boards, const StationConfig& config) {
+  return boards.enough ||
+         std::count_if(boards.images.begin(), boards.images.end(), [](const auto& image) {
+           return image.second.blur_px.has_value();
+         }) >= enough_to_blame(config);
+}
+
+/// What a step lacks, then what of its figures misses its gate, that of the station first. Whether
+/// it was solved.
+bool add_causes_of(const Unit& unit, StationStep step, const std::vector<CheckedMetric>& figures,
+                   const std::string& ended, std::vector<Cause>& causes) {
+  add_problems(unit, step, ended, causes);
+  const auto& result = unit.step(step).result;
+  if (!result || !result->ok()) return false;
+  for (const bool of_camera : {false, true}) {
+    for (const CheckedMetric& figure : figures) {
+      const bool missed = has_value(*result, figure.name) && !figure.met();
+      if (missed && metric_kind(figure.name)->of_camera == of_camera) {
+        causes.push_back({cause_of(figure), of_camera});
+      }
+    }
+  }
+  return true;
 }
 
 /// What the captures of all steps tell of the lamps.
@@ -97,34 +143,29 @@ std::vector<CheckedMetric> Unit::figures() const {
   return check_all(config_.gates, values, unit_metrics());
 }
 
-std::vector<std::string> Unit::causes() const {
-  std::vector<std::string> causes;
+std::vector<Cause> Unit::causes() const {
+  std::vector<Cause> causes;
   const auto figures = this->figures();
-  const auto add_gate = [&](const CheckedMetric& figure) {
-    if (!figure.met()) causes.push_back(cause_of(figure));
-  };
-  const auto blur = [](const CheckedMetric& figure) { return figure.name == "blur_px"; };
-  if (other_board(step(StationStep::boards))) {
-    causes.emplace_back("wrong board: the tags have other ids");
+  const UnitStep& boards = step(StationStep::boards);
+  if (other_board(boards)) causes.push_back({"wrong board: the tags have other ids"});
+  for (const CheckedMetric& figure : figures) {
+    const bool blur = figure.name == "blur_px" && figure.value && !figure.met();
+    if (blur && blur_is_known(boards, config_)) causes.push_back({cause_of(figure), true});
+  }
+  bool solved = add_causes_of(*this, StationStep::boards, figures, ended_, causes);
+  const auto of_boards = static_cast<std::ptrdiff_t>(causes.size());
+  for (const StationStep each :
+       {StationStep::rotation, StationStep::dispersion, StationStep::check}) {
+    solved = solved && add_causes_of(*this, each, figures, ended_, causes);
   }
   for (const CheckedMetric& figure : figures) {
-    if (blur(figure) && figure.value) add_gate(figure);
-  }
-  // What a step lacks comes before its figures, and both before the steps that rest on it.
-  for (const StationStep each : kStationSteps) {
-    add_problems(*this, each, causes);
-    const auto& result = step(each).result;
-    if (!result || !result->ok()) break;
-    for (const CheckedMetric& figure : figures) {
-      if (has_value(*result, figure.name)) add_gate(figure);
-    }
-  }
-  for (const CheckedMetric& figure : figures) {
-    if (!current() && !figure.value) add_gate(figure);
+    if (!current() && !figure.value) causes.push_back({cause_of(figure)});
   }
   if (causes.empty()) return causes;
-  const auto faults = lamp_faults_of(*this);
-  causes.insert(causes.begin(), faults.begin(), faults.end());
+  // The lens was measured without the lamps.
+  std::vector<Cause> faults;
+  for (std::string& fault : lamp_faults_of(*this)) faults.push_back({std::move(fault)});
+  causes.insert(causes.begin() + of_boards, faults.begin(), faults.end());
   return causes;
 }
 

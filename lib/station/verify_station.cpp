@@ -64,11 +64,15 @@ class Verification {
   RunRecord record(const std::string& run, const ProgramVersion& program) {
     const auto figures = check_all(golden_.gates, values_, unit_metrics());
     for (const CheckedMetric& figure : figures) {
-      if (!figure.met()) causes_.push_back(cause_of(figure));
+      // It is the station that is measured, and fails by its figures.
+      if (!figure.met()) causes_.push_back({cause_of(figure), figure.value.has_value()});
     }
     if (!causes_.empty()) {
       const auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration);
-      causes_.insert(causes_.begin(), faults.begin(), faults.end());
+      std::vector<Cause> first;
+      first.reserve(faults.size());
+      for (const std::string& fault : faults) first.push_back({fault, true});
+      causes_.insert(causes_.begin(), first.begin(), first.end());
     }
     RunRecord record{.run = run,
                      .kind = "golden",
@@ -76,7 +80,7 @@ class Verification {
                      .camera = golden_.camera_id,
                      .begun_utc = begun_utc(run),
                      .ended_utc = now_utc(),
-                     .verdict = causes_.empty() ? "PASS" : "FAIL",
+                     .verdict = "",
                      .causes = "",
                      .program = program.program + " " + program.version,
                      .libraries = library_versions(),
@@ -84,7 +88,7 @@ class Verification {
                      .calibration = "",
                      .figures = figures,
                      .images = images_};
-    for (const std::string& cause : causes_) record.causes.append(cause).append("\n");
+    record.judge(causes_);
     return record;
   }
 
@@ -98,7 +102,11 @@ class Verification {
 
  private:
   void add(const char* step, const StepResult& result) {
-    if (!result.ok()) causes_.push_back(fmt::format("{}: {}", step, result.why));
+    if (!result.ok()) {
+      const bool of_station =
+          result.failure == StepFailure::wrong_board || result.failure == StepFailure::wrong_map;
+      causes_.push_back({fmt::format("{}: {}", step, result.why), of_station});
+    }
     values_.insert(values_.end(), result.metrics.begin(), result.metrics.end());
     if (result.drawing) drawn_.push_back(draw_aside(result.drawing));
   }
@@ -116,7 +124,7 @@ class Verification {
   std::vector<Frame> frames_ = {};
   std::vector<Metric> values_ = {};
   std::vector<StepPicture> drawn_ = {};
-  std::vector<std::string> causes_ = {};
+  std::vector<Cause> causes_ = {};
   std::vector<RunRecord::Image> images_ = {};
 };
 

@@ -18,7 +18,8 @@ struct Verified {
 /// and, where they are there, FOLDER/dispersion/ and FOLDER/boards/. The lens that the boards give
 /// is compared with the known one (center_px, focal_percent, nominal_px): when it differs, the
 /// board has. The fixes are made with the known calibration: when they are off, lamps or known
-/// points have moved. `run` is of new_run(), from before the measurement. Throws InputError without
+/// points have moved. Here FAIL is of the station, and INVALID a golden unit that was not measured.
+/// `run` is of new_run(), from before the measurement. Throws InputError without
 /// images. Precondition: the configuration has a golden unit.
 Verified verify_station(const StationConfig& config, const std::filesystem::path& folder,
                         const std::string& run, const ProgramVersion& program, int threads);

@@ -109,7 +109,7 @@ std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
     const std::vector<fs::path> now(waiting.begin(), end);
     waiting.erase(waiting.begin(), end);
     most -= now.size();
-    unit_.add(step, now);
+    unit_.add(step, now, !waiting.empty());
     for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
   }
   if (!arrivals.empty() || reread) unit_.advance(false);

@@ -67,7 +67,7 @@ tried() {
   if [[ $said != *"$3"* ]]; then
     wrong=$((wrong + 1)) end='   NOT AS IT SHOULD'
   fi
-  printf '%-10s %4d   %s%s\n' "$1" "$2" "${said#*fails: }" "$end"
+  printf '%-10s %4d   %s%s\n' "$1" "$2" "${said#*camera*: }" "$end"
 }
 
 good() {
@@ -113,7 +113,7 @@ timing() {
   render
   local TIMEFORMAT='%U %S' processor step image arriving=$work/station/captures/timing
   processor=$({ time vlp-station run -q --station "$work/station/station.yaml" \
-    --camera-id batch --batch "$work/unit"; } 2>&1)
+    --camera-id timing --batch "$work/unit"; } 2>&1)
   mkdir -p "$arriving"/{boards,rotation,dispersion,check}
   cp "$work"/unit/dispersion/captures.csv "$arriving/dispersion/"
   cp "$work"/unit/check/captures.csv "$arriving/check/"

@@ -41,6 +41,8 @@ class SmallStation : public testing::Test {
   std::filesystem::path captures(const std::string& camera) const {
     return folder / "station/captures" / camera;
   }
+  /// The images of the unit as another camera would take them: the same pictures, other files.
+  void take_again() const;
   /// The images of a step of the unit, by name.
   std::vector<std::filesystem::path> images(const std::string& step) const;
   /// An image into a step's folder as a capture tool would do it: under another name first.
@@ -49,7 +51,7 @@ class SmallStation : public testing::Test {
   void prepare(const std::string& camera) const;
   /// All images of the unit, in the order of the steps.
   void drop_all(const std::string& camera) const;
-  /// The calibration of a camera without its id.
+  /// The calibration of a camera without its id and the digests of its images.
   std::string comparable_calibration(const std::string& camera) const;
   /// The one file of this name below the results of a camera; its content, empty without one.
   std::string result(const std::string& camera, const std::string& name) const;

@@ -112,8 +112,8 @@ TEST_F(StationKilled, GoesOnWhereItWasWithPostgres) {
 /// twice.
 TEST_F(StationKilled, AfterItsVerdictItSaysItAgain) {
   prepare("b");
-  const auto fail = run_program(run("b", "-q --idle-s 0.2"));
-  EXPECT_EQ(fail.exit_code, 1);
+  const auto ended = run_program(run("b", "-q --idle-s 0.2"));
+  EXPECT_EQ(ended.exit_code, 3);
   fs::path away;
   for (const auto& entry : fs::directory_iterator(folder / "station/captures")) {
     away = entry.path();
@@ -121,8 +121,8 @@ TEST_F(StationKilled, AfterItsVerdictItSaysItAgain) {
   fs::rename(away, captures("b"));  // as it was before the end
   fs::remove_all(folder / "station/results");
   const auto again = run_program(run("b", "--idle-s 60"));
-  EXPECT_EQ(again.exit_code, 1);
-  EXPECT_THAT(again.output, HasSubstr("FAIL   camera b"));
+  EXPECT_EQ(again.exit_code, 3);
+  EXPECT_THAT(again.output, HasSubstr("INVALID   camera b"));
   EXPECT_NE(result("b", "report.html"), "");
   EXPECT_TRUE(fs::exists(away));
   EXPECT_FALSE(fs::exists(captures("b")));
@@ -135,22 +135,31 @@ TEST_F(StationKilled, SurvivesAFullDisk) {
   render("boards");  // the unit fails, and has a record as long
   const auto small = folder / "station/results";
   fs::create_directory(small);
-  if (::mount("none", small.c_str(), "tmpfs", 0, "size=4m") != 0) {
+  if (::mount("none", small.c_str(), "tmpfs", 0, "size=10m") != 0) {
     GTEST_SKIP() << "no small file system can be mounted here";
   }
   change("station.yaml", "records: records.db", "records: results/records.db");
   const std::string fill = (small / "full").string();
-  run_program("head -c 5000000 /dev/zero >" + fill + " || true");
-  EXPECT_EQ(run_program(batch("a")).exit_code, 2);
+  run_program("head -c 12000000 /dev/zero >" + fill + " || true");
+  const auto before = run_program(batch("a"));
+  EXPECT_EQ(before.exit_code, 2);
+  EXPECT_THAT(before.errors, HasSubstr("results"));
   fs::resize_file(fill, 0);
-  ASSERT_EQ(run_program(batch("b")).exit_code, 1);
-  // Now so full that a record fits in part.
+  ASSERT_EQ(run_program(batch("b")).exit_code, 3);
+  // Full while the unit is worked on, so that a record fits in part.
   for (const int free_bytes : {4096, 12288}) {
     fs::resize_file(fill, 0);
-    run_program("head -c 5000000 /dev/zero >" + fill + " || true");
-    fs::resize_file(fill, fs::file_size(fill) - static_cast<std::uintmax_t>(free_bytes));
-    const auto full = run_program(batch("c"));
-    EXPECT_THAT(full.exit_code, testing::AnyOf(1, 2)) << full.errors;
+    for (const auto& image : images("boards")) {
+      fs::create_directories(captures("c") / "boards");
+      drop(image, captures("c") / "boards");
+    }
+    const auto full =
+        run_program("(until [ -d " + small.string() +
+                    "/c ]; do sleep 0.05; done; sleep 0.5; head -c 12000000 /dev/zero >" + fill +
+                    "; truncate -s -" + std::to_string(free_bytes) + " " + fill + ") & " +
+                    run("c", "--idle-s 3") + "; code=$?; wait; exit $code");
+    EXPECT_THAT(full.exit_code, testing::AnyOf(2, 3)) << full.errors;
+    EXPECT_THAT(full.output, HasSubstr("INVALID   camera c"));
     if (full.exit_code == 2) {
       EXPECT_THAT(full.errors, HasSubstr("results"));
     }
@@ -165,7 +174,7 @@ TEST_F(StationKilled, SurvivesAFullDisk) {
     }
   }
   for (const auto& entry : fs::recursive_directory_iterator(small)) {
-    if (entry.path().filename() != "failed-calibration.yaml") continue;
+    if (entry.path().filename() != "invalid-calibration.yaml") continue;
     EXPECT_THAT(TemporaryFolder::content_of(entry.path()), HasSubstr("intrinsics: ["));
   }
   ::umount(small.c_str());

@@ -132,7 +132,8 @@ TEST_F(StationTerminal, ShowsColourAndStopsOnAKey) {
   tmux.screen_with("Ctrl-C");
   EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[1m"));
   tmux.type("q");
-  EXPECT_THAT(tmux.screen_with("FAIL"), HasSubstr("boards: not enough images"));
+  EXPECT_THAT(tmux.screen_with("INVALID   camera"),
+              HasSubstr("boards: the operator ended the run"));
   EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[31m"));
 }
 
@@ -178,7 +179,7 @@ TEST_F(StationTerminal, IsNotConfusedByTheTerminalsSize) {
   tmux.screen_with("Next");
   // The verdict is longer than 24 lines. Its end is what counts.
   tmux.type("q");
-  EXPECT_THAT(tmux.screen_with("FAIL   camera"), HasSubstr("#      #   #   #####   #####"));
+  EXPECT_THAT(tmux.screen_with("INVALID   camera"), HasSubstr("###  #   #    #    #   #  #####"));
 }
 
 }  // namespace

@@ -15,7 +15,13 @@ using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
-class Station : public SmallStation {};
+class Station : public SmallStation {
+ protected:
+  /// The folder with the results of the one run of a camera.
+  fs::path only_results(const std::string& camera) const {
+    return fs::directory_iterator(folder / "station/results" / camera)->path();
+  }
+};
 
 TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   render();
@@ -30,10 +36,18 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
                     HasSubstr("Coverage: the corners"), HasSubstr("Left: the lamps"),
                     HasSubstr("Fixes at a known station minus")));
   // A unit calibrated again keeps its history, and gives the same calibration.
+  take_again();
   EXPECT_EQ(run_program(batch("0002") + " --threads 1").exit_code, 0);
   EXPECT_EQ(comparable_calibration("0002"), comparable_calibration("0001"));
 
-  EXPECT_THAT(records("list").output, HasSubstr("2 runs, 2 passed"));
+  EXPECT_THAT(records("list").output,
+              HasSubstr("2 runs, 2 passed, 0 failed, 0 invalid: yield 100.0 % of 2"));
+  // The files of a run come back from its record.
+  const fs::path files = only_results("0001");
+  fs::remove_all(files);
+  EXPECT_EQ(records("restore " + files.filename().string()).output, files.string() + "\n");
+  EXPECT_EQ(this->result("0001", "calibration.yaml"), calibration);
+  EXPECT_THAT(this->result("0001", "report.html"), HasSubstr("<strong>PASS"));
   EXPECT_THAT(records("list --camera-id 0002").output, HasSubstr("1 runs, 1 passed"));
   EXPECT_THAT(
       records("show --camera-id 0001").output,
@@ -117,27 +131,166 @@ TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {
   const auto lamps = TemporaryFolder::content_of(folder / "station/lamps.yaml");
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.05, 0.27, 1.6]");
   const auto loose = run_program(batch("loose"));
-  EXPECT_EQ(loose.exit_code, 1);
-  EXPECT_THAT(loose.errors, HasSubstr("fails: lamp 5 is loose"));
+  EXPECT_EQ(loose.exit_code, 3);
+  EXPECT_THAT(loose.errors, HasSubstr("not judged: lamp 5 is loose"));
+  EXPECT_THAT(loose.output, HasSubstr("INVALID   camera loose"));
   EXPECT_EQ(result("loose", "calibration.yaml"), "");
-  EXPECT_NE(result("loose", "failed-calibration.yaml"), "");
+  EXPECT_NE(result("loose", "invalid-calibration.yaml"), "");
   EXPECT_THAT(result("loose", "report.html"),
-              AllOf(HasSubstr("<strong>FAIL"), HasSubstr("lamp 5 is loose")));
+              HasSubstr("<strong>INVALID</strong><p>lamp 5 is loose"));
 
   folder.file("station/lamps.yaml", lamps);
   change("lamps.yaml", "frequency_hz: 2000", "frequency_hz: 9999");
   change("lamps.yaml", "frequency_hz: 3800", "frequency_hz: 2000");
   change("lamps.yaml", "frequency_hz: 9999", "frequency_hz: 3800");
+  take_again();
   const auto swapped = run_program(batch("swapped"));
-  EXPECT_EQ(swapped.exit_code, 1);
-  EXPECT_THAT(swapped.errors, HasSubstr("fails: lamps 2 and 5 look swapped"));
+  EXPECT_EQ(swapped.exit_code, 3);
+  EXPECT_THAT(swapped.errors, HasSubstr("not judged: lamps 2 and 5 look swapped"));
 
   folder.file("station/lamps.yaml", lamps);
   change("board.yaml", "first_id: 0", "first_id: 100");
+  take_again();
   const auto board = run_program(batch("board"));
-  EXPECT_EQ(board.exit_code, 1);
-  EXPECT_THAT(board.errors, HasSubstr("fails: wrong board"));
-  EXPECT_THAT(records("list").output, HasSubstr("3 runs, 0 passed"));
+  EXPECT_EQ(board.exit_code, 3);
+  EXPECT_THAT(board.errors, HasSubstr("not judged: wrong board"));
+  EXPECT_THAT(records("list").output, AllOf(HasSubstr("3 runs, 0 passed, 0 failed, 3 invalid\n"),
+                                            HasSubstr("lamps 2 and 5 look swapped")));
+  EXPECT_THAT(records("trend rms_px").errors, HasSubstr("0 of the runs have rms_px"));
+}
+
+/// What the operator or the station does wrong is no unit's fault.
+TEST_F(Station, JudgesNoUnitForWhatIsNotItsFault) {
+  render();
+  const auto table = folder / "unit/check/captures.csv", truth = folder / "unit/check/truth.csv";
+  fs::rename(table, folder / "captures.csv");
+  if (fs::exists(truth)) fs::rename(truth, folder / "truth.csv");
+  const auto places = run_program(batch());
+  EXPECT_EQ(places.exit_code, 3);
+  EXPECT_THAT(places.errors, HasSubstr("not judged: check: nothing tells where"));
+  fs::rename(folder / "captures.csv", table);
+
+  // Images of one step in the folder of another.
+  const auto boards = folder / "unit/boards", check = folder / "unit/check";
+  fs::rename(boards, folder / "unit/kept");
+  fs::copy(check, boards);
+  const auto lamps_as_boards = run_program(batch());
+  EXPECT_EQ(lamps_as_boards.exit_code, 3);
+  EXPECT_THAT(lamps_as_boards.errors,
+              HasSubstr("not judged: boards (0/16): 8 of 8 images refused"));
+  fs::remove_all(boards);
+  fs::rename(folder / "unit/kept", boards);
+  fs::remove_all(check);
+  fs::copy(boards, check);
+  const auto boards_as_check = run_program(batch());
+  EXPECT_EQ(boards_as_check.exit_code, 3);
+  EXPECT_THAT(boards_as_check.errors, HasSubstr("not judged: check"));
+  EXPECT_THAT(records("list").output, HasSubstr("3 runs, 0 passed, 0 failed, 3 invalid\n"));
+}
+
+/// One unit's images, as another's.
+TEST_F(Station, TakesNoImagesOfAnotherUnit) {
+  change("scene.yaml", "count: 16", "count: 4");
+  render("boards");
+  EXPECT_EQ(run_program(batch("0001")).exit_code, 3);
+  EXPECT_EQ(run_program(batch("0001")).exit_code, 3);  // its own, again
+  const auto result = run_program(batch("0002"));
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.errors, HasSubstr("4 of 4 images refused: 4 already of camera 0001"));
+  EXPECT_THAT(records("show --camera-id 0001").output, HasSubstr("4, 4 used"));
+  EXPECT_THAT(records("show --camera-id 0002").output, HasSubstr("4, 0 used"));
+}
+
+/// Before the first image is looked at.
+TEST_F(Station, NoticesAtOnceThatResultsCannotBeWritten) {
+  folder.file("station/results", "a file");
+  const auto result = run_program(run("0001", "--idle-s 60"));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("results/0001: cannot be made"));
+}
+
+/// Whatever cannot be written, the verdict is on the screen, in the record, and can be restored.
+TEST_F(Station, LosesNoVerdictWhenItsFilesCannotBeWritten) {
+  change("scene.yaml", "count: 16", "count: 4");
+  render("boards");
+  fs::create_directories(captures("0001"));
+  fs::copy(folder / "unit/boards", captures("0001") / "boards");
+  // While it waits for images, a file takes the place of the folder.
+  const auto results = folder / "station/results";
+  const std::string there = results.string();
+  const auto result =
+      run_program("(until [ -d " + there + "/0001 ]; do sleep 0.05; done; sleep 0.5; mv " + there +
+                  " " + there + "-old; touch " + there + ") & " + run("0001", "--idle-s 3") +
+                  "; code=$?; wait; exit $code");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.output, HasSubstr("INVALID   camera 0001"));
+  EXPECT_THAT(result.errors,
+              AllOf(HasSubstr("cannot be made"), HasSubstr("the verdict INVALID is recorded"),
+                    HasSubstr("vlp-station restore 20")));
+  fs::remove(results);
+  const std::string listed = records("list").output;
+  const auto at = listed.find("\n20");
+  ASSERT_NE(at, std::string::npos);
+  EXPECT_EQ(records("restore " + listed.substr(at + 1, 33)).exit_code, 0);
+  EXPECT_THAT(this->result("0001", "report.html"), HasSubstr("<strong>INVALID"));
+}
+
+/// A station that is watched: exit code 1 for an alarm, of what can be compared.
+TEST_F(Station, WatchesATrend) {
+  change("scene.yaml", "count: 16", "count: 4");
+  render("boards");
+  ASSERT_EQ(run_program(batch()).exit_code, 3);  // makes the tables
+  const auto add = [&](int first, const std::string& of, const std::string& kind,
+                       const std::string& verdict, const std::vector<double>& values) {
+    std::string sql;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const std::string run = std::to_string(first + static_cast<int>(i));
+      sql.append("INSERT INTO runs SELECT '").append(run).append("', '").append(kind);
+      sql.append("', '").append(of).append("', 'a', '', '").append(run).append("', '");
+      sql.append(verdict).append("', '', '', '', '', '';\n");
+      sql.append("INSERT INTO figures VALUES ('").append(run).append("', 1, 'rms_px', ");
+      sql.append(std::to_string(values[i])).append(", NULL, 0, 1, 'px');\n");
+    }
+    const auto client = folder.file("client.py",
+                                    "import sqlite3, sys\n"
+                                    "sqlite3.connect(sys.argv[1], isolation_level=None)"
+                                    ".executescript(open(sys.argv[2]).read())\n");
+    const auto script = folder.file("add.sql", sql);
+    const auto done = run_program("python3 " + client.string() + " " +
+                                  (folder / "station/records.db").string() + " " + script.string());
+    EXPECT_EQ(done.exit_code, 0) << done.errors;
+  };
+  add(100, "station-1", "unit", "PASS", std::vector<double>(10, 1));
+  const auto steady = records("trend rms_px");
+  EXPECT_EQ(steady.exit_code, 0) << steady.output << steady.errors;
+  EXPECT_THAT(steady.output, HasSubstr("10 runs"));
+  // Others are not mixed in unless they are asked for.
+  add(200, "station-1", "golden", "PASS", {5});
+  add(300, "station-1", "unit", "FAIL", {7, 8});
+  add(400, "station-2", "unit", "PASS", {9});
+  add(450, "station-1", "unit", "INVALID", {9});
+  EXPECT_THAT(records("trend rms_px").output, HasSubstr("10 runs"));
+  EXPECT_THAT(records("trend rms_px --verdict FAIL").output, HasSubstr("2 runs"));
+  EXPECT_THAT(records("trend rms_px --kind any").output, HasSubstr("11 runs"));
+  EXPECT_THAT(records("trend rms_px --of-station any").output, HasSubstr("11 runs"));
+  const auto shared =
+      run_program("vlp-station trend rms_px --records " + (folder / "station/records.db").string());
+  EXPECT_EQ(shared.exit_code, 2);
+  EXPECT_THAT(shared.errors, HasSubstr("of station-1 and of station-2: say of which"));
+  add(500, "station-1", "unit", "PASS", {7});
+  const auto alarm = records("trend rms_px");
+  EXPECT_EQ(alarm.exit_code, 1);
+  EXPECT_THAT(alarm.output, HasSubstr("outside   500"));
+}
+
+/// What is at full scale hides edges and stripes.
+TEST_F(Station, NamesOverexposure) {
+  change("scene.yaml", "count: 16", "count: 4");
+  change("scene.yaml", "white_e_per_s: 2.4e+6", "white_e_per_s: 2.4e+8");
+  render("boards");
+  const auto boards = run_program(batch("0001"));
+  EXPECT_EQ(boards.exit_code, 3);
+  EXPECT_THAT(boards.output, HasSubstr("images refused: 4 overexposed"));
 }
 
 struct LensFault {
@@ -148,16 +301,20 @@ struct LensFault {
 };
 class FaultyLens : public SmallStation, public testing::WithParamInterface<LensFault> {};
 
-TEST_P(FaultyLens, FailsWithItsCause) {
+TEST_P(FaultyLens, IsNamedAsTheCause) {
   change("scene.yaml", GetParam().from, GetParam().to);
   change("scene.yaml", "count: 16", "count: 12");
   change("station.yaml", "board_views: 16", "board_views: 12");
   render("boards");
   const auto result = run_program(batch());
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.output, HasSubstr("FAIL   camera"));
+  // Too little light is the station's.
+  const bool invalid = GetParam().cause.starts_with("boards");
+  EXPECT_EQ(result.exit_code, invalid ? 3 : 1);
+  EXPECT_THAT(result.output, HasSubstr(invalid ? "INVALID   camera" : "FAIL   camera"));
   // The cause is the first that is named, before what follows from it.
-  EXPECT_THAT(result.errors, HasSubstr("camera 0001 fails: " + GetParam().cause));
+  EXPECT_THAT(result.errors,
+              HasSubstr(std::string("camera 0001 ") + (invalid ? "is not judged: " : "fails: ") +
+                        GetParam().cause));
   EXPECT_THAT(records("show").output, HasSubstr("Cause    " + GetParam().cause));
 }
 

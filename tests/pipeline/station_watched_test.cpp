@@ -17,6 +17,7 @@ class WatchedStation : public SmallStation {};
 TEST_F(WatchedStation, ComesToTheSameAsFromFullFoldersAndPutsTheImagesAway) {
   render();
   ASSERT_EQ(run_program(batch("a")).exit_code, 0);
+  take_again();
   prepare("b");
   drop_all("b");
   const auto result = run_program(run("b", "--idle-s 60"));
@@ -42,12 +43,38 @@ TEST_F(WatchedStation, SaysWhyAnImageIsRefused) {
   cv::imwrite((at / "3.png").string(), cv::Mat1b(480, 640, static_cast<unsigned char>(90)));
   std::ofstream(at / "4.png") << "no image";
   const auto result = run_program(run("a", "--idle-s 1"));
-  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(
       result.errors,
-      AllOf(HasSubstr("0.png: taken"), HasSubstr("1.png: refused: same pose as 0.png"),
+      AllOf(HasSubstr("0.png: taken"), HasSubstr("1.png: refused: same image as 0.png"),
             HasSubstr("2.png: refused: too dark"), HasSubstr("3.png: refused: is 640 x 480"),
             HasSubstr("4.png: refused: cannot be read")));
+}
+
+/// All that is there when a run goes on comes at once: its order is no order.
+TEST_F(WatchedStation, CountsNoRefusalsInTheOrderOfNames) {
+  const auto at = captures("a") / "boards";
+  fs::create_directories(at);
+  for (int i = 0; i < 13; ++i) std::ofstream(at / ("bad-" + std::to_string(i) + ".png")) << "none";
+  fs::copy_file(VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png",
+                at / "good.png");
+  const auto result = run_program(run("a", "--idle-s 1 --threads 2"));
+  EXPECT_THAT(result.errors,
+              AllOf(HasSubstr("good.png: taken"), HasSubstr("no image came for 1 s")));
+  EXPECT_THAT(records("show").output, HasSubstr("images     14, 1 used"));
+}
+
+/// A name cannot speak to the terminal.
+TEST_F(WatchedStation, ObeysNoNames) {
+  const auto at = captures("a") / "boards";
+  fs::create_directories(at);
+  std::ofstream(at / "\x1b[2Jgone.png") << "none";
+  const auto result = run_program(run("a", "--idle-s 1"));
+  EXPECT_THAT(result.errors, HasSubstr("\\x1b[2Jgone.png: refused"));
+  const auto shown = records("show");
+  for (const std::string& said : {result.output, result.errors, shown.output, shown.errors}) {
+    EXPECT_EQ(said.find('\x1b'), std::string::npos) << said;
+  }
 }
 
 /// A captures.csv that comes last, and in parts, is read when it is whole.

@@ -43,10 +43,29 @@ TEST(ControlChart, NamesADriftBeforeItIsOutside) {
   EXPECT_THAT(control_chart(values).drifting, ElementsAre(7, 8, 9, 10, 11, 19, 20, 21, 22, 23));
 }
 
+TEST(ControlChart, OfEqualValuesHasNoAlarm) {
+  for (const double value : {1.0, 0.1, 0.3, 1e-7}) {
+    const ControlChart chart = control_chart(std::vector<double>(10, value));
+    EXPECT_EQ(chart.mean, value);
+    EXPECT_THAT(chart.outside, IsEmpty());
+    EXPECT_THAT(chart.drifting, IsEmpty());
+  }
+}
+
+TEST(ControlChart, CountsAValueAtTheMeanOnNeitherSide) {
+  // Mean 1: seven below it, one at it, seven above.
+  std::vector<double> values(7, 0.5);
+  values.push_back(1);
+  values.insert(values.end(), 7, 1.5);
+  EXPECT_EQ(control_chart(values).mean, 1);
+  EXPECT_THAT(control_chart(values).drifting, IsEmpty());
+}
+
 TEST(ControlChart, DrawsAPicture) {
   const TemporaryFolder folder;
   std::vector<TrendPoint> points;
-  for (int i = 0; i < 10; ++i) points.push_back({"run", "camera", "PASS", i == 5 ? 9.0 : 1.0});
+  for (int i = 0; i < 10; ++i)
+    points.push_back({"run", "station", "camera", "PASS", i == 5 ? 9.0 : 1.0});
   draw_trend(folder / "trend.svg", "rms_px", points);
   const std::string svg = TemporaryFolder::content_of(folder / "trend.svg");
   EXPECT_THAT(svg, testing::HasSubstr("outside the limits"));

@@ -22,6 +22,7 @@
 namespace vlp {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -85,6 +86,13 @@ void check_records(const std::string& where) {
   ASSERT_THAT(all, SizeIs(4));
   EXPECT_EQ(all[0].camera, "a");
   EXPECT_EQ(all[3].verdict, "FAIL");
+  EXPECT_EQ(all[3].station, "station-1");
+  EXPECT_THAT(all[3].causes, StartsWith("it's \"blurred\""));
+  // Whose an image is: of the first run that uses it, and of no run of the camera itself.
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), "camera a: run " + run_of(0));
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "a"), "camera b: run " + run_of(2));
+  EXPECT_EQ(records.owner_of(std::string(64, 'c'), "b"), "") << "it was refused there";
+  EXPECT_EQ(refusal_of([&] { records.check_writable(); }), "");
   RunFilter filter;
   filter.camera = "a";
   EXPECT_THAT(records.list(filter), SizeIs(3));
@@ -260,7 +268,7 @@ void check_later_version(const std::string& where) {
   answer_of(where, "UPDATE vlp_schema SET version = 99;\n");
   const std::string before = state_of(where);
   EXPECT_THAT(refusal_of([&] { Records records(where); }),
-              HasSubstr(": holds records of version 99, this program knows those up to 2: use the "
+              HasSubstr(": holds records of version 99, this program knows those up to 3: use the "
                         "newer vlp-station that wrote them"));
   EXPECT_EQ(state_of(where), before);
 }
@@ -277,6 +285,17 @@ TEST(Records, OfVersion1InAFileAreBroughtUpToDateOnce) {
   const std::string file = (folder / "records.db").string();
   answer_of(file, kVersion1);
   check_migration_by_another(file);
+}
+
+TEST(Records, ThatCannotBeWrittenAreNoticedBefore) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  { const Records made(file); }
+  answer_of(file,
+            "CREATE TRIGGER stop BEFORE UPDATE ON vlp_schema BEGIN SELECT RAISE(ABORT, 'stopped'); "
+            "END;\n");
+  Records records(file);
+  EXPECT_THAT(refusal_of([&] { records.check_writable(); }), HasSubstr("stopped"));
 }
 
 TEST(Records, OfVersion1InAFileStayAsTheyAreWhenItFails) {
@@ -328,6 +347,8 @@ TEST(Records, AreKeptInPostgres) {
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
   check_two_writers(server.uri());
+  // A connection string without a parameter, as psql takes it.
+  EXPECT_THAT(Records(server.plain_uri()).list({}), SizeIs(50));
   answer_of(server.uri(), kDropAll);
   check_records(server.uri());
 
@@ -353,13 +374,25 @@ TEST(Records, DoNotTellThePasswordOfAServer) {
                             "postgresql://vlp@/postgres?host=/nowhere&password=a@secret"}) {
     EXPECT_THAT(
         refusal_of([&] { Records records(where); }),
-        testing::AllOf(StartsWith("postgresql:///nowhere/postgres: "), Not(HasSubstr("secret"))));
+        testing::AllOf(
+            StartsWith("postgresql:///nowhere/postgres: the server of the records cannot be "
+                       "reached"),
+            Not(HasSubstr("secret"))));
   }
-  for (const char* where : {"postgresql://vlp@/postgres?secret", "mysql://vlp:secret@/records"}) {
+  for (const char* where :
+       {"postgresql://vlp@/postgres?secret", "mysql://vlp:secret@/records",
+        // where libpq takes a part of the password for the host, the port or the database
+        "postgresql://vlp:a@secret@/postgres", "postgresql://vlp:a/secret@nowhere/postgres",
+        "postgresql://vlp:secret/postgres"}) {
     EXPECT_THAT(refusal_of([&] { Records records(where); }),
                 testing::AllOf(HasSubstr("://...: is not of the form postgresql://USER@HOST/NAME"),
                                Not(HasSubstr("secret"))));
   }
+}
+
+TEST(Records, DoNotTellThePasswordOfKeywords) {
+  EXPECT_THAT(refusal_of([&] { Records records("host=/nowhere user=vlp password=secret"); }),
+              AllOf(HasSubstr("is not of the form postgresql://"), Not(HasSubstr("secret"))));
 }
 
 /// The part of a text up to the end of its first line.

@@ -45,11 +45,11 @@ TEST_F(UnitImages, ThatShowTheSameGetTheirTurnWhenTheFirstGoes) {
   come("a.png", true);
   come("b.png", true);
   EXPECT_EQ(refusal("a.png"), "");
-  EXPECT_EQ(refusal("b.png"), "same pose as a.png");
+  EXPECT_EQ(refusal("b.png"), "same image as a.png");
   unit.remove(StationStep::boards, "a.png");
   EXPECT_EQ(refusal("b.png"), "");
   come("a.png", true);
-  EXPECT_EQ(refusal("a.png"), "same pose as b.png");
+  EXPECT_EQ(refusal("a.png"), "same image as b.png");
 }
 
 TEST_F(UnitImages, ThatAreOverwrittenCountNoMore) {
@@ -78,7 +78,8 @@ TEST_F(UnitImages, OfACameraThatAreRefusedStayAsRefusals) {
   unit.remove(StationStep::boards, "a.png");
   unit.advance(true);
   EXPECT_THAT(unit.causes(),
-              ElementsAre(AllOf(HasSubstr("boards (0/1)"), HasSubstr("2 of 2 images refused"))));
+              ElementsAre(testing::Field(&Cause::text, AllOf(HasSubstr("boards (0/1)"),
+                                                             HasSubstr("2 of 2 images refused")))));
 }
 
 }  // namespace

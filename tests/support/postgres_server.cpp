@@ -51,6 +51,12 @@ PostgresServer::PostgresServer() {
   uri_ = "postgresql://vlp@/postgres?host=" + folder;
 }
 
+std::string PostgresServer::plain_uri() const {
+  std::string host;
+  for (const char c : folder_.string()) host += c == '/' ? std::string("%2F") : std::string(1, c);
+  return "postgresql://vlp@" + host + "/postgres";
+}
+
 PostgresServer::~PostgresServer() {
   if (!uri_.empty()) as_owner("pg_ctl -D '" + folder_.string() + "/data' -m immediate stop");
   std::error_code ignored;

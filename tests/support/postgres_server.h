@@ -20,6 +20,8 @@ class PostgresServer {
   static bool installed();
   /// postgresql://...; empty when it did not start.
   const std::string& uri() const { return uri_; }
+  /// The same without a parameter: the socket's folder stands for the host.
+  std::string plain_uri() const;
 
  private:
   int as_owner(const std::string& command) const;

@@ -1,0 +1,86 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/database_name.h"
+
+#include <libpq-fe.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+constexpr const char* kScheme = "://";
+
+/// What libpq makes of a connection string; empty when it cannot.
+std::map<std::string, std::string> parts_of(const std::string& where) {
+  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
+      PQconninfoParse(where.c_str(), nullptr), PQconninfoFree);
+  std::map<std::string, std::string> parts;
+  const PQconninfoOption* option = options.get();
+  for (; option != nullptr && option->keyword != nullptr; ++option) {
+    if (option->val != nullptr) parts[option->keyword] = option->val;
+  }
+  return parts;
+}
+
+/// Whether a part of the password may stand where the host or the database is looked for.
+bool may_be_misread(const std::string& where, const std::map<std::string, std::string>& parts) {
+  const std::string said = where.substr(0, where.find('?'));
+  const auto begin = said.find(kScheme) + std::string(kScheme).size();
+  const auto slash = std::min(said.find('/', begin), said.size());
+  const auto at = said.find('@', begin);
+  if (at != std::string::npos && (at > slash || said.find('@', at + 1) != std::string::npos)) {
+    return true;
+  }
+  // postgresql://USER:PASSWORD/NAME, where the host was forgotten.
+  const auto port = parts.find("port");
+  return port != parts.end() && port->second.find_first_not_of("0123456789,") != std::string::npos;
+}
+
+/// A connection string as libpq's own tools know it, of keywords.
+bool is_of_keywords(const std::string& where) {
+  return where.find("password=") != std::string::npos || where.find("host=") != std::string::npos ||
+         where.find("dbname=") != std::string::npos;
+}
+
+}  // namespace
+
+bool is_server(const std::string& where) { return where.find(kScheme) != std::string::npos; }
+
+std::string name_of_database(const std::string& where) {
+  const std::string form = "is not of the form postgresql://USER@HOST/NAME";
+  if (!is_server(where)) {
+    if (is_of_keywords(where)) throw InputError("a connection string of keywords", form);
+    return where;
+  }
+  const std::string hidden = where.substr(0, where.find(kScheme)) + kScheme + "...";
+  auto parts = parts_of(where);
+  if (parts.empty()) throw InputError(hidden, form);
+  if (may_be_misread(where, parts)) {
+    throw InputError(hidden, form + "; in user and password '@' is %40, ':' is %3A, '/' is %2F");
+  }
+  const std::string port = parts.contains("port") ? ":" + parts["port"] : "";
+  return "postgresql://" + parts["host"] + port + "/" + parts["dbname"];
+}
+
+std::string connection_of(const std::string& where) {
+  std::string connection;
+  for (const char c : where) {
+    if (c == ' ') {
+      connection += "%20";
+    } else if (c == '"') {
+      connection += "%22";
+    } else {
+      connection += c;
+    }
+  }
+  if (parts_of(where).contains("connect_timeout")) return connection;
+  return connection + (connection.find('?') == std::string::npos ? "?" : "&") +
+         "connect_timeout=10";
+}
+
+}  // namespace vlp
