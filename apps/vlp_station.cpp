@@ -53,7 +53,8 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
   command->add_option("--records", options.records,
                       "Or its records: a file of SQLite, or postgresql://USER@HOST/NAME");
   command->add_option("--camera-id", options.filter.camera, "Only of this camera");
-  command->add_option("--of-station", options.filter.station, "Only of the station of this name, or any");
+  command->add_option("--of-station", options.filter.station,
+                      "Only of the station of this name, or any");
   command->add_option("--verdict", options.filter.verdict, "Only with this verdict")
       ->check(CLI::IsMember({"PASS", "FAIL", "INVALID", "any"}));
   command->add_option("--kind", options.filter.kind, "Only units, or only golden units")
@@ -105,7 +106,8 @@ int main(int argc, char** argv) {
   exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
   auto* trend = vlp::add_records(
       app, "trend",
-      "A figure over the runs, with the limits of a control chart; exit code 1 for an alarm. Of units "
+      "A figure over the runs, with the limits of a control chart; exit code 1 for an alarm. Of "
+      "units "
       "of the station that passed, unless --verdict, --kind or --of-station says otherwise",
       records);
   trend->add_option("figure", records.figure, "Which: rms_px, check_mean_mm, ...")->required();

@@ -11,14 +11,14 @@
 
 namespace vlp {
 
-/// That the results of a camera's run can be written, before it is begun: the folder is there, takes
-/// a file, and has room. Throws InputError.
+/// That the results of a camera's run can be written, before it is begun: the folder is there,
+/// takes a file, and has room. Throws InputError.
 void check_results(const std::filesystem::path& results, const std::string& camera);
 
 /// Writes of RESULTS/CAMERA/RUN/ what is not there: calibration.yaml when the unit passed,
 /// failed-calibration.yaml or invalid-calibration.yaml when it did not and came so far;
-/// report.html, last, which without `pictures` has none. The folder. It can be done at any time, and
-/// again. Throws InputError, for a calibration that is there and is another, too.
+/// report.html, last, which without `pictures` has none. The folder. It can be done at any time,
+/// and again. Throws InputError, for a calibration that is there and is another, too.
 std::filesystem::path publish_run(const RunRecord& record,
                                   const std::vector<ReportPicture>& pictures,
                                   const std::filesystem::path& results);

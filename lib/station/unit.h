@@ -31,9 +31,9 @@ class Unit {
   Unit(const Unit&) = delete;
   Unit& operator=(const Unit&) = delete;
 
-  /// Images of a step that came, or changed. One that comes when the step is done is not used. Nobody
-  /// knows in which order those were taken that came together: of them, refusals count as in a row
-  /// when none is used. `more_to_come`: others came with them, which the next call has.
+  /// Images of a step that came, or changed. One that comes when the step is done is not used.
+  /// Nobody knows in which order those were taken that came together: of them, refusals count as in
+  /// a row when none is used. `more_to_come`: others came with them, which the next call has.
   void add(StationStep step, const std::vector<std::filesystem::path>& files,
            bool more_to_come = false);
   /// An image that is there no more. What was refused because of it is taken.
