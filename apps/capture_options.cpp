@@ -80,9 +80,10 @@ SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   tell(seen);
-  for (const auto& [image, lights] : seen.lights) {
-    for (const Light& light : lights) spdlog::debug("{}: {}", image, line_of(light));
-  }
+  if (spdlog::should_log(spdlog::level::debug))
+    for (const auto& [image, lights] : seen.lights) {
+      for (const Light& light : lights) spdlog::debug("{}: {}", image, line_of(light));
+    }
   if (!options.lights.empty()) write_lights(options.lights, seen.lights);
   require(seen);
   return seen;

@@ -86,7 +86,8 @@ std::string HelpFormatter::make_footer(const CLI::App* app) const {
   for (std::string line; std::getline(footer, line);) {
     const std::size_t name = line.find_first_not_of(' ');
     const std::size_t gap = name == std::string::npos ? name : line.find("  ", name);
-    const std::size_t column = gap == std::string::npos ? 0 : line.find_first_not_of(' ', gap);
+    const std::size_t text_at = gap == std::string::npos ? gap : line.find_first_not_of(' ', gap);
+    const std::size_t column = text_at == std::string::npos ? 0 : text_at;
     text.append(line, 0, column).append(filled(line.substr(column), column, column)).append("\n");
   }
   return text;

@@ -97,7 +97,7 @@ void print_ratios(const Evaluation& evaluation) {
       fmt::print(", height {:.1f} %", percent * *share);
     }
     if (const auto& share = stated->yaw_within_95) fmt::print(", yaw {:.1f} %", percent * *share);
-    fmt::print(" (errors within 1.96 sd; of one unit they go together)\n");
+    fmt::print(" (errors within 1.96 sd; those of one calibration go together)\n");
   }
   if (const auto& limit = evaluation.limit) {
     fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} (1: the best there can be)\n",

@@ -58,14 +58,13 @@ void run(const CLI::App& app, const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Converts a camera from the file of one tool to that of another: a calibration of this\n"
-      "toolbox, mrcal's .cameramodel, OpenCV's FileStorage (also cv::fisheye), ROS camera_info,\n"
-      "Kalibr's camchain. The input's content tells its format. The numbers stay as they are "
-      "where\n"
-      "both have the lens model; otherwise --lens fits one that the other has.\n\n"
+      "Converts a camera from the file of one tool to that of another: a calibration of "
+      "this toolbox, mrcal's .cameramodel, OpenCV's FileStorage (also cv::fisheye), ROS "
+      "camera_info, Kalibr's camchain. The input's content tells its format. The numbers stay as "
+      "they are where both have the lens model; otherwise --lens fits one that the other has.\n\n"
       "Example, from the project's folder:\n"
-      "  build/bin/vlp-convert datasets/paper-rig/rendered/true_calibration.yaml --to ros -o "
-      "ros.yaml\n",
+      "  build/bin/vlp-convert datasets/paper-rig/rendered/true_calibration.yaml \\\n"
+      "    --to ros -o ros.yaml\n",
       "vlp-convert");
   vlp::Options options;
   app.add_option("input", options.input, "File with a camera")->required();

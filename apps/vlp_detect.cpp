@@ -23,7 +23,8 @@ void run(const CaptureOptions& options) {
   check_output(options.output, inputs);
   if (!options.lights.empty()) {
     check_output(options.lights, inputs);
-    if (options.lights == options.output) {
+    namespace fs = std::filesystem;
+    if (fs::weakly_canonical(options.lights) == fs::weakly_canonical(options.output)) {
       throw std::invalid_argument("--output and --lights name one file");
     }
   }

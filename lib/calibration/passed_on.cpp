@@ -20,17 +20,16 @@ void recenter(Calibration& calibration) {
 
 }  // namespace
 
-std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const MatrixX& covariance) {
+std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::Vector2d& exact,
+                                   const MatrixX& covariance) {
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return {};
   const Eigen::MatrixXd lower = factor.matrixL();
-  const auto exact = solved(Eigen::VectorXd::Zero(lower.rows()));
-  if (!exact) return {};
   Eigen::MatrixXd moved(lower.cols(), 2);
   for (Eigen::Index i = 0; i < lower.cols(); ++i) {
     const auto by_one = solved(lower.col(i));
     if (!by_one) return {};
-    moved.row(i) = (*by_one - *exact).transpose();
+    moved.row(i) = (*by_one - exact).transpose();
   }
   // J L = moved'.
   const MatrixX jacobian = factor.matrixU().solve(moved).transpose();

@@ -22,8 +22,9 @@ using SolvedWith = std::function<std::optional<Eigen::Vector2d>(const Eigen::Vec
 ///   J = (f(L_1) - f(0), f(L_2) - f(0), ...) L^-1,
 /// so that errors are tried as large as they are, and those that are known only together, as
 /// coefficients of a lens are, move together. Nothing where a solve finds nothing or the covariance
-/// is not positive definite.
-std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const MatrixX& covariance);
+/// is not positive definite. exact: f(0).
+std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::Vector2d& exact,
+                                   const MatrixX& covariance);
 
 /// With errors added to the intrinsics; the zenith stays, and center_px with it.
 Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);

@@ -28,7 +28,7 @@ CaptureOutcome outcome_of(const LampDetector& detector, const std::filesystem::p
     write_annotated(*run.annotate, file, annotated(found.image, found.lights, detector.readout()));
   }
   for (Light& light : found.lights) {
-    light.outline = {};
+    std::vector<EdgePoint>().swap(light.outline);
     if (light.kind != LightKind::lamp) continue;
     outcome.lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
   }

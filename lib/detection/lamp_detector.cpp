@@ -31,6 +31,17 @@ int most_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_tim
   return static_cast<int>(std::ceil(most)) + spare;
 }
 
+/// Whether no pixel can be brighter: full scale of 8 bits, or of a converter of 10 to 16.
+bool is_full_scale(double level, int depth) {
+  constexpr double nearly = 0.98;
+  const int least_bits = depth == CV_16U ? 10 : 8, most_bits = depth == CV_16U ? 16 : 8;
+  for (int bits = least_bits; bits <= most_bits; bits += 2) {
+    const double full = std::exp2(bits) - 1;
+    if (level <= full && level >= nearly * full) return true;
+  }
+  return false;
+}
+
 /// Of a steady light, see Light::clipped.
 double clipped_share(const cv::Mat& lines, const Eigen::Vector2d& low,
                      const Eigen::Vector2d& high) {
@@ -43,6 +54,7 @@ double clipped_share(const cv::Mat& lines, const Eigen::Vector2d& low,
   if (pixels.empty()) return 0;
   double brightest = 0;
   cv::minMaxLoc(pixels, nullptr, &brightest);
+  if (!is_full_scale(brightest, pixels.depth())) return 0;
   return double(cv::countNonZero(pixels >= brightest)) / double(pixels.total());
 }
 

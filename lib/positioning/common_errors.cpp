@@ -119,7 +119,7 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   // From errors that are independent (lens, own of the zenith, own of the offset) to those there
   // are.
   const Eigen::Vector2d focal_px = focal_of(calibration);
-  Eigen::MatrixXd passed_on = Eigen::MatrixXd::Identity(covariance_.rows(), covariance_.cols());
+  Eigen::MatrixXd passed_on = Eigen::MatrixXd::Identity(first_lamp, first_lamp);
   if (turned && !adjustment) {
     const RotationCenter& center = *calibration.rotation_center;
     covariance_.block<2, 2>(zenith, zenith) = normalized(center.covariance, focal_px);
@@ -142,7 +142,11 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
           by_zenith * Eigen::MatrixXd(passed_on.middleRows<2>(zenith));
     }
   }
-  if (turned || shifted) covariance_ = passed_on * covariance_ * passed_on.transpose();
+  if (turned || shifted) {
+    covariance_.topRows(first_lamp) = passed_on * covariance_.topRows(first_lamp).eval();
+    covariance_.leftCols(first_lamp) =
+        covariance_.leftCols(first_lamp).eval() * passed_on.transpose();
+  }
   stated_ = adjustment.has_value() || covariance_.diagonal().maxCoeff() > 0;
 }
 

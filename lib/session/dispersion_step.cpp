@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "calibration/passed_on.h"
@@ -58,12 +59,8 @@ std::vector<StationCapture> at_cameras(const KnownPlaces& places, const LampMap&
   return captures;
 }
 
-/// An offset d acts as a camera that is H d / f beside where it is.
-void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, const LampMap& lamps,
-                       const Calibration& levelled) {
-  const auto& center = levelled.rotation_center;
-  if (!center || !center->lever_arm_m) return;
-  const Eigen::Vector2d& arm_m = *center->lever_arm_m;
+/// Of the first lamp of the map over the cameras; 0 without a fix.
+double mean_height_m(const KnownPlaces& places, const LampMap& lamps, const Calibration& levelled) {
   const Positioner positioner(lamps, levelled);
   double height_m = 0;
   int fixes = 0;
@@ -73,10 +70,20 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
     height_m += lamps.lamps.front().position_m.z() - fix.estimate.pose.position_m.z();
     ++fixes;
   }
-  if (fixes == 0) return;
+  return fixes > 0 ? height_m / fixes : 0;
+}
+
+/// An offset d acts as a camera that is H d / f beside where it is.
+void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, const LampMap& lamps,
+                       const Calibration& levelled) {
+  const auto& center = levelled.rotation_center;
+  if (!center || !center->lever_arm_m) return;
+  const Eigen::Vector2d& arm_m = *center->lever_arm_m;
+  const double height_m = mean_height_m(places, lamps, levelled);
+  if (!(height_m > 0)) return;
   const Eigen::Vector2d focal_px(levelled.camera.intrinsics[0], levelled.camera.intrinsics[1]);
   const Eigen::Vector2d beside_m =
-      height_m / fixes * result.fit.dispersion.offset_px.cwiseQuotient(focal_px);
+      height_m * result.fit.dispersion.offset_px.cwiseQuotient(focal_px);
   constexpr double alike = 0.2, least_m = 1e-3;
   if (arm_m.norm() < least_m || (beside_m + arm_m).norm() > alike * arm_m.norm()) return;
   result.warnings.push_back(fmt::format(
@@ -86,29 +93,48 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
 }
 
 /// How the offset moves with lens and zenith, where these say how well they are known.
-void pass_on(Dispersion& dispersion, std::span<const StationCapture> captures,
+void pass_on(DispersionResult& result, std::span<const StationCapture> captures,
              const LampCaptures& input, DispersionMethod method, DispersionCircle circle) {
+  Dispersion& dispersion = result.fit.dispersion;
   const auto offset_with = [&](const Calibration& moved) -> std::optional<Eigen::Vector2d> {
     const DispersionFit fit = fit_dispersion(captures, input.lamps, moved, method, circle);
     if (fit.status != DispersionStatus::ok) return {};
     return fit.dispersion.offset_px.cwiseQuotient(focal_px_of(moved.camera));
   };
+  const Eigen::Vector2d exact =
+      dispersion.offset_px.cwiseQuotient(focal_px_of(input.calibration.camera));
+  bool told = true;
   if (const auto& report = input.calibration.intrinsics_report; report && report->covariance) {
-    dispersion.by_intrinsics = jacobian_of(
-        [&](const Eigen::VectorXd& error) {
-          return offset_with(with_lens_error(input.calibration, error));
-        },
-        *report->covariance);
+    const auto by_lens = [&](const Eigen::VectorXd& error) {
+      return offset_with(with_lens_error(input.calibration, error));
+    };
+    dispersion.by_intrinsics = jacobian_of(by_lens, exact, *report->covariance);
+    told = dispersion.by_intrinsics.has_value();
   }
   if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
-    constexpr double step = 1e-5;  // of second order in it: 1e-10 is left
-    const auto by_zenith = jacobian_of(
-        [&](const Eigen::VectorXd& error) {
-          return offset_with(with_zenith_error(input.calibration, error));
-        },
-        step * step * Eigen::Matrix2d::Identity());
+    constexpr double least = 1e-5;  // of second order in it: 1e-10 is left
+    const double sd =
+        std::sqrt(center->covariance->trace()) / input.calibration.camera.intrinsics[0];
+    const double step = std::max(least, sd);
+    const auto by_error = [&](const Eigen::VectorXd& error) {
+      return offset_with(with_zenith_error(input.calibration, error));
+    };
+    const auto by_zenith = jacobian_of(by_error, exact, step * step * Eigen::Matrix2d::Identity());
     if (by_zenith) dispersion.by_zenith = *by_zenith;
+    told = told && by_zenith;
   }
+  if (told) return;
+  result.warnings.emplace_back(
+      "how the errors of lens and zenith move the offset cannot be told, and sd of fixes will lack "
+      "part of them: vlp-adjust states them");
+}
+
+/// Places of the axis are good to what the lever arm is: that goes into the offset.
+void add_lever_arm(Dispersion& dispersion, const LampCaptures& input, double height_m) {
+  const auto& covariance_m2 = input.calibration.rotation_center->lever_arm_covariance;
+  if (!covariance_m2 || !dispersion.covariance || !(height_m > 0)) return;
+  const Eigen::Vector2d px_per_m = focal_px_of(input.calibration.camera) / height_m;
+  *dispersion.covariance += px_per_m.asDiagonal() * *covariance_m2 * px_per_m.asDiagonal();
 }
 
 }  // namespace
@@ -159,7 +185,10 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   if (const auto& world_m = fit.world_offset_m) {
     result.metrics.push_back({"world_mm", millimetres * world_m->norm()});
   }
-  pass_on(result.fit.dispersion, captures, input, method, circle);
+  if (of_axis) {
+    add_lever_arm(result.fit.dispersion, input, mean_height_m(places, input.lamps, levelled));
+  }
+  pass_on(result, captures, input, method, circle);
   result.calibration = with_dispersion(input.calibration, fit.dispersion, std::move(entry));
   result.drawing = [fit] { return drawing_of(plot_of("Fixes at a known station", fit)); };
   return result;

@@ -205,9 +205,13 @@ void warn_of_region(LocateResult& result, const LocateInput& input) {
     if (!result.fixes[i].ok()) continue;
     ++fixes;
     const auto& detections = input.frames[i].detections;
+    const auto& rejected = result.rows[i].rejected;
     const auto seen =
-        std::count_if(detections.begin(), detections.end(),
-                      [&](const Detection& one) { return !lies_in(report->region_px, one.pixel); });
+        std::count_if(detections.begin(), detections.end(), [&](const Detection& one) {
+          return !lies_in(report->region_px, one.pixel) &&
+                 find_lamp(input.lamps.lamps, one.lamp) != nullptr &&
+                 std::find(rejected.begin(), rejected.end(), one.lamp) == rejected.end();
+        });
     if (seen == 0) continue;
     ++outside;
     result.details.push_back(fmt::format("{}: {} of {} lamps are where the lens is not known",

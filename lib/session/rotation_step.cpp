@@ -43,19 +43,30 @@ RotationFit fit_of(const SpotCaptures& spot, const Camera& camera, RotationMetho
   return fit_circle_centers(spot, camera).mean;
 }
 
-/// How the zenith moves with the lens, where that says how well it is known.
-std::optional<MatrixX> by_intrinsics(const LampCaptures& input, RotationMethod method) {
+/// How the zenith moves with the lens, where that says how well it is known. What was estimated
+/// stays what is.
+void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMethod method) {
   const auto& report = input.calibration.intrinsics_report;
-  if (!report || !report->covariance) return {};
+  if (!report || !report->covariance) return;
+  RotationCenter& center = result.fit.center;
   const auto zenith_with = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::Vector2d> {
     const Camera camera = with_lens_error(camera_alone(input.calibration), error).camera;
     const SpotCaptures spot = spot_captures(input.frames, input.lamps, camera);
-    if (spot.status != SpotStatus::ok) return {};
+    if (spot.status != SpotStatus::ok || spot.heights.size() != result.spot.heights.size() ||
+        spot.left_out.size() != result.spot.left_out.size()) {
+      return {};
+    }
     const RotationFit fit = fit_of(spot, camera, method);
-    if (!fit.converged) return {};
+    if (!fit.converged || fit.center.lever_arm_m.has_value() != center.lever_arm_m.has_value()) {
+      return {};
+    }
     return zenith_point(fit.center);
   };
-  return jacobian_of(zenith_with, *report->covariance);
+  center.by_intrinsics = jacobian_of(zenith_with, zenith_point(center), *report->covariance);
+  if (center.by_intrinsics) return;
+  result.warnings.emplace_back(
+      "how the lens' errors move the zenith cannot be told, and sd of fixes will lack them: "
+      "vlp-adjust states them");
 }
 
 /// A height in metres, without a sign where it rounds to zero.
@@ -149,7 +160,7 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
                 "are right");
     return result;
   }
-  result.fit.center.by_intrinsics = by_intrinsics(input, method);
+  pass_on_lens(result, input, method);
   add_metrics(result);
   add_warnings(result);
   result.calibration = with_rotation_center(input.calibration, result.fit.center, std::move(entry));

@@ -33,9 +33,6 @@ StationFixes::StationFixes(std::span<const StationCapture> captures, const LampM
                            const Calibration& calibration)
     : captures_(captures), map_(map), calibration_(calibration) {
   calibration_.dispersion.reset();
-  // What the captures have in common is not asked for.
-  calibration_.intrinsics_report.reset();
-  calibration_.adjustment.reset();
   const Positioner positioner(map_, calibration_);
   for (const StationCapture& capture : captures_) {
     const Fix fix = fix_of(positioner, capture);
