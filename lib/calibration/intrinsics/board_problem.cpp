@@ -31,7 +31,8 @@ struct LatticePoint {
 
 LatticePoint lattice_point(const BoardProblem& problem, std::size_t index) {
   const auto cols = static_cast<std::size_t>(problem.cols);
-  const Eigen::Array2d node(static_cast<double>(index % cols), static_cast<double>(index / cols));
+  const std::size_t col = index % cols, row = index / cols;
+  const Eigen::Array2d node(static_cast<double>(col), static_cast<double>(row));
   const Eigen::Array2d last(problem.cols - 1, problem.rows - 1);
   return {problem.spacing_m * node.matrix(), (1 - (2 * node / last - 1).square()).matrix()};
 }
