@@ -41,10 +41,10 @@ void RunRecord::judge(const std::vector<Cause>& why) {
 
 std::string contradiction_of(const RunRecord& record) {
   if (!record.passed()) return "";
-  const std::string changed = "the record says PASS, but ", hand = ": it was changed by hand";
-  if (!record.causes.empty()) return changed + "names a cause" + hand;
+  constexpr const char* words = "the record says PASS, but {}: it was changed by hand";
+  if (!record.causes.empty()) return fmt::format(words, "names a cause");
   for (const CheckedMetric& figure : record.figures) {
-    if (figure.limit && !figure.met()) return changed + words_of(figure) + hand;
+    if (figure.limit && !figure.met()) return fmt::format(words, words_of(figure));
   }
   return "";
 }

@@ -48,7 +48,9 @@ std::string unit_report(const RunRecord& record, const std::filesystem::path& ca
     }
   }
   for (const auto& [step, image, sha256, refused] : record.images) {
-    if (!refused.empty()) report.refused.push_back({step + "/" + image, refused});
+    if (refused.empty()) continue;
+    std::string where = step;
+    report.refused.push_back({where.append("/").append(image), refused});
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
