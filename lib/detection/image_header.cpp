@@ -77,44 +77,31 @@ Size jpeg_size(std::string_view bytes) {
   return {};
 }
 
-/// Of the first directory: tags 256 and 257, each a SHORT (3) or a LONG (4).
-Size tiff_size(std::string_view bytes) {
-  const ByteOrder order = bytes[0] == 'M' ? ByteOrder::big : ByteOrder::little;
-  const auto directory = number_at(bytes, 4, 4, order);
-  if (!directory) return {};
-  const auto start = static_cast<std::size_t>(*directory);
-  const auto entries = number_at(bytes, start, 2, order);
-  if (!entries) return {};
-  std::optional<std::int64_t> width, height;
-  constexpr std::size_t entry_bytes = 12;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(*entries); ++i) {
-    const std::size_t entry = start + 2 + i * entry_bytes;
-    const auto tag = number_at(bytes, entry, 2, order),
-               type = number_at(bytes, entry + 2, 2, order);
-    if (!tag || !type) return {};
-    const auto value = number_at(bytes, entry + 8, *type == 3 ? 2 : 4, order);
-    if (*tag == 256) width = value;
-    if (*tag == 257) height = value;
-  }
-  return pair_of(width, height);
-}
+/// How TIFF, and BigTIFF with its numbers of 8 bytes, lay out what leads to the size.
+struct TiffLayout {
+  /// Where the place of the first directory stands; bytes of a place, and of a count of entries.
+  std::size_t directory_at, place_bytes, count_bytes;
+  /// Bytes of an entry, and where in it the value stands.
+  std::size_t entry_bytes, value_at;
+};
+constexpr TiffLayout kTiff{4, 4, 2, 12, 8}, kBigTiff{8, 8, 8, 20, 12};
 
-/// BigTIFF: as TIFF, with numbers of 8 bytes.
-Size big_tiff_size(std::string_view bytes) {
+/// Of the first directory: tags 256 and 257, each a SHORT (3), a LONG (4) or as long as a place.
+Size tiff_size(std::string_view bytes, const TiffLayout& layout) {
   const ByteOrder order = bytes[0] == 'M' ? ByteOrder::big : ByteOrder::little;
-  const auto directory = number_at(bytes, 8, 8, order);
+  const auto directory = number_at(bytes, layout.directory_at, layout.place_bytes, order);
   if (!directory || *directory < 0) return {};
   const auto start = static_cast<std::size_t>(*directory);
-  const auto entries = number_at(bytes, start, 8, order);
+  const auto entries = number_at(bytes, start, layout.count_bytes, order);
   if (!entries || *entries < 0) return {};
   std::optional<std::int64_t> width, height;
-  constexpr std::size_t entry_bytes = 20;
   for (std::size_t i = 0; i < static_cast<std::size_t>(*entries); ++i) {
-    const std::size_t entry = start + 8 + i * entry_bytes;
+    const std::size_t entry = start + layout.count_bytes + i * layout.entry_bytes;
     const auto tag = number_at(bytes, entry, 2, order),
                type = number_at(bytes, entry + 2, 2, order);
     if (!tag || !type) return {};
-    const auto value = number_at(bytes, entry + 12, *type == 3 ? 2 : *type == 4 ? 4 : 8, order);
+    const std::size_t value_bytes = *type == 3 ? 2 : *type == 4 ? 4 : layout.place_bytes;
+    const auto value = number_at(bytes, entry + layout.value_at, value_bytes, order);
     if (*tag == 256) width = value;
     if (*tag == 257) height = value;
   }
@@ -148,8 +135,9 @@ Size size_in_header(std::string_view bytes) {
   if (bytes.starts_with("\x89PNG\r\n\x1a\n"sv)) return png_size(bytes);
   if (bytes.starts_with("\xff\xd8"sv)) return jpeg_size(bytes);
   if (bytes.starts_with("BM"sv)) return bmp_size(bytes);
-  if (bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv)) return tiff_size(bytes);
-  if (bytes.starts_with("II+\0"sv) || bytes.starts_with("MM\0+"sv)) return big_tiff_size(bytes);
+  if (bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv)) return tiff_size(bytes, kTiff);
+  if (bytes.starts_with("II+\0"sv) || bytes.starts_with("MM\0+"sv))
+    return tiff_size(bytes, kBigTiff);
   if (bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6') {
     return pnm_size(bytes);
   }

@@ -44,6 +44,17 @@ INSTANTIATE_TEST_SUITE_P(Formats, SizeInHeader,
                          testing::Values(".png", ".jpg", ".bmp", ".tif", ".pgm"),
                          [](const auto& ending) { return std::string(ending.param + 1); });
 
+TEST(SizeInHeaderOf, BigTiffIsThatOfItsDirectory) {
+  std::string bytes("II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0", 16);
+  bytes += std::string("\x02\0\0\0\0\0\0\0", 8);
+  bytes += std::string("\0\x01\x04\0\x01\0\0\0\0\0\0\0\x20\x4e\0\0\0\0\0\0", 20);
+  bytes += std::string("\x01\x01\x03\0\x01\0\0\0\0\0\0\0\x2c\x01\0\0\0\0\0\0", 20);
+  EXPECT_EQ(size_in_header(bytes), (Size{20000, 300}));
+  for (std::size_t length = 0; length < 58; ++length) {
+    EXPECT_FALSE(size_in_header(std::string_view(bytes).substr(0, length))) << length;
+  }
+}
+
 TEST(SizeInHeaderOf, OtherFilesIsNotKnown) {
   EXPECT_FALSE(size_in_header(""));
   EXPECT_FALSE(size_in_header("no image"));

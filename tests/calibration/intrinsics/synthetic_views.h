@@ -53,8 +53,8 @@ struct SyntheticViews {
           Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), 0)) *
           Eigen::AngleAxisd(random.uniform(-3.2, 3.2), Eigen::Vector3d::UnitZ()).toRotationMatrix();
       const double z_m = fill_m * random.uniform(0.8, farthest);
-      const Eigen::Vector3d middle(random.uniform(-0.5, 0.5) * imager_px[0],
-                                   random.uniform(-0.5, 0.5) * imager_px[1], lens.focal_px().x());
+      const double v = random.uniform(-0.5, 0.5), u = random.uniform(-0.5, 0.5);
+      const Eigen::Vector3d middle(u * imager_px[0], v * imager_px[1], lens.focal_px().x());
       const SeenBoard seen = view(rotation, middle * (z_m / middle.z()), random, noise_px);
       if (seen.tags.size() >= 8) return seen;
     }
@@ -76,7 +76,9 @@ struct SyntheticViews {
         whole = whole && pixel && (pixel->array() > 3).all() && pixel->x() < imager_px[0] - 3 &&
                 pixel->y() < imager_px[1] - 3;
         if (!whole) break;
-        tag.corners_px[k] = *pixel + noise_px * Eigen::Vector2d(random.normal(), random.normal());
+        // One after the other: compilers take arguments in orders of their own.
+        const double v = random.normal(), u = random.normal();
+        tag.corners_px[k] = *pixel + noise_px * Eigen::Vector2d(u, v);
       }
       if (whole) seen.tags.push_back(tag);
     }
