@@ -39,8 +39,9 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
   for (const double focal_px : starts) {
     IntrinsicsSolver solver(input);
     if (!solver.start(focal_px) || !solver.refine() || !solver.take_out_shifts() ||
-        !solver.finish())
+        !solver.bend() || !solver.leave_out_outliers()) {
       continue;
+    }
     if (solver.all_alike()) return failure(IntrinsicsStatus::all_alike);
     IntrinsicsSolution solution = solver.solution();
     if (2 * solution.views.size() > input.views.size()) return solution;

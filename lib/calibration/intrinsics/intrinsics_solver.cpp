@@ -52,27 +52,28 @@ bool IntrinsicsSolver::refine() {
   // Zero would be a stationary point of some of them.
   constexpr double tiny = 1e-6;
   problem_.intrinsics.resize(parameter_count(input_.lens_model), tiny);
-  const bool distortions = problem_.intrinsics.size() > 4;
   for (int round = 0; round < rounds; ++round) {
-    if (!solve({true, distortions, false, false})) return false;
+    if (!solve(solved_for_)) return false;
     if (!change_poses()) break;
     if (used_.size() < kLeastViews) return false;
     assemble(lens());
   }
   if (!take_back()) return true;
   assemble(lens());
-  return solve({true, distortions, false, false});
+  return solve(solved_for_);
 }
 
 bool IntrinsicsSolver::take_out_shifts() {
   constexpr int rounds = 2;
+  constexpr double settled_px = 0.002;
   const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   for (int round = 0; round < rounds; ++round) {
     auto views = input_.views;
     for (auto& view : views) view = input_.lattice.bent(std::move(view), problem_.warp_m);
     const auto shifts = edge_shifts(views, lens());
-    if (std::all_of(shifts.begin(), shifts.end(),
-                    [](const EdgeShift& shift) { return shift.by.isZero(0); })) {
+    if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeShift& shift) {
+          return shift.by.lpNorm<Eigen::Infinity>() < settled_px;
+        })) {
       return true;
     }
     for (std::size_t view = 0; view < input_.views.size(); ++view) {
@@ -83,35 +84,31 @@ bool IntrinsicsSolver::take_out_shifts() {
         problem_.points[(i * parts + corner.part) * count + corner.point].head<2>() = corner.pixel;
       }
     }
-    if (!solve({true, true, false, false})) return false;
+    if (!solve(solved_for_)) return false;
   }
   return true;
 }
 
-bool IntrinsicsSolver::solve_all() {
+bool IntrinsicsSolver::bend() {
   constexpr double much = 20;
-  solved_for_.warp = false;
-  if (input_.warp != WarpChoice::on && !solve(solved_for_)) return false;
   if (input_.warp == WarpChoice::off) return true;
-  const IntrinsicsSolution flat = solution();
-  const BoardProblem before = problem_;
-  solved_for_.warp = true;
-  if (!solve(solved_for_)) return false;
-  if (input_.warp == WarpChoice::on) return true;
-  const IntrinsicsSolution bent = solution();
   const auto squares = [](const IntrinsicsSolution& solution) {
     return solution.rms_px * solution.rms_px * 2 * solution.corners;
   };
-  if (squares(flat) - squares(bent) > much * bent.rms_px * bent.rms_px) return true;
-  problem_ = before;
-  solved_for_.warp = false;
-  return true;
+  const IntrinsicsSolution flat = solution();
+  solved_for_.warp = true;
+  if (!solve(solved_for_)) return false;
+  const IntrinsicsSolution bent = solution();
+  if (input_.warp == WarpChoice::automatic &&
+      squares(flat) - squares(bent) <= much * bent.rms_px * bent.rms_px) {
+    problem_ = flat.problem;
+    solved_for_.warp = false;
+    return true;
+  }
+  return take_out_shifts();  // the first shifts were those of a flat board
 }
 
-bool IntrinsicsSolver::finish() {
-  if (!solve_all()) return false;
-  // On a board that bends the first shifts were those of a flat one.
-  if (solved_for_.warp && (!take_out_shifts() || !solve(solved_for_))) return false;
+bool IntrinsicsSolver::leave_out_outliers() {
   // Without noise what is left is the regularization's, and would be taken for outliers.
   constexpr double exact_px = 0.005;
   if (solution().rms_px < exact_px) return true;

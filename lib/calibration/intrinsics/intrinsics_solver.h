@@ -20,10 +20,12 @@ class IntrinsicsSolver {
   bool start(double focal_px);
   /// Stage 3.
   bool refine();
-  /// Stage 4.
+  /// Stage 4: what edge_shifts() finds, until it finds nothing more.
   bool take_out_shifts();
-  /// Stage 5.
-  bool finish();
+  /// Stage 5: the warp of the board, if it is to be; and the shifts of a board that bends.
+  bool bend();
+  /// Stage 6.
+  bool leave_out_outliers();
 
   IntrinsicsSolution solution() const;
   /// No two boards are tilted differently, by five degrees or more.
@@ -32,8 +34,6 @@ class IntrinsicsSolver {
  private:
   Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
   bool solve(SolveFor what);
-  /// Solves with the warp where it is to be, and says so in solved_for_.
-  bool solve_all();
   /// Poses of every view through this lens; views without one wait for another lens.
   void seed(const Lens& lens);
   /// The problem of the views used, at their seeds.
@@ -49,7 +49,8 @@ class IntrinsicsSolver {
   IntrinsicsInput input_;
   /// What was taken out of the views of the input.
   std::vector<double> edge_shifts_px_;
-  SolveFor solved_for_{true, true, true, false};
+  /// The warp only after bend().
+  SolveFor solved_for_{true, true, false, false};
   PoseSeeds seeds_;
   std::vector<std::size_t> used_;
   std::vector<IntrinsicsSolution::Dropped> dropped_;
