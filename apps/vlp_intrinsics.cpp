@@ -27,6 +27,8 @@
 namespace vlp {
 namespace {
 
+constexpr const char* kChosen = "auto";
+
 struct Options {
   std::vector<std::string> images;
   std::string board, output, cache, ros, kalibr, opencv, plot;
@@ -43,7 +45,8 @@ struct Options {
 Camera known_camera(const Options& options) {
   Camera camera;
   camera.id = options.camera_id;
-  camera.lens_model = *lens_model_from_name(options.lens);
+  // One that is chosen takes its place.
+  camera.lens_model = lens_model_from_name(options.lens).value_or(LensModel::opencv8);
   camera.pixel_pitch_m = options.pixel_pitch_m;
   camera.row_time_s = options.row_time_s;
   camera.readout = options.readout;
@@ -68,10 +71,11 @@ void write_exports(const Options& options, const Camera& camera) {
   if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
 }
 
-/// Throws std::invalid_argument for a format that has no lens model like the one asked for, before
-/// anything is solved or written.
-void check_exports(const Options& options) {
-  Camera camera = known_camera(options);
+bool chooses_lens(const Options& options) { return options.lens == kChosen; }
+
+/// Throws std::invalid_argument for a format that has no lens model like the camera's, before
+/// anything is written.
+void check_exports(const Options& options, Camera camera) {
   camera.imager_px = {1, 1};
   camera.intrinsics.assign(parameter_count(camera.lens_model), 1);
   if (!options.ros.empty()) ros_camera_info(camera);
@@ -86,7 +90,7 @@ std::vector<Gate> gates_of(const Options& options) {
 
 void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = gates_of(options);
-  check_exports(options);
+  if (!chooses_lens(options)) check_exports(options, known_camera(options));
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
@@ -99,11 +103,12 @@ void run(const CLI::App& app, const Options& options) {
   const SeenBoards seen = boards_in(images, board, options);
   tell(seen);
   require(seen);
-  const LensResult lens = solve_lens(
-      {seen.views, board, options.board, known_camera(options), options.held_out, options.warp},
-      history_entry(app, inputs));
+  const LensResult lens = solve_lens({seen.views, board, options.board, known_camera(options),
+                                      options.held_out, options.warp, chooses_lens(options)},
+                                     history_entry(app, inputs));
   tell(lens);
   require(lens);
+  check_exports(options, lens.calibration.camera);
   write_calibration(options.output, lens.calibration);
   write_exports(options, lens.calibration.camera);
   if (has_mrcal(lens.calibration.camera.lens_model)) {
@@ -114,6 +119,7 @@ void run(const CLI::App& app, const Options& options) {
   }
   write_corners(beside(options.output, ".corners.vnl"), lens.solution, lens.images);
   if (!options.plot.empty()) draw(options.plot, lens.drawing());
+  if (lens.choice) fmt::print("lens model    {}\n", words_of(*lens.choice));
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
   const std::string failed = words_of_missed(check_gates(gates, lens.metrics));
   if (failed.empty()) return;
@@ -134,9 +140,13 @@ void add_options(CLI::App& app, Options& options) {
                  "(of lens models that mrcal has) and .corners.vnl go beside it")
       ->required();
   app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
-  app.add_option("--lens", options.lens, "Lens model (default: LENSMODEL_OPENCV8)")
+  app.add_option(
+         "--lens", options.lens,
+         "Lens model (default: LENSMODEL_OPENCV8); auto: the one that the views call for, by "
+         "what each leaves of views that took no part")
       ->check([](const std::string& name) {
-        return lens_model_from_name(name) ? std::string() : "the models are: " + lens_model_names();
+        const bool known = name == kChosen || lens_model_from_name(name);
+        return known ? std::string() : "the models are: auto, " + lens_model_names();
       });
   app.add_option("--row-time-s", options.row_time_s,
                  "Time from one row of the read-out to the next, which every program that finds "

@@ -137,7 +137,20 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
     result.fail(StepFailure::wrong_board, layout.problem, input.board_file);
     return result;
   }
-  const Sorted views = sorted(input, result);
+  Sorted views = sorted(input, result);
+  Camera camera = input.camera;
+  if (input.choose_lens_model) {
+    result.choice = choose_lens(views.solved);
+    if (!result.choice) {
+      result.fail(StepFailure::undetermined,
+                  fmt::format("{} views with the board do not tell the lens model: that takes six "
+                              "or more, which one of the models fits; name one with --lens",
+                              views.solved.views.size()));
+      return result;
+    }
+    camera.lens_model = result.choice->model;
+    views.solved.lens_model = views.held_out.lens_model = camera.lens_model;
+  }
   result.solution = solve_intrinsics(views.solved);
   const IntrinsicsSolution& solution = result.solution;
   if (!solution.ok()) {
@@ -162,11 +175,10 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
   result.report = report_on(solution, views.solved);
   result.coverage = coverage_of(solution, views.solved);
   result.held_out = held_out_fit(solution, views.held_out);
-  result.calibration = with_camera(camera_of(input.camera, solution.problem),
+  result.calibration = with_camera(camera_of(camera, solution.problem),
                                    report_of(result, views.solved), std::move(entry));
   result.metrics = lens_metrics(solution, result.report, result.coverage);
-  const std::string title =
-      fmt::format("{}, {}", input.camera.id, name_of(input.camera.lens_model));
+  const std::string title = fmt::format("{}, {}", camera.id, name_of(camera.lens_model));
   result.drawing = [title, solution] { return drawing_of(plot_of(title, solution)); };
   return result;
 }

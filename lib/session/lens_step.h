@@ -3,11 +3,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/lens_choice.h"
 #include "detection/boards/detect_boards.h"
 #include "evaluation/gate.h"
 #include "rig/board.h"
@@ -26,6 +28,8 @@ struct LensInput {
   /// Every so many-th view is kept out of the solve, to say how well the lens fits it; 0: none.
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
+  /// Takes the model that the views call for, choose_lens(), and not the camera's.
+  bool choose_lens_model = false;
 };
 
 struct LensResult : StepResult {
@@ -33,6 +37,8 @@ struct LensResult : StepResult {
   CalibrationReport report{};
   ViewCoverage coverage{};
   HeldOut held_out{};
+  /// When it was asked for.
+  std::optional<LensChoice> choice{};
   /// Images of the views that were solved for, in their order.
   std::vector<std::string> images;
 };

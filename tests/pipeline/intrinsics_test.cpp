@@ -136,5 +136,14 @@ TEST_F(IntrinsicsProgram, FitsAPhonesImagesAsWellAsOthers) {
   EXPECT_NEAR(found.camera.intrinsics[0], 3196.9, 25);
 }
 
+TEST_F(IntrinsicsProgram, ChoosesTheLensModel) {
+  const auto real = real_data("apriltag-lattice-phone");
+  if (real.empty()) GTEST_SKIP() << "no real captures here";
+  const auto result = calibrate(real.string(), (real / "board.yaml").string(), "--lens auto");
+  const std::string taken(name_of(read_calibration(folder / "camera.yaml").camera.lens_model));
+  EXPECT_THAT(result.output, HasSubstr("lens model    " + taken + ", 0."));
+  EXPECT_EQ(taken, "LENSMODEL_OPENCV4");  // eight views of a good lens do not show more
+}
+
 }  // namespace
 }  // namespace vlp

@@ -75,23 +75,33 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   return report;
 }
 
-HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out) {
+std::vector<double> held_out_rms_px(const IntrinsicsSolution& solution,
+                                    const IntrinsicsInput& held_out) {
   const Lens lens = solution.lens();
-  HeldOut fit;
-  double squares = 0;
   auto views = held_out.views;
   for (auto& view : views) {
     view = held_out.lattice.bent(std::move(view), solution.problem.warp_m);
   }
   const auto shifts = edge_shifts(views, lens);
+  std::vector<double> rms_px;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    auto& corners = views[i];
-    take_out_shift(corners, shifts[i]);
-    const auto pose = view_pose(corners, lens);
-    if (!pose) continue;
+    take_out_shift(views[i], shifts[i]);
+    const auto pose = view_pose(views[i], lens);
+    rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
+  }
+  return rms_px;
+}
+
+HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out) {
+  HeldOut fit;
+  double squares = 0;
+  const auto rms_px = held_out_rms_px(solution, held_out);
+  for (std::size_t i = 0; i < rms_px.size(); ++i) {
+    if (!std::isfinite(rms_px[i])) continue;
+    const std::size_t corners = held_out.views[i].size();
     ++fit.views;
-    fit.corners += static_cast<int>(corners.size());
-    squares += pose->rms_px * pose->rms_px * 2 * static_cast<double>(corners.size());
+    fit.corners += static_cast<int>(corners);
+    squares += rms_px[i] * rms_px[i] * 2 * static_cast<double>(corners);
   }
   if (fit.corners > 0) fit.rms_px = std::sqrt(squares / (2 * fit.corners));
   return fit;

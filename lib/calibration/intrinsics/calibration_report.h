@@ -37,8 +37,12 @@ struct CalibrationReport {
 /// Precondition: solution.ok(). Two more solves.
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
 
-/// What views that took no part in a solution say of its lens: their poses are fitted, nothing
-/// else.
+/// What a solution leaves of each of some views that took no part in it, rms per axis: their poses
+/// and the shifts of their edges are fitted, nothing else. Infinite of a view without a pose.
+std::vector<double> held_out_rms_px(const IntrinsicsSolution& solution,
+                                    const IntrinsicsInput& held_out);
+
+/// The same of all of them together.
 struct HeldOut {
   int views = 0, corners = 0;
   /// Per axis.

@@ -1,0 +1,123 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/lens_choice.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "calibration/intrinsics/calibration_report.h"
+#include "geometry/median.h"
+
+namespace vlp {
+namespace {
+
+using Squares = std::vector<double>;
+
+/// By their number of parameters.
+constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
+                             LensModel::opencv8, LensModel::opencv12};
+
+/// The mean squared residual per axis of each view, from solves without it; nothing when a solve
+/// fails or a view has no pose.
+std::optional<Squares> judged(const IntrinsicsInput& input) {
+  constexpr std::size_t parts = 3;
+  Squares squares;
+  for (std::size_t part = 0; part < parts; ++part) {
+    IntrinsicsInput solved = input, held_out = input;
+    solved.views.clear();
+    held_out.views.clear();
+    for (std::size_t view = 0; view < input.views.size(); ++view) {
+      (view % parts == part ? held_out : solved).views.push_back(input.views[view]);
+    }
+    const IntrinsicsSolution solution = solve_intrinsics(solved);
+    if (!solution.ok()) return {};
+    for (const double rms_px : held_out_rms_px(solution, held_out)) {
+      if (!std::isfinite(rms_px)) return {};
+      squares.push_back(rms_px * rms_px);
+    }
+  }
+  return squares;
+}
+
+double mean_of(const Squares& squares) {
+  return std::accumulate(squares.begin(), squares.end(), 0.0) / static_cast<double>(squares.size());
+}
+
+/// Whether `a` is above `b` in the mean by no more than two standard errors of the difference.
+bool as_good(const Squares& a, const Squares& b) {
+  constexpr double errors = 2;
+  const auto n = static_cast<double>(a.size());
+  const double mean = mean_of(a) - mean_of(b);
+  double spread = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) spread += std::pow(a[i] - b[i] - mean, 2);
+  return mean <= errors * std::sqrt(spread / (n - 1) / n);
+}
+
+/// Takes the views from all models that even the model with the smallest median fits badly: what is
+/// wrong with them is not the lens.
+void leave_out_bad_views(std::vector<std::optional<Squares>>& of_models) {
+  constexpr double much = 9;
+  Squares best;
+  for (const auto& squares : of_models) {
+    if (squares && (best.empty() || upper_median(*squares) < upper_median(best))) best = *squares;
+  }
+  if (best.empty()) return;
+  const double limit = much * upper_median(best);
+  for (auto& squares : of_models) {
+    if (!squares) continue;
+    Squares kept;
+    for (std::size_t view = 0; view < best.size(); ++view) {
+      if (best[view] <= limit) kept.push_back((*squares)[view]);
+    }
+    squares = kept;
+  }
+}
+
+}  // namespace
+
+std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
+  constexpr std::size_t least_views = 6;
+  if (input.views.size() < least_views) return {};
+  std::vector<std::optional<Squares>> squares;
+  for (const LensModel model : kModels) {
+    IntrinsicsInput with_model = input;
+    with_model.lens_model = model;
+    squares.push_back(judged(with_model));
+  }
+  leave_out_bad_views(squares);
+  LensChoice choice{};
+  const Squares* best = nullptr;
+  for (std::size_t i = 0; i < kModels.size(); ++i) {
+    choice.tried.push_back({kModels[i]});
+    if (!squares[i]) continue;
+    choice.tried.back().rms_px = std::sqrt(mean_of(*squares[i]));
+    if (best == nullptr || mean_of(*squares[i]) < mean_of(*best)) best = &*squares[i];
+  }
+  if (best == nullptr) return {};
+  for (std::size_t i = 0; i < kModels.size(); ++i) {
+    if (!squares[i] || !as_good(*squares[i], *best)) continue;
+    choice.model = kModels[i];
+    break;
+  }
+  return choice;
+}
+
+std::string words_of(const LensChoice& choice) {
+  std::string taken, others;
+  for (const auto& [model, rms_px] : choice.tried) {
+    const std::string left =
+        std::isfinite(rms_px) ? fmt::format("{:.3f} px", rms_px) : std::string("no lens");
+    if (model == choice.model) {
+      taken = fmt::format("{}, {}", name_of(model), left);
+    } else {
+      others += fmt::format("{}{} {}", others.empty() ? "" : ", ", name_of(model), left);
+    }
+  }
+  return fmt::format("{} rms in views left out; {}", taken, others);
+}
+
+}  // namespace vlp

@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/intrinsics/intrinsics.h"
+
+namespace vlp {
+
+/// What one lens model leaves of views that took no part in its solves.
+struct TriedLens {
+  LensModel model;
+  /// Per axis, over the views that count; infinite when no lens of the model fits all of them.
+  double rms_px = std::numeric_limits<double>::infinity();
+};
+
+/// A lens model for a camera, and what it was chosen by.
+struct LensChoice {
+  LensModel model;
+  /// The models tried, those with fewer parameters first.
+  std::vector<TriedLens> tried;
+};
+
+/// The lens model that the views call for, by cross-validation: the views go into three parts in
+/// turn, every model with distortion is solved for with two of them (solve_intrinsics()) and judged
+/// by the third, where only poses are fitted (held_out_rms_px()), until each view has been judged
+/// once. Taken is the model with the fewest parameters whose mean squared residual is no more than
+/// two standard errors above that of the best, the standard error being that of the mean difference
+/// of the two, view by view: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
+/// Classification and Regression Trees, 1984, 3.4.3, which with one error would take a model larger
+/// than the lens in one of six cases. Views that even the best model leaves three times the usual
+/// residual of do not count. input.lens_model is not looked at. Nothing when no model fits all
+/// views, or there are fewer than six of them.
+std::optional<LensChoice> choose_lens(const IntrinsicsInput& input);
+
+/// In words: the models with what they left, the one taken first.
+std::string words_of(const LensChoice& choice);
+
+}  // namespace vlp

@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Which lens model views of a board call for, by cross-validation.
+#include "calibration/intrinsics/lens_choice.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/synthetic_views.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kNoise_px = 0.05;
+
+IntrinsicsInput seen_through(const Lens& lens, int count) {
+  const SyntheticViews views{synthetic_board(false), lens};
+  Random random(41);
+  return views.input(count, random, kNoise_px);
+}
+
+Lens radial_lens() {
+  return {LensModel::opencv4, std::array{520.0, 521.0, 402.0, 297.0, -0.25, 0.08, 0.0002, -0.0001}};
+}
+
+/// With a denominator that no polynomial of OPENCV5 stands in for.
+Lens rational_lens() {
+  return {LensModel::opencv8, std::array{420.0, 421.0, 402.0, 297.0, 0.9, 0.25, 0.0002, -0.0001,
+                                         0.01, 1.25, 0.5, 0.06}};
+}
+
+Lens fisheye_lens() {
+  return {LensModel::fisheye, std::array{290.0, 291.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006}};
+}
+
+double rms_of(const LensChoice& choice, LensModel model) {
+  return std::find_if(choice.tried.begin(), choice.tried.end(),
+                      [model](const TriedLens& tried) { return tried.model == model; })
+      ->rms_px;
+}
+
+void expect_chosen(const Lens& lens) {
+  constexpr int count = 30;
+  const auto choice = choose_lens(seen_through(lens, count));
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(name_of(choice->model), name_of(lens.model())) << words_of(*choice);
+  // Noise, and what the poses take of it.
+  EXPECT_NEAR(rms_of(*choice, choice->model), kNoise_px, 0.1 * kNoise_px);
+  EXPECT_EQ(choice->tried.size(), 5U);
+  EXPECT_TRUE(words_of(*choice).starts_with(name_of(lens.model()))) << words_of(*choice);
+}
+
+TEST(ChooseLens, TakesARadialLens) { expect_chosen(radial_lens()); }
+
+TEST(ChooseLens, TakesARationalLens) { expect_chosen(rational_lens()); }
+
+TEST(ChooseLens, TakesAFisheye) { expect_chosen(fisheye_lens()); }
+
+TEST(ChooseLens, IsNotMovedByABadView) {
+  constexpr int count = 24;
+  IntrinsicsInput input = seen_through(rational_lens(), count);
+  for (auto& corner : input.views[5]) {
+    corner.pixel += Eigen::Vector2d(corner.point % 2 == 0 ? 2 : -2, 0);
+  }
+  const auto choice = choose_lens(input);
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(name_of(choice->model), name_of(LensModel::opencv8)) << words_of(*choice);
+  EXPECT_NEAR(rms_of(*choice, choice->model), kNoise_px, 0.2 * kNoise_px);
+}
+
+TEST(ChooseLens, NeedsSixViews) {
+  EXPECT_FALSE(choose_lens(seen_through(radial_lens(), 5)));
+  EXPECT_TRUE(choose_lens(seen_through(radial_lens(), 12)));
+}
+
+TEST(ChooseLens, SaysWhichModelsCannotBe) {
+  const LensChoice choice{LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}};
+  EXPECT_EQ(words_of(choice),
+            "OPENCV_FISHEYE, 0.051 px rms in views left out; LENSMODEL_OPENCV4 no lens");
+}
+
+}  // namespace
+}  // namespace vlp
