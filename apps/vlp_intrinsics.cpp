@@ -134,7 +134,9 @@ void run(const CLI::App& app, const Options& options) {
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("images", options.images, "Images of the board, or folders of them")->required();
-  app.add_option("--board", options.board, "The board, board.yaml")->required();
+  app.add_option("--board", options.board,
+                 "The board, board.yaml, or Kalibr's description of an aprilgrid")
+      ->required();
   app.add_option("-o,--output", options.output,
                  "Where to write the calibration with its camera part; mrcal's .cameramodel "
                  "(of lens models that mrcal has) and .corners.vnl go beside it")

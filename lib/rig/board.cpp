@@ -19,6 +19,9 @@ constexpr std::array kFamilies{"tag36h11",         "tag25h9",         "tag16h5",
 // In the order of BoardCorner.
 constexpr std::array kCorners{"bottom-left", "bottom-right", "top-left", "top-right"};
 
+constexpr int kMostTags = 1000;
+constexpr double kLeastTag_m = 1e-4, kLargestTag_m = 2;
+
 IdOrder read_id_order(const YamlValue& value) {
   std::string names;
   for (const bool column_major : {false, true}) {
@@ -39,6 +42,22 @@ std::string read_family(const YamlValue& value) {
   throw value.unknown("the families are: " + names);
 }
 
+/// Kalibr's target of kind aprilgrid, as its documentation describes it: tag36h11 with a border of
+/// two bits and squares at the corners, ids from 0 along the rows, from the bottom left.
+Board read_kalibr_target(YamlMap& map) {
+  const YamlValue kind = map.required("target_type");
+  if (kind.text() != "aprilgrid") {
+    throw kind.error(
+        "is a target of Kalibr's without AprilTags; the lens is found from an aprilgrid");
+  }
+  Board board{"tag36h11", 0, 0, 0, 0, 2, true, 0, {false, BoardCorner::bottom_left}};
+  board.cols = map.required("tagCols").integer_within(1, kMostTags);
+  board.rows = map.required("tagRows").integer_within(1, kMostTags);
+  board.tag_size_m = map.required("tagSize").number_within(kLeastTag_m, kLargestTag_m, "m");
+  board.tag_spacing = map.required("tagSpacing").number_within(0.01, 10, "(gap / tag)");
+  return board;
+}
+
 }  // namespace
 
 std::string name_of(const IdOrder& order) {
@@ -47,12 +66,12 @@ std::string name_of(const IdOrder& order) {
 }
 
 Board read_board(YamlMap& map) {
-  constexpr int most_tags = 1000, largest_id = 1'000'000;  // families have fewer
+  constexpr int largest_id = 1'000'000;  // families have fewer
   Board board;
   board.family = read_family(map.required("family"));
-  board.cols = map.required("cols").integer_within(1, most_tags);
-  board.rows = map.required("rows").integer_within(1, most_tags);
-  board.tag_size_m = map.required("tag_size_m").number_within(1e-4, 2, "m");
+  board.cols = map.required("cols").integer_within(1, kMostTags);
+  board.rows = map.required("rows").integer_within(1, kMostTags);
+  board.tag_size_m = map.required("tag_size_m").number_within(kLeastTag_m, kLargestTag_m, "m");
   board.tag_spacing = map.required("tag_spacing").number_within(0.01, 10, "(gap / tag)");
   board.border_bits = map.required("border_bits").integer_within(1, 2);
   board.corner_squares = map.required("corner_squares").boolean();
@@ -62,8 +81,10 @@ Board read_board(YamlMap& map) {
 }
 
 Board read_board(const std::filesystem::path& file) {
-  YamlMap document = read_yaml(file, kBoardFormat);
-  Board board = read_board(document);
+  YamlMap document = read_yaml(file);
+  const bool kalibr = document.has("target_type");
+  if (!kalibr) require_format(document, kBoardFormat);
+  Board board = kalibr ? read_kalibr_target(document) : read_board(document);
   document.finish();
   return board;
 }

@@ -39,7 +39,9 @@ struct Board {
   IdOrder id_order;
 };
 
-/// Reads `vlp-board/1`; every field above is a key of the same name. Throws InputError.
+/// Reads `vlp-board/1`, of which every field above is a key of the same name, or the YAML file that
+/// Kalibr describes its AprilGrid by (target_type, tagCols, tagRows, tagSize in m, tagSpacing).
+/// Throws InputError.
 Board read_board(const std::filesystem::path& file);
 
 /// Writes what read_board() reads, whole or not at all. Throws InputError.

@@ -104,6 +104,11 @@ std::optional<YamlValue> YamlMap::optional(const std::string& key) {
   return std::nullopt;
 }
 
+bool YamlMap::has(const std::string& key) const {
+  return std::any_of(entries_.begin(), entries_.end(),
+                     [&](const Entry& entry) { return entry.key == key; });
+}
+
 YamlValue YamlMap::required(const std::string& key) {
   if (auto value = optional(key)) return *value;
   std::string names;
@@ -127,21 +132,27 @@ InputError YamlMap::error(std::size_t line, const std::string& problem) const {
   return {*file_, line, prefix_, problem};
 }
 
-YamlMap read_yaml(const std::filesystem::path& file, const std::string& format) {
+YamlMap read_yaml(const std::filesystem::path& file) {
   constexpr std::size_t max_bytes = 1 << 20;  // yaml-cpp needs 500 times as much memory
   const YAML::Node node = parse(file, read_text_file(file, max_bytes));
-  const YamlValue document(node, &file, "", line_of(node.Mark()));
-  YamlMap map = document.map();
+  return YamlValue(node, &file, "", line_of(node.Mark())).map();
+}
+
+YamlMap read_yaml(const std::filesystem::path& file, const std::string& format) {
+  YamlMap map = read_yaml(file);
+  require_format(map, format);
+  return map;
+}
+
+void require_format(YamlMap& map, const std::string& format) {
   const auto found = map.optional("format");
   if (!found) {
-    throw document.error("key 'format' is missing: the file should begin with 'format: " + format +
-                         "'");
+    throw map.error("key 'format' is missing: the file should begin with 'format: " + format + "'");
   }
   if (found->text() != format) {
     throw found->error("should be '" + format + "', not " + in_quotes(found->text()) +
                        ": is it the right file?");
   }
-  return map;
 }
 
 }  // namespace vlp

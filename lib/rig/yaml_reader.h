@@ -53,6 +53,7 @@ class YamlMap {
  public:
   YamlMap(const YAML::Node& node, const std::filesystem::path* file, std::string key);
 
+  bool has(const std::string& key) const;
   YamlValue required(const std::string& key);
   std::optional<YamlValue> optional(const std::string& key);
   /// Throws InputError for the first key that nobody asked for.
@@ -76,10 +77,13 @@ class YamlMap {
   std::vector<std::string> known_;
 };
 
-/// A YAML file whose first key is `format: NAME/VERSION`. Throws InputError when it cannot be read
-/// or parsed, is longer than 1 MiB, is not UTF-8, holds aliases or a second document, is nested
-/// more than 20 levels deep, or is of another format.
+/// A YAML file that is a mapping. Throws InputError when it cannot be read or parsed, is longer
+/// than 1 MiB, is not UTF-8, holds aliases or a second document, or is nested more than 20 levels
+/// deep.
+YamlMap read_yaml(const std::filesystem::path& file);
+/// One whose first key is `format: NAME/VERSION`; throws InputError for other formats, too.
 YamlMap read_yaml(const std::filesystem::path& file, const std::string& format);
+void require_format(YamlMap& map, const std::string& format);
 
 }  // namespace vlp
 #pragma GCC visibility pop

@@ -49,6 +49,30 @@ TEST(Board, KeepsEachOfTheEightIdOrders) {
   }
 }
 
+constexpr const char* kKalibrTarget =
+    "target_type: 'aprilgrid' #gridtype\n"
+    "tagCols: 5               #number of apriltags\n"
+    "tagRows: 4               #number of apriltags\n"
+    "tagSize: 0.02            #size of apriltag, edge to edge [m]\n"
+    "tagSpacing: 0.2          #ratio of space between tags to tagSize\n";
+
+TEST(Board, IsReadFromKalibrsDescriptionOfItsTarget) {
+  const TemporaryFolder folder;
+  const Board board{"tag36h11", 5, 4, 0.02, 0.2, 2, true, 0, {false, BoardCorner::bottom_left}};
+  expect_same(read_board(folder.file("target.yaml", kKalibrTarget)), board);
+}
+
+TEST(Board, RefusesKalibrsOtherTargetsAndKeys) {
+  const TemporaryFolder folder;
+  const auto refusal_of = [&](const std::string& from, const std::string& to) {
+    return refusal(read_board, folder.file("target.yaml", changed(kKalibrTarget, from, to)));
+  };
+  EXPECT_THAT(refusal_of("aprilgrid", "checkerboard"), HasSubstr("without AprilTags"));
+  EXPECT_THAT(refusal_of("tagSize", "tagsize"), HasSubstr("key 'tagSize' is missing"));
+  EXPECT_THAT(refusal_of("tagCols: 5", "tagCols: 0"), HasSubstr("tagCols"));
+  EXPECT_THAT(refusal_of("#gridtype", "\nrowSpacingMeters: 1"), HasSubstr("'rowSpacingMeters'"));
+}
+
 TEST(Board, KeepsTheOtherValueOfEachSwitch) {
   Board board = sample_board();
   board.border_bits = 1;
