@@ -93,11 +93,20 @@ void check_output(const std::string& output, const std::vector<std::string>& inp
   }
 }
 
-void check_plot(const std::string& plot, const std::string& output,
-                const std::vector<std::string>& inputs) {
-  if (plot.empty()) return;
-  check_output(plot, inputs);
-  if (plot == output) throw std::invalid_argument("--output and --plot name one file");
+bool same_file(const std::string& one, const std::string& other) {
+  const auto of = [](const std::string& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
+  };
+  return !one.empty() && !other.empty() && of(one) == of(other);
+}
+
+void check_further_output(const std::string& option, const std::string& file,
+                          const std::string& output, const std::vector<std::string>& inputs) {
+  if (file.empty()) return;
+  check_output(file, inputs);
+  if (same_file(file, output)) {
+    throw std::invalid_argument("--output and " + option + " name one file");
+  }
 }
 
 int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run) {

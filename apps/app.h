@@ -39,9 +39,13 @@ CLI::Validator finite_not_negative();
 /// Throws std::invalid_argument when `output` is one of the files that are read.
 void check_output(const std::string& output, const std::vector<std::string>& inputs);
 
-/// The same of a picture, which may be none, and must not be the output.
-void check_plot(const std::string& plot, const std::string& output,
-                const std::vector<std::string>& inputs);
+/// Whether two outputs, which need not exist, are one file; an empty name is none.
+bool same_file(const std::string& one, const std::string& other);
+
+/// check_output() of a further output, that of `option`, which may be none: it must not be the
+/// file of --output either.
+void check_further_output(const std::string& option, const std::string& file,
+                          const std::string& output, const std::vector<std::string>& inputs);
 
 /// The common shell of a program: adds --quiet, --verbose and --version to `app`, makes its --help
 /// fit 80 columns, parses, and calls `run`. Messages go through spdlog to stderr. Bad usage and bad

@@ -48,10 +48,7 @@ void rotate_by_lamps(const CLI::App& app, const CaptureOptions& images,
                      const std::string& refined_map) {
   const std::vector<std::string> inputs = inputs_of(images);
   check_output(images.output, inputs);
-  if (!refined_map.empty()) check_output(refined_map, inputs);
-  if (refined_map == images.output) {
-    throw std::invalid_argument("--output and --refine-map name one file");
-  }
+  check_further_output("--refine-map", refined_map, images.output, inputs);
   const LampCaptures input = read_captures_of(images);
   const auto& [frames, lamps, lamps_file, calibration] = input;
   check_lamps(frames, lamps, lamps_file);

@@ -24,7 +24,7 @@ void rotate_on_spot(const CLI::App& app, const CaptureOptions& images, const std
                     const std::string& plot) {
   const std::vector<std::string> inputs = inputs_of(images);
   check_output(images.output, inputs);
-  check_plot(plot, images.output, inputs);
+  check_further_output("--plot", plot, images.output, inputs);
   const LampCaptures input = read_captures_of(images);
   const RotationResult found =
       solve_rotation(input, kMethods.at(method), history_entry(app, inputs));

@@ -125,10 +125,7 @@ void run(const CLI::App& app, const Options& options) {
     }
   }
   check_output(images.output, inputs);
-  if (!options.refined_map.empty()) check_output(options.refined_map, inputs);
-  if (options.refined_map == images.output) {
-    throw std::invalid_argument("--output and --refine-map name one file");
-  }
+  check_further_output("--refine-map", options.refined_map, images.output, inputs);
   AdjustStepInput input;
   input.lamps = read_lamp_map(images.lamps);
   input.lamps_file = images.lamps;

@@ -21,13 +21,7 @@ namespace {
 void run(const CaptureOptions& options) {
   const std::vector<std::string> inputs{options.lamps, options.calibration, options.classifier};
   check_output(options.output, inputs);
-  if (!options.lights.empty()) {
-    check_output(options.lights, inputs);
-    namespace fs = std::filesystem;
-    if (fs::weakly_canonical(options.lights) == fs::weakly_canonical(options.output)) {
-      throw std::invalid_argument("--output and --lights name one file");
-    }
-  }
+  check_further_output("--lights", options.lights, options.output, inputs);
   std::optional<Calibration> calibration;
   if (!options.calibration.empty()) {
     calibration = read_calibration(options.calibration);

@@ -112,7 +112,7 @@ void run(const CLI::App& app, const Options& options) {
     if (options.captures.empty() && std::filesystem::exists(beside)) inputs.push_back(beside);
   }
   check_output(options.images.output, inputs);
-  check_plot(options.plot, options.images.output, inputs);
+  check_further_output("--plot", options.plot, options.images.output, inputs);
   const LampCaptures input = read_captures_of(options.images);
   check_lamps(input.frames, input.lamps, input.lamps_file);
   const KnownPlaces places = places_of(options, input.frames, captures_of(options));

@@ -58,14 +58,6 @@ void check_line(const std::string& option, const std::array<double, 4>& line_m) 
   }
 }
 
-/// Outputs, which need not exist; empty: none.
-bool same_file(const std::string& one, const std::string& other) {
-  const auto of = [](const std::string& file) {
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
-  };
-  return !one.empty() && !other.empty() && of(one) == of(other);
-}
-
 std::vector<MetricKind> known_metrics() {
   return metric_kinds({MetricSource::evaluation, MetricSource::reference});
 }

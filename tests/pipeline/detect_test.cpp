@@ -115,6 +115,7 @@ TEST_F(Detect, RefusesToWriteLightsOverOtherFiles) {
     EXPECT_FALSE(fs::exists(folder / "found.csv"));
   };
   refused(folder / "found.csv", "--output and --lights name one file");
+  refused(folder / "." / "found.csv", "--output and --lights name one file");
   refused(kRig + "/lamps.yaml", "lamps.yaml: is an input, too");
   refused(kRig + "/sample/0000.png", "0000.png: is an input, too");
   refused(folder / "none" / "lights.csv", "lights.csv");

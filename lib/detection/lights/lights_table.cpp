@@ -124,16 +124,20 @@ std::string explanation_of(LightReason reason) {
       return "its parts vary each in its way, as letters and patterns do, and no stripes: if it is "
              "a lamp, is the read-out right?";
     case LightReason::irregular:
-      return "its stripes keep no time, as when something hides a part";
+      return "its stripes keep no time: if it is a lamp, see that nothing hides a part";
     case LightReason::like_no_lamp:
       return "its period is like no lamp's, or like two lamps': are frequencies, row time and "
-             "read-out right?";
+             "read-out right, and the classifier, if there is one, of these lamps?";
     case LightReason::soft:
-      return "it is much softer than others, as reflections are";
+      return "it is much softer than others, as reflections are: if it is a lamp, bring it into "
+             "focus";
     case LightReason::not_round:
-      return "most of its edge is not on its outline, as when something hides a part";
+      return "most of its edge is not on its outline: if it is a lamp, see that nothing hides a "
+             "part";
     case LightReason::seen_better:
-      return "another light of the image is that lamp and has the surer centre";
+      return "another light of the image is that lamp and has the surer centre: if both are lamps, "
+             "give "
+             "each a frequency of its own";
     case LightReason::alone:
       return fmt::format(
           "it shows less than {} periods, and no lamp with more is in the image: go nearer, or "
