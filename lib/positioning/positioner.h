@@ -34,7 +34,9 @@ struct PositionerOptions {
   /// undistorted image, f * (x/z, y/z) + c of the level camera. Stated noise is of the image as
   /// taken, and weighs a lamp by how the lens squeezes the image there; where nothing is known
   /// of it, lamps weigh alike in direction, as in the closed forms. Poses do not depend on this
-  /// figure; their covariance does, and whether lamps close together are `degenerate`.
+  /// figure, unless something is known of motion or lean with a standard deviation, against which
+  /// it weighs the pixels; their covariance does, and whether lamps close together are
+  /// `degenerate`.
   double unstated_sigma_px = 1;
 };
 
