@@ -95,10 +95,13 @@ void run(const CLI::App& app, const Options& options) {
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
   for (const std::string& output : {options.output, beside(options.output, ".cameramodel"),
-                                    beside(options.output, ".corners.vnl"), options.ros,
-                                    options.kalibr, options.opencv, options.plot}) {
+                                    beside(options.output, ".corners.vnl")}) {
     check_output(output, inputs);
   }
+  check_further_output("--ros", options.ros, options.output, inputs);
+  check_further_output("--kalibr", options.kalibr, options.output, inputs);
+  check_further_output("--opencv", options.opencv, options.output, inputs);
+  check_further_output("--plot", options.plot, options.output, inputs);
   const Board board = read_board(options.board);
   const SeenBoards seen = boards_in(images, board, options);
   tell(seen);
@@ -108,9 +111,7 @@ void run(const CLI::App& app, const Options& options) {
                                      history_entry(app, inputs));
   tell(lens);
   require(lens);
-  check_exports(options, lens.calibration.camera);
   write_calibration(options.output, lens.calibration);
-  write_exports(options, lens.calibration.camera);
   if (has_mrcal(lens.calibration.camera.lens_model)) {
     write_cameramodel(beside(options.output, ".cameramodel"), lens.solution);
   } else {
@@ -118,6 +119,7 @@ void run(const CLI::App& app, const Options& options) {
     std::filesystem::remove(beside(options.output, ".cameramodel"));
   }
   write_corners(beside(options.output, ".corners.vnl"), lens.solution, lens.images);
+  write_exports(options, lens.calibration.camera);
   if (!options.plot.empty()) draw(options.plot, lens.drawing());
   if (lens.choice) fmt::print("lens model    {}\n", words_of(*lens.choice));
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);

@@ -141,14 +141,15 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
   Camera camera = input.camera;
   if (input.choose_lens_model) {
     result.choice = choose_lens(views.solved);
-    if (!result.choice) {
+    if (views.solved.views.size() < kLeastViewsToChoose) {
       result.fail(StepFailure::undetermined,
-                  fmt::format("{} views with the board do not tell the lens model: that takes six "
-                              "or more, which one of the models fits; name one with --lens",
-                              views.solved.views.size()));
+                  fmt::format("{} views with the board do not tell the lens model, which takes {}; "
+                              "add views, or name the model with --lens",
+                              views.solved.views.size(), kLeastViewsToChoose));
       return result;
     }
-    camera.lens_model = result.choice->model;
+    // When none fits, the camera's says why.
+    if (result.choice) camera.lens_model = result.choice->model;
     views.solved.lens_model = views.held_out.lens_model = camera.lens_model;
   }
   result.solution = solve_intrinsics(views.solved);

@@ -67,7 +67,7 @@ struct IntrinsicsSolution {
 ///  2. STEREOGRAPHIC with every pose, and the poses again with that lens, until they stay;
 ///  3. the model wanted, regularized as mrcal does it, and the poses again; views that fit no pose
 ///     are dropped;
-///  4. the shift of the tags' edges taken out (edge_shifts()), and the model again, until it stays;
+///  4. the shift of the tags' edges taken out (edge_shifts()), and the model again, at most twice;
 ///  5. the board's warp (WarpChoice), and then the shifts of a board that bends;
 ///  6. all of it without outliers.
 /// Planar flips cannot live: both poses of every view are tried with each lens (view_pose()).

@@ -52,14 +52,19 @@ bool IntrinsicsSolver::refine() {
   // Zero would be a stationary point of some of them.
   constexpr double tiny = 1e-6;
   problem_.intrinsics.resize(parameter_count(input_.lens_model), tiny);
+  bool settled = false;
   for (int round = 0; round < rounds; ++round) {
     if (!solve(solved_for_)) return false;
-    if (!change_poses()) break;
+    settled = !change_poses();
+    if (settled) break;
     if (used_.size() < kLeastViews) return false;
     assemble(lens());
   }
-  if (!take_back()) return true;
-  assemble(lens());
+  if (take_back()) {
+    assemble(lens());
+  } else if (settled) {
+    return true;
+  }
   return solve(solved_for_);
 }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "calibration/intrinsics/calibration_report.h"
@@ -21,8 +22,8 @@ using Squares = std::vector<double>;
 constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
                              LensModel::opencv8, LensModel::opencv12};
 
-/// The mean squared residual per axis of each view, from solves without it; nothing when a solve
-/// fails or a view has no pose.
+/// The mean squared residual per axis of each view, from solves without it, infinite where it has
+/// no pose; nothing when a solve fails.
 std::optional<Squares> judged(const IntrinsicsInput& input) {
   constexpr std::size_t parts = 3;
   Squares squares;
@@ -36,7 +37,6 @@ std::optional<Squares> judged(const IntrinsicsInput& input) {
     const IntrinsicsSolution solution = solve_intrinsics(solved);
     if (!solution.ok()) return {};
     for (const double rms_px : held_out_rms_px(solution, held_out)) {
-      if (!std::isfinite(rms_px)) return {};
       squares.push_back(rms_px * rms_px);
     }
   }
@@ -57,31 +57,39 @@ bool as_good(const Squares& a, const Squares& b) {
   return mean <= errors * std::sqrt(spread / (n - 1) / n);
 }
 
-/// Takes the views from all models that even the model with the smallest median fits badly: what is
-/// wrong with them is not the lens.
+/// Takes the views from all models that none of them fits: what is wrong with those is not the
+/// lens.
 void leave_out_bad_views(std::vector<std::optional<Squares>>& of_models) {
   constexpr double much = 9;
-  Squares best;
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  double usual = inf;
+  Squares least;
   for (const auto& squares : of_models) {
-    if (squares && (best.empty() || upper_median(*squares) < upper_median(best))) best = *squares;
+    if (!squares) continue;
+    usual = std::min(usual, upper_median(*squares));
+    least.resize(squares->size(), inf);
+    for (std::size_t view = 0; view < least.size(); ++view) {
+      least[view] = std::min(least[view], (*squares)[view]);
+    }
   }
-  if (best.empty()) return;
-  const double limit = much * upper_median(best);
   for (auto& squares : of_models) {
     if (!squares) continue;
     Squares kept;
-    for (std::size_t view = 0; view < best.size(); ++view) {
-      if (best[view] <= limit) kept.push_back((*squares)[view]);
+    for (std::size_t view = 0; view < least.size(); ++view) {
+      if (least[view] <= much * usual && std::isfinite(least[view])) {
+        kept.push_back((*squares)[view]);
+      }
     }
-    squares = kept;
+    const bool fits =
+        std::all_of(kept.begin(), kept.end(), [](double square) { return std::isfinite(square); });
+    squares = fits && kept.size() > 1 ? std::optional(kept) : std::nullopt;
   }
 }
 
 }  // namespace
 
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
-  constexpr std::size_t least_views = 6;
-  if (input.views.size() < least_views) return {};
+  if (input.views.size() < kLeastViewsToChoose) return {};
   std::vector<std::optional<Squares>> squares;
   for (const LensModel model : kModels) {
     IntrinsicsInput with_model = input;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>
@@ -14,14 +15,16 @@ namespace vlp {
 /// What one lens model leaves of views that took no part in its solves.
 struct TriedLens {
   LensModel model;
-  /// Per axis, over the views that count; infinite when no lens of the model fits all of them.
+  /// Per axis, over the views that count; infinite when no lens of the model fits all of those.
   double rms_px = std::numeric_limits<double>::infinity();
 };
+
+constexpr std::size_t kLeastViewsToChoose = 6;
 
 /// A lens model for a camera, and what it was chosen by.
 struct LensChoice {
   LensModel model;
-  /// The models tried, those with fewer parameters first.
+  /// The models tried, those with fewer parameters first, OPENCV4 before the fisheye.
   std::vector<TriedLens> tried;
 };
 
@@ -32,9 +35,9 @@ struct LensChoice {
 /// two standard errors above that of the best, the standard error being that of the mean difference
 /// of the two, view by view: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
 /// Classification and Regression Trees, 1984, 3.4.3, which with one error would take a model larger
-/// than the lens in one of six cases. Views that even the best model leaves three times the usual
-/// residual of do not count. input.lens_model is not looked at. Nothing when no model fits all
-/// views, or there are fewer than six of them.
+/// than the lens in one of six cases. Views that every model leaves three times the usual
+/// residual of do not count. input.lens_model is not looked at. Nothing when no model fits the
+/// views, or there are fewer than kLeastViewsToChoose.
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input);
 
 /// In words: the models with what they left, the one taken first.
