@@ -7,7 +7,8 @@
 #include <span>
 
 #include "../geometry/frames.h"
-#include "../geometry/types.h"
+#include "fix.h"
+#include "robot.h"
 
 /// The fix of a body that drives, turns and leans while the shutter reads. The body is the robot,
 /// with the camera at `arm_in_body_m`, or the camera itself, with no arm. At the time 0, the middle
@@ -33,18 +34,6 @@ struct BodyMotion {
 struct BodyState {
   Pose pose{{0, 0, 0}, 0};
   BodyMotion motion = {};
-};
-
-/// Where the states stand in covariances: X, Y, Z, yaw, then those of BodyMotion.
-enum BodyIndex { kBodyYaw = 3, kBodyVelocity = 4, kBodyYawRate = 6, kBodyRoll = 7, kBodyPitch = 8 };
-inline constexpr int kBodyStates = 9;
-using BodyCovariance = Eigen::Matrix<double, kBodyStates, kBodyStates, Eigen::DontAlign>;
-
-/// Something known with a standard deviation.
-struct KnownHeight {
-  double z_m;
-  /// Positive.
-  double sd_m;
 };
 
 /// What is known before the lamps are seen: each state is normal about `mean`, with its standard

@@ -4,24 +4,11 @@
 
 #include <Eigen/Core>
 
-#include "../geometry/frames.h"
-#include "../geometry/types.h"
+#include "fix.h"
 #include "lean.h"
+#include "robot.h"
 
 namespace vlp {
-
-/// How the camera sits on the robot. The robot's frame has z up at its centre; the camera stands at
-/// `position_in_robot_m`, its yaw turned by `yaw_in_robot_rad` against the robot's.
-struct CameraMount {
-  Eigen::Vector3d position_in_robot_m;
-  double yaw_in_robot_rad;
-};
-
-/// A pose and the covariance of its (X, Y, Z, yaw) in metres and radians.
-struct PoseEstimate {
-  Pose pose;
-  Matrix4 covariance;
-};
 
 /// What an error of the inclination's roll, and one of its pitch, does to (X, Y, Z, yaw).
 using LeanEffect = Eigen::Matrix<double, 4, 2>;

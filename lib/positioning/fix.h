@@ -2,12 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <optional>
 #include <string_view>
 
-#include "body_fix.h"
-#include "camera_mount.h"
+#include "../geometry/frames.h"
+#include "../geometry/types.h"
 
 namespace vlp {
 
@@ -33,6 +34,17 @@ std::string_view name_of(FixStatus status);
 
 /// What it means and what to do, for people.
 std::string_view explanation_of(FixStatus status);
+
+/// A pose and the covariance of its (X, Y, Z, yaw) in metres and radians.
+struct PoseEstimate {
+  Pose pose;
+  Matrix4 covariance;
+};
+
+/// Where the states of a body stand in covariances: X, Y, Z, yaw, then velocity, yaw rate and lean.
+enum BodyIndex { kBodyYaw = 3, kBodyVelocity = 4, kBodyYawRate = 6, kBodyRoll = 7, kBodyPitch = 8 };
+inline constexpr int kBodyStates = 9;
+using BodyCovariance = Eigen::Matrix<double, kBodyStates, kBodyStates, Eigen::DontAlign>;
 
 /// How the body of a fix moved and leaned: the robot, or, without a mount, the camera.
 struct BodyEstimate {

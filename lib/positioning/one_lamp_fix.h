@@ -5,15 +5,10 @@
 #include <optional>
 
 #include "../geometry/frames.h"
+#include "robot.h"
 #include "sighting.h"
 
 namespace vlp {
-
-/// What a robot knows from elsewhere: its camera's height and heading.
-struct HeightAndYaw {
-  double z_m;
-  double yaw_rad;
-};
 
 /// Position from one lamp when height and yaw are known: s = p - H e^{jg} z (eq. 6 solved for
 /// s). Nothing when the lamp is not above the camera.

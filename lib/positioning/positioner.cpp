@@ -10,7 +10,12 @@
 #include <stdexcept>
 #include <string>
 
+#include "camera/lens.h"
 #include "geometry/plane.h"
+#include "positioning/body_frame.h"
+#include "positioning/camera_mount.h"
+#include "positioning/common_errors.h"
+#include "positioning/frame_fix.h"
 #include "positioning/one_lamp_fix.h"
 #include "positioning/sighting.h"
 
@@ -126,7 +131,61 @@ Fix refused(FixStatus status, int unknown_lamps) {
 
 }  // namespace
 
-Positioner::Positioner(const LampMap& map, const Calibration& calibration,
+static_assert(Positioner::max_lamps == kMaxSightings);
+
+class Positioner::Impl {
+ public:
+  Impl(const LampMap& map, const Calibration& calibration, const PositionerOptions& options);
+
+  Fix locate(std::span<const Detection> detections, const Sensors& sensors) const;
+  Fix locate(std::span<const Detection> detections, const Sensors& sensors,
+             std::span<const EarlierFrame> earlier) const;
+  int lamps_elsewhere() const { return common_.lamps_elsewhere(); }
+
+ private:
+  template <typename Frame, typename Add>
+  FixStatus look_up(std::span<const Detection> detections, Frame& frame, int& unknown_lamps,
+                    const Add& add) const;
+  FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
+                  SightedFrame& frame) const;
+  std::size_t index_of(int id) const;
+  void reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
+                          ConsistentFix& solution) const;
+  Matrix4 common_covariance(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
+                            const PoseEstimate& camera) const;
+  Matrix4 common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
+                            const BodyFix& fix) const;
+  FixStatus sight_from_body(std::span<const Detection> detections, double time_s, BodyFrame& frame,
+                            int& unknown_lamps) const;
+  /// Nothing when fewer than two lamps of the map are seen.
+  std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
+                                 std::span<const EarlierFrame> earlier) const;
+
+  /// When a pixel is read, from the middle row (or column) of the image.
+  struct Shutter {
+    double row_time_s, middle_row;
+    Readout readout;
+
+    double time_s(const Eigen::Vector2d& pixel) const {
+      return row_time_s * ((readout == Readout::rows ? pixel.y() : pixel.x()) - middle_row);
+    }
+  };
+
+  std::vector<Lamp> lamps_;        // in the order of their ids, their places from origin_m_
+  std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
+  Lens lens_;
+  Eigen::Vector3d origin_m_;
+  Eigen::Matrix3d base_from_camera_;
+  CommonErrors common_;
+  Eigen::Matrix3d body_from_camera_;
+  std::optional<CameraMount> mount_;
+  double max_residual_share_;
+  double unstated_sigma_px_;
+  /// Nothing when the calibration lacks the row time or the read-out.
+  std::optional<Shutter> shutter_;
+};
+
+Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
                        const PositionerOptions& options)
     : lamps_(sorted_by_id(map.lamps)),
       lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
@@ -157,8 +216,8 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
 /// Adds each detection of a lamp of the map to the frame: `add` takes it, its lamp, its ray and its
 /// standard deviation, and fills the frame's sighting.
 template <typename Frame, typename Add>
-FixStatus Positioner::look_up(std::span<const Detection> detections, Frame& frame,
-                              int& unknown_lamps, const Add& add) const {
+FixStatus Positioner::Impl::look_up(std::span<const Detection> detections, Frame& frame,
+                                    int& unknown_lamps, const Add& add) const {
   const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
   for (const Detection& detection : detections) {
     const auto lamp =
@@ -185,7 +244,7 @@ FixStatus Positioner::look_up(std::span<const Detection> detections, Frame& fram
   return FixStatus::ok;
 }
 
-std::size_t Positioner::index_of(int id) const {
+std::size_t Positioner::Impl::index_of(int id) const {
   const auto lamp =
       std::lower_bound(lamps_.begin(), lamps_.end(), id,
                        [](const Lamp& candidate, int sought) { return candidate.id < sought; });
@@ -193,8 +252,9 @@ std::size_t Positioner::index_of(int id) const {
 }
 
 /// Where everything that is uncertain is stated, it decides; else the rules of fix_frame() do.
-void Positioner::reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
-                                    ConsistentFix& solution) const {
+void Positioner::Impl::reject_unexplained(SightedFrame& frame,
+                                          const Eigen::Matrix3d& level_from_base,
+                                          ConsistentFix& solution) const {
   if (solution.status != FixStatus::ok || frame.size < 4) return;
   // What the noise alone explains needs nothing else to.
   if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
@@ -215,9 +275,9 @@ void Positioner::reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& 
   solution = fix_consistent(frame.span(), std::numeric_limits<double>::infinity());
 }
 
-Matrix4 Positioner::common_covariance(const SightedFrame& frame,
-                                      const Eigen::Matrix3d& level_from_base,
-                                      const PoseEstimate& camera) const {
+Matrix4 Positioner::Impl::common_covariance(const SightedFrame& frame,
+                                            const Eigen::Matrix3d& level_from_base,
+                                            const PoseEstimate& camera) const {
   const LevelPose pose(camera.pose);
   CommonErrors::ByShared by_shared = CommonErrors::ByShared::Zero(4, common_.shared());
   std::array<CommonErrors::ByLamp, max_lamps> by_lamp;
@@ -243,8 +303,8 @@ Matrix4 Positioner::common_covariance(const SightedFrame& frame,
 }
 
 /// The gain of the pixels, in standard deviations, is that of the body's least squares.
-Matrix4 Positioner::common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
-                                      const BodyFix& fix) const {
+Matrix4 Positioner::Impl::common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
+                                            const BodyFix& fix) const {
   const PosedBody body(fix.state);
   const Eigen::Matrix3d body_from_base = body_from_camera_ * base_from_camera_.transpose();
   CommonErrors::ByShared by_shared = CommonErrors::ByShared::Zero(4, common_.shared());
@@ -268,8 +328,9 @@ Matrix4 Positioner::common_covariance(const BodyFrame& frame, const Eigen::Vecto
   return common_.covariance_of(by_shared, {by_lamp.data(), frame.size}, {lamps.data(), frame.size});
 }
 
-FixStatus Positioner::sight(std::span<const Detection> detections,
-                            const Eigen::Matrix3d& level_from_base, SightedFrame& frame) const {
+FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
+                                  const Eigen::Matrix3d& level_from_base,
+                                  SightedFrame& frame) const {
   const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
   const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                        double sigma_px) {
@@ -286,8 +347,8 @@ FixStatus Positioner::sight(std::span<const Detection> detections,
   return look_up(detections, frame, frame.unknown_lamps, add);
 }
 
-FixStatus Positioner::sight_from_body(std::span<const Detection> detections, double time_s,
-                                      BodyFrame& frame, int& unknown_lamps) const {
+FixStatus Positioner::Impl::sight_from_body(std::span<const Detection> detections, double time_s,
+                                            BodyFrame& frame, int& unknown_lamps) const {
   const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                        double sigma_px) {
     const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
@@ -302,9 +363,9 @@ FixStatus Positioner::sight_from_body(std::span<const Detection> detections, dou
   return look_up(detections, frame, unknown_lamps, add);
 }
 
-std::optional<Fix> Positioner::locate_body(std::span<const Detection> detections,
-                                           const Sensors& sensors,
-                                           std::span<const EarlierFrame> earlier) const {
+std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> detections,
+                                                 const Sensors& sensors,
+                                                 std::span<const EarlierFrame> earlier) const {
   const KnownMotion motion = sensors.motion.value_or(KnownMotion());
   if (moves(motion) && !shutter_) return refused(FixStatus::row_time_unknown, 0);
   BodyPrior prior{{motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
@@ -347,8 +408,8 @@ std::optional<Fix> Positioner::locate_body(std::span<const Detection> detections
   return fix;
 }
 
-Fix Positioner::locate(std::span<const Detection> detections, const Sensors& sensors,
-                       std::span<const EarlierFrame> earlier) const noexcept {
+Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensors& sensors,
+                             std::span<const EarlierFrame> earlier) const {
   const bool finite_times =
       std::all_of(earlier.begin(), earlier.end(),
                   [](const EarlierFrame& before) { return std::isfinite(before.before_s); });
@@ -357,8 +418,7 @@ Fix Positioner::locate(std::span<const Detection> detections, const Sensors& sen
   return locate(detections, sensors);
 }
 
-Fix Positioner::locate(std::span<const Detection> detections,
-                       const Sensors& sensors) const noexcept {
+Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensors& sensors) const {
   if (!finite(sensors)) return refused(FixStatus::not_finite, 0);
   if (needs_body(sensors) && detections.size() > 1) {
     if (auto fix = locate_body(detections, sensors, {})) return *fix;
@@ -420,5 +480,21 @@ Fix Positioner::locate(std::span<const Detection> detections,
   fix.estimate.pose.position_m += origin_m_;
   return fix;
 }
+
+Positioner::Positioner(const LampMap& map, const Calibration& calibration,
+                       const PositionerOptions& options)
+    : impl_(std::make_shared<const Impl>(map, calibration, options)) {}
+
+Fix Positioner::locate(std::span<const Detection> detections,
+                       const Sensors& sensors) const noexcept {
+  return impl_->locate(detections, sensors);
+}
+
+Fix Positioner::locate(std::span<const Detection> detections, const Sensors& sensors,
+                       std::span<const EarlierFrame> earlier) const noexcept {
+  return impl_->locate(detections, sensors, earlier);
+}
+
+int Positioner::lamps_elsewhere() const noexcept { return impl_->lamps_elsewhere(); }
 
 }  // namespace vlp

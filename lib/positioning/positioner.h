@@ -4,23 +4,25 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
-#include <vector>
 
-#include "../camera/lens.h"
 #include "../rig/calibration.h"
 #include "../rig/detection.h"
 #include "../rig/lamp_map.h"
-#include "body_frame.h"
-#include "camera_mount.h"
-#include "common_errors.h"
 #include "correction.h"
 #include "fix.h"
-#include "frame_fix.h"
-#include "one_lamp_fix.h"
+#include "robot.h"
 
 namespace vlp {
+
+#if defined(__x86_64__) || defined(__aarch64__)
+static_assert(
+    alignof(Detection) == 16,
+    "the library has vectors with Eigen's own alignment of 16 bytes: take EIGEN_DONT_ALIGN "
+    "and EIGEN_MAX_STATIC_ALIGN_BYTES away");
+#endif
 
 struct PositionerOptions {
   Correction correction = Correction::all;
@@ -81,10 +83,11 @@ struct EarlierFrame {
 };
 
 /// From identified lamps in an image to a position: the way from pixels to a fix, put together
-/// once from calibration and lamp map. Immutable: any number of threads may share it.
+/// once from calibration and lamp map. Immutable: any number of threads may share it, and copies
+/// are cheap.
 class Positioner {
  public:
-  static constexpr std::size_t max_lamps = kMaxSightings;
+  static constexpr std::size_t max_lamps = 256;
 
   /// Throws std::invalid_argument when the map is empty, an id stands twice in it, two lamps are in
   /// one place or a place is not finite (likewise that of the mount), when the intrinsics are not
@@ -107,49 +110,11 @@ class Positioner {
 
   /// Lamps of the calibration's adjustment that the map has elsewhere: what fixes state is not of
   /// them (CommonErrors).
-  int lamps_elsewhere() const { return common_.lamps_elsewhere(); }
+  int lamps_elsewhere() const noexcept;
 
  private:
-  template <typename Frame, typename Add>
-  FixStatus look_up(std::span<const Detection> detections, Frame& frame, int& unknown_lamps,
-                    const Add& add) const;
-  FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
-                  SightedFrame& frame) const;
-  std::size_t index_of(int id) const;
-  void reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
-                          ConsistentFix& solution) const;
-  Matrix4 common_covariance(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
-                            const PoseEstimate& camera) const;
-  Matrix4 common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
-                            const BodyFix& fix) const;
-  FixStatus sight_from_body(std::span<const Detection> detections, double time_s, BodyFrame& frame,
-                            int& unknown_lamps) const;
-  /// Nothing when fewer than two lamps of the map are seen.
-  std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
-                                 std::span<const EarlierFrame> earlier) const;
-
-  /// When a pixel is read, from the middle row (or column) of the image.
-  struct Shutter {
-    double row_time_s, middle_row;
-    Readout readout;
-
-    double time_s(const Eigen::Vector2d& pixel) const {
-      return row_time_s * ((readout == Readout::rows ? pixel.y() : pixel.x()) - middle_row);
-    }
-  };
-
-  std::vector<Lamp> lamps_;        // in the order of their ids, their places from origin_m_
-  std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
-  Lens lens_;
-  Eigen::Vector3d origin_m_;
-  Eigen::Matrix3d base_from_camera_;
-  CommonErrors common_;
-  Eigen::Matrix3d body_from_camera_;
-  std::optional<CameraMount> mount_;
-  double max_residual_share_;
-  double unstated_sigma_px_;
-  /// Nothing when the calibration lacks the row time or the read-out.
-  std::optional<Shutter> shutter_;
+  class Impl;
+  std::shared_ptr<const Impl> impl_;
 };
 
 }  // namespace vlp

@@ -4,10 +4,14 @@
 /// the same points in the same run.
 #include <benchmark/benchmark.h>
 
+#include <filesystem>
 #include <opencv2/calib3d.hpp>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "positioning/positioner.h"
+#include "positioning/vlp.h"
 #include "support/body_rig.h"
 #include "support/synthetic_rig.h"
 
@@ -35,6 +39,32 @@ void fix(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(scene.detections));
 }
 BENCHMARK(fix)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
+
+/// The same through the C API.
+void fix_in_c(benchmark::State& state) {
+  const Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
+  const std::string lamps = "fix_benchmark_lamps.yaml", calibration = "fix_benchmark.yaml";
+  write_lamp_map(lamps, scene.rig.map);
+  write_calibration(calibration, scene.rig.calibration);
+  vlp_positioner* positioner = nullptr;
+  const int opened = vlp_open(lamps.c_str(), calibration.c_str(), nullptr, &positioner);
+  std::filesystem::remove(lamps);
+  std::filesystem::remove(calibration);
+  if (opened != VLP_OK) throw std::logic_error(vlp_last_error());
+  std::vector<vlp_detection> seen;
+  for (const Detection& detection : scene.detections) {
+    seen.push_back({detection.lamp, detection.pixel.x(), detection.pixel.y(), 0.1});
+  }
+  vlp_fix fix;
+  for (auto _ : state) {
+    if (vlp_locate(positioner, seen.data(), seen.size(), nullptr, &fix) != VLP_OK) {
+      throw std::logic_error("no fix");
+    }
+    benchmark::DoNotOptimize(fix);
+  }
+  vlp_close(positioner);
+}
+BENCHMARK(fix_in_c)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
 
 /// The same lamps from a camera that drives at 1 m/s, turns and leans, with more and more unknown.
 void fix_of_a_body(benchmark::State& state, const Sensors& sensors, const BodyMotion& motion) {

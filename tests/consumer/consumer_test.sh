@@ -2,15 +2,20 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs the project, then builds the example of a robot's loop in lib/README.md against the installed
+# Installs the library, then builds the example of a robot's loop in lib/README.md against the installed
 # tree: with its CMake package, and with pkg-config for this very processor (-march=native), which
-# changes the layout of Eigen's own types. Both programs run.
+# changes the layout of Eigen's own types. Both programs run. Then the same fixes through the C API, from C99
+# and C++17, and through the C++ API, by GCC and by Clang where there is one, without optimisation and with all
+# of it: they are the same to the last bit.
 set -euo pipefail
 source_dir=$1 build_dir=$2 scratch=$3 flags=${4:-}
 
 rm -rf "$scratch"
 mkdir -p "$scratch/robot"
-cmake --install "$build_dir" --prefix "$scratch/installed" >"$scratch/install.log"
+for component in positioning development; do
+  cmake --install "$build_dir" --prefix "$scratch/installed" --component $component >>"$scratch/install.log"
+done
+lib=$(dirname "$(find "$scratch/installed" -name libvlp_positioning.so)")
 
 cp "$source_dir"/tests/consumer/robot/* "$scratch/robot"
 # Its one C++ block.
@@ -21,11 +26,11 @@ cmake -G Ninja -S "$scratch/robot" -B "$scratch/with-cmake" -DCMAKE_PREFIX_PATH=
   -DCMAKE_CXX_FLAGS="$flags" -DCMAKE_BUILD_TYPE=Release
 cmake --build "$scratch/with-cmake"
 
-export PKG_CONFIG_PATH=$scratch/installed/lib/pkgconfig
+export PKG_CONFIG_PATH=$lib/pkgconfig
 mkdir "$scratch/with-pkg-config"
 # shellcheck disable=SC2046,SC2086 # several words each
 c++ -std=c++20 -O2 -march=native $flags "$scratch"/robot/*.cpp -o "$scratch/with-pkg-config/robot" \
-  $(pkg-config --cflags --libs vlp-positioning) -Wl,-rpath,"$scratch/installed/lib"
+  $(pkg-config --cflags --libs vlp-positioning) -Wl,-rpath,"$lib"
 
 cd "$source_dir/datasets/example"
 for how in with-cmake with-pkg-config; do
@@ -35,3 +40,39 @@ for how in with-cmake with-pkg-config; do
   [ "$(grep -c 'no fix: fewer than two lamps' <<<"$output")" = 1 ]
 done
 [ "$("$scratch/with-cmake/robot")" = "$("$scratch/with-pkg-config/robot")" ]
+
+libs="-I$scratch/installed/include -L$lib -lvlp_positioning -Wl,-rpath,$lib"
+eigen=$(pkg-config --cflags eigen3)
+sed -n '/^```c$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/robot.c"
+# shellcheck disable=SC2086 # several words each
+cc -std=c99 -Wall -Wextra -Wpedantic -Werror $flags "$scratch/robot.c" $libs -o "$scratch/robot-in-c"
+grep '^x ' <<<"$("$scratch/robot-in-c")"
+same=$source_dir/tests/consumer/same_fix/same_fix
+first=''
+same_fix() {  # COMPILER OPTIONS...
+  if ! command -v "$1" >/dev/null; then
+    echo "same_fix: no $1"
+    return
+  fi
+  # shellcheck disable=SC2086 # several words each
+  "$@" $flags $libs -o "$scratch/same_fix"
+  fixes=$("$scratch/same_fix")
+  first=${first:-$fixes}
+  if [ "$fixes" != "$first" ]; then
+    printf 'same_fix: %s:\n%s\nand not\n%s\n' "$*" "$fixes" "$first"
+    exit 1
+  fi
+}
+for optimise in -O0 "-O3 -march=native"; do
+  # shellcheck disable=SC2086 # several words each
+  for compiler in cc clang; do
+    same_fix $compiler -std=c99 -Wall -Wextra -Wpedantic -Werror $optimise -x c "$same.c"
+    same_fix ${compiler/cc/c}++ -std=c++17 -Wall -Wextra -Werror $optimise -x c++ "$same.c"
+  done
+  # shellcheck disable=SC2086 # several words each
+  same_fix c++ -std=c++20 $eigen $optimise -x c++ "$same.cpp"
+done
+# shellcheck disable=SC2086 # several words each
+same_fix clang++ -std=c++20 $eigen -O3 -march=native -x c++ "$same.cpp"
+echo "same_fix: $first"
+[ "$(grep -c '^0 ' <<<"$first")" = 2 ]

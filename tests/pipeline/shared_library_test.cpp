@@ -17,20 +17,26 @@
 namespace vlp {
 namespace {
 
+/// The headers that are installed, from lib.
+std::vector<std::string> headers() {
+  std::vector<std::string> names;
+  std::istringstream list(VLP_PUBLIC_HEADERS);
+  for (std::string name; std::getline(list, name, ' ');) names.push_back(name);
+  return names;
+}
+
+std::string text_of(const std::string& header) {
+  return TemporaryFolder::content_of(std::filesystem::path(VLP_SOURCE_DIR "/lib") / header);
+}
+
 /// The words of the headers that are installed.
 std::set<std::string> words_of_headers() {
   std::set<std::string> words;
   const std::regex word("[A-Za-z_][A-Za-z0-9_]*");
-  for (const char* folder : {"geometry", "camera", "rig", "positioning"}) {
-    const std::filesystem::path all = std::filesystem::path(VLP_SOURCE_DIR "/lib") / folder;
-    for (const auto& entry : std::filesystem::directory_iterator(all)) {
-      const std::string name = entry.path().filename().string();
-      const bool installed = name.ends_with(".h") && !name.starts_with("yaml_") && name != "file.h";
-      if (!installed) continue;
-      const std::string text = TemporaryFolder::content_of(entry.path());
-      for (std::sregex_iterator at(text.begin(), text.end(), word), end; at != end; ++at) {
-        words.insert(at->str());
-      }
+  for (const std::string& header : headers()) {
+    const std::string text = text_of(header);
+    for (std::sregex_iterator at(text.begin(), text.end(), word), end; at != end; ++at) {
+      words.insert(at->str());
     }
   }
   return words;
@@ -54,6 +60,13 @@ TEST(SharedLibrary, ShowsWhatItsHeadersDeclareAndNothingElse) {
   std::set<std::string> functions;
   for (std::string line; std::getline(lines, line);) {
     std::string symbol = line.substr(line.find(' ') + 3);
+    // A weak function could be a user's own, compiled otherwise.
+    EXPECT_NE(line[line.find(' ') + 1], 'W') << line;
+    if (symbol.starts_with("vlp_")) {
+      EXPECT_TRUE(words.contains(symbol)) << line;
+      functions.insert(symbol);
+      continue;
+    }
     symbol = std::regex_replace(symbol, std::regex("^(typeinfo|typeinfo name|vtable) for "), "");
     ASSERT_TRUE(symbol.starts_with("vlp::")) << line;
     EXPECT_THAT(symbol, testing::Not(testing::HasSubstr("YAML"))) << line;
@@ -62,9 +75,61 @@ TEST(SharedLibrary, ShowsWhatItsHeadersDeclareAndNothingElse) {
     }
     functions.insert(symbol.substr(0, symbol.find('(')));
   }
-  for (const char* function : {"vlp::Positioner::locate", "vlp::read_calibration",
-                               "vlp::read_lamp_map", "vlp::explanation_of", "vlp::InputError"}) {
+  for (const char* function :
+       {"vlp::Positioner::locate", "vlp::read_calibration", "vlp::read_lamp_map",
+        "vlp::explanation_of", "vlp::InputError::InputError", "vlp_open", "vlp_locate"}) {
     EXPECT_THAT(functions, testing::Contains(function));
+  }
+}
+
+TEST(SharedLibrary, ShowsEveryFunctionOfTheCHeader) {
+  const auto shown = run_program("nm -D --defined-only '" VLP_SHARED_LIBRARY "'");
+  const std::string text = text_of("positioning/vlp.h");
+  const std::regex function(
+      "\n[a-z_0-9]+\\*? \\*?(vlp_[a-z_]+)\\(|\nconst char\\* (vlp_[a-z_]+)\\(");
+  std::size_t functions = 0;
+  for (std::sregex_iterator at(text.begin(), text.end(), function), end; at != end; ++at) {
+    const std::string name = (*at)[1].matched ? (*at)[1] : (*at)[2];
+    EXPECT_THAT(shown.output, testing::HasSubstr(" T " + name + "\n"));
+    ++functions;
+  }
+  EXPECT_EQ(functions, 6U);
+}
+
+/// What is vectorised widest is aligned widest: Eigen's matrices of 32 bytes, or a multiple, have
+/// another alignment with AVX, and of 64 with AVX-512.
+TEST(SharedLibrary, HasNoTypeWhoseLayoutChangesWithTheProcessor) {
+  const std::regex matrix("Eigen::(?:Matrix<double, ([0-9]+), ([0-9]+)>|(Matrix|Vector)([24])d)");
+  for (const std::string& header : headers()) {
+    const std::string text = text_of(header);
+    if (!header.ends_with("types.h")) {
+      for (std::sregex_iterator at(text.begin(), text.end(), matrix), end; at != end; ++at) {
+        const auto& found = *at;
+        const int size = found[1].matched       ? std::stoi(found[1]) * std::stoi(found[2])
+                         : found[3] == "Matrix" ? std::stoi(found[4]) * std::stoi(found[4])
+                                                : std::stoi(found[4]);
+        EXPECT_NE(size % 4, 0) << header << ": " << found.str() << " wants Eigen::DontAlign";
+      }
+    }
+  }
+  // The compiler's own account of every class of the headers, for an old processor and a new one.
+  const TemporaryFolder folder;
+  std::string all;
+  for (const std::string& header : headers()) all.append("#include \"" + header + "\"\n");
+  const auto source = folder.file("all.cpp", all);
+  std::string first;
+  for (const char* processor : {"", "-mavx512f -mfma"}) {
+    const auto result = run_program("cd '" + (folder / "").string() +
+                                    "' && c++ -std=c++20 -fsyntax-only -I'" VLP_SOURCE_DIR
+                                    "/lib' -isystem '" VLP_EIGEN_DIR "' " +
+                                    processor + " -fdump-lang-class=classes all.cpp && " +
+                                    "grep -A 2 '^Class vlp' classes");
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    if (first.empty()) first = result.output;
+    EXPECT_EQ(result.output, first) << processor;
+  }
+  for (const char* type : {"vlp::Fix", "vlp::Calibration", "vlp::Sensors", "vlp_fix"}) {
+    EXPECT_THAT(first, testing::HasSubstr(std::string("Class ") + type + "\n"));
   }
 }
 

@@ -9,7 +9,9 @@
 #include <thread>
 
 #include "positioning/positioner.h"
+#include "positioning/vlp.h"
 #include "support/synthetic_rig.h"
+#include "support/temporary_folder.h"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -75,6 +77,29 @@ TEST(Positioner, DoesNotAllocate) {
   const long before = allocations;
   ::operator delete(::operator new(1));
   EXPECT_EQ(allocations, before + 1) << "the counter does not count";
+}
+
+TEST(CInterfaceMemory, IsNotAllocatedPerFix) {
+  const SyntheticRig rig = tilted_rig();
+  const TemporaryFolder folder;
+  const std::string lamps = folder / "lamps.yaml", calibration = folder / "calibration.yaml";
+  write_lamp_map(lamps, rig.map);
+  write_calibration(calibration, rig.calibration);
+  vlp_positioner* positioner = nullptr;
+  ASSERT_EQ(vlp_open(lamps.c_str(), calibration.c_str(), nullptr, &positioner), VLP_OK);
+  std::vector<vlp_detection> seen;
+  for (const Detection& detection : seen_from(rig)) {
+    seen.push_back({detection.lamp, detection.pixel.x(), detection.pixel.y(), 0.1});
+  }
+  vlp_sensors sensors = {};
+  sensors.inclination_sigma_rad = 1.6;
+  vlp_fix fix;
+  const long before = allocations;
+  EXPECT_EQ(vlp_locate(positioner, seen.data(), seen.size(), nullptr, &fix), VLP_OK);
+  EXPECT_EQ(vlp_locate(positioner, seen.data(), seen.size(), &sensors, &fix), VLP_OK);
+  EXPECT_EQ(vlp_locate(positioner, seen.data(), 1, &sensors, &fix), VLP_TOO_FEW_LAMPS);
+  EXPECT_EQ(allocations, before);
+  vlp_close(positioner);
 }
 
 TEST(Positioner, AnswersManyThreadsAlike) {

@@ -6,7 +6,9 @@
 #include <optional>
 #include <vector>
 
+#include "camera/lens.h"
 #include "geometry/angles.h"
+#include "positioning/body_fix.h"
 #include "positioning/positioner.h"
 #include "support/random.h"
 #include "support/synthetic_rig.h"

@@ -4,6 +4,8 @@
 
 #include <Eigen/LU>
 
+#include "camera/lens.h"
+
 namespace vlp {
 
 Camera synthetic_camera() {

@@ -6,6 +6,8 @@
 #include <Eigen/LU>
 #include <numbers>
 
+#include "camera/lens.h"
+
 namespace vlp {
 
 Survey::Survey(double map_sd_m)

@@ -1,0 +1,218 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/vlp.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <string_view>
+
+#include "positioning/positioner.h"
+#include "rig/input_error.h"
+
+struct vlp_positioner {
+  vlp::Positioner positioner;
+};
+
+namespace vlp {
+namespace {
+
+static_assert(VLP_MAX_LAMPS == Positioner::max_lamps);
+static_assert(VLP_OK == static_cast<int>(FixStatus::ok));
+static_assert(VLP_TOO_FEW_LAMPS == static_cast<int>(FixStatus::too_few_lamps));
+static_assert(VLP_TOO_MANY_LAMPS == static_cast<int>(FixStatus::too_many_lamps));
+static_assert(VLP_DUPLICATE_LAMP == static_cast<int>(FixStatus::duplicate_lamp));
+static_assert(VLP_NOT_FINITE == static_cast<int>(FixStatus::not_finite));
+static_assert(VLP_OUTSIDE_LENS == static_cast<int>(FixStatus::outside_lens));
+static_assert(VLP_LAMP_BELOW_CAMERA == static_cast<int>(FixStatus::lamp_below_camera));
+static_assert(VLP_DEGENERATE == static_cast<int>(FixStatus::degenerate));
+static_assert(VLP_AMBIGUOUS == static_cast<int>(FixStatus::ambiguous));
+static_assert(VLP_INCONSISTENT == static_cast<int>(FixStatus::inconsistent));
+static_assert(VLP_MIRRORED_MAP == static_cast<int>(FixStatus::mirrored_map));
+static_assert(VLP_UNDETERMINED == static_cast<int>(FixStatus::undetermined));
+static_assert(VLP_ROW_TIME_UNKNOWN == static_cast<int>(FixStatus::row_time_unknown));
+
+/// An array without a destructor: a thread may still ask while it ends.
+thread_local std::array<char, 1024> last_error;
+
+std::int32_t failed(std::int32_t code, std::string_view message) {
+  const auto length = std::min(message.size(), last_error.size() - 1);
+  std::copy_n(message.begin(), length, last_error.begin());
+  last_error[length] = '\0';
+  return code;
+}
+
+PositionerOptions options_of(const vlp_options& options) {
+  PositionerOptions result;
+  if (options.has_mount != 0) {
+    result.mount = CameraMount{Eigen::Vector3d(options.mount_position_m), options.mount_yaw_rad};
+  }
+  if (options.max_residual_share != 0) result.max_residual_share = options.max_residual_share;
+  if (options.unstated_sigma_px != 0) result.unstated_sigma_px = options.unstated_sigma_px;
+  return result;
+}
+
+Sensors sensors_of(const vlp_sensors& sensors) {
+  Sensors result;
+  if (sensors.has_inclination != 0) {
+    result.inclination = Inclination{sensors.roll_rad, sensors.pitch_rad};
+  }
+  result.inclination_sigma_rad = sensors.inclination_sigma_rad;
+  if (sensors.has_height_and_yaw != 0) {
+    result.height_and_yaw = HeightAndYaw{sensors.camera_z_m, sensors.camera_yaw_rad};
+  }
+  if (sensors.has_motion != 0) {
+    result.motion =
+        KnownMotion{Eigen::Vector2d(sensors.velocity_m_per_s), sensors.yaw_rate_rad_per_s,
+                    sensors.velocity_sd_m_per_s, sensors.yaw_rate_sd_rad_per_s};
+  }
+  if (sensors.has_height != 0) result.height = KnownHeight{sensors.z_m, sensors.z_sd_m};
+  return result;
+}
+
+using Covariance6 = Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>;
+
+/// (X, Y, Z, yaw) of the pose's covariance, and roll and pitch with all of them of the body's.
+void fill_covariance(const Matrix4& of_pose, const BodyCovariance& of_body, double* rows) {
+  constexpr std::array<int, 6> body = {0, 1, 2, kBodyRoll, kBodyPitch, kBodyYaw};
+  Covariance6 covariance(rows);
+  for (int i = 0; i < 6; ++i) {
+    for (int k = 0; k < 6; ++k) {
+      const int from_i = body[static_cast<std::size_t>(i)];
+      const int from_k = body[static_cast<std::size_t>(k)];
+      const bool pose = from_i <= kBodyYaw && from_k <= kBodyYaw;
+      covariance(i, k) = pose ? of_pose(from_i, from_k) : of_body(from_i, from_k);
+    }
+  }
+}
+
+/// A body that has not been estimated moves and leans as it was told.
+BodyEstimate told_body(const Sensors& sensors, double yaw_rad) {
+  BodyEstimate body;
+  if (sensors.inclination) body.inclination = *sensors.inclination;
+  const double variance = sensors.inclination_sigma_rad * sensors.inclination_sigma_rad;
+  body.covariance(kBodyRoll, kBodyRoll) = body.covariance(kBodyPitch, kBodyPitch) = variance;
+  if (sensors.motion) {
+    const Eigen::Vector2d& velocity = sensors.motion->velocity_m_per_s;
+    const double c = std::cos(yaw_rad), s = std::sin(yaw_rad);
+    body.velocity_m_per_s = {c * velocity.x() - s * velocity.y(),
+                             s * velocity.x() + c * velocity.y()};
+    body.yaw_rate_rad_per_s = sensors.motion->yaw_rate_rad_per_s;
+    const double velocity_variance =
+        sensors.motion->velocity_sd_m_per_s * sensors.motion->velocity_sd_m_per_s;
+    body.covariance.block<2, 2>(kBodyVelocity, kBodyVelocity)
+        .diagonal()
+        .setConstant(velocity_variance);
+    body.covariance(kBodyYawRate, kBodyYawRate) =
+        sensors.motion->yaw_rate_sd_rad_per_s * sensors.motion->yaw_rate_sd_rad_per_s;
+  }
+  return body;
+}
+
+void fill(const Fix& from, const Sensors& sensors, vlp_fix& fix) {
+  fix.status = static_cast<std::int32_t>(from.status);
+  fix.unknown_lamps = from.unknown_lamps;
+  if (!from.ok()) return;
+  const auto& [pose, covariance] = from.estimate;
+  const BodyEstimate body = from.body ? *from.body : told_body(sensors, pose.yaw_rad);
+  std::copy_n(pose.position_m.data(), 3, fix.position_m);
+  fix.roll_rad = body.inclination.roll_rad;
+  fix.pitch_rad = body.inclination.pitch_rad;
+  fix.yaw_rad = pose.yaw_rad;
+  fill_covariance(covariance, body.covariance, fix.covariance);
+  fill_covariance(from.noise_covariance, body.covariance, fix.noise_covariance);
+  std::copy_n(body.velocity_m_per_s.data(), 2, fix.velocity_m_per_s);
+  fix.yaw_rate_rad_per_s = body.yaw_rate_rad_per_s;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(fix.velocity_covariance) =
+      body.covariance.block<3, 3>(kBodyVelocity, kBodyVelocity);
+  fix.residual_px = from.residual_px;
+  fix.lamps = from.lamps;
+  fix.rejected_lamps = from.rejected_lamps;
+  std::copy(from.rejected_ids.begin(), from.rejected_ids.end(), fix.rejected_ids);
+}
+
+/// The room of a frame's detections, not made before it is filled.
+union Room {
+  Room() {}
+  std::array<Detection, Positioner::max_lamps> detections;
+};
+
+}  // namespace
+}  // namespace vlp
+
+const char* vlp_version(void) { return VLP_VERSION; }
+
+int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp_options* options,
+                 vlp_positioner** positioner) {
+  using namespace vlp;
+  if (positioner == nullptr) return failed(VLP_BAD_ARGUMENT, "positioner is a null pointer");
+  *positioner = nullptr;
+  if (lamps_yaml == nullptr || calibration_yaml == nullptr) {
+    return failed(VLP_BAD_ARGUMENT, "the name of a file is a null pointer");
+  }
+  try {
+    const LampMap map = read_lamp_map(lamps_yaml);
+    const Calibration calibration = read_calibration(calibration_yaml);
+    const PositionerOptions chosen =
+        options != nullptr ? options_of(*options) : PositionerOptions();
+    *positioner = new vlp_positioner{Positioner(map, calibration, chosen)};
+    return VLP_OK;
+  } catch (const InputError& error) {
+    return failed(VLP_BAD_FILE, error.what());
+  } catch (const std::invalid_argument& error) {
+    return failed(VLP_BAD_ARGUMENT, error.what());
+  } catch (const std::bad_alloc&) {
+    return failed(VLP_NO_MEMORY, "there is not enough memory");
+  } catch (const std::exception& error) {
+    return failed(VLP_FAILED, error.what());
+  } catch (...) {
+    return failed(VLP_FAILED, "an unknown exception");
+  }
+}
+
+void vlp_close(vlp_positioner* positioner) { delete positioner; }
+
+int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detections, size_t count,
+                   const vlp_sensors* sensors, vlp_fix* fix) {
+  using namespace vlp;
+  if (fix == nullptr) return VLP_BAD_ARGUMENT;
+  *fix = {};
+  if (sensors != nullptr) fix->stamp = sensors->stamp;
+  if (positioner == nullptr || (detections == nullptr && count > 0)) {
+    return fix->status = VLP_BAD_ARGUMENT;
+  }
+  if (count > Positioner::max_lamps) return fix->status = VLP_TOO_MANY_LAMPS;
+  Room room;
+  for (std::size_t i = 0; i < count; ++i) {
+    const vlp_detection& seen = detections[i];
+    Detection& detection =
+        *new (&room.detections[i]) Detection{seen.lamp, {seen.u_px, seen.v_px}, {}};
+    if (seen.sigma_px != 0) detection.sigma_px = seen.sigma_px;
+  }
+  const Sensors known = sensors != nullptr ? sensors_of(*sensors) : Sensors();
+  fill(positioner->positioner.locate({room.detections.data(), count}, known), known, *fix);
+  return fix->status;
+}
+
+const char* vlp_explanation(int32_t code) {
+  switch (code) {
+    case VLP_BAD_FILE:
+      return "a file cannot be read or holds what it should not; see vlp_last_error()";
+    case VLP_BAD_ARGUMENT:
+      return "a pointer is null or a figure out of range";
+    case VLP_NO_MEMORY:
+      return "there is not enough memory";
+    case VLP_FAILED:
+      return "an error of the library; see vlp_last_error()";
+    default:
+      break;
+  }
+  if (code < VLP_OK || code > VLP_ROW_TIME_UNKNOWN) return "no code of this library";
+  return vlp::explanation_of(static_cast<vlp::FixStatus>(code)).data();
+}
+
+const char* vlp_last_error(void) { return vlp::last_error.data(); }

@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The fixes of same_fix.c through the C++ API, printed alike: no bit of them may depend on the API
+/// or on how its user compiles.
+#include <vlp/positioning/positioner.h>
+
+#include <cstdio>
+#include <vector>
+
+namespace {
+
+void print(const vlp::Fix& fix) {
+  const auto& [pose, covariance] = fix.estimate;
+  std::printf("%d %a %a %a %a\n", static_cast<int>(fix.status), pose.position_m.x(),
+              pose.position_m.y(), pose.position_m.z(), pose.yaw_rad);
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < 4; ++k) std::printf("%a ", covariance(i, k));
+  }
+  const vlp::BodyEstimate body = fix.body.value_or(vlp::BodyEstimate());
+  std::printf("\n%a %a %a\n", body.inclination.roll_rad, body.inclination.pitch_rad,
+              body.covariance(vlp::kBodyRoll, vlp::kBodyPitch));
+}
+
+}  // namespace
+
+int main() {
+  const vlp::Positioner positioner(vlp::read_lamp_map("lamps.yaml"),
+                                   vlp::read_calibration("calibration.yaml"));
+  const std::vector<vlp::Detection> seen = {{1, {331.4048, 303.6158}, 0.05},
+                                            {2, {691.1398, 302.9379}, 0.05},
+                                            {3, {677.3313, 499.7995}, 0.05},
+                                            {4, {335.0629, 517.9374}, {}},
+                                            {5, {545.7014, 421.0321}, 0.05}};
+  print(positioner.locate(seen));
+  vlp::Sensors sensors;
+  sensors.inclination_sigma_rad = 0.05;
+  sensors.motion = vlp::KnownMotion{{0, 0}, 0, 1, 0};
+  print(positioner.locate(seen, sensors));
+}

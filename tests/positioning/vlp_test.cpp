@@ -1,0 +1,241 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The C API says what the C++ API says, in its own order, and lets nothing else out.
+#include "positioning/vlp.h"
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "positioning/positioner.h"
+#include "support/body_rig.h"
+#include "support/synthetic_rig.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Handle = std::unique_ptr<vlp_positioner, void (*)(vlp_positioner*)>;
+using Covariance6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+
+/// A body that drives and leans under lamps, its files, and both positioners of them.
+class CInterface : public testing::Test {
+ protected:
+  CInterface() {
+    rig.map.lamps[2].sd_m = 0.001;
+    write_lamp_map(lamps, rig.map);
+    write_calibration(calibration, rig.calibration);
+    Random random(1);
+    seen = with_noise(seen_from(rig, 0.1), random);
+    for (const Detection& detection : seen) {
+      given.push_back({detection.lamp, detection.pixel.x(), detection.pixel.y(),
+                       detection.sigma_px.value_or(0)});
+    }
+  }
+
+  Handle open(const vlp_options* options = nullptr) const {
+    vlp_positioner* positioner = nullptr;
+    EXPECT_EQ(vlp_open(lamps.c_str(), calibration.c_str(), options, &positioner), VLP_OK)
+        << vlp_last_error();
+    return {positioner, &vlp_close};
+  }
+  vlp_fix located(const vlp_positioner* positioner, const vlp_sensors* sensors) const {
+    vlp_fix fix;
+    EXPECT_EQ(vlp_locate(positioner, given.data(), given.size(), sensors, &fix), fix.status);
+    return fix;
+  }
+
+  TemporaryFolder folder;
+  const std::string lamps = folder / "lamps.yaml", calibration = folder / "calibration.yaml";
+  BodyRig rig{synthetic_lamps(),
+              rolling_calibration(),
+              {{{0.1, -0.05, 0}, 0.4}, {{0.8, -0.6}, 0, {0.06, -0.08}}},
+              {}};
+  std::vector<Detection> seen;
+  std::vector<vlp_detection> given;
+};
+
+/// Bit by bit: no tolerance.
+void expect_same(const vlp_fix& c, const Fix& fix) {
+  ASSERT_EQ(c.status, static_cast<int>(fix.status));
+  ASSERT_EQ(c.status, VLP_OK);
+  const Covariance6 covariance(c.covariance), noise(c.noise_covariance);
+  const std::array<int, 4> pose = {0, 1, 2, 5};
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < 4; ++k) {
+      const int row = pose[static_cast<std::size_t>(i)], col = pose[static_cast<std::size_t>(k)];
+      EXPECT_EQ(covariance(row, col), fix.estimate.covariance(i, k));
+      EXPECT_EQ(noise(row, col), fix.noise_covariance(i, k));
+    }
+  }
+  EXPECT_EQ(Eigen::Vector3d(c.position_m), fix.estimate.pose.position_m);
+  EXPECT_EQ(c.yaw_rad, fix.estimate.pose.yaw_rad);
+  EXPECT_EQ(c.residual_px, fix.residual_px);
+  EXPECT_EQ(c.lamps, fix.lamps);
+  EXPECT_EQ(c.rejected_lamps, fix.rejected_lamps);
+  EXPECT_EQ(c.unknown_lamps, fix.unknown_lamps);
+  EXPECT_TRUE(covariance.isApprox(covariance.transpose(), 1e-12));
+  const Eigen::SelfAdjointEigenSolver<Covariance6> eigen(covariance);
+  EXPECT_GE(eigen.eigenvalues().minCoeff(), -1e-15);
+}
+
+TEST_F(CInterface, LocatesAStandingCamera) {
+  rig.body.motion = {};
+  seen = seen_from(rig, 0.1);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    given[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(), 0.1};
+  }
+  const auto positioner = open();
+  expect_same(located(positioner.get(), nullptr), rig.positioner().locate(seen));
+  const vlp_fix fix = located(positioner.get(), nullptr);
+  EXPECT_NEAR(fix.position_m[0], 0.1, 1e-9);
+  EXPECT_EQ(fix.roll_rad, 0);
+  EXPECT_EQ(fix.velocity_m_per_s[0], 0);
+  EXPECT_EQ(Covariance6(fix.covariance).row(3), Eigen::RowVectorXd::Zero(6));
+}
+
+TEST_F(CInterface, LocatesABodyThatDrivesAndLeans) {
+  rig.mount = CameraMount{{0.2, -0.1, 0.3}, 0.5};
+  vlp_options options = {};
+  options.has_mount = 1;
+  options.mount_position_m[0] = 0.2;
+  options.mount_position_m[1] = -0.1;
+  options.mount_position_m[2] = 0.3;
+  options.mount_yaw_rad = 0.5;
+  vlp_sensors sensors = {};
+  sensors.stamp = std::numeric_limits<std::int64_t>::max() - 1;
+  sensors.inclination_sigma_rad = 0.2;
+  sensors.has_motion = 1;
+  sensors.velocity_sd_m_per_s = 1;
+  Sensors same;
+  same.inclination_sigma_rad = 0.2;
+  same.motion = KnownMotion{{0, 0}, 0, 1, 0};
+  const Fix fix = rig.positioner().locate(seen, same);
+  const vlp_fix c = located(open(&options).get(), &sensors);
+  expect_same(c, fix);
+  ASSERT_TRUE(fix.body);
+  EXPECT_EQ(c.stamp, sensors.stamp);
+  EXPECT_EQ(c.roll_rad, fix.body->inclination.roll_rad);
+  EXPECT_EQ(c.pitch_rad, fix.body->inclination.pitch_rad);
+  EXPECT_EQ(c.velocity_m_per_s[1], fix.body->velocity_m_per_s.y());
+  const Covariance6 covariance(c.covariance);
+  EXPECT_GT(covariance(3, 3), 0);
+  EXPECT_EQ(covariance(0, 3), fix.body->covariance(0, kBodyRoll));
+  EXPECT_EQ(covariance(4, 5), fix.body->covariance(kBodyPitch, kBodyYaw));
+  EXPECT_EQ(covariance(4, 4), fix.body->covariance(kBodyPitch, kBodyPitch));
+  EXPECT_EQ(c.velocity_covariance[1], fix.body->covariance(kBodyVelocity, kBodyVelocity + 1));
+}
+
+TEST_F(CInterface, LocatesByOneLampAndEveryKnownFigure) {
+  seen.resize(1);
+  given.resize(1);
+  vlp_sensors sensors = {};
+  sensors.has_inclination = 1;
+  sensors.roll_rad = 0.06;
+  sensors.pitch_rad = -0.08;
+  sensors.inclination_sigma_rad = 0.01;
+  sensors.has_height_and_yaw = 1;
+  sensors.camera_yaw_rad = 0.4;
+  sensors.has_motion = 1;
+  sensors.velocity_m_per_s[0] = 2;
+  sensors.yaw_rate_rad_per_s = 0.1;
+  sensors.yaw_rate_sd_rad_per_s = 0.2;
+  const Sensors same{Inclination{0.06, -0.08}, 0.01, HeightAndYaw{0, 0.4}};
+  const vlp_fix fix = located(open().get(), &sensors);
+  expect_same(fix, rig.positioner().locate(seen, same));
+  EXPECT_EQ(fix.roll_rad, 0.06);
+  EXPECT_EQ(fix.pitch_rad, -0.08);
+  EXPECT_DOUBLE_EQ(Covariance6(fix.covariance)(4, 4), 1e-4);
+  EXPECT_DOUBLE_EQ(fix.velocity_m_per_s[0], 2 * std::cos(0.4));
+  EXPECT_DOUBLE_EQ(fix.velocity_m_per_s[1], 2 * std::sin(0.4));
+  EXPECT_DOUBLE_EQ(fix.velocity_covariance[8], 0.04);
+}
+
+TEST_F(CInterface, KnowsAHeight) {
+  vlp_sensors sensors = {};
+  sensors.inclination_sigma_rad = 0.2;
+  sensors.has_motion = sensors.has_height = 1;
+  sensors.velocity_sd_m_per_s = 1;
+  sensors.z_sd_m = 1e-4;
+  Sensors same;
+  same.inclination_sigma_rad = 0.2;
+  same.motion = KnownMotion{{0, 0}, 0, 1, 0};
+  same.height = KnownHeight{0, 1e-4};
+  const vlp_fix fix = located(open().get(), &sensors);
+  expect_same(fix, rig.positioner().locate(seen, same));
+  EXPECT_LE(std::sqrt(fix.noise_covariance[14]), 1e-4);
+}
+
+TEST_F(CInterface, StampsAndCountsWithoutAFix) {
+  for (vlp_detection& detection : given) detection.lamp += 100;
+  vlp_sensors sensors = {};
+  sensors.stamp = -7;
+  const vlp_fix fix = located(open().get(), &sensors);
+  EXPECT_EQ(fix.status, VLP_TOO_FEW_LAMPS);
+  EXPECT_EQ(fix.stamp, -7);
+  EXPECT_EQ(fix.unknown_lamps, static_cast<int>(given.size()));
+  EXPECT_EQ(fix.position_m[0], 0);
+}
+
+TEST_F(CInterface, RefusesWhatIsNone) {
+  const auto positioner = open();
+  vlp_fix fix;
+  EXPECT_EQ(vlp_locate(nullptr, given.data(), given.size(), nullptr, &fix), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(fix.status, VLP_BAD_ARGUMENT);
+  EXPECT_EQ(vlp_locate(positioner.get(), nullptr, 1, nullptr, &fix), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(vlp_locate(positioner.get(), given.data(), 1, nullptr, nullptr), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(vlp_locate(positioner.get(), nullptr, 0, nullptr, &fix), VLP_TOO_FEW_LAMPS);
+  given.resize(VLP_MAX_LAMPS + 1);
+  EXPECT_EQ(located(positioner.get(), nullptr).status, VLP_TOO_MANY_LAMPS);
+  given.resize(2);
+  for (const double bad : {-0.1, 1e-5, std::numeric_limits<double>::quiet_NaN()}) {
+    given[0].sigma_px = bad;
+    EXPECT_EQ(located(positioner.get(), nullptr).status, VLP_NOT_FINITE) << bad;
+  }
+  vlp_close(nullptr);
+}
+
+TEST_F(CInterface, SaysWhatIsWrongWithAFileOrAnOption) {
+  EXPECT_STREQ(vlp_last_error(), "");
+  vlp_positioner* positioner = nullptr;
+  const std::string missing = folder / "none.yaml";
+  EXPECT_EQ(vlp_open(missing.c_str(), calibration.c_str(), nullptr, &positioner), VLP_BAD_FILE);
+  EXPECT_EQ(positioner, nullptr);
+  EXPECT_THAT(vlp_last_error(), HasSubstr("none.yaml"));
+  EXPECT_EQ(vlp_open(lamps.c_str(), lamps.c_str(), nullptr, &positioner), VLP_BAD_FILE);
+  EXPECT_THAT(vlp_last_error(), HasSubstr("is it the right file?"));
+  vlp_options options = {};
+  options.max_residual_share = -1;
+  EXPECT_EQ(vlp_open(lamps.c_str(), calibration.c_str(), &options, &positioner), VLP_BAD_ARGUMENT);
+  EXPECT_THAT(vlp_last_error(), HasSubstr("max_residual_share"));
+  EXPECT_EQ(vlp_open(nullptr, calibration.c_str(), nullptr, &positioner), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(vlp_open(lamps.c_str(), calibration.c_str(), nullptr, nullptr), VLP_BAD_ARGUMENT);
+  std::string of_another_thread = "?";
+  std::thread([&] { of_another_thread = vlp_last_error(); }).join();
+  EXPECT_THAT(of_another_thread, IsEmpty());
+  const std::string endless(5000, 'x');
+  EXPECT_EQ(vlp_open(endless.c_str(), calibration.c_str(), nullptr, &positioner), VLP_BAD_FILE);
+  EXPECT_THAT(vlp_last_error(), HasSubstr("xxx"));
+}
+
+TEST(CInterfaceCodes, AreExplainedEach) {
+  std::set<std::string> texts;
+  for (int code = VLP_FAILED; code <= VLP_ROW_TIME_UNKNOWN; ++code) {
+    texts.insert(vlp_explanation(code));
+  }
+  EXPECT_EQ(texts.size(), static_cast<std::size_t>(VLP_ROW_TIME_UNKNOWN - VLP_FAILED + 1));
+  EXPECT_EQ(vlp_explanation(13), std::string(vlp_explanation(-5)));
+  EXPECT_THAT(vlp_version(), HasSubstr("."));
+}
+
+}  // namespace
+}  // namespace vlp
