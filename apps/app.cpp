@@ -14,12 +14,14 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 #include <thread>
 #include <utility>
 
 #include "captures/printable.h"
 
 #include "help_formatter.h"
+#include "reference.h"
 
 namespace vlp {
 namespace {
@@ -119,6 +121,11 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   app.add_flag("-v,--verbose", verbose, "Details on stderr")->excludes(quiet_flag);
   app.set_version_flag("--version", app.get_name() + " " + VLP_VERSION);
   log_to_stderr(app.get_name(), false, false);
+  if (argc == 3 && std::string_view(argv[1]) == "--reference") {
+    const std::string text = reference_of(app, argv[2]);
+    std::fputs(text.c_str(), stdout);
+    return text.empty() || std::fflush(stdout) != 0 ? kBadInput : kDone;
+  }
   try {
     app.parse(argc, argv);
     log_to_stderr(app.get_name(), quiet, verbose);

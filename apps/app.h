@@ -49,7 +49,8 @@ void check_further_output(const std::string& option, const std::string& file,
 
 /// The common shell of a program: adds --quiet, --verbose and --version to `app`, makes its --help
 /// fit 80 columns, parses, and calls `run`. Messages go through spdlog to stderr. Bad usage and bad
-/// input end with one line and exit code 2, Undetermined with 3, GateNotMet with 1.
+/// input end with one line and exit code 2, Undetermined with 3, GateNotMet with 1. `--reference`
+/// prints what is installed beside it (reference.h).
 int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run);
 
 }  // namespace vlp

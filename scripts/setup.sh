@@ -18,13 +18,16 @@ build=(
   libmrcal-dev libsuitesparse-dev libcairo2-dev
   libsoci-dev libboost-dev libsqlite3-dev libpq-dev  # SOCI's headers include Boost's since Debian 13
   gnuplot-nox fonts-dejavu-core
+  dpkg-dev file  # of scripts/packages.sh
 )
 tests=(
   clang libclang-rt-dev clang-format clang-tidy
   libgtest-dev libgmock-dev libbenchmark-dev mrcal python3-mrcal poppler-utils unzip
   postgresql postgresql-client tmux util-linux  # of the station
+  pybind11-dev python3-dev python3-numpy python3-pil  # of the Python module
   chromium-headless-shell python3  # the report is opened in a browser
-  debootstrap  # of tests/bare_root.sh
+  debootstrap lintian  # of tests/bare_root.sh and tests/packages.sh
+  groff zsh  # manual pages and completions are checked by them
 )
 # Snakemake, and a Slurm on one machine for the tests of its profile.
 batch=(snakemake slurmctld slurmd slurm-client munge procps)

@@ -6,7 +6,7 @@
 # git and a network sees. What is committed is cloned to /vlp there, which is where the command starts.
 # Only the superuser can. Nothing stays but the folders that are named, and no process.
 #
-#   tests/bare_root.sh [--root DIR] [--ccache DIR] RELEASE COMMAND
+#   tests/bare_root.sh [--root DIR] [--ccache DIR] [--bind DIR PLACE] RELEASE COMMAND
 #
 #   tests/bare_root.sh bookworm scripts/demo.sh
 #   tests/bare_root.sh trixie 'scripts/setup.sh --batch && scripts/test.sh'
@@ -14,6 +14,8 @@
 #   --root DIR     make the root there, and keep it; one that is there already is used as it is, with
 #                  the clone brought to what is committed now (default: a temporary one)
 #   --ccache DIR   compile with this cache (default: without one)
+#   --bind DIR PLACE
+#                  have this folder there, too, at PLACE
 #
 # Exit code: the command's; 75 when there is no root: no debootstrap, not the superuser, no mirror.
 set -euo pipefail
@@ -27,12 +29,14 @@ refuse() {  # CODE MESSAGE
   echo "bare_root.sh: $2" >&2
   exit "$1"
 }
-root='' ccache=''
+root='' ccache='' bind='' place=''
 while [[ ${1:-} == -* ]]; do
   case $1 in
     --root | --ccache) [ $# -gt 1 ] || refuse 2 "$1 wants a folder" ;;&
     --root) root=$2; shift 2 ;;
     --ccache) ccache=$2; shift 2 ;;
+    --bind) [ $# -gt 2 ] || refuse 2 "--bind wants a folder and its place"
+            bind=$(realpath "$2") place=$3; shift 3 ;;
     -h | --help) usage; exit ;;
     *) refuse 2 "unknown option $1; see bare_root.sh --help" ;;
   esac
@@ -77,9 +81,9 @@ rm -rf "$root/vlp.git"
 git clone --quiet --bare --no-hardlinks "$project" "$root/vlp.git"
 begin=${EPOCHREALTIME//[!0-9]/} code=0
 unshare --mount --pid --fork --kill-child "$BASH" -euo pipefail -s \
-  "$root" "${ccache:+$(realpath "$ccache")}" "$command" "${CI:-}" <<'INSIDE' &
+  "$root" "${ccache:+$(realpath "$ccache")}" "$command" "${CI:-}" "$bind" "$place" <<'INSIDE' &
 # Mounts and processes are of a namespace that ends with the command.
-root=$1 ccache=$2 command=$3 ci=$4
+root=$1 ccache=$2 command=$3 ci=$4 bind=$5 place=$6
 mount --make-rprivate /
 mount -t proc proc "$root/proc"
 mount --rbind /sys "$root/sys"
@@ -93,6 +97,10 @@ if [ -n "$ccache" ]; then
   settings+=(CCACHE_DIR=/ccache)
 else
   settings+=(CCACHE_DISABLE=1)
+fi
+if [ -n "$bind" ]; then
+  mkdir -p "$root/$place"
+  mount --bind "$bind" "$root/$place"
 fi
 exec chroot "$root" /usr/bin/env -i "${settings[@]}" /bin/bash -euo pipefail -c '
   if [ -d /vlp ]; then

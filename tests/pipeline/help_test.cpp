@@ -1,9 +1,14 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// --help: every program has one that fits a terminal, and its example works as typed.
+/// --help: every program has one that fits a terminal, and its example works as typed. Its manual
+/// page and what the shells complete say the same.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <regex>
 #include <sstream>
+#include <string>
 #include <vector>
 
 #include "support/program.h"
@@ -80,6 +85,85 @@ TEST_P(Help, NamesTheVersion) {
   const auto result = run_program(std::string(GetParam()) + " --version");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.output, HasSubstr(std::string(GetParam()) + " 0."));
+}
+
+/// "-o", "--output" from lines of --help that begin with an option.
+std::vector<std::string> options_in(const std::string& help) {
+  const std::regex name("(--?[a-z][a-z0-9-]*)[,{ ]?");
+  std::vector<std::string> options;
+  for (const std::string& line : lines_of(help)) {
+    if (!line.starts_with("  -")) continue;
+    const std::string names = line.substr(2, line.find(' ', 2) - 2);
+    for (std::sregex_iterator at(names.begin(), names.end(), name), end; at != end; ++at) {
+      options.push_back((*at)[1]);
+    }
+  }
+  return options;
+}
+
+TEST_P(Help, IsInTheManualPage) {
+  const std::string program = GetParam();
+  const auto page = run_program(program + " --reference man | sed 's/\\\\-/-/g'");
+  ASSERT_EQ(page.exit_code, 0) << page.errors;
+  EXPECT_THAT(page.output, HasSubstr(".TH " + program + " 1"));
+  EXPECT_THAT(page.output, HasSubstr(".SH NAME\n" + program + " - "));
+  EXPECT_THAT(page.output, testing::Not(HasSubstr("build/bin")));
+  const auto commands = subcommands_in(run_program(program + " --help").output);
+  std::string help = run_program(program + " --help").output;
+  for (const std::string& command : commands) {
+    help += run_program(program + " " + command + " --help").output;
+    EXPECT_THAT(page.output, HasSubstr(".SH COMMAND " + command + "\n"));
+  }
+  const auto options = options_in(help);
+  EXPECT_GE(options.size(), 6U);
+  for (const std::string& option : options) EXPECT_THAT(page.output, HasSubstr(option));
+  const auto typeset = run_program("command -v groff || exit 77; " + program +
+                                   " --reference man | groff -man -Tutf8 -ww >/dev/null");
+  if (typeset.exit_code != 77) {
+    EXPECT_EQ(typeset.errors, "");
+  }
+}
+
+/// What bash offers for the last of these words.
+std::vector<std::string> completed(const std::string& program, const std::string& words) {
+  std::string function = "_" + program;
+  std::replace(function.begin(), function.end(), '-', '_');
+  const auto offered =
+      run_program("bash -c 'source <(" + program + " --reference bash); COMP_WORDS=(" + program +
+                  " " + words + "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); " + function +
+                  "; printf \"%s\\n\" \"${COMPREPLY[@]}\"'");
+  EXPECT_EQ(offered.errors, "");
+  return lines_of(offered.output);
+}
+
+TEST_P(Help, IsWhatTheShellsComplete) {
+  const std::string program = GetParam();
+  const auto offered = completed(program, "-");
+  for (const std::string& option : options_in(run_program(program + " --help").output)) {
+    EXPECT_THAT(offered, testing::Contains(option));
+  }
+  const auto zsh = run_program("command -v zsh >/dev/null || exit 77; " + program +
+                               " --reference zsh >completion.zsh && zsh -n completion.zsh");
+  if (zsh.exit_code != 77) {
+    EXPECT_EQ(zsh.exit_code, 0);
+    EXPECT_EQ(zsh.errors, "");
+  }
+  std::filesystem::remove("completion.zsh");
+}
+
+TEST(Completion, KnowsChoicesCommandsAndFiles) {
+  EXPECT_THAT(completed("vlp-locate", "--correction \"\""),
+              testing::ElementsAre("none", "rotation", "dispersion", "all"));
+  EXPECT_THAT(completed("vlp-board", "--family tag36"), testing::ElementsAre("tag36h11"));
+  EXPECT_THAT(completed("vlp-station", "tr"), testing::ElementsAre("trend"));
+  EXPECT_THAT(completed("vlp-station", "run --cam"), testing::ElementsAre("--camera-id"));
+  const TemporaryFolder folder;
+  folder.file("lamps.yaml", "");
+  const std::string begin = (folder / "lam").string();
+  EXPECT_THAT(completed("vlp-locate", "--lamps " + begin),
+              testing::ElementsAre((folder / "lamps.yaml").string()));
+  EXPECT_THAT(completed("vlp-locate", begin), testing::SizeIs(1));
+  EXPECT_THAT(completed("vlp-locate", "--sigma-px " + begin), testing::ElementsAre(""));
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -1,0 +1,495 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The Python module vlp: what a notebook wants of the toolbox, in and out as arrays of numpy.
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "camera/lens.h"
+#include "captures/detections_table.h"
+#include "captures/fixes_table.h"
+#include "captures/truth_table.h"
+#include "detection/identity/lamp_classifier.h"
+#include "detection/lamp_detector.h"
+#include "positioning/positioner.h"
+#include "rig/input_error.h"
+
+namespace py = pybind11;
+
+namespace vlp {
+namespace {
+
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Integers = py::array_t<int, py::array::c_style | py::array::forcecast>;
+using Pair = std::array<double, 2>;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr int kStatuses = static_cast<int>(FixStatus::row_time_unknown) + 1;
+
+Doubles doubles(std::vector<py::ssize_t> shape) { return Doubles(std::move(shape)); }
+
+/// An array of so many columns; one row may be given without its brackets.
+std::size_t rows_of(const Doubles& array, py::ssize_t columns, const char* name) {
+  if (array.ndim() != 2 || array.shape(1) != columns) {
+    throw std::invalid_argument(std::string(name) + " should have the shape (n, " +
+                                std::to_string(columns) + ")");
+  }
+  return static_cast<std::size_t>(array.shape(0));
+}
+
+void check_length(const py::array& array, std::size_t length, const char* name) {
+  if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != length) {
+    throw std::invalid_argument(std::string(name) + " should be one for each detection, " +
+                                std::to_string(length));
+  }
+}
+
+template <typename Vector>
+Doubles array_of(const Vector& values) {
+  return Doubles(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
+Doubles array_of(const Matrix4& matrix) {
+  Doubles array = doubles({4, 4});
+  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.mutable_data()) = matrix;
+  return array;
+}
+
+// Lamp map, calibration, lens
+
+Doubles positions_of(const LampMap& map) {
+  Doubles positions = doubles({static_cast<py::ssize_t>(map.lamps.size()), 3});
+  double* next = positions.mutable_data();
+  for (const Lamp& lamp : map.lamps) next = std::copy_n(lamp.position_m.data(), 3, next);
+  return positions;
+}
+
+Integers ids_of(const LampMap& map) {
+  Integers ids(static_cast<py::ssize_t>(map.lamps.size()));
+  std::transform(map.lamps.begin(), map.lamps.end(), ids.mutable_data(),
+                 [](const Lamp& lamp) { return lamp.id; });
+  return ids;
+}
+
+Lens lens_of(const std::string& model, const std::vector<double>& intrinsics) {
+  const auto known = lens_model_from_name(model);
+  if (!known) throw std::invalid_argument("there are " + lens_model_names());
+  return Lens(*known, intrinsics);
+}
+
+Doubles project(const Lens& lens, const Doubles& points) {
+  const std::size_t n = rows_of(points, 3, "points");
+  Doubles pixels = doubles({static_cast<py::ssize_t>(n), 2});
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto pixel = lens.project(Eigen::Vector3d(points.data() + 3 * i));
+    pixels.mutable_data()[2 * i] = pixel ? pixel->x() : kNone;
+    pixels.mutable_data()[2 * i + 1] = pixel ? pixel->y() : kNone;
+  }
+  return pixels;
+}
+
+Doubles unproject(const Lens& lens, const Doubles& pixels) {
+  const std::size_t n = rows_of(pixels, 2, "pixels");
+  Doubles rays = doubles({static_cast<py::ssize_t>(n), 3});
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto ray = lens.unproject(Eigen::Vector2d(pixels.data() + 2 * i));
+    const Eigen::Vector3d direction =
+        ray ? ray->direction.normalized() : Eigen::Vector3d(kNone, kNone, kNone);
+    std::copy_n(direction.data(), 3, rays.mutable_data() + 3 * i);
+  }
+  return rays;
+}
+
+// Fixes
+
+Correction correction_of(const std::string& name) {
+  const std::array<std::pair<const char*, Correction>, 4> all = {
+      {{"none", Correction::none},
+       {"rotation", Correction::rotation},
+       {"dispersion", Correction::dispersion},
+       {"all", Correction::all}}};
+  for (const auto& [known, correction] : all) {
+    if (name == known) return correction;
+  }
+  throw std::invalid_argument("correction should be none, rotation, dispersion or all");
+}
+
+Positioner positioner_of(const LampMap& map, const Calibration& calibration,
+                         const std::string& correction,
+                         const std::optional<std::array<double, 4>>& mount,
+                         double unstated_sigma_px, double max_residual_share) {
+  PositionerOptions options;
+  options.correction = correction_of(correction);
+  if (mount) options.mount = CameraMount{{(*mount)[0], (*mount)[1], (*mount)[2]}, (*mount)[3]};
+  options.unstated_sigma_px = unstated_sigma_px;
+  options.max_residual_share = max_residual_share;
+  return {map, calibration, options};
+}
+
+Sensors sensors_of(const std::optional<Pair>& inclination_rad, double inclination_sigma_rad,
+                   const std::optional<Pair>& height_and_yaw,
+                   const std::optional<Pair>& velocity_m_per_s, double velocity_sd_m_per_s,
+                   double yaw_rate_rad_per_s, double yaw_rate_sd_rad_per_s,
+                   const std::optional<Pair>& height_m, const std::optional<double>& time_s) {
+  Sensors sensors;
+  if (inclination_rad) sensors.inclination = {(*inclination_rad)[0], (*inclination_rad)[1]};
+  sensors.inclination_sigma_rad = inclination_sigma_rad;
+  if (height_and_yaw) sensors.height_and_yaw = {(*height_and_yaw)[0], (*height_and_yaw)[1]};
+  if (velocity_m_per_s || velocity_sd_m_per_s != 0 || yaw_rate_rad_per_s != 0 ||
+      yaw_rate_sd_rad_per_s != 0) {
+    const Pair velocity = velocity_m_per_s.value_or(Pair{0, 0});
+    sensors.motion = KnownMotion{
+        {velocity[0], velocity[1]}, yaw_rate_rad_per_s, velocity_sd_m_per_s, yaw_rate_sd_rad_per_s};
+  }
+  if (height_m) sensors.height = {(*height_m)[0], (*height_m)[1]};
+  sensors.time_s = time_s;
+  return sensors;
+}
+
+std::vector<Detection> detections_of(const Integers& lamps, const Doubles& pixels,
+                                     const std::optional<Doubles>& sigma_px) {
+  const std::size_t n = rows_of(pixels, 2, "pixels");
+  check_length(lamps, n, "lamps");
+  if (sigma_px) check_length(*sigma_px, n, "sigma_px");
+  std::vector<Detection> detections(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    detections[i] = {lamps.data()[i], Eigen::Vector2d(pixels.data() + 2 * i), {}};
+    // Not stated is NaN in tables.
+    if (sigma_px && !std::isnan(sigma_px->data()[i])) detections[i].sigma_px = sigma_px->data()[i];
+  }
+  return detections;
+}
+
+Fix locate(const Positioner& positioner, const Integers& lamps, const Doubles& pixels,
+           const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
+  return positioner.locate(detections_of(lamps, pixels, sigma_px), sensors);
+}
+
+/// Where each run of equal numbers begins, and the end.
+std::vector<std::size_t> frames_in(const Integers& frames) {
+  const auto n = static_cast<std::size_t>(frames.shape(0));
+  std::vector<std::size_t> begins;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (i == 0 || frames.data()[i] != frames.data()[i - 1]) begins.push_back(i);
+  }
+  begins.push_back(n);
+  return begins;
+}
+
+py::dict locate_frames(const Positioner& positioner, const Integers& frames, const Integers& lamps,
+                       const Doubles& pixels, const std::optional<Doubles>& sigma_px,
+                       const Sensors& sensors) {
+  const auto detections = detections_of(lamps, pixels, sigma_px);
+  check_length(frames, detections.size(), "frames");
+  const auto begins = frames_in(frames);
+  const auto n = static_cast<py::ssize_t>(begins.size()) - 1;
+  Integers frame(n), status(n), used(n);
+  Doubles position = doubles({n, 3}), yaw = doubles({n}), residual = doubles({n});
+  Doubles covariance = doubles({n, 4, 4});
+  int* const frame_out = frame.mutable_data();
+  int* const status_out = status.mutable_data();
+  int* const used_out = used.mutable_data();
+  double* const position_out = position.mutable_data();
+  double* const yaw_out = yaw.mutable_data();
+  double* const residual_out = residual.mutable_data();
+  double* const covariance_out = covariance.mutable_data();
+  const int* const frame_in = frames.data();
+  {
+    const py::gil_scoped_release others_may_run;
+    for (std::size_t i = 0; i + 1 < begins.size(); ++i) {
+      const Fix fix =
+          positioner.locate({detections.data() + begins[i], begins[i + 1] - begins[i]}, sensors);
+      const bool ok = fix.ok();
+      frame_out[i] = frame_in[begins[i]];
+      status_out[i] = static_cast<int>(fix.status);
+      used_out[i] = ok ? fix.lamps : 0;
+      const auto& [pose, of_pose] = fix.estimate;
+      for (int k = 0; k < 3; ++k)
+        position_out[3 * i + static_cast<std::size_t>(k)] = ok ? pose.position_m[k] : kNone;
+      yaw_out[i] = ok ? pose.yaw_rad : kNone;
+      residual_out[i] = ok ? fix.residual_px : kNone;
+      Eigen::Map<Matrix4> rows(covariance_out + 16 * i);  // symmetric
+      if (ok) {
+        rows = of_pose;
+      } else {
+        rows.setConstant(kNone);
+      }
+    }
+  }
+  py::dict fixes;
+  fixes["frame"] = frame;
+  fixes["status"] = status;
+  fixes["position_m"] = position;
+  fixes["yaw_rad"] = yaw;
+  fixes["covariance"] = covariance;
+  fixes["residual_px"] = residual;
+  fixes["lamps"] = used;
+  return fixes;
+}
+
+std::string shown(const Fix& fix) {
+  if (!fix.ok()) return "<vlp.Fix: " + std::string(name_of(fix.status)) + ">";
+  const Pose& pose = fix.estimate.pose;
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(), "<vlp.Fix: x %.4f m, y %.4f m, z %.4f m, yaw %.4f rad>",
+                pose.position_m.x(), pose.position_m.y(), pose.position_m.z(), pose.yaw_rad);
+  return text.data();
+}
+
+// Lamps in images
+
+cv::Mat image_of(const py::array& array) {
+  const bool bytes = py::isinstance<py::array_t<std::uint8_t>>(array);
+  if (array.ndim() != 2 || array.size() == 0 ||
+      !(bytes || py::isinstance<py::array_t<std::uint16_t>>(array))) {
+    throw std::invalid_argument("an image should have the shape (rows, columns), uint8 or uint16");
+  }
+  const auto rows = py::array::ensure(array, py::array::c_style);
+  return cv::Mat(static_cast<int>(rows.shape(0)), static_cast<int>(rows.shape(1)),
+                 bytes ? CV_8U : CV_16U, const_cast<void*>(rows.data()))
+      .clone();
+}
+
+py::tuple arrays_of(const std::vector<Detection>& detections) {
+  const auto n = static_cast<py::ssize_t>(detections.size());
+  Integers lamps(n);
+  Doubles pixels = doubles({n, 2}), sigma_px = doubles({n});
+  for (std::size_t i = 0; i < detections.size(); ++i) {
+    lamps.mutable_data()[i] = detections[i].lamp;
+    std::copy_n(detections[i].pixel.data(), 2, pixels.mutable_data() + 2 * i);
+    sigma_px.mutable_data()[i] = detections[i].sigma_px.value_or(kNone);
+  }
+  return py::make_tuple(lamps, pixels, sigma_px);
+}
+
+py::tuple detect(const LampDetector& detector, const py::array& array) {
+  const cv::Mat image = image_of(array);
+  std::vector<Detection> detections;
+  {
+    const py::gil_scoped_release others_may_run;
+    for (const Light& light : detector.detect(image)) {
+      if (light.kind == LightKind::lamp) {
+        detections.push_back({*light.lamp, light.pixel, light.sigma_px});
+      }
+    }
+  }
+  return arrays_of(detections);
+}
+
+LampDetector detector_of(const LampMap& map, const Calibration& calibration,
+                         const std::optional<std::filesystem::path>& classifier) {
+  if (!calibration.camera.row_time_s) {
+    throw std::invalid_argument("the calibration has no row_time_s, by which lamps are told apart");
+  }
+  std::optional<LampClassifier> trained;
+  if (classifier) trained = read_lamp_classifier(*classifier);
+  return {map, detector_camera(calibration), std::move(trained)};
+}
+
+// Tables
+
+py::dict detections_table(const std::filesystem::path& file) {
+  const auto read = read_detections(file);
+  std::vector<Detection> all;
+  std::vector<int> frames;
+  py::list images;
+  for (const Frame& frame : read) {
+    frames.insert(frames.end(), frame.detections.size(), static_cast<int>(images.size()));
+    all.insert(all.end(), frame.detections.begin(), frame.detections.end());
+    images.append(frame.image);
+  }
+  const py::tuple arrays = arrays_of(all);
+  py::dict table;
+  table["images"] = images;
+  table["frames"] = Integers(static_cast<py::ssize_t>(frames.size()), frames.data());
+  table["lamps"] = arrays[0];
+  table["pixels"] = arrays[1];
+  table["sigma_px"] = arrays[2];
+  return table;
+}
+
+py::dict fixes_table(const std::filesystem::path& file) {
+  const auto rows = read_fixes(file);
+  const auto n = static_cast<py::ssize_t>(rows.size());
+  py::list images, statuses;
+  Doubles position = doubles({n, 3}), yaw = doubles({n}), sd = doubles({n, 4});
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    images.append(rows[i].image);
+    statuses.append(rows[i].status);
+    const auto& fix = rows[i].fix;
+    const Eigen::Vector3d none = Eigen::Vector3d::Constant(kNone);
+    const Eigen::Vector3d at = fix ? fix->pose.position_m : none;
+    const Eigen::Vector4d stated =
+        fix && fix->sd ? *fix->sd : Eigen::Vector4d(Eigen::Vector4d::Constant(kNone));
+    std::copy_n(at.data(), 3, position.mutable_data() + 3 * i);
+    std::copy_n(stated.data(), 4, sd.mutable_data() + 4 * i);
+    yaw.mutable_data()[i] = fix ? fix->pose.yaw_rad : kNone;
+  }
+  py::dict table;
+  table["images"] = images;
+  table["statuses"] = statuses;
+  table["position_m"] = position;
+  table["yaw_rad"] = yaw;
+  table["sd"] = sd;
+  return table;
+}
+
+py::dict truth_table(const std::filesystem::path& file) {
+  const auto rows = read_truth(file);
+  const auto n = static_cast<py::ssize_t>(rows.size());
+  py::list images;
+  Doubles position = doubles({n, 3}), yaw = doubles({n});
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    images.append(rows[i].image);
+    double* const xyz = position.mutable_data() + 3 * i;
+    std::copy_n(rows[i].xy_m.data(), 2, xyz);
+    xyz[2] = rows[i].z_m.value_or(kNone);
+    yaw.mutable_data()[i] = rows[i].yaw_rad.value_or(kNone);
+  }
+  py::dict table;
+  table["images"] = images;
+  table["position_m"] = position;
+  table["yaw_rad"] = yaw;
+  return table;
+}
+
+}  // namespace
+}  // namespace vlp
+
+PYBIND11_MODULE(vlp, m) {
+  using namespace vlp;
+  using namespace pybind11::literals;
+  m.doc() =
+      "Positions from modulated ceiling lamps: lens, lamp map, calibration, lamps in images, "
+      "fixes.\n\n"
+      "Metres, radians, seconds, pixels; the world has z up, yaw is counter-clockwise seen from\n"
+      "above, the centre of an image's top left pixel is (0, 0). Nothing is None, or NaN in "
+      "arrays.";
+  m.attr("__version__") = VLP_VERSION;
+  py::register_exception<InputError>(m, "InputError", PyExc_ValueError).doc() =
+      "A file that is bad: file, line, key, and what to do.";
+  py::list statuses;
+  for (int i = 0; i < kStatuses; ++i) statuses.append(name_of(static_cast<FixStatus>(i)));
+  m.attr("STATUSES") = py::tuple(statuses);
+  m.def(
+      "explanation",
+      [](int status) {
+        if (status < 0 || status >= kStatuses) throw std::invalid_argument("no such status");
+        return explanation_of(static_cast<FixStatus>(status));
+      },
+      "status"_a, "What a status, an index of STATUSES, means and what to do.");
+
+  py::class_<LampMap>(m, "LampMap", "The lamps of a room, lamps.yaml.")
+      .def(py::init(&read_lamp_map), "file"_a)
+      .def_property_readonly("ids", &ids_of)
+      .def_property_readonly("positions_m", &positions_of, "(n, 3), in the world.")
+      .def("__len__", [](const LampMap& map) { return map.lamps.size(); });
+
+  py::class_<Lens>(m, "Lens", "A lens: directions to pixels and back.")
+      .def(py::init(&lens_of), "model"_a, "intrinsics"_a, "By mrcal's name, with its parameters.")
+      .def("project", &project, "points"_a,
+           "Pixels (n, 2) of points (n, 3) in the camera; NaN where the lens has none.")
+      .def("unproject", &unproject, "pixels"_a,
+           "Unit directions (n, 3) in the camera of pixels (n, 2); NaN where the lens has none.");
+
+  py::class_<Calibration>(m, "Calibration", "All that is known of a camera, calibration.yaml.")
+      .def(py::init(&read_calibration), "file"_a)
+      .def_property_readonly("camera_id", [](const Calibration& c) { return c.camera.id; })
+      .def_property_readonly(
+          "imager_px", [](const Calibration& c) { return c.camera.imager_px; }, "Width and height.")
+      .def_property_readonly("lens_model",
+                             [](const Calibration& c) { return name_of(c.camera.lens_model); })
+      .def_property_readonly("intrinsics",
+                             [](const Calibration& c) { return array_of(c.camera.intrinsics); })
+      .def_property_readonly("row_time_s", [](const Calibration& c) { return c.camera.row_time_s; })
+      .def_property_readonly("lens", [](const Calibration& c) {
+        return Lens(c.camera.lens_model, c.camera.intrinsics);
+      });
+
+  py::class_<Sensors>(m, "Sensors", "What a robot knows of a frame besides the image.")
+      .def(py::init(&sensors_of), py::kw_only(), "inclination_rad"_a = py::none(),
+           "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
+           "velocity_m_per_s"_a = py::none(), "velocity_sd_m_per_s"_a = 0.0,
+           "yaw_rate_rad_per_s"_a = 0.0, "yaw_rate_sd_rad_per_s"_a = 0.0, "height_m"_a = py::none(),
+           "time_s"_a = py::none(),
+           "inclination_rad: (roll, pitch), and its standard deviation, with which they are\n"
+           "estimated. height_and_yaw: of the camera, for fixes of one lamp. velocity_m_per_s: in\n"
+           "the level frame; with standard deviations it is estimated. height_m: (z, sd).");
+
+  py::class_<Fix>(m, "Fix", "The answer to one frame.")
+      .def_property_readonly("ok", &Fix::ok)
+      .def_property_readonly("status", [](const Fix& fix) { return name_of(fix.status); })
+      .def_property_readonly("explanation",
+                             [](const Fix& fix) { return explanation_of(fix.status); })
+      .def_property_readonly("position_m",
+                             [](const Fix& fix) { return array_of(fix.estimate.pose.position_m); })
+      .def_property_readonly("yaw_rad", [](const Fix& fix) { return fix.estimate.pose.yaw_rad; })
+      .def_property_readonly(
+          "covariance", [](const Fix& fix) { return array_of(fix.estimate.covariance); },
+          "(4, 4), of x, y, z, yaw: all that is known of the error.")
+      .def_property_readonly(
+          "noise_covariance", [](const Fix& fix) { return array_of(fix.noise_covariance); },
+          "The part that is of this frame alone and averages out.")
+      .def_property_readonly(
+          "lean_rad",
+          [](const Fix& fix) -> std::optional<Pair> {
+            if (!fix.body) return std::nullopt;
+            return Pair{fix.body->inclination.roll_rad, fix.body->inclination.pitch_rad};
+          },
+          "(roll, pitch) where they were estimated.")
+      .def_property_readonly(
+          "velocity_m_per_s",
+          [](const Fix& fix) -> std::optional<Pair> {
+            if (!fix.body) return std::nullopt;
+            return Pair{fix.body->velocity_m_per_s.x(), fix.body->velocity_m_per_s.y()};
+          },
+          "In the world, where it was estimated.")
+      .def_readonly("residual_px", &Fix::residual_px)
+      .def_readonly("lamps", &Fix::lamps, "That the fix rests on.")
+      .def_readonly("rejected_lamps", &Fix::rejected_lamps)
+      .def_readonly("unknown_lamps", &Fix::unknown_lamps)
+      .def_readonly("time_s", &Fix::time_s)
+      .def("__repr__", &shown);
+
+  py::class_<Positioner>(m, "Positioner", "From identified lamps in an image to a position.")
+      .def(py::init(&positioner_of), "lamp_map"_a, "calibration"_a, py::kw_only(),
+           "correction"_a = "all", "mount"_a = py::none(), "unstated_sigma_px"_a = 1.0,
+           "max_residual_share"_a = 0.1,
+           "mount: (x, y, z, yaw) of the camera on the robot, whose fixes it then makes.")
+      .def("locate", &locate, "lamps"_a, "pixels"_a, "sigma_px"_a = py::none(),
+           "sensors"_a = Sensors(),
+           "The Fix of one frame, from ids (n), pixels (n, 2), their standard deviations (n).")
+      .def(
+          "locate_frames", &locate_frames, "frames"_a, "lamps"_a, "pixels"_a,
+          "sigma_px"_a = py::none(), "sensors"_a = Sensors(),
+          "Fixes of many frames: the detections of one follow each other and have the same number\n"
+          "in `frames`. A dict of arrays, a row for each frame: frame, status (an index of\n"
+          "STATUSES, 0: ok), position_m, yaw_rad, covariance, residual_px, lamps.");
+
+  py::class_<LampDetector>(m, "LampDetector", "Finds and identifies the lamps of a map in images.")
+      .def(py::init(&detector_of), "lamp_map"_a, "calibration"_a, "classifier"_a = py::none(),
+           "classifier: the file of one that vlp-train made, instead of the map's frequencies.")
+      .def("detect", &detect, "image"_a,
+           "(lamps, pixels, sigma_px) of the lamps wholly in view, as Positioner.locate takes "
+           "them;\n"
+           "the image has the shape (rows, columns), uint8 or uint16.");
+
+  m.def("read_detections", &detections_table, "file"_a,
+        "detections.csv as a dict: images, and for each detection frames (an index of images),\n"
+        "lamps, pixels, sigma_px.");
+  m.def("read_fixes", &fixes_table, "file"_a,
+        "fixes.csv as a dict: images, statuses, position_m, yaw_rad, sd (n, 4).");
+  m.def("read_truth", &truth_table, "file"_a, "truth.csv as a dict: images, position_m, yaw_rad.");
+}

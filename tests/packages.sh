@@ -1,0 +1,59 @@
+#!/bin/bash
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Debian packages, made and checked by lintian, then installed, used and removed in a bare root of this
+# machine's release, as a user of theirs has it. Only the superuser can, and with a network.
+#
+#   tests/packages.sh [--root DIR] [COMPONENT...]
+#
+#   --root DIR   make the root there and keep it, or use the one that is there (default: a temporary one)
+#   COMPONENT    as of scripts/packages.sh
+#
+# Exit code 75 when there is no root (tests/bare_root.sh).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+root=()
+if [ "${1:-}" = --root ]; then
+  root=(--root "$2")
+  shift 2
+fi
+[ -n "$(command -v lintian)" ] || { echo "packages.sh: lintian is missing; scripts/setup.sh installs it" >&2; exit 1; }
+scratch=$(mktemp --directory --tmpdir packages-XXXXXX)
+trap 'rm -rf "$scratch"' EXIT
+chmod 755 "$scratch"
+scripts/packages.sh -o "$scratch" "$@"
+lintian --fail-on error --allow-root "$scratch"/*.deb
+
+. /etc/os-release
+# The packages are what is newest in the root, and nothing of the project is built there.
+tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$VERSION_CODENAME" '
+  export DEBIAN_FRONTEND=noninteractive
+  apt-get update -qq
+  apt-get install -qq --no-install-recommends /packages/*.deb >/packages/install.log 2>&1 ||
+    { tail /packages/install.log; exit 1; }
+  has() { dpkg-query -W "$1" >/dev/null 2>&1; }
+  cd datasets/example
+  if has libvlp-positioning-dev; then
+    apt-get install -qq --no-install-recommends g++ pkg-config >>/packages/install.log 2>&1
+    sed -n "/^\`\`\`c\$/,/^\`\`\`\$/{/^\`\`\`/!p}" ../../lib/README.md >/packages/robot.c
+    cc -std=c99 /packages/robot.c -lvlp_positioning -o /packages/robot
+    /packages/robot | grep "^x "
+    c++ -std=c++20 -x c++ ../../tests/consumer/same_fix/same_fix.cpp -o /packages/robot \
+      $(pkg-config --cflags --libs vlp-positioning)
+    /packages/robot | grep -c "^0 "
+  fi
+  if has vlp-tools; then
+    vlp-locate detections.csv --lamps lamps.yaml --calibration calibration.yaml -o /packages/fixes.csv
+    vlp-evaluate /packages/fixes.csv --truth truth.csv --gate mean_mm=1 --report /packages/report.html
+    for program in /usr/bin/vlp-*; do
+      "$program" --version
+      test -s "/usr/share/man/man1/${program##*/}.1.gz"
+    done
+  fi
+  if has python3-vlp; then python3 ../../apps/python/example.py; fi
+  installed=$(dpkg-query -W -f "\${Package}\n" | grep vlp)
+  apt-get purge -qq $installed >>/packages/install.log 2>&1
+  ! ls -d /usr/bin/vlp-* /usr/include/vlp /usr/lib/*/libvlp* /usr/share/doc/*vlp* 2>/dev/null'
+echo "packages.sh: $(cd "$scratch" && echo *.deb): made, installed, used, removed"

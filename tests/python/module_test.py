@@ -1,0 +1,133 @@
+#!/usr/bin/python3
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""The Python module: says what the files say, locates as it should, refuses what is none."""
+
+import pathlib
+import subprocess
+import sys
+import time
+import unittest
+
+import numpy as np
+import PIL.Image
+import vlp
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+EXAMPLE = SOURCE / "datasets/example"
+RENDERED = SOURCE / "datasets/paper-rig/rendered"
+
+
+class Module(unittest.TestCase):
+    def setUp(self):
+        self.lamps = vlp.LampMap(EXAMPLE / "lamps.yaml")
+        self.calibration = vlp.Calibration(EXAMPLE / "calibration.yaml")
+        self.positioner = vlp.Positioner(self.lamps, self.calibration)
+        self.seen = vlp.read_detections(EXAMPLE / "detections.csv")
+        self.truth = vlp.read_truth(EXAMPLE / "truth.csv")
+
+    def located(self, **options):
+        seen = self.seen
+        return self.positioner.locate_frames(
+            seen["frames"], seen["lamps"], seen["pixels"], seen["sigma_px"], **options
+        )
+
+    def test_reads_files(self):
+        self.assertEqual(list(self.lamps.ids), [1, 2, 3, 4, 5])
+        self.assertEqual(list(self.lamps.positions_m[4]), [0.05, 0, 1.5])
+        self.assertEqual(self.calibration.imager_px, [800, 600])
+        self.assertEqual(self.calibration.lens_model, "LENSMODEL_OPENCV8")
+        self.assertEqual(self.calibration.row_time_s, 3e-5)
+        self.assertEqual(self.seen["pixels"].shape, (len(self.seen["lamps"]), 2))
+
+    def test_lens_is_its_own_inverse(self):
+        pixels = np.array([[10.0, 20], [400, 300], [790, 590]])
+        lens = self.calibration.lens
+        np.testing.assert_allclose(lens.project(5 * lens.unproject(pixels)), pixels, atol=1e-8)
+        self.assertTrue(np.isnan(lens.project([[0.0, 0, -1]])).all())
+        same = vlp.Lens(self.calibration.lens_model, self.calibration.intrinsics)
+        np.testing.assert_array_equal(same.unproject(pixels), lens.unproject(pixels))
+
+    def test_locates_where_the_truth_is(self):
+        fixes = self.located()
+        self.assertTrue((fixes["status"] == 0).all())
+        error = fixes["position_m"] - self.truth["position_m"]
+        self.assertLess(np.abs(error).max(), 1e-3)
+        turn = fixes["yaw_rad"] - self.truth["yaw_rad"]
+        self.assertLess(np.abs(np.sin(turn)).max(), 1e-3)
+        sd = np.sqrt(np.diagonal(fixes["covariance"], axis1=1, axis2=2))
+        self.assertLess(np.abs(error / sd[:, :3]).max(), 5)
+
+    def test_one_frame_is_as_among_many(self):
+        fixes = self.located()
+        of_3 = self.seen["frames"] == 3
+        seen = [self.seen[name][of_3] for name in ("lamps", "pixels", "sigma_px")]
+        fix = self.positioner.locate(*seen)
+        self.assertTrue(fix.ok)
+        np.testing.assert_array_equal(fix.position_m, fixes["position_m"][3])
+        np.testing.assert_allclose(fix.covariance, fixes["covariance"][3], rtol=1e-12, atol=1e-30)
+        self.assertEqual(fix.lamps, fixes["lamps"][3])
+        leaning = self.positioner.locate(*seen, vlp.Sensors(inclination_sigma_rad=0.1, time_s=7))
+        self.assertEqual(leaning.time_s, 7)
+        self.assertLess(abs(leaning.lean_rad[0]), 0.01)
+        mounted = vlp.Positioner(self.lamps, self.calibration, mount=(0, 0, 0.5, 0)).locate(*seen)
+        self.assertAlmostEqual(mounted.position_m[2], fix.position_m[2] - 0.5)
+
+    def test_says_why_there_is_no_fix(self):
+        fix = self.positioner.locate([1], [[400.0, 300]])
+        self.assertFalse(fix.ok)
+        self.assertEqual(fix.status, "too_few_lamps")
+        fixes = self.positioner.locate_frames([0, 1, 1], [1, 1, 2], [[400.0, 300]] * 3)
+        self.assertEqual(vlp.STATUSES[fixes["status"][0]], "too_few_lamps")
+        self.assertTrue(np.isnan(fixes["position_m"]).all())
+        self.assertIn("fewer than two", vlp.explanation(fixes["status"][0]))
+
+    def test_refuses_what_is_none(self):
+        with self.assertRaisesRegex(vlp.InputError, "none.yaml"):
+            vlp.LampMap("none.yaml")
+        with self.assertRaisesRegex(ValueError, "shape"):
+            self.positioner.locate([1, 2], [1.0, 2])
+        with self.assertRaisesRegex(ValueError, "one for each"):
+            self.positioner.locate([1, 2, 3], [[1.0, 2], [3, 4]])
+        with self.assertRaisesRegex(ValueError, "correction"):
+            vlp.Positioner(self.lamps, self.calibration, correction="some")
+        with self.assertRaisesRegex(ValueError, "uint8"):
+            vlp.LampDetector(self.lamps, self.calibration).detect(np.zeros((5, 5)))
+        with self.assertRaises(ValueError):
+            vlp.Lens("LENSMODEL_NONE", [1, 1, 0, 0])
+
+    def test_detects_as_the_table_says(self):
+        detector = vlp.LampDetector(
+            vlp.LampMap(RENDERED / "lamps.yaml"),
+            vlp.Calibration(RENDERED / "true_calibration.yaml"),
+        )
+        true = vlp.read_detections(RENDERED / "sample/true_detections.csv")
+        image = true["images"][0]
+        lamps, pixels, sigma_px = detector.detect(np.array(PIL.Image.open(RENDERED / "sample" / image)))
+        self.assertGreaterEqual(len(lamps), 2)
+        for lamp, pixel, sigma in zip(lamps, pixels, sigma_px):
+            row = (true["frames"] == 0) & (true["lamps"] == lamp)
+            self.assertLess(np.linalg.norm(true["pixels"][row][0] - pixel), 6 * sigma + 0.05)
+
+    def test_locates_many_frames_in_no_time(self):
+        copies = 100000 // len(self.seen["images"]) + 1
+        count = len(self.seen["images"])
+        frames = np.concatenate([self.seen["frames"] + count * i for i in range(copies)])
+        lamps = np.tile(self.seen["lamps"], copies)
+        pixels = np.tile(self.seen["pixels"], (copies, 1))
+        begin = time.process_time()
+        fixes = self.positioner.locate_frames(frames, lamps, pixels)
+        took = time.process_time() - begin
+        print(f"{len(fixes['status'])} fixes in {took:.2f} s of processor time")
+        self.assertTrue((fixes["status"] == 0).all())
+        self.assertLess(took, 5)  # 1 s on a machine of its own
+
+    def test_example_runs(self):
+        example = [sys.executable, SOURCE / "apps/python/example.py", EXAMPLE]
+        told = subprocess.run(example, capture_output=True, text=True, check=True).stdout
+        self.assertRegex(told, "5 lamps")
+        self.assertRegex(told, r"\d+ fixes, mean error 0\.\d+ mm")
+
+
+if __name__ == "__main__":
+    unittest.main()
