@@ -100,13 +100,15 @@ void print_ratios(const Evaluation& evaluation) {
     fmt::print(" (errors within 1.96 sd; those of one calibration go together)\n");
   }
   if (const auto& limit = evaluation.limit) {
-    fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} (1: the best there can be)\n",
-               mm(limit->limit_m), limit->horizontal);
+    fmt::print(
+        "limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
+        limit->horizontal,
+        limit->beaten() ? "beaten: the stated noise is too large" : "1: the best there can be");
   }
 }
 
 void print_comparison(const Comparison& comparison) {
-  fmt::print("compared    {}{}", comparison.verdict(), comparison.too_few() ? ", too few" : "");
+  fmt::print("compared    {}", comparison.words());
   if (comparison.pairs > 0) {
     fmt::print(": mean error differs by {:+.3f} mm", mm(comparison.mean_difference_m));
   }

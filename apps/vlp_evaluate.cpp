@@ -219,8 +219,8 @@ void add_options(CLI::App& app, Options& options) {
          "what a turn about the calibration's lever arm adds)")
       ->check(finite_positive());
   app.add_option("--compare", options.compare,
-                 "Other fixes of the same captures: are these better, worse, or is there no "
-                 "evidence?");
+                 "Other fixes of the same captures: are these better, worse, the same (within "
+                 "1 um or 1 % of the mean error, whichever is more), or is there no evidence?");
   app.add_option("--gate", options.gates,
                  "What a figure has to be at most; again for another, or with commas")
       ->delimiter(',')

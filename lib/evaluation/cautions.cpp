@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "captures/csv_writer.h"
+
 namespace vlp {
 namespace {
 
@@ -24,6 +26,15 @@ std::string unasked_missing(const Evaluation& evaluation, const std::vector<Chec
   return std::to_string(missing) + " of " + std::to_string(evaluation.captures) +
          (missing == 1 ? " captures has" : " captures have") +
          " no fix, and no gate 'missing' asks";
+}
+
+std::string caution_of_limit(const Evaluation& evaluation) {
+  const auto& limit = evaluation.limit;
+  if (!limit || !limit->beaten()) return "";
+  constexpr int digits = 3;
+  return "the errors are " + significant(limit->horizontal, digits) +
+         " times the theoretical limit, which nothing beats: the stated noise of a lamp's pixel is "
+         "too large";
 }
 
 std::vector<std::string> cautions_of_few(const Evaluation& evaluation) {

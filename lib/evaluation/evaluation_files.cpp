@@ -100,6 +100,7 @@ Json json_of(const Comparison& comparison) {
   if (comparison.pairs > 0) {
     json["mean_difference_mm"] = kMmKeys.of_one * comparison.mean_difference_m;
   }
+  json["least_mm"] = kMmKeys.of_one * comparison.least_m;
   if (comparison.too_few()) json["why"] = "too few";
   if (comparison.interval_m) json["interval_95_mm"] = json_of(*comparison.interval_m);
   return json;
@@ -148,6 +149,7 @@ std::string json_of(const Evaluation& evaluation, const std::vector<CheckedMetri
   if (evaluation.limit) {
     json["limit"] = {{"ratio", evaluation.limit->horizontal},
                      {"limit_rms_mm", kMmKeys.of_one * evaluation.limit->limit_m},
+                     {"beaten", evaluation.limit->beaten()},
                      {"fixes", evaluation.limit->fixes}};
   }
   if (evaluation.comparison) json["comparison"] = json_of(*evaluation.comparison);

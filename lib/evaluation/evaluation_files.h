@@ -17,8 +17,9 @@ namespace vlp {
 /// comparison of too few units has a "why". Objects: horizontal (with intervals_95 and cdf), height
 /// and yaw (with bias), repeated (bias and scatter of stations with two fixes or more, and the
 /// list), fitted_line (of --line; jitter, angle, ends), stated_ratio (errors / stated sd), limit
-/// (errors / theoretical limit), comparison (verdict, pairs, difference), gates (name, unit, value,
-/// limit, asked: "at most" or "at least", passed), passed.
+/// (errors / theoretical limit, and whether that is beaten), comparison (verdict, pairs,
+/// difference, and the least that matters), gates (name, unit, value, limit, asked: "at most" or
+/// "at least", passed), passed.
 std::string json_of(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
 /// JUnit XML, for CI systems: a test case for each gate, failed with words_of() it.

@@ -7,9 +7,12 @@
 namespace vlp {
 namespace {
 
-/// The end of the difference's interval that is nearer to better; nothing is certain of too few.
+/// The end of the difference's interval that is nearer to better; nothing is certain of too few,
+/// and what does not matter is nothing.
 double worse_m(const Comparison& comparison) {
-  return comparison.too_few() ? 0 : comparison.interval_m->low;
+  if (comparison.too_few()) return 0;
+  const double low_m = comparison.interval_m->low;
+  return low_m > 0 && low_m <= comparison.least_m ? 0 : low_m;
 }
 
 }  // namespace

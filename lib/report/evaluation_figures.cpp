@@ -36,8 +36,7 @@ void add_horizontal(std::vector<ReportFigure>& figures, const Evaluation& evalua
 }
 
 std::string note_of(const Comparison& comparison) {
-  std::string note = "Compared with the other fixes: " + std::string(comparison.verdict()) +
-                     (comparison.too_few() ? ", too few" : "") + "; ";
+  std::string note = "Compared with the other fixes: " + comparison.words() + "; ";
   if (comparison.pairs > 0) {
     note += "the mean error is " + readable_mm(std::abs(comparison.mean_difference_m)) + " mm " +
             (comparison.mean_difference_m < 0 ? "smaller" : "larger") + " than theirs";
@@ -104,6 +103,9 @@ std::vector<std::string> report_notes(const Evaluation& evaluation) {
                     " " + evaluation.drawn + ".");
   }
   if (evaluation.comparison) notes.push_back(note_of(*evaluation.comparison));
+  if (const std::string caution = caution_of_limit(evaluation); !caution.empty()) {
+    notes.push_back("Caution: " + caution + ".");
+  }
   for (const std::string& caution : cautions_of_few(evaluation)) {
     notes.push_back("Caution: " + caution + ".");
   }

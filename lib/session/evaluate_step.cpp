@@ -37,6 +37,9 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
   if (input.line_m && !evaluation.fit) {
     result.warnings.emplace_back("no line is fitted: the fixes are spread in no direction");
   }
+  if (std::string caution = caution_of_limit(evaluation); !caution.empty()) {
+    result.warnings.push_back(std::move(caution));
+  }
   if (!result.caution.empty()) result.warnings.push_back(result.caution);
   for (std::string& caution : cautions_of_few(evaluation)) {
     result.notes.push_back(std::move(caution));

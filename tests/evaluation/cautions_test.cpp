@@ -55,6 +55,17 @@ TEST(Cautions, TellOfFewUnits) {
               ElementsAre("there are too few stations with a fix for intervals"));
 }
 
+TEST(Cautions, TellOfALimitThatIsBeaten) {
+  Evaluation limited = evaluation(1000);
+  EXPECT_EQ(caution_of_limit(limited), "");
+  limited.limit = LimitRatio{0.609, 1e-3, 36};
+  EXPECT_THAT(
+      caution_of_limit(limited),
+      HasSubstr("0.609 times the theoretical limit, which nothing beats: the stated noise"));
+  limited.limit->horizontal = 0.9;
+  EXPECT_EQ(caution_of_limit(limited), "");
+}
+
 TEST(Cautions, CountTheUnitsOfThePairs) {
   Evaluation compared = evaluation(1000);
   compared.comparison = Comparison{};

@@ -94,6 +94,8 @@ TEST(Gates, OfAComparisonOfTooFewDoNotFail) {
   compared.comparison->units = 20;
   compared.comparison->interval_m = {0.1, 1};
   EXPECT_FALSE(passed());
+  compared.comparison->interval_m = {1e-7, 2.4e-7};  // of no matter
+  EXPECT_TRUE(passed());
 }
 
 TEST(Gates, HaveLimitsThatAFigureCanReach) {

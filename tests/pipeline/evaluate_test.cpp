@@ -121,10 +121,21 @@ TEST_F(Evaluate, SaysWhichOfTwoRunsIsBetter) {
   folder.file("fixes.csv", good);
   folder.file("other.csv", bad);
   folder.file("truth.csv", truth);
-  EXPECT_THAT(with_truth("--compare other.csv --gate worse_mm=0").output,
-              AllOf(HasSubstr("compared    better: mean error differs by -0.150 mm"),
-                    HasSubstr("20 in both: 20 with a smaller error")));
-  EXPECT_THAT(with_truth("--compare fixes.csv").output, HasSubstr("no evidence"));
+  EXPECT_THAT(
+      with_truth("--compare other.csv --gate worse_mm=0").output,
+      AllOf(HasSubstr("compared    better by more than 0.0025 mm: mean error differs by -0.150 mm"),
+            HasSubstr("20 in both: 20 with a smaller error")));
+  EXPECT_THAT(with_truth("--compare fixes.csv").output, HasSubstr("the same within 0.001 mm"));
+  // All off by 0.17 um more, and surely so: nobody's loss.
+  std::string hardly = good;
+  for (auto at = hardly.find(".0001,"); at != std::string::npos; at = hardly.find(".0001,", at)) {
+    hardly.replace(at, 6, ".00010017,");
+  }
+  folder.file("fixes.csv", hardly);
+  folder.file("other.csv", good);
+  const auto same = with_truth("--compare other.csv --gate worse_mm=0");
+  EXPECT_EQ(same.exit_code, 0) << same.output;
+  EXPECT_THAT(same.output, HasSubstr("compared    the same within 0.001 mm: mean error differs"));
   folder.file("fixes.csv", bad);
   folder.file("other.csv", good);
   EXPECT_EQ(with_truth("--compare other.csv --gate worse_mm=0").exit_code, 1);
@@ -148,6 +159,23 @@ TEST_F(Evaluate, ComparesWithTheLimitOfTheExample) {
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output,
               AllOf(HasSubstr("limit       0.1"), HasSubstr("error / sd  horizontal")));
+}
+
+TEST_F(Evaluate, SaysThatALimitIsBeatenAndWhatThatMeans) {
+  const std::string example = VLP_SOURCE_DIR "/datasets/example/";
+  const std::string rig =
+      " --lamps " + example + "lamps.yaml --calibration " + example + "calibration.yaml ";
+  ASSERT_EQ(run_program("vlp-locate " + example + "detections.csv" + rig + "-o '" +
+                        path("example.csv") + "'")
+                .exit_code,
+            0);
+  const auto result =
+      run_program("vlp-evaluate '" + path("example.csv") + "' --truth " + example + "truth.csv" +
+                  rig + "--noise-px 0.1 --json '" + path("e.json") + "'");  // 0.05 in truth
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("(beaten: the stated noise is too large)"));
+  EXPECT_THAT(result.errors, HasSubstr("which nothing beats: the stated noise"));
+  EXPECT_THAT(content("e.json"), HasSubstr("\"beaten\": true"));
 }
 
 TEST_F(Evaluate, EndsWithThreeWithoutAFix) {

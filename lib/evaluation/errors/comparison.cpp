@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "captures/csv_writer.h"
 #include "captures/name_index.h"
 #include "rig/input_error.h"
 
@@ -38,10 +39,20 @@ std::size_t count_different(std::vector<std::size_t> units) {
 }  // namespace
 
 std::string_view Comparison::verdict() const {
-  if (too_few()) return "no evidence";
-  if (interval_m && interval_m->high < 0) return "better";
-  if (interval_m && interval_m->low > 0) return "worse";
-  return "no evidence";
+  if (too_few() || !interval_m) return "no evidence";
+  if (interval_m->high < -least_m) return "better";
+  if (interval_m->low > least_m) return "worse";
+  const bool within = interval_m->low >= -least_m && interval_m->high <= least_m;
+  return within ? "the same" : "no evidence";
+}
+
+std::string Comparison::words() const {
+  constexpr int digits = 2;
+  const std::string least = significant(1e3 * least_m, digits) + " mm";
+  std::string words(verdict());
+  if (words == "the same") return words.append(" within ").append(least);
+  if (words == "no evidence") return words.append(too_few() ? ", too few" : "");
+  return words.append(" by more than ").append(least);
 }
 
 Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>& errors,
@@ -52,14 +63,16 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
   Comparison comparison;
   std::vector<double> differences_m;
   std::vector<std::size_t> units;
+  double others_m = 0;
   for (const FixError& error : errors) {
     const auto other = images.find(fixes[error.fix].image);
     if (!other) {
       ++comparison.only_these;
       continue;
     }
-    const double difference_m =
-        error.horizontal_m.norm() - other_errors[*other].horizontal_m.norm();
+    const double other_m = other_errors[*other].horizontal_m.norm();
+    const double difference_m = error.horizontal_m.norm() - other_m;
+    others_m += other_m;
     differences_m.push_back(difference_m);
     units.push_back(error.unit);
     comparison.mean_difference_m += difference_m;
@@ -69,7 +82,9 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
   comparison.pairs = differences_m.size();
   comparison.only_others = other_errors.size() - comparison.pairs;
   if (comparison.pairs > 0) {
-    comparison.mean_difference_m /= static_cast<double>(comparison.pairs);
+    const auto pairs = static_cast<double>(comparison.pairs);
+    comparison.mean_difference_m /= pairs;
+    comparison.least_m = std::max(kLeastDifference_m, kLeastDifferenceShare * others_m / pairs);
     const auto intervals = error_intervals(differences_m, units, threads);
     if (intervals) comparison.interval_m = intervals->mean;
     comparison.units = count_different(std::move(units));

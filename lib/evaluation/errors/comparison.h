@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -17,6 +18,11 @@ namespace vlp {
 /// of 5 / 8 / 10 / 20 / 50 units with a horizontal error each, not in 5 %.
 inline constexpr std::size_t kFewestUnitsCompared = 20;
 
+/// The smallest change of a mean error that matters: nobody measures less, nor gains by it. So
+/// much, and such a share of the others' mean error, whichever is larger.
+inline constexpr double kLeastDifference_m = 1e-6;
+inline constexpr double kLeastDifferenceShare = 0.01;
+
 /// These fixes and others of the same captures, by their horizontal errors.
 struct Comparison {
   /// Captures with a fix in both, in the first alone, in the second alone.
@@ -29,12 +35,16 @@ struct Comparison {
   /// drawn by the units of the first).
   double mean_difference_m = 0;
   std::optional<Interval> interval_m;
+  /// The smallest difference that matters here.
+  double least_m = kLeastDifference_m;
 
   bool too_few() const { return units < kFewestUnitsCompared; }
-  /// The word: "better" when the whole interval is below zero, "worse" when it is above, otherwise,
-  /// and always when there are too few units, "no evidence". It is of the pairs alone: look at what
-  /// is missing, too.
+  /// The words: "better" when the whole interval is below -least_m, "worse" when it is above
+  /// least_m, "the same" when it is between, otherwise, and always when there are too few units,
+  /// "no evidence". They are of the pairs alone: look at what is missing, too.
   std::string_view verdict() const;
+  /// For example "worse by more than 0.004 mm", with least_m where the verdict rests on it.
+  std::string words() const;
 };
 
 /// Pairs by image. `others` are against the same truth or path. No figures when there is no pair.

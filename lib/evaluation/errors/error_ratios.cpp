@@ -55,6 +55,11 @@ std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
       height.within_95(),  yaw.within_95()};
 }
 
+bool LimitRatio::beaten() const {
+  constexpr double sure = 3;
+  return horizontal < 1 - sure / std::sqrt(4 * static_cast<double>(fixes));
+}
+
 std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,
                                       const std::vector<TruthRow>& truth, const LampMap& lamps,
                                       const Camera& camera, double noise_px, int threads) {

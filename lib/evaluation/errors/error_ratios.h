@@ -40,6 +40,10 @@ struct LimitRatio {
   double limit_m;
   /// Fixes at whose true pose there is a limit.
   std::size_t fixes;
+
+  /// By more than chance allows in 1 of 700 cases: the ratio of 2 n normal errors has a standard
+  /// deviation of 1 / sqrt(4 n), and what errors have in common only adds to them.
+  bool beaten() const;
 };
 /// The limit at the true pose of each fix: ErrorBudget::noise, Cramer-Rao, for a level camera that
 /// sees every lamp of the map that is wholly in its image. Nothing when the truth has no height and

@@ -35,13 +35,34 @@ std::string_view verdict_of(const Pairs& all) {
 }
 
 TEST(Comparison, SeesSmallDifferencesInPairs) {
-  EXPECT_EQ(verdict_of(pairs(100, 1e-4)), "worse");
-  EXPECT_EQ(verdict_of(pairs(100, -1e-4)), "better");
+  EXPECT_EQ(verdict_of(pairs(100, 3e-4)), "worse");
+  EXPECT_EQ(verdict_of(pairs(100, -3e-4)), "better");
   EXPECT_EQ(verdict_of(pairs(kFewestUnitsCompared, 1e-2)), "worse");
   EXPECT_EQ(verdict_of(pairs(kFewestUnitsCompared - 1, 1e-2)), "no evidence");  // too few
   EXPECT_EQ(verdict_of(pairs(4, 1)), "no evidence");
   const Pairs same = pairs(100, 0);
-  EXPECT_EQ(compare(same.fixes, same.errors, same.fixes, same.errors, 1).verdict(), "no evidence");
+  EXPECT_EQ(compare(same.fixes, same.errors, same.fixes, same.errors, 1).verdict(), "the same");
+}
+
+TEST(Comparison, TakesWhatDoesNotMatterForTheSame) {
+  // Of errors of 15 mm on average 1 % is 0.15 mm; the differences' mean is known to 0.01 mm.
+  EXPECT_EQ(verdict_of(pairs(100, 1e-4)), "the same");
+  EXPECT_EQ(verdict_of(pairs(100, -1e-4)), "the same");
+  EXPECT_EQ(verdict_of(pairs(100, 1.5e-4)), "no evidence");
+  const Pairs tenth = pairs(100, 1e-4);
+  EXPECT_EQ(compare(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1).words(),
+            "the same within 0.15 mm");
+  // Of small errors it is a micrometre.
+  Pairs small = pairs(100, 0);
+  for (FixError& error : small.errors) error.horizontal_m = {1e-5 + 1.7e-7, 0};
+  for (FixError& error : small.other_errors) error.horizontal_m = {1e-5, 0};
+  Comparison comparison = compare(small.fixes, small.errors, small.others, small.other_errors, 1);
+  EXPECT_EQ(comparison.words(), "the same within 0.001 mm");
+  EXPECT_GT(comparison.interval_m->low, 0);
+  comparison.least_m = 1e-7;
+  EXPECT_EQ(comparison.words(), "worse by more than 0.0001 mm");
+  comparison.units = 1;
+  EXPECT_EQ(comparison.words(), "no evidence, too few");
 }
 
 TEST(Comparison, CountsUnitsAndNotPairs) {

@@ -62,5 +62,21 @@ TEST(LimitRatio, IsErrorsOverTheFormulasLimit) {
   EXPECT_NEAR(ratio->horizontal, 3, 1e-6);
 }
 
+TEST(LimitRatio, IsBeatenByMoreThanChanceAlone) {
+  Random random(3);
+  constexpr int trials = 2000, fixes = 50;
+  const auto beaten = [&](double stated) {
+    int count = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      double squares = 0;
+      for (int i = 0; i < 2 * fixes; ++i) squares += std::pow(random.normal(), 2);
+      count += LimitRatio{std::sqrt(squares / (2 * fixes)) / stated, 1, fixes}.beaten() ? 1 : 0;
+    }
+    return count;
+  };
+  EXPECT_LE(beaten(1), 10);  // 2.7 are expected
+  EXPECT_EQ(beaten(1.0 / 0.609), trials);
+}
+
 }  // namespace
 }  // namespace vlp
