@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
+#include <string_view>
 
 #include "detection/image_header.h"
 #include "rig/input_error.h"
@@ -24,6 +25,13 @@ bool is_cut_jpeg(const std::string& bytes) {
   if (!bytes.starts_with("\xff\xd8")) return false;
   const auto scan = bytes.rfind("\xff\xda"), end = bytes.rfind("\xff\xd9");
   return scan == std::string::npos || end == std::string::npos || end < scan + marker;
+}
+
+/// A PNG ends with its IEND chunk: no data, and their check sum. Some programs add to it.
+bool is_cut_png(const std::string& bytes) {
+  using namespace std::string_view_literals;
+  constexpr auto end = "\0\0\0\0IEND\xae\x42\x60\x82"sv;
+  return bytes.starts_with("\x89PNG\r\n\x1a\n") && bytes.rfind(end) == std::string::npos;
 }
 
 void check_size(const fs::path& file, const std::string& bytes, double max_mpx) {
@@ -73,8 +81,10 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   std::ifstream stream(file, std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   if (bytes.empty()) throw InputError(file, "cannot be read as an image");
-  if (is_cut_jpeg(bytes)) throw InputError(file, "cannot be read as an image: it is cut short");
+  const char* const cut = "cannot be read as an image: it is cut short";
+  if (is_cut_jpeg(bytes)) throw InputError(file, cut);
   check_size(file, bytes, max_mpx);
+  if (is_cut_png(bytes)) throw InputError(file, cut);
   cv::Mat image;
   try {
     image =

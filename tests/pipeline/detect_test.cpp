@@ -191,6 +191,8 @@ TEST_F(Detect, SkipsAndCountsImagesThatItCannotUse) {
   EXPECT_THAT(result.output, HasSubstr("images      7\n  skipped   5\n"));
   EXPECT_THAT(result.errors, HasSubstr("empty.png: cannot be read as an image; skipped"));
   EXPECT_THAT(result.errors, HasSubstr("cut.jpg: cannot be read as an image: it is cut short"));
+  EXPECT_THAT(result.errors, HasSubstr("half.PNG: cannot be read as an image: it is cut short"));
+  EXPECT_THAT(result.errors, testing::Not(HasSubstr("libpng")));
   EXPECT_THAT(result.errors, HasSubstr("text.png: cannot be read as an image; skipped"));
   EXPECT_THAT(result.errors, HasSubstr("the calibration's camera has 800 x 600 px; skipped"));
   EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
