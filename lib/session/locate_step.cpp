@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <stdexcept>
 
@@ -171,6 +172,9 @@ void warn_of_noise(LocateResult& result, const std::vector<Frame>& frames) {
   }
   constexpr double too_noisy = 3;
   const auto shown_px = residual_noise_px(result.fixes);
+  if (shown_px && stated_px > 0) {
+    result.metrics.push_back({"residual_ratio", *shown_px / stated_px});
+  }
   if (!shown_px || *shown_px <= too_noisy * stated_px) return;
   result.warnings.push_back(fmt::format(
       "the residuals show {:.2g} px of noise, {:.2g} px are stated: sd is too small; are "
@@ -236,10 +240,11 @@ void warn_of_captures(LocateResult& result, const LocateInput& input) {
       without, input.frames.size(), input.frames.front().image, captures.begin()->first));
 }
 
-/// How far from its place in the map a lamp is seen, on the ceiling; nothing where that is not
+/// From its place in the map to where a lamp is seen, on the ceiling; nothing where that is not
 /// known: with a mount fixes are not of the camera.
-std::optional<double> off_m(const LocateInput& input, std::size_t frame, const Fix& fix, int id,
-                            const Lens& lens, const Eigen::Matrix3d& base_from_camera) {
+std::optional<Eigen::Vector2d> off_m(const LocateInput& input, std::size_t frame, const Fix& fix,
+                                     int id, const Lens& lens,
+                                     const Eigen::Matrix3d& base_from_camera) {
   const Lamp* lamp = find_lamp(input.lamps.lamps, id);
   if (lamp == nullptr || input.how.mount) return std::nullopt;
   const auto& [image, detections] = input.frames[frame];
@@ -257,7 +262,39 @@ std::optional<double> off_m(const LocateInput& input, std::size_t frame, const F
   const double height_m = lamp->position_m.z() - pose.position_m.z();
   const Eigen::Vector3d seen_m =
       pose.position_m + rotation_about_z(pose.yaw_rad) * level * (height_m / level.z());
-  return (seen_m - lamp->position_m).head<2>().norm();
+  return (seen_m - lamp->position_m).head<2>();
+}
+
+/// Of those that two captures or more see beside two other lamps or more.
+std::vector<LampOffset> offsets_of_lamps(const LocateInput& input, const PositionerOptions& how) {
+  const Positioner positioner(input.lamps, input.calibration, how);
+  const Lens lens(input.calibration.camera.lens_model, input.calibration.camera.intrinsics);
+  const Eigen::Matrix3d base_from_camera = level_from_camera(input.calibration, how.correction);
+  std::map<int, std::vector<Eigen::Vector2d>> seen;
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    const auto& [image, detections] = input.frames[i];
+    for (const Detection& one : detections) {
+      std::vector<Detection> others;
+      std::copy_if(detections.begin(), detections.end(), std::back_inserter(others),
+                   [&](const Detection& other) { return other.lamp != one.lamp; });
+      const Fix fix = positioner.locate(others, sensors_of(image, input));
+      if (!fix.ok() || fix.lamps < 2) continue;
+      const auto off = off_m(input, i, fix, one.lamp, lens, base_from_camera);
+      if (off) seen[one.lamp].push_back(*off);
+    }
+  }
+  std::vector<LampOffset> offsets;
+  for (const auto& [id, all_m] : seen) {
+    if (all_m.size() < 2) continue;
+    const auto count = static_cast<double>(all_m.size());
+    Eigen::Vector2d mean_m(0, 0), squares_m2(0, 0);
+    for (const Eigen::Vector2d& one_m : all_m) mean_m += one_m / count;
+    for (const Eigen::Vector2d& one_m : all_m) squares_m2 += (one_m - mean_m).cwiseAbs2();
+    offsets.push_back({id, static_cast<int>(all_m.size()),
+                       find_lamp(input.lamps.lamps, id)->position_m.head<2>(), mean_m,
+                       (squares_m2 / (count * (count - 1))).cwiseSqrt()});
+  }
+  return offsets;
 }
 
 void tell_of_lamps_left_out(LocateResult& result, const LocateInput& input) {
@@ -278,7 +315,7 @@ void tell_of_lamps_left_out(LocateResult& result, const LocateInput& input) {
       LeftOut& lamp = lamps[id];
       ++lamp.captures;
       if (const auto off = off_m(input, i, fix, id, lens, base_from_camera)) {
-        lamp.off_m.push_back(*off);
+        lamp.off_m.push_back(off->norm());
       }
       result.details.push_back(fmt::format("{}: lamp {} contradicts the others and is left out",
                                            input.frames[i].image, id));
@@ -334,6 +371,7 @@ LocateResult locate_frames(const LocateInput& input) {
   warn_of_map(result, input);
   warn_of_captures(result, input);
   tell_of_lamps_left_out(result, input);
+  if (input.lamp_offsets) result.lamp_offsets = offsets_of_lamps(input, how);
   result.summary = summarize(result.rows);
   if (result.summary.fixes == 0) {
     result.fail(StepFailure::undetermined,

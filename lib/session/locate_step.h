@@ -36,6 +36,8 @@ struct LocateInput {
   double lean_sd_rad = 0;
   /// Standard deviation of the z_m of `captures`, which then counts.
   std::optional<double> height_sd_m = {};
+  /// Of every lamp, too: a fix more for each lamp of a capture.
+  bool lamp_offsets = false;
   /// Captures that are fixed together, with one velocity: this and those before it, within 0.2 s.
   int frames_together = 1;
 };
@@ -47,11 +49,12 @@ struct LocateResult : StepResult {
   FixSummary summary;
 };
 
-/// The fix of each frame. Where not every detection states its sigma_px, one is taken from the
-/// residuals, if they show it. Throws std::invalid_argument when a camera moves whose calibration
-/// lacks row_time_s or readout. Warns of residuals that the stated noise does not explain, of
-/// detections outside the image or where the lens is not known (region_px), of images that
-/// `captures` lacks, of lamps left out. undetermined: no frame has a fix.
+/// The fix of each frame. Metrics: residual_ratio, the noise that the residuals show over the
+/// largest that is stated, where all state it. Where not every detection states its sigma_px, one
+/// is taken from the residuals, if they show it. Throws std::invalid_argument when a camera moves
+/// whose calibration lacks row_time_s or readout. Warns of residuals that the stated noise does not
+/// explain, of detections outside the image or where the lens is not known (region_px), of images
+/// that `captures` lacks, of lamps left out. undetermined: no frame has a fix.
 LocateResult locate_frames(const LocateInput& input);
 
 }  // namespace vlp

@@ -455,6 +455,7 @@ class SessionRun {
       SeenLamps seen = see(folder, input.lamps, input.calibration, calibration);
       if (!seen.ok()) return Work{seen};
       input.frames = std::move(seen.frames);
+      input.lamp_offsets = session_.check() == folder;
       LocateResult found = locate_frames(input);
       take_over(seen, found);
       return Work{found,

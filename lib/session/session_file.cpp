@@ -4,7 +4,9 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
+#include "calibration/passed_on.h"
 #include "calibration/rotation/rotation_fit.h"
 #include "geometry/angles.h"
 #include "session/step_file.h"
@@ -15,10 +17,25 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kMillimetres = 1e3;
+constexpr double kDegrees = 180 / std::numbers::pi;
 
 Json sd_of(const std::optional<Matrix2>& covariance, double factor) {
   if (!covariance) return nullptr;
   return {factor * std::sqrt((*covariance)(0, 0)), factor * std::sqrt((*covariance)(1, 1))};
+}
+
+/// Of the zenith's normalized point, of the captures and of the lens. Without that of the lens,
+/// where it is known how this moves with it, there is none.
+std::optional<Matrix2> zenith_covariance(const Calibration& calibration) {
+  const auto& center = calibration.rotation_center;
+  const auto& lens = calibration.intrinsics_report;
+  if (!center->covariance) return std::nullopt;
+  const Eigen::Vector2d per_px = focal_px_of(calibration.camera).cwiseInverse();
+  Matrix2 covariance = per_px.asDiagonal() * *center->covariance * per_px.asDiagonal();
+  if (!lens || !lens->covariance) return covariance;
+  if (!center->by_intrinsics) return std::nullopt;
+  covariance += *center->by_intrinsics * *lens->covariance * center->by_intrinsics->transpose();
+  return covariance;
 }
 
 Json calibration_of(const Calibration& calibration) {
@@ -26,6 +43,12 @@ Json calibration_of(const Calibration& calibration) {
   Json json{{"lens_model", name_of(calibration.camera.lens_model)},
             {"focal_px", {in[0], in[1]}},
             {"center_px", {in[2], in[3]}}};
+  const auto& lens = calibration.intrinsics_report;
+  if (lens && lens->covariance) {
+    const auto sd_px = [&](Eigen::Index i) { return std::sqrt((*lens->covariance)(i, i)); };
+    json["focal_sd_px"] = {sd_px(0), sd_px(1)};
+    json["center_sd_px"] = {sd_px(2), sd_px(3)};
+  }
   if (const auto& row_time_s = calibration.camera.row_time_s) json["row_time_s"] = *row_time_s;
   if (const auto& center = calibration.rotation_center) {
     const auto [angle_rad, azimuth_rad] = tilt_of(*center);
@@ -33,6 +56,9 @@ Json calibration_of(const Calibration& calibration) {
     json["rotation_center_sd_px"] = sd_of(center->covariance, 1);
     json["tilt_deg"] = deg_from_rad(angle_rad);
     json["tilt_azimuth_deg"] = deg_from_rad(azimuth_rad);
+    const Eigen::Vector2d zenith = zenith_point(*center);
+    json["zenith_deg"] = {kDegrees * zenith.x(), kDegrees * zenith.y()};
+    json["zenith_sd_deg"] = sd_of(zenith_covariance(calibration), kDegrees);
     if (const auto& arm_m = center->lever_arm_m) {
       json["lever_arm_mm"] = {kMillimetres * arm_m->x(), kMillimetres * arm_m->y()};
       json["lever_arm_sd_mm"] = sd_of(center->lever_arm_covariance, kMillimetres);
@@ -101,7 +127,8 @@ std::string session_json(const SessionResult& result, const SessionOptions& opti
   for (const SessionStep& step : result.steps) {
     const Json of_step = json_of(step.result);
     Json entry{{"name", step.name}, {"failure", of_step.at("failure")}};
-    for (const char* key : {"why", "warnings", "notes", "skipped", "lamps_left_out"}) {
+    for (const char* key :
+         {"why", "warnings", "notes", "skipped", "lamps_left_out", "lamp_offsets"}) {
       if (!of_step.at(key).empty() && of_step.at(key) != "") entry[key] = of_step.at(key);
     }
     json["steps"].push_back(std::move(entry));

@@ -15,10 +15,15 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "vlp-step/1";
+constexpr double kMillimetres = 1e3;
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 double number_of(const Json& json) {
   return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
+}
+
+Eigen::Vector2d vector_of(const Json& json) {
+  return {json.at(0).get<double>(), json.at(1).get<double>()};
 }
 
 StepResult result_of(const Json& json) {
@@ -38,6 +43,12 @@ StepResult result_of(const Json& json) {
   for (const Json& lamp : json.at("lamps_left_out")) {
     result.lamps_left_out.push_back({lamp.at("lamp").get<int>(), lamp.at("captures").get<int>()});
   }
+  for (const Json& lamp : json.at("lamp_offsets")) {
+    result.lamp_offsets.push_back({lamp.at("lamp").get<int>(), lamp.at("captures").get<int>(),
+                                   vector_of(lamp.at("map_m")),
+                                   vector_of(lamp.at("offset_mm")) / kMillimetres,
+                                   vector_of(lamp.at("offset_sd_mm")) / kMillimetres});
+  }
   return result;
 }
 
@@ -56,7 +67,8 @@ Json json_of(const StepResult& result) {
   Json json{{"failure", name_of(result.failure)}, {"why", result.why},
             {"subject", result.subject.string()}, {"metrics", Json::array()},
             {"warnings", result.warnings},        {"notes", result.notes},
-            {"skipped", Json::array()},           {"lamps_left_out", Json::array()}};
+            {"skipped", Json::array()},           {"lamps_left_out", Json::array()},
+            {"lamp_offsets", Json::array()}};
   for (const auto& [name, value] : result.metrics) {
     json["metrics"].push_back({{"name", name}, {"value", number_or_null(value)}});
   }
@@ -65,6 +77,14 @@ Json json_of(const StepResult& result) {
   }
   for (const auto& [lamp, captures] : result.lamps_left_out) {
     json["lamps_left_out"].push_back({{"lamp", lamp}, {"captures", captures}});
+  }
+  for (const auto& [lamp, captures, map_m, offset_m, sd_m] : result.lamp_offsets) {
+    json["lamp_offsets"].push_back(
+        {{"lamp", lamp},
+         {"captures", captures},
+         {"map_m", {map_m.x(), map_m.y()}},
+         {"offset_mm", {kMillimetres * offset_m.x(), kMillimetres * offset_m.y()}},
+         {"offset_sd_mm", {kMillimetres * sd_m.x(), kMillimetres * sd_m.y()}}});
   }
   return json;
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -38,6 +39,15 @@ struct LampLeftOut {
   int captures;
 };
 
+/// Where the other lamps see a lamp, on the ceiling and in the world, less where the map has it:
+/// the mean over captures, and its standard deviation by their scatter. A lamp that moves by d is
+/// seen d off, the others less, and in other directions.
+struct LampOffset {
+  int lamp;
+  int captures;
+  Eigen::Vector2d map_m, offset_m, sd_m;
+};
+
 /// What every step of the calibration tells of how it went; the words are for people, a line each.
 struct StepResult {
   StepFailure failure = StepFailure::none;
@@ -54,6 +64,7 @@ struct StepResult {
   std::vector<std::string> warnings = {}, notes = {}, details = {};
   std::vector<SkippedImage> skipped = {};
   std::vector<LampLeftOut> lamps_left_out = {};
+  std::vector<LampOffset> lamp_offsets = {};
   /// The calibration with the step's part, of the steps that have one.
   Calibration calibration = {};
   /// Makes the step's picture, later; may be empty.

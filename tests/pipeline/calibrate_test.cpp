@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -385,6 +386,26 @@ TEST_F(SmallSession, TellsOfImagesThatAreDamaged) {
   EXPECT_EQ(skipped,
             (std::map<std::string, std::string>{{"rotation", "0003.png"}, {"check", "0001.png"}}));
   EXPECT_THAT(result("session.json"), Not(HasSubstr(path("")))) << "of no use elsewhere";
+}
+
+TEST_F(SmallSession, StatesHowWellTheCalibrationIsKnown) {
+  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
+  const auto json = nlohmann::json::parse(result("session.json"));
+  const auto& figures = json["calibration"];
+  for (const char* name : {"focal_sd_px", "center_sd_px", "zenith_sd_deg", "lever_arm_sd_mm"}) {
+    ASSERT_EQ(figures[name].size(), 2) << name;
+    for (const auto& sd : figures[name]) {
+      EXPECT_GT(sd.get<double>(), 1e-4) << name;
+      EXPECT_LT(sd.get<double>(), 1) << name;
+    }
+  }
+  EXPECT_NEAR(std::hypot(figures["zenith_deg"][0].get<double>(), figures["zenith_deg"][1]),
+              figures["tilt_deg"].get<double>(), 1e-3);
+  std::size_t lamps = 0;
+  for (const auto& step : json["steps"]) {
+    if (step.contains("lamp_offsets")) lamps += step["lamp_offsets"].size();
+  }
+  EXPECT_EQ(lamps, 6);
 }
 
 TEST_F(SmallSession, KeepsTwoSessionsApart) {

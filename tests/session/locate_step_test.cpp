@@ -44,6 +44,30 @@ TEST(LocateFrames, CountsTheCapturesThatALampIsLeftOutOf) {
               testing::Contains(HasSubstr("3 detections that contradict the others")));
 }
 
+TEST(LocateFrames, SeesALampThatMovedWhereItIs) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  LocateInput input{{}, rig.map, rig.calibration};
+  const Eigen::Vector2d moved_m(1e-3, -2e-3);
+  rig.map.lamps.front().position_m.head<2>() += moved_m;
+  for (int i = 0; i < 4; ++i) {
+    rig.body.pose = {{0.1 * i, -0.05 * i, 0}, 1.5 * i};
+    input.frames.push_back({std::to_string(i), seen_from(rig, 0)});
+  }
+  EXPECT_THAT(locate_frames(input).lamp_offsets, IsEmpty()) << "was not asked";
+  input.lamp_offsets = true;
+  const auto offsets = locate_frames(input).lamp_offsets;
+  ASSERT_EQ(offsets.size(), rig.map.lamps.size());
+  for (const LampOffset& offset : offsets) {
+    EXPECT_EQ(offset.captures, 4);
+    if (offset.lamp == rig.map.lamps.front().id) {
+      EXPECT_LT((offset.offset_m - moved_m).norm(), 1e-8) << offset.offset_m.transpose();
+      EXPECT_LT(offset.sd_m.norm(), 1e-8);
+    } else {
+      EXPECT_LT(offset.offset_m.norm(), moved_m.norm());
+    }
+  }
+}
+
 TEST(LocateFrames, UsesInclinationsWhereThereAreSome) {
   LocateInput input = example();
   const double x_m = locate_frames(input).rows[0].fix->pose.position_m.x();

@@ -21,6 +21,7 @@ StepResult sample() {
   result.notes = {"note"};
   result.skipped = {{"a.png", "is empty"}};
   result.lamps_left_out = {{2, 12}};
+  result.lamp_offsets = {{3, 12, {-0.6, 0.3}, {1e-3, -2e-3}, {1e-4, 2e-4}}};
   result.fail(StepFailure::wrong_map, "look swapped", "lamps.yaml");
   return result;
 }
@@ -38,6 +39,13 @@ TEST(StepFile, GivesBackWhatWasKept) {
   EXPECT_EQ(result.warnings, sample().warnings);
   EXPECT_EQ(result.skipped[0].reason, "is empty");
   EXPECT_EQ(result.lamps_left_out[0].captures, 12);
+  ASSERT_EQ(result.lamp_offsets.size(), 1);
+  const LampOffset& offset = result.lamp_offsets[0];
+  EXPECT_EQ(offset.lamp, 3);
+  EXPECT_EQ(offset.captures, 12);
+  EXPECT_EQ(offset.map_m, Eigen::Vector2d(-0.6, 0.3));
+  EXPECT_LT((offset.offset_m - Eigen::Vector2d(1e-3, -2e-3)).norm(), 1e-15);
+  EXPECT_LT((offset.sd_m - Eigen::Vector2d(1e-4, 2e-4)).norm(), 1e-15);
   EXPECT_EQ(result.failure, StepFailure::wrong_map);
   EXPECT_EQ(message_of(result), "lamps.yaml: look swapped");
 }
