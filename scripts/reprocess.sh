@@ -6,10 +6,12 @@
 #
 #   scripts/reprocess.sh ARCHIVE RESULTS [--gates FILE] [--previous RESULTS] [--cores N]
 #                        [--profile slurm] [--session-gates FILE] [--row-time-s S]
-#                        [--readout rows|columns] [--shard-size N]
+#                        [--readout rows|columns] [--shard-size N] [--keep N]
+#   scripts/reprocess.sh --diff RESULTS CAMERA/SESSION [KEY | OTHER_RESULTS]
 #
 # ARCHIVE/CAMERA/SESSION/ is laid out as vlp-calibrate has it, and only read. RESULTS gets
-#   summary.csv            a row per session: verdict, figures, reason, version, digests, cost
+#   summary.csv            a row per session: verdict, figures, what to look at, reason, version, cost
+#   fleet.csv, lamps.csv   what was calibrated, and where each lamp was seen, over time
 #   overview.html          the same for people, with what changed since --previous
 #   changes.json           that comparison for programs, and the gates
 #   sessions/, failed/     per session its results, or why there are none: session.json
@@ -22,8 +24,12 @@
 # --gates          what the archive as a whole has to keep to, vlp-archive-gates/1
 # --session-gates  gates (vlp-gates/1) for sessions that have no gates.yaml of their own
 # --shard-size N   sessions in a job at most (default 50)
+# --keep N         results that a session had before, of which so many stay in former/ (default 0)
+# --diff           says what differs between a session's result and a former one, by its key's first letters
+#                  (default: the last one), or that of other results
 #
-# Exit code: 0 done; 1 done, and a gate is not met; 2 bad input; 3 not all could be done.
+# Exit code: 0 done; 1 done, and a gate is not met, of the archive or, where it has no gate_share, of a
+# session; 2 bad input; 3 not all could be done.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
 bin=${VLP_PROGRAMS_DIR:-$(cd "$scripts/../.." && pwd)/build/bin}
@@ -34,18 +40,23 @@ refuse() {
   exit 2
 }
 usage() { refuse "$1; see reprocess.sh --help"; }
+if [ "${1:-}" = --diff ]; then
+  shift
+  PYTHONDONTWRITEBYTECODE=1 exec "$python" "$scripts/diff.py" "$@"
+fi
 folders=() plan=() profile=''
 cores=$(nproc)
 while [ $# -gt 0 ]; do
   case $1 in
-    --gates | --session-gates | --previous | --shard-size | --cores | --profile | --row-time-s | --readout)
+    --gates | --session-gates | --previous | --shard-size | --keep | --cores | --profile | --row-time-s | --readout)
       [ $# -gt 1 ] || usage "$1 wants a value"
       case $1 in
         --cores | --shard-size) [[ $2 =~ ^[1-9][0-9]*$ ]] || usage "$1: should be a number from 1" ;;
+        --keep) [[ $2 =~ ^[0-9]+$ ]] || usage "$1: should be a number" ;;
         --row-time-s) [[ $2 =~ ^[0-9.]+(e-?[0-9]+)?$ ]] || usage "$1: should be seconds" ;;
         --readout) [[ $2 =~ ^(rows|columns)$ ]] || usage "$1: should be rows or columns" ;;
       esac ;;&
-    --gates | --session-gates | --previous | --shard-size) plan+=("$1" "$2"); shift ;;
+    --gates | --session-gates | --previous | --shard-size | --keep) plan+=("$1" "$2"); shift ;;
     --row-time-s | --readout) plan+=("--camera-option=$1" "--camera-option=$2"); shift ;;
     --cores) cores=$2; shift ;;
     --profile)

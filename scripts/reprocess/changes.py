@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changed from one run over an archive to the next, and the gates for it.
 
-Sessions are paired by camera and session where the inputs are the same. Sessions of a camera share its
+Sessions are paired by camera and session. One that had a result and has none now counts, whatever became of its
+inputs; figures are compared where the inputs are the same. Sessions of a camera share its
 lens, so cameras are what the interval counts: the mean over cameras of the change of mean_mm, with its
 95 % interval by Student's distribution, of 20 cameras or more. A session whose figure changes by no more
 than a micrometre is the same.
@@ -13,7 +14,7 @@ import statistics
 
 import yaml
 
-HAVE_RESULT = ("pass", "gate")
+HAVE_RESULT = ("pass", "look", "gate")
 FEWEST_CAMERAS = 20  # as vlp-evaluate asks for 20 stations
 SAME_MM = 0.001  # nobody measures less
 
@@ -30,7 +31,7 @@ def counts_of(rows):
     verdicts = [row["verdict"] for row in rows]
     figures = sorted(float(row["mean_mm"]) for row in with_figures(rows))
     counts = {"sessions": len(rows)}
-    for verdict in ("pass", "gate", "no result", "crashed"):
+    for verdict in ("pass", "look", "gate", "no result", "crashed"):
         counts[verdict.replace(" ", "_")] = verdicts.count(verdict)
     if figures:
         counts["mean_mm"] = statistics.fmean(figures)
@@ -66,20 +67,22 @@ def changes_of(rows, before_rows):
     changes = {
         "only_now": len(rows) - len(both),
         "only_before": len(before) - len(both),
-        "other_inputs": len(both) - len(same_inputs),
+        "in_both": len(both),
         "same_inputs": len(same_inputs),
+        "other_inputs": [name_of(row) for row, old in both if row["inputs"] != old["inputs"]],
         "newly_failed": [],
         "newly_good": [],
     }
     pairs = []
-    for row, old in same_inputs:
+    for row, old in both:
         good, was_good = row["verdict"] in HAVE_RESULT, old["verdict"] in HAVE_RESULT
         if was_good and not good:
             changes["newly_failed"].append(name_of(row))
         elif good and not was_good:
             changes["newly_good"].append(name_of(row))
-        elif good and row["mean_mm"] and old["mean_mm"]:
+        elif good and row["inputs"] == old["inputs"] and row["mean_mm"] and old["mean_mm"]:
             pairs.append((row, old, float(row["mean_mm"]) - float(old["mean_mm"])))
+    changes["lost_with_other_inputs"] = sorted(set(changes["newly_failed"]) & set(changes["other_inputs"]))
     changes |= {
         "pairs": len(pairs),
         "better": sum(change < -SAME_MM for _, _, change in pairs),
@@ -99,10 +102,8 @@ def changes_of(rows, before_rows):
     return changes, pairs
 
 
-
-
 def newly_failed(changes):
-    return len(changes["newly_failed"]) if changes and changes["same_inputs"] else None
+    return len(changes["newly_failed"]) if changes and changes["in_both"] else None
 
 
 def worse_share(changes):
@@ -114,6 +115,7 @@ def worse_share(changes):
 GATES = {
     "no_result": (0, math.inf, lambda counts, changes: counts["no_result"] + counts["crashed"]),
     "no_result_share": (0, 1, lambda counts, changes: (counts["no_result"] + counts["crashed"]) / counts["sessions"]),
+    "look_share": (0, 1, lambda counts, changes: counts["look"] / counts["sessions"]),
     "gate_share": (0, 1, lambda counts, changes: counts["gate"] / counts["sessions"]),
     "mean_mm": (0, math.inf, lambda counts, changes: counts.get("mean_mm")),
     "median_mm": (0, math.inf, lambda counts, changes: counts.get("median_mm")),
@@ -159,6 +161,11 @@ def check_gates(gates, counts, changes):
         passed = value is not None and value <= limit
         results.append({"name": name, "value": value, "limit": limit, "passed": passed})
     return results
+
+
+def sessions_beyond_gates(counts, gates):
+    """How many sessions miss a gate of theirs, where no gate of the archive says how many may."""
+    return 0 if any(gate["name"] == "gate_share" for gate in gates) else counts["gate"]
 
 
 def load(file):

@@ -87,5 +87,13 @@ def entry_digest(entry):
         return "cannot be read"
 
 
+def input_digests(session):
+    """Of each file and folder that the stages read, by name."""
+    lines = {}
+    for name, entry in input_files(session):
+        lines.setdefault(name.split("/")[0], []).append(f"{entry_digest(entry)}  {name}\n")
+    return {name: digest("".join(of_it)) for name, of_it in lines.items()}
+
+
 def input_digest(session):
-    return digest("".join(f"{entry_digest(entry)}  {name}\n" for name, entry in input_files(session)))
+    return digest(json_text(input_digests(session)))

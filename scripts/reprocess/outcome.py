@@ -1,10 +1,25 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""What came of a session: its verdict and figures, from session.json of vlp-calibrate and how that ended."""
+"""What came of a session: its verdict and figures, from session.json of vlp-calibrate and how that ended.
+
+A session that passes with something to look at, warnings, images skipped or lamps left out, has the verdict
+"look", and `look` says at what.
+"""
 import json
 
 FIGURES = ["captures", "fixes", "missing_share", "mean_mm", "median_mm", "p90_mm", "max_mm", "rms_px"]
-COLUMNS = ["camera", "session", "verdict", *FIGURES, "reason", "version", "inputs", "key", "cpu_s"]
+TOLD = ["warnings", "images_skipped", "lamps_left_out", "look"]
+COLUMNS = ["camera", "session", "verdict", *FIGURES, *TOLD, "date", "reason", "version", "inputs", "key", "cpu_s"]
+# Of a calibration, over time: each along x and y with its standard deviation, and its name in session.json.
+TWO = {"focal": "px", "center": "px", "zenith": "deg", "rotation_center": "px"}
+TWO |= {"lever_arm": "mm", "dispersion_offset": "px"}
+TRACKED = [f"{name}_{axis}_{unit}" for name, unit in TWO.items() for axis in "xy"]
+RESIDUALS = ["rms_px", "rotation_px", "residual_ratio", "stated_ratio"]
+FLEET = ["camera", "session", "date", "room", "map", "tilt_deg"]
+FLEET += [column for name in TRACKED for column in (name, f"sd_{name}")] + [*RESIDUALS, "mean_mm"]
+LAMPS = ["room", "map", "lamp", "camera", "session", "date", "captures", "map_x_m", "map_y_m"]
+LAMPS += ["offset_x_mm", "offset_y_mm", "sd_offset_x_mm", "sd_offset_y_mm"]
+ALL = list(dict.fromkeys([*COLUMNS, *FLEET, "lamps"]))  # of a shard's rows
 TOOK_TOO_LONG = (124, 137)  # exit codes of timeout
 # Files of vlp-calibrate that are kept, and their names there.
 KEPT = {
@@ -16,22 +31,61 @@ KEPT = {
 }
 
 
+def digits(value):
+    return f"{value:.6g}" if value is not None else ""
+
+
 def figures_of(folder, session):
     figures = {}
     if (folder / "evaluation.json").exists():
         evaluation = json.loads((folder / "evaluation.json").read_text())
         figures = {name: evaluation[name] for name in ("captures", "fixes", "missing_share")}
         for name in ("mean_mm", "median_mm", "p90_mm", "max_mm"):
-            figures[name] = f"{evaluation['horizontal'][name]:.6g}"
+            figures[name] = digits(evaluation["horizontal"][name])
     for metric in session["metrics"]:
-        if metric["name"] == "rms_px" and metric["step"] == "lens":
-            figures["rms_px"] = f"{metric['value']:.6g}"
+        if metric["name"] in RESIDUALS:
+            figures[metric["name"]] = digits(metric["value"])
+    return figures
+
+
+def told_by(session):
+    """What there is to look at: numbers, ids, and words."""
+    words, skipped, left_out, warnings = [], 0, {}, 0
+    for step in session["steps"]:
+        of_step = step.get("warnings", [])
+        warnings += len(of_step)
+        words += [f"{step['name']}: {warning}" for warning in of_step]
+        if images := step.get("skipped"):
+            skipped += len(images)
+            first = f"{images[0]['image']}: {images[0]['reason']}"
+            words.append(f"{step['name']}: {len(images)} image{'s' * (len(images) > 1)} skipped; the first, {first}")
+        for lamp in step.get("lamps_left_out", []):
+            left_out[lamp["lamp"]] = left_out.get(lamp["lamp"], 0) + lamp["captures"]
+    lamps = ", ".join(f"{lamp} ({captures})" for lamp, captures in sorted(left_out.items()))
+    return {"warnings": warnings, "images_skipped": skipped, "lamps_left_out": lamps, "look": "; ".join(words)}
+
+
+def calibration_of(session):
+    """What is tracked over time, and where each lamp is seen."""
+    figures, calibration = {}, session.get("calibration", {})
+    for name, unit in TWO.items():
+        values, sds = calibration.get(f"{name}_{unit}"), calibration.get(f"{name}_sd_{unit}")
+        for i, axis in enumerate("xy"):
+            figures[f"{name}_{axis}_{unit}"] = digits(values[i]) if values else ""
+            figures[f"sd_{name}_{axis}_{unit}"] = digits(sds[i]) if sds else ""
+    figures["tilt_deg"] = digits(calibration.get("tilt_deg"))
+    for part in session.get("history", []):
+        for entry in part["inputs"]:
+            if part["part"] == "rotation_center" and entry["file"] == "lamps.yaml":
+                figures["map"] = entry["sha256"][:12]
+    lamps = [lamp for step in session["steps"] for lamp in step.get("lamp_offsets", [])]
+    figures["lamps"] = json.dumps(lamps) if lamps else ""
     return figures
 
 
 def outcome_of(folder, name, ended, said):
-    """The verdict: "pass", "gate" or "no result", as session.json says; "crashed", when vlp-calibrate ended
-    without one. ended: its exit code, of timeout when it took too long; said: what it said at the end."""
+    """The verdict: "pass", "look", "gate" or "no result", as session.json says; "crashed", when vlp-calibrate
+    ended without one. ended: its exit code, of timeout when it took too long; said: what it said at the end."""
     camera, name_of_session = name.split("/")
     outcome = {"camera": camera, "session": name_of_session}
     try:
@@ -40,5 +94,11 @@ def outcome_of(folder, name, ended, said):
         words = "ran for more than an hour" if ended in TOOK_TOO_LONG else f"ended with exit code {ended}"
         last = said.strip().splitlines()[-1:]
         return outcome | {"verdict": "crashed", "reason": ": ".join([f"vlp-calibrate {words}", *last])}
-    outcome |= {"verdict": session["verdict"], "reason": session["reason"]}
-    return outcome if outcome["verdict"] == "no result" else outcome | figures_of(folder, session)
+    told = told_by(session)
+    verdict = session["verdict"]
+    if verdict == "pass" and (told["look"] or told["lamps_left_out"]):
+        verdict = "look"
+    outcome |= {"verdict": verdict, "reason": session["reason"], **told}
+    if verdict == "no result":
+        return outcome
+    return outcome | figures_of(folder, session) | calibration_of(session)

@@ -9,32 +9,19 @@ from collections import Counter
 from html import escape
 from pathlib import Path
 
+import fleet_page
 import pictures
-from changes import changes_of, check_gates, counts_of, load, name_of, read_gates, with_figures
+from changes import changes_of, check_gates, counts_of, load, name_of, read_gates, sessions_beyond_gates, with_figures
 from files import json_text, read_table, write_whole
+from fleet import fleet_of
+from html_parts import number, picture, table
 
-MOST_ROWS = 200  # of a table
 MOST_PICTURES = 6
+MOST_LOOKED_INTO = 200  # sessions of other inputs, which files of them
 
 STYLE = """body { font: 16px/1.5 sans-serif; max-width: 60rem; margin: 1rem auto; padding: 0 1rem; color: #222 }
 table { border-collapse: collapse } td, th { text-align: left; padding: 0.2rem 0.8rem; border-bottom: 1px solid #ccc }
 .wide { overflow-x: auto } img { max-width: 100% } .verdict { font-size: 2rem; font-weight: bold }"""
-
-
-def table(columns, rows):
-    head = "".join(f'<th scope="col">{escape(column)}</th>' for column in columns)
-    cells = ["".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows[:MOST_ROWS]]
-    body = "".join(f"<tr>{row}</tr>\n" for row in cells)
-    more = f"<p>and {len(rows) - MOST_ROWS} more, in summary.csv</p>" if len(rows) > MOST_ROWS else ""
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table></div>{more}\n'
-
-
-def picture(data, words):
-    return f'<p><img src="{data}" alt="{escape(words)}"></p><p>{escape(words)}</p>\n'
-
-
-def number(value):
-    return f"{value:.4g}" if isinstance(value, float) else "none" if value is None else str(value)
 
 
 def compared(run, truth, now, before):
@@ -73,6 +60,29 @@ def differing(run, previous, pairs):
     return html
 
 
+def parts_of(results, name):
+    """Digests of what is in a session's folder, as it was run there."""
+    for place in ("sessions", "failed"):
+        file = results / place / name / "row.json"
+        if file.exists():
+            return load(file).get("parts", {})
+    return {}
+
+
+def changed_inputs(previous, rows, changes):
+    html = "<h2>Of other inputs than before</h2>\n"
+    by_name, listed = {name_of(row): row for row in rows}, []
+    lost = changes["lost_with_other_inputs"]
+    for name in [*lost, *(name for name in changes["other_inputs"] if name not in set(lost))][:MOST_LOOKED_INTO]:
+        now, before = parts_of(Path("."), name), parts_of(previous, name)
+        files = sorted(part for part in {*now, *before} if now.get(part) != before.get(part))
+        what = "lost its result" if name in lost else by_name[name]["verdict"]
+        listed.append((name, ", ".join(files) if before else "not known", what))
+    html += table(["session", "what of it is another", "now"], listed)
+    more = len(changes["other_inputs"]) - len(listed)
+    return html + (f"<p>and {more} more, in changes.json</p>\n" if more else "")
+
+
 def comparison(run, previous, rows, before, changes, pairs):
     html = "<h2>What changed</h2>\n"
     html += table(
@@ -88,6 +98,8 @@ def comparison(run, previous, rows, before, changes, pairs):
         figures = [(float(old["mean_mm"]), float(row["mean_mm"])) for row, old, _ in pairs]
         html += picture(pictures.scatter(sorted(figures)), "Mean error of each session, before and now")
         html += differing(run, previous, pairs)
+    if changes["other_inputs"]:
+        html += changed_inputs(previous, rows, changes)
     if changes["newly_failed"]:
         html += "<h2>Had a result before, and have none now</h2>\n"
         by_name = {name_of(row): row["reason"] for row in rows}
@@ -102,18 +114,35 @@ COUNTED = [
     ("without a result, had one", "newly_failed"),
     ("with a result, had none", "newly_good"),
     ("of other inputs than before", "other_inputs"),
+    ("of them without a result, had one", "lost_with_other_inputs"),
     ("new", "only_now"),
     ("no longer there", "only_before"),
 ]
 
 
-def page(run, rows, counts, gates, parts):
+def look_here(rows):
+    look = [row for row in rows if row["verdict"] == "look"]
+    if not look:
+        return ""
+    words = "<h2>Passed, but look here</h2>\n"
+    columns = ["session", "mean (mm)", "images skipped", "lamps left out (captures)", "what to look at"]
+    keys = ("mean_mm", "images_skipped", "lamps_left_out", "look")
+    return words + table(columns, [(name_of(row), *(row[key] for key in keys)) for row in look])
+
+
+def page(run, rows, counts, gates, fleet, parts):
     missed = [gate for gate in gates if not gate["passed"]]
+    beyond = sessions_beyond_gates(counts, gates)
     html = '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
     html += '<meta name="viewport" content="width=device-width, initial-scale=1">'
     html += f"<title>Reprocessed archive</title><style>{STYLE}</style></head><body>\n<h1>Reprocessed archive</h1>\n"
+    if gates or beyond:
+        html += f'<p class="verdict">{"FAIL" if missed or beyond else "PASS"}</p>\n'
+    if beyond:
+        html += f"<p>{beyond} of {counts['sessions']} sessions miss a gate of theirs.</p>\n"
+    html += look_here(rows) + fleet
     if gates:
-        html += f'<p class="verdict">{"FAIL" if missed else "PASS"}</p>\n<h2>Gates</h2>\n'
+        html += "<h2>Gates</h2>\n"
         words = [(g["name"], number(g["value"]), g["limit"], "met" if g["passed"] else "not met") for g in gates]
         html += table(["gate", "value", "at most", ""], words)
     html += f"<p>Version {escape(run['version'])}, toolbox {run['toolbox'][:12]}.</p>\n<h2>Sessions</h2>\n"
@@ -143,10 +172,12 @@ def main():
         parts += "<h2>Errors</h2>\n" + picture(pictures.distribution(*figures), "Mean errors of the sessions")
     if changes:
         parts += comparison(run, Path(compare["previous"]), rows, before, changes, pairs)
-    passed = all(gate["passed"] for gate in results)
-    document = {"counts": counts, "changes": changes, "gates": results, "passed": passed}
+    passed = all(gate["passed"] for gate in results) and not sessions_beyond_gates(counts, results)
+    fleet_rows, lamp_rows = read_table("fleet.csv"), read_table("lamps.csv")
+    fleet = fleet_of(fleet_rows, lamp_rows)
+    document = {"counts": counts, "changes": changes, "gates": results, "passed": passed, "fleet": fleet}
     write_whole("changes.json", json_text({"format": "vlp-archive-changes/1", **document}))
-    write_whole("overview.html", page(run, rows, counts, results, parts))
+    write_whole("overview.html", page(run, rows, counts, results, fleet_page.page(fleet, fleet_rows, lamp_rows), parts))
 
 
 if __name__ == "__main__":

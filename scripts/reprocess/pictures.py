@@ -48,6 +48,27 @@ def scatter(pairs):
     return drawn(script, "520,520")
 
 
+def over_time(series, words, dated, since=None):
+    """series: {name: [(time, value, sd)]}; days since 1970 where they are dated; since: where the change is."""
+    script = f"set ylabel '{words}'\nset offsets graph 0.05, 0.05, 0.1, 0.1\nset key top left\n"
+    if dated:
+        script += "set xdata time\nset timefmt '%s'\nset format x '%Y-%m'\nset xtics rotate by -30\n"
+        script += "set rmargin 5\n"
+    else:
+        script += "set xlabel 'session'\n"
+    day_s = 86400 if dated else 1
+    if since is not None:
+        at = f"'{since * day_s:.0f}'" if dated else f"{since}"
+        script += f"set arrow from {at}, graph 0 to {at}, graph 1 nohead dt 2 lc rgb '#888888'\n"
+    plots = []
+    for number, (name, points) in enumerate(series.items()):
+        lines = "\n".join(f"{time * day_s:.0f} {value:.8g} {sd:.6g}" for time, value, sd in points)
+        script += f"$series{number} << END\n{lines}\nEND\n"
+        style = f"with yerrorbars pt 7 ps 0.5 lc rgb '{(NOW, BEFORE)[number % 2]}' title '{name}'"
+        plots.append(f"$series{number} using 1:2:3 {style}")
+    return drawn(script + "plot " + ", ".join(plots) + "\n", "640,320")
+
+
 def errors(truth_file, fixes_file):
     truth = {row["image"]: row for row in read_table(truth_file)}
     vectors = []

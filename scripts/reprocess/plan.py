@@ -4,16 +4,19 @@
 
 Writes into RESULTS/.state: run.json (toolbox and options), shards/N.list (a session a line, with the
 number, size and latest change of its files: a glance that tells which shards to look into), shards.txt
-(how many), again.txt (rows to make again), and compare.json. What has not changed is not touched, so that
-Snakemake runs the rest.
+(how many), again.txt (rows to make again), dates.csv (dates and rooms of sessions) and compare.json. What has
+not changed is not touched, so that Snakemake runs the rest.
 """
 import argparse
 import re
+import shutil
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from checks import check, fail
-from files import digest, input_files, json_text, write_if_other, write_whole
+from dates import dates_of
+from files import digest, input_files, json_text, table, write_if_other, write_whole
 from toolbox import toolbox
 
 
@@ -52,6 +55,8 @@ def write_shards(archive, state, size, at_a_time):
     for name in sessions:
         if not re.fullmatch(r"\w[\w .-]*/\w[\w .-]*", name, re.ASCII):
             fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks")
+    dates = dates_of(archive, sessions)
+    write_if_other(state / "dates.csv", table(["camera", "session", "date", "room"], dates))
     with ThreadPoolExecutor(16) as threads:  # most of it is waiting for the file system
         glances = list(threads.map(lambda name: glance(archive / name), sessions))
     lines = [f"{name}\t{seen}\n" for name, seen in zip(sessions, glances)]
@@ -84,6 +89,7 @@ def main():
     parser.add_argument("--gates", type=Path)
     parser.add_argument("--session-gates", type=Path)
     parser.add_argument("--previous", type=Path)
+    parser.add_argument("--keep", type=int, default=0)
     parser.add_argument("--shard-size", type=int, default=50)
     parser.add_argument("--at-a-time", type=int, default=1)
     parser.add_argument("--camera-option", action="append", default=[])
@@ -92,12 +98,15 @@ def main():
     check(options)
     state = results / ".state"
     (state / "logs").mkdir(parents=True, exist_ok=True)  # a cluster's jobs find it
+    shutil.rmtree(state / "ran", ignore_errors=True)
+    write_whole(state / "started", f"{time.time():.3f}\n")
     run = {
         "archive": str(archive),
         "bin": str(options.bin.resolve()),
         "camera": " ".join(options.camera_option),
         "session_gates": str(options.session_gates.resolve()) if options.session_gates else "",
         "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
+        "keep": options.keep,
         **toolbox(options.bin),
     }
     count = write_shards(archive, state, options.shard_size, options.at_a_time)
@@ -117,5 +126,5 @@ def main():
 if __name__ == "__main__":
     try:
         main()
-    except (OSError, UnicodeDecodeError) as failure:
+    except (OSError, UnicodeDecodeError, ValueError) as failure:
         fail(failure)

@@ -16,8 +16,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from files import digest, input_digest, json_text, table, write_whole
-from outcome import COLUMNS, KEPT, outcome_of
+from files import digest, input_digests, json_text, table, write_whole
+from outcome import ALL, KEPT, outcome_of
 
 STATE = Path(".state")
 COSTS = STATE / "costs"
@@ -70,9 +70,29 @@ def same_file(source, target):
         shutil.copyfile(source, target)
 
 
-def publish(row, work):
-    """Takes what a session gave to its place, and nothing else of it remains. The work is left as it is,
-    so that this can be done again."""
+def put_aside(place, name, keep):
+    """The former result goes to former/, by its key, of which so many stay; with none it is gone."""
+    old = STATE / "old" / name
+    shutil.rmtree(old, ignore_errors=True)
+    old.parent.mkdir(parents=True, exist_ok=True)
+    place.rename(old)
+    former = Path("former") / name
+    if keep > 0:
+        former.mkdir(parents=True, exist_ok=True)
+        kept = former / json.loads((old / "row.json").read_text())["key"][:12]
+        shutil.rmtree(kept, ignore_errors=True)
+        old.rename(kept)
+    else:
+        shutil.rmtree(old)
+    if former.is_dir():
+        by_age = sorted(former.iterdir(), key=lambda result: (result / "row.json").stat().st_mtime_ns)
+        for result in by_age[: max(0, len(by_age) - keep)]:
+            shutil.rmtree(result)
+
+
+def publish(row, work, keep=0):
+    """Takes what a session gave to its place; of what it gave before, so many results remain. The work is left
+    as it is, so that this can be done again."""
     name = f"{row['camera']}/{row['session']}"
     ready = STATE / "ready" / name
     shutil.rmtree(ready, ignore_errors=True)
@@ -83,14 +103,11 @@ def publish(row, work):
     write_whole(ready / "row.json", json_text(row))
     place = place_of(name, row["verdict"])
     place.parent.mkdir(parents=True, exist_ok=True)
-    old = STATE / "old" / name
-    shutil.rmtree(old, ignore_errors=True)
-    old.parent.mkdir(parents=True, exist_ok=True)
     for former in (Path("sessions") / name, Path("failed") / name):
         if former.exists():
-            former.rename(old)
-            shutil.rmtree(old)
+            put_aside(former, name, keep)
     ready.rename(place)
+    return sum(file.stat().st_size for file in place.iterdir())
 
 
 def stated_cost(name):
@@ -101,18 +118,26 @@ def stated_cost(name):
         return ""
 
 
+def tell_run(shard, row, cost, size):
+    """A line for what this run did, also of one that is killed and goes on."""
+    (STATE / "ran").mkdir(exist_ok=True)
+    with open(STATE / "ran" / shard, "a") as ran:
+        ran.write(f"{row['camera']}/{row['session']}\t{row['verdict']}\t{cost}\t{size}\n")
+
+
 def reprocess(run, shard, names, lock):
     work = (STATE / "work" / shard).absolute()
     rows, made = [], 0
     for name in names:
-        inputs = input_digest(Path(run["archive"]) / name)
+        parts = input_digests(Path(run["archive"]) / name)
+        inputs = digest(json_text(parts))
         key = key_of(inputs, run)
         row = current(name, key)
         if row is None:
             outcome, cost = calibrate(run, name, work, lock)
-            row = outcome | {"key": key, "inputs": inputs, "version": run["version"]}
+            row = outcome | {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
             write_whole(COSTS / name, cost)
-            publish(row, work)
+            tell_run(shard, row, cost, publish(row, work, run["keep"]))
             shutil.rmtree(work / name)
             made += 1
         rows.append(row | {"cpu_s": stated_cost(name)})
@@ -130,7 +155,7 @@ def main():
         # A job that the cluster gave up may still be at work.
         fcntl.flock(lock, fcntl.LOCK_EX)
         rows = reprocess(run, shard, [line.split("\t")[0] for line in lines], lock)
-    write_whole(STATE / "rows" / f"{shard}.csv", table(COLUMNS, rows))
+    write_whole(STATE / "rows" / f"{shard}.csv", table(ALL, rows))
 
 
 if __name__ == "__main__":

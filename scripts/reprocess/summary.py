@@ -1,15 +1,34 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Joins the rows of the shards, in RESULTS, to summary.csv."""
+"""Joins the rows of the shards, in RESULTS, to summary.csv (a row per session), fleet.csv (a row per session with
+a calibration: its figures over time) and lamps.csv (a row per session and lamp: where the others see it)."""
+import json
 from pathlib import Path
 
 from files import read_table, table, write_whole
-from outcome import COLUMNS
+from outcome import COLUMNS, FLEET, LAMPS
+
+
+def lamps_of(row):
+    for lamp in json.loads(row["lamps"]) if row["lamps"] else []:
+        figures = {"lamp": lamp["lamp"], "captures": lamp["captures"]}
+        for i, axis in enumerate("xy"):
+            figures[f"map_{axis}_m"] = f"{lamp['map_m'][i]:.6g}"
+            figures[f"offset_{axis}_mm"] = f"{lamp['offset_mm'][i]:.6g}"
+            figures[f"sd_offset_{axis}_mm"] = f"{lamp['offset_sd_mm'][i]:.6g}"
+        yield row | figures
 
 
 def main():
     shards = sorted(file.stem for file in Path(".state/shards").glob("*.list"))
+    stated = {(row["camera"], row["session"]): row for row in read_table(".state/dates.csv")}
     rows = [row for shard in shards for row in read_table(f".state/rows/{shard}.csv")]
+    for row in rows:
+        known = stated.get((row["camera"], row["session"]), {"date": "", "room": ""})
+        row |= {"date": known["date"], "room": known["room"]}
+    calibrated = [row for row in rows if row["focal_x_px"]]
+    write_whole("lamps.csv", table(LAMPS, (lamp for row in calibrated for lamp in lamps_of(row))))
+    write_whole("fleet.csv", table(FLEET, calibrated))
     write_whole("summary.csv", table(COLUMNS, rows))
 
 

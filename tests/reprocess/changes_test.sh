@@ -32,12 +32,58 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   few="$archive/unit 2/few boards"
   rm "$few"/boards/00{05..19}.png
   mv "$few/check/truth.csv" "$few/check/captures.csv"
-  reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" >"$said"
+  code=0
+  reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
+  [ "$code" = 1 ] || fail "exit code $code, and two sessions miss their gates"
+  grep -q '2 of 2 sessions miss a gate of theirs' "$scratch/errors" || fail "$(cat "$scratch/errors")"
+  printf 'format: vlp-archive-gates/1\ngates: {gate_share: 1}\n' >"$scratch/gates.yaml"
+  reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" --gates "$scratch/gates.yaml" >"$said"
+  grep -q '^this run    ran 0, of them 0 without a result; reused 2; ' "$said" || fail "$(cat "$said")"
   grep -q '^gates       2 with a result that misses a gate' "$said" || fail "$(cat "$said")"
   grep -q '^camera.*mean_mm is .* at most 0.0001 mm' "$scratch/gates-results/summary.csv" || fail "no reason"
   grep -q '^unit 2,few boards,gate,12,.*halves_px is ' "$scratch/gates-results/summary.csv" || fail "no reason"
   grep -q '"verdict": "gate"' "$scratch/gates-results/sessions/unit 2/few boards/session.json" || fail "passes without a lens"
   grep -q 'id: "unit 2"' "$scratch/gates-results/sessions/unit 2/few boards/calibration.yaml" || fail "whose calibration?"
+)
+
+# Half of a turn is cut off: that passes, and the overview begins with it. The map of another session is gone since:
+# it lost its result, whatever became of its inputs.
+(
+  take "$scratch/looked" camera-00001/session-01 camera-00002/session-01
+  cut=camera-00001/session-01 lost=camera-00002/session-01 looked=$scratch/looked-results
+  rm -rf "$looked"
+  printf 'camera,session,fault,date,room\ncamera-00001,session-01,,2026-03-14,hall\n' >"$archive/archive.csv"
+  truncate --size 1000 "$archive/$cut"/rotation/00{06..11}.png
+  mv "$archive/$lost/lamps.yaml" "$scratch/looked-lamps.yaml"
+  printf 'format: vlp-archive-gates/1\ngates: {newly_failed: 0}\n' >"$scratch/gates.yaml"
+  code=0
+  reprocess "$looked" --previous "$baseline" --gates "$scratch/gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
+  [ "$code" = 1 ] && grep -q 'gate newly_failed: is 1, at most 0' "$scratch/errors" || fail "$code $(cat "$scratch/errors")"
+  for words in '^this run    ran 2, of them 1 without a result; reused 0; ' '^passed      0' '^look        1 that passed' \
+    '1 newly without a result' '^inputs      2 of other inputs than before, 1 lost their result'; do
+    grep -q "$words" "$said" || fail "no '$words' in $(cat "$said")"
+  done
+  page=$looked/overview.html
+  head -n 20 "$page" | grep -q '<h2>Passed, but look here</h2>' || fail "the overview does not begin with it"
+  grep -q 'taken as zero' "$page" || fail "the warning is not in the overview"
+  grep -q '6 images skipped; the first, 0006.png: cannot be read as an image: it is cut short' "$page" || fail "no skipped images"
+  grep -q "$lost</td><td>lamps.yaml</td><td>lost its result" "$page" || fail "no inputs that changed"
+  grep -q '^camera-00001,session-01,look,.*,6,,.*,2026-03-14,' "$looked/summary.csv" || fail "$(cat "$looked/summary.csv")"
+  grep -q '^camera-00001,session-01,2026-03-14,hall,' "$looked/fleet.csv" || fail "$(cat "$looked/fleet.csv")"
+  [ "$(grep -c '^hall,[0-9a-f]*,[1-6],camera-00001,session-01,2026-03-14,' "$looked/lamps.csv")" = 6 ] || fail "six lamps"
+
+  # It is mended, and what it was before is kept and told.
+  mv "$scratch/looked-lamps.yaml" "$archive/$lost/lamps.yaml"
+  reprocess "$looked" --keep 1 >"$said"
+  grep -q '^this run    ran 1, of them 0 without a result; reused 1; ' "$said" || fail "$(cat "$said")"
+  "$source_dir/scripts/reprocess.sh" --diff "$looked" "$lost" >"$said"
+  grep -q '^verdict     no result -> ' "$said" && grep -q '^inputs      lamps.yaml$' "$said" || fail "$(cat "$said")"
+  "$source_dir/scripts/reprocess.sh" --diff "$looked" "$cut" "$baseline" >"$said"
+  grep -q '^verdict     pass -> look' "$said" && grep -q '^  calibration tilt_deg: ' "$said" || fail "$(cat "$said")"
+  printf 'camera,session,date\ncamera-00001,session-01,14.3.2026\n' >"$archive/archive.csv"
+  code=0
+  reprocess "$looked" >/dev/null 2>"$scratch/errors" || code=$?
+  [ "$code" = 2 ] && grep -q 'archive.csv:2: date: should be as' "$scratch/errors" || fail "$code $(cat "$scratch/errors")"
 )
 
 refused() {  # MESSAGE ARGUMENT...: exit code 2 and one line
@@ -53,6 +99,10 @@ refused 'unknown option' "$archive" "$scratch/refused" --odd
 refused '--shard-size: should be a number' "$archive" "$scratch/refused" --shard-size 0
 refused '--readout: should be rows or columns' "$archive" "$scratch/refused" --readout diagonals
 refused 'neither of ours nor a folder' "$archive" "$scratch/refused" --profile odd
+refused '--keep: should be a number' "$archive" "$scratch/refused" --keep all
+refused 'keeps no former result' --diff "$results" camera-00001/session-01
+refused 'holds no result of' --diff "$results" camera-00001/session-77
+refused 'wants RESULTS CAMERA/SESSION' --diff "$results"
 refused 'holds no summary.csv' "$archive" "$scratch/refused" --previous "$scratch"
 refused 'this run writes there' "$archive" "$previous" --previous "$previous"
 refused 'cannot be written to' "$archive" /dev/null/results
@@ -64,4 +114,4 @@ mkdir -p "$scratch/empty" "$scratch/odd/camera/it's"
 refused 'no sessions in it' "$scratch/empty" "$scratch/refused"
 refused 'names of cameras and sessions' "$scratch/odd" "$scratch/refused"
 [ ! -e "$scratch/refused" ] || fail "something is left of what was refused"
-rm -rf "$results" "$previous" "$scratch"/gates* "$scratch/refused"
+rm -rf "$results" "$previous" "$scratch"/gates* "$scratch"/looked* "$scratch/refused"

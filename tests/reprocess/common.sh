@@ -45,7 +45,7 @@ bytes_of() {  # RESULTS [SESSION...]
   local results=$1 session
   shift
   if [ $# = 0 ]; then
-    (cd "$results" && find sessions failed overview.html -type f | sort | xargs sha256sum)
+    (cd "$results" && find sessions failed overview.html fleet.csv lamps.csv -type f | sort | xargs sha256sum)
     sed 's/,[^,]*$//' "$results/summary.csv"
   fi
   for session; do

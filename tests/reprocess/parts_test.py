@@ -19,10 +19,16 @@ except ImportError:
     print("yaml is missing: scripts/setup.sh --batch")
     sys.exit(77)
 import changes
+import dates
+import diff
 import files
+import fleet
 import outcome
 import plan
 import shard
+import summary
+import made_up_fleet
+from made_up_fleet import Fleet
 
 
 def row(number, verdict, mean, inputs="same"):
@@ -40,8 +46,9 @@ class Changes(unittest.TestCase):
         found, pairs = changes.changes_of(now, before)
         self.assertEqual([found[key] for key in ("better", "worse", "same", "pairs")], [1, 1, 1, 3])
         self.assertEqual(found["newly_failed"], ["c0001/s1", "c0002/s1"])
+        self.assertEqual(found["lost_with_other_inputs"], [])
         self.assertEqual(found["newly_good"], ["c0002/s0"])
-        self.assertEqual([found[key] for key in ("other_inputs", "only_now", "only_before")], [1, 1, 1])
+        self.assertEqual([found[key] for key in ("other_inputs", "only_now", "only_before")], [["c0003/s0"], 1, 1])
         self.assertEqual([change for _, _, change in pairs], [1, -0.5, 0])
         self.assertIn("cannot tell", found["verdict"])
 
@@ -75,11 +82,32 @@ class Changes(unittest.TestCase):
         self.assertEqual(passed, [True, False, True, True, False, False])
 
     def test_gates_without_a_pair_are_not_met(self):
-        now, before = [row(0, "pass", 1, "new")], [row(0, "pass", 1, "old")]
-        found, _ = changes.changes_of(now, before)
         gates = {"newly_failed": 0, "worse_share": 1, "mean_difference_mm": 1}
-        passed = [gate["passed"] for gate in changes.check_gates(gates, changes.counts_of(now), found)]
-        self.assertEqual(passed, [False, False, False])
+
+        def passed(now, before):
+            found, _ = changes.changes_of(now, before)
+            return [gate["passed"] for gate in changes.check_gates(gates, changes.counts_of(now), found)]
+
+        self.assertEqual(passed([row(0, "pass", 1, "new")], [row(0, "pass", 1, "old")]), [True, False, False])
+        self.assertEqual(passed([row(0, "pass", 1)], [row(1, "pass", 1)]), [False, False, False])
+
+    def test_sessions_that_lost_their_result_with_other_inputs_are_counted(self):
+        before = [row(i, "pass", 1, "old") for i in range(3)]
+        now = [row(0, "no result", None, "new"), row(1, "look", 1, "new"), row(2, "no result", None, "old")]
+        found, pairs = changes.changes_of(now, before)
+        self.assertEqual(found["other_inputs"], ["c0000/s0", "c0000/s1"])
+        self.assertEqual(found["newly_failed"], ["c0000/s0", "c0001/s0"])
+        self.assertEqual(found["lost_with_other_inputs"], ["c0000/s0"])
+        self.assertEqual(pairs, [])
+        gates = changes.check_gates({"newly_failed": 1}, changes.counts_of(now), found)
+        self.assertEqual([(gate["value"], gate["passed"]) for gate in gates], [(2, False)])
+
+    def test_sessions_that_miss_their_gates_count_where_no_gate_says_how_many_may(self):
+        counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 1), row(2, "look", 1)])
+        self.assertEqual((counts["pass"], counts["look"], counts["gate"]), (1, 1, 1))
+        self.assertEqual(changes.sessions_beyond_gates(counts, []), 1)
+        gates = changes.check_gates({"gate_share": 0.5}, counts, None)
+        self.assertEqual(changes.sessions_beyond_gates(counts, gates), 0)
 
     def test_less_than_a_micrometre_is_the_same(self):
         now = [row(0, "pass", 1.0005), row(1, "pass", 0.9995), row(2, "pass", 1.002)]
@@ -115,9 +143,9 @@ class Outcome(unittest.TestCase):
         self.addCleanup(self.folder.cleanup)
         self.work = Path(self.folder.name)
 
-    def session(self, verdict, reason="", metrics=()):
-        text = json.dumps({"verdict": verdict, "reason": reason, "metrics": list(metrics)})
-        (self.work / "session.json").write_text(text)
+    def session(self, verdict, reason="", metrics=(), steps=(), **others):
+        stated = {"verdict": verdict, "reason": reason, "metrics": list(metrics), "steps": list(steps)}
+        (self.work / "session.json").write_text(json.dumps(stated | others))
 
     def outcome(self, ended=0, said=""):
         return outcome.outcome_of(self.work, "c/s", ended, said)
@@ -131,6 +159,39 @@ class Outcome(unittest.TestCase):
         self.assertEqual((found["camera"], found["session"]), ("c", "s"))
         self.assertEqual((found["verdict"], found["reason"]), ("gate", "rms_px is 2 px"))
         self.assertEqual((found["fixes"], found["mean_mm"], found["rms_px"]), (2, "0.25", "2"))
+
+    def test_what_passed_with_something_to_look_at_says_so(self):
+        cut = [{"image": f"000{i}.png", "reason": "is cut short"} for i in range(6)]
+        warning = "a lever arm cannot be told from a tilt; it is taken as zero"
+        steps = [{"name": "lens"}, {"name": "rotation", "warnings": [warning], "skipped": cut}]
+        self.session("pass", steps=steps)
+        found = self.outcome()
+        self.assertEqual((found["verdict"], found["reason"]), ("look", ""))
+        self.assertEqual((found["warnings"], found["images_skipped"], found["lamps_left_out"]), (1, 6, ""))
+        skipped = "rotation: 6 images skipped; the first, 0000.png: is cut short"
+        self.assertEqual(found["look"], f"rotation: {warning}; {skipped}")
+        left_out = [{"lamp": 4, "captures": 1}, {"lamp": 2, "captures": 12}]
+        self.session("pass", steps=[{"name": "check", "lamps_left_out": left_out, "warnings": ["lamp 2 is left out"]}])
+        found = self.outcome()
+        self.assertEqual((found["verdict"], found["lamps_left_out"]), ("look", "2 (12), 4 (1)"))
+        self.session("gate", "rms_px is 2 px", steps=steps)
+        self.assertEqual((self.outcome()["verdict"], self.outcome()["images_skipped"]), ("gate", 6))
+        self.session("pass", steps=[{"name": "check", "notes": ["of so few as 12 captures"]}])
+        self.assertEqual((self.outcome()["verdict"], self.outcome()["look"]), ("pass", ""))
+
+    def test_keeps_what_is_tracked_over_time(self):
+        calibration = {"tilt_deg": 0.5, "focal_px": [260.5, 261], "focal_sd_px": [0.02, 0.03], "lever_arm_mm": [1, 2]}
+        calibration |= {"lever_arm_sd_mm": None}
+        history = [{"part": "camera", "inputs": []}]
+        history += [{"part": "rotation_center", "inputs": [{"file": "lamps.yaml", "sha256": "0123456789abcdef"}]}]
+        lamps = [{"lamp": 2, "captures": 12, "map_m": [0, 1], "offset_mm": [0.5, -1], "offset_sd_mm": [0.1, 0.2]}]
+        self.session("pass", steps=[{"name": "check", "lamp_offsets": lamps}], calibration=calibration, history=history)
+        found = self.outcome()
+        self.assertEqual(found["verdict"], "pass")
+        self.assertEqual((found["focal_y_px"], found["sd_focal_y_px"], found["map"]), ("261", "0.03", "0123456789ab"))
+        self.assertEqual((found["lever_arm_x_mm"], found["sd_lever_arm_x_mm"], found["center_x_px"]), ("1", "", ""))
+        lamp = next(summary.lamps_of(found))
+        self.assertEqual((lamp["lamp"], lamp["offset_y_mm"], lamp["sd_offset_y_mm"], lamp["map_y_m"]), (2, "-1", "0.2", "1"))
 
     def test_no_result_has_no_figures(self):
         self.session("no result", "lens: boards: holds no image")
@@ -172,6 +233,163 @@ class Shard(unittest.TestCase):
             self.assertEqual(found, sorted([*outcome.KEPT.values(), "row.json"]))
 
 
+    def test_former_results_stay_by_their_keys_so_many(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            work = Path("work")
+            (work / "c/s").mkdir(parents=True)
+
+            def publish(key, keep, verdict="pass"):
+                (work / "c/s/session.json").unlink(missing_ok=True)  # another file, as programs write
+                (work / "c/s/session.json").write_text(key)
+                shard.publish({"camera": "c", "session": "s", "verdict": verdict, "key": key * 4}, work, keep)
+                for age, file in enumerate(sorted(Path(".").rglob("row.json"), key=lambda file: file.stat().st_mtime_ns)):
+                    os.utime(file, ns=(age, age))  # that of one tick are told apart
+                return sorted(path.name for path in Path("former").rglob("*") if path.is_dir() and path.name.endswith("key"))
+
+            self.assertEqual(publish("1key", 2), [])
+            self.assertEqual(publish("2key", 2, "no result"), ["1key1key1key"])
+            self.assertEqual(publish("3key", 2), ["1key1key1key", "2key2key2key"])
+            self.assertFalse(Path("failed/c/s").exists())
+            self.assertEqual(publish("4key", 2), ["2key2key2key", "3key3key3key"])
+            self.assertEqual(Path("former/c/s/3key3key3key/session.json").read_text(), "3key")
+            self.assertEqual(Path("sessions/c/s/session.json").read_text(), "4key")
+            self.assertEqual(publish("5key", 0), [])
+
+
+class Diff(unittest.TestCase):
+    def test_names_what_differs_and_nothing_else(self):
+        def result(verdict, focal, mean, warnings, parts):
+            step = {"name": "check", "warnings": warnings}
+            metrics = [{"name": "mean_mm", "step": "evaluate", "value": mean}]
+            metrics += [{"name": "rms_px", "step": "lens", "value": 1}]
+            session = {"metrics": metrics, "steps": [step], "version": "1"}
+            session["calibration"] = {"focal_px": focal, "lens_model": "x"}
+            return {"verdict": verdict, "reason": "", "parts": parts}, session
+
+        before = result("pass", [260, 261], 0.2, [], {"lamps.yaml": "a", "check": "b"})
+        now = result("look", [260, 261.5], 0.3, ["the residuals show"], {"lamps.yaml": "c", "check": "b"})
+        said = "\n".join(diff.lines_of(before, now))
+        for words in ("verdict     pass -> look", "inputs      lamps.yaml\n", "1 -> 1 (the same)", "2 of 4 differ"):
+            self.assertIn(words, said)
+        self.assertIn("  evaluate mean_mm: 0.2 -> 0.3 (+0.1)", said)
+        self.assertIn("  calibration focal_px y: 261 -> 261.5 (+0.5)", said)
+        self.assertIn("  + check: the residuals show", said)
+        self.assertEqual(len(said.splitlines()), 7)
+
+
+class Dates(unittest.TestCase):
+    def test_are_those_of_the_table_or_of_the_name(self):
+        for name, date in (("2026-03-14", "2026-03-14"), ("20260314-b", "2026-03-14"), ("x 2026-03-14T0930", "2026-03-14")):
+            self.assertEqual(dates.date_in(name), date)
+        for name in ("session-01", "2026-13-14", "120260314", "20260314555"):
+            self.assertEqual(dates.date_in(name), "")
+        self.assertEqual(dates.days_of("1970-01-02T12:00"), 1.5)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "archive.csv"
+            file.write_text("camera,session,fault,date,room\na,1,,2026-03-14T09:30,hall\na,20260101,,,attic\n")
+            lines = dates.dates_of(Path(folder), ["a/1", "a/20260101", "b/1"])
+            expected = [("a", "1", "2026-03-14T09:30:00", "hall"), ("a", "20260101", "2026-01-01", "attic")]
+            self.assertEqual([tuple(line.values()) for line in lines], expected)
+            file.write_text("camera,session,date\na,1,14.3.2026\n")
+            self.assertRaisesRegex(ValueError, "archive.csv:2: date: should be as", dates.table_of, Path(folder))
+
+
+def fleet_rows(made_up):
+    rows, lamps = [], []
+    for camera, session, result in made_up.all():
+        named = {"camera": camera, "session": session, "date": dates.date_in(session), "room": ""}
+        rows.append(dict.fromkeys(outcome.ALL, "") | named | outcome.calibration_of(result))
+        lamps += summary.lamps_of(rows[-1])
+    return rows, lamps
+
+
+class OverTime(unittest.TestCase):
+    # Of 20 cameras with 10 sessions each in a year: 0.1 % of the focal length, 0.02 degrees of tilt, 0.3 px.
+    DRIFTS = {
+        3: {"focal": (0.26, 0.26)},
+        8: {"zenith": (0.02, 0), "rotation_center": (0.0908, 0)},
+        15: {"center": (0.3, 0), "rotation_center": (0.3, 0)},
+    }
+    MOVED = [(0, 2, 150, complex(0.8, 0.6)), (1, 5, 240, complex(-3, 4))]
+
+    def test_finds_what_drifts_and_which_lamps_were_moved_and_when(self):
+        fleets, found_cameras, false = 20, 0, 0
+        for seed in range(fleets):
+            made_up = Fleet(seed, drifts=self.DRIFTS, moved=self.MOVED)
+            found = fleet.fleet_of(*fleet_rows(made_up))
+            cameras = {alarm["camera"] for alarm in found["cameras"]}
+            found_cameras += len(cameras & {"camera-03", "camera-08", "camera-15"})
+            lamps = [(lamp["map"][0], lamp["lamp"]) for lamp in found["lamps"]]
+            false += bool(cameras - {"camera-03", "camera-08", "camera-15"}) or sorted(lamps) != [("0", 2), ("1", 5)]
+            for room, lamp, day, moved in self.MOVED:
+                one = next(one for one in found["lamps"] if (one["map"][0], one["lamp"]) == (str(room), lamp))
+                self.assertLess(one["before"]["date"], made_up.date(day), (seed, lamp))
+                self.assertGreaterEqual(one["since"]["date"], made_up.date(day), (seed, lamp))
+                self.assertLess(abs(complex(*one["moved_mm"]) - moved), 5 * sum(one["sd_mm"]), (seed, lamp))
+        self.assertGreaterEqual(found_cameras, 3 * fleets - 7)  # of 600 cameras 39 are missed, nearly all tilts
+        self.assertLessEqual(false, 4)  # 1 is expected at most
+
+    def test_says_of_a_camera_that_broke_between_which_sessions(self):
+        for seed in range(5):
+            made_up = Fleet(seed, broken={7: (6, {"center": (0.4, -0.3)})})
+            alarm = fleet.fleet_of(*fleet_rows(made_up))["cameras"][0]
+            first = alarm["changes"][0]
+            self.assertEqual((alarm["camera"], first["kind"]), ("camera-07", "step"))
+            self.assertEqual(fleet.kind_of(first["figure"]), "center")
+            dates_of_both = [made_up.date(made_up.day(7, session)) for session in (5, 6)]
+            self.assertEqual([first["before"]["date"], first["since"]["date"]], dates_of_both)
+
+    def test_tells_a_drift_from_a_step(self):
+        for seed in range(5):
+            found = fleet.fleet_of(*fleet_rows(Fleet(seed, drifts={3: {"focal": (0.5, 0.5)}})))["cameras"][0]
+            self.assertEqual((found["camera"], found["changes"][0]["kind"]), ("camera-03", "drift"))
+            self.assertAlmostEqual(found["changes"][0]["change"], 0.5 * 0.95, delta=5 * found["changes"][0]["sd"])
+
+    def test_gives_false_alarms_no_oftener_than_stated(self):
+        fleets = 40
+        for honest in (True, False):
+            alarms = 0
+            for seed in range(1000, 1000 + fleets):
+                found = fleet.fleet_of(*fleet_rows(Fleet(seed, honest=honest)))
+                alarms += bool(found["cameras"] or found["lamps"])
+            self.assertLessEqual(alarms, 6, honest)  # 2 are expected at most; more than 6 in 1 of 200 such tests
+
+    def test_states_by_how_much_sessions_differ_more_than_they_say(self):
+        factors = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=60)))["factors"]
+        for name, (_, _, factor) in made_up_fleet.SDS.items():
+            self.assertAlmostEqual(factors[name] / factor, 1.05, delta=0.12)
+
+    def test_of_too_few_sessions_says_nothing(self):
+        found = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=2, sessions=3, broken={0: (1, {"center": (9, 9)})})))
+        self.assertEqual((found["cameras"], found["lamps"], set(found["factors"].values())), ([], [], {None}))
+        self.assertEqual(fleet.fleet_of([], [])["cameras"], [])
+
+    def test_steps_and_drifts_are_those_of_least_squares(self):
+        series = [(1.0, 0.5), (2.0, 1.0), (4.0, 0.25)]
+        (first, first_sd), (last, last_sd) = fleet.steps(series)
+        self.assertAlmostEqual(first, (2 * 1 + 4 * 16) / 17 - 1)
+        self.assertAlmostEqual(first_sd, (1 / 4 + 1 / 17) ** 0.5)
+        self.assertAlmostEqual(last, 4 - (1 * 4 + 2 * 1) / 5)
+        self.assertAlmostEqual(last_sd, (1 / 5 + 1 / 16) ** 0.5)
+        change, sd = fleet.drift([0, 5, 20], [(1 + 0.3 * time, 0.1) for time in (0, 5, 20)])
+        self.assertAlmostEqual(change, 6)
+        middle = 25 / 3
+        self.assertAlmostEqual(sd, 0.1 * 20 / sum((time - middle) ** 2 for time in (0, 5, 20)) ** 0.5)
+        self.assertIsNone(fleet.drift([3, 3], [(1, 1), (2, 1)]))
+
+    def test_a_lamp_that_moved_explains_what_the_others_show(self):
+        made_up = Fleet(1, moved=[(0, 2, 150, complex(3, -4))])
+        made_up.chance = unittest.mock.Mock(gauss=lambda mean, sd: mean, uniform=lambda low, high: 1)
+        room = fleet.rooms_of(fleet_rows(made_up)[1])[0]
+        _, lamp, k, change, _ = room.largest(1)
+        self.assertEqual(lamp, 2)
+        self.assertAlmostEqual(abs(change - complex(3, -4)), 0, places=4)
+        room.take_off(lamp, room.series[lamp][k][0], change)
+        self.assertLess(room.largest(1)[0], 1e-3)
+
+
 class Plan(unittest.TestCase):
     def test_shards_end_together(self):
         def lengths(*arguments):
@@ -201,6 +419,7 @@ class Files(unittest.TestCase):
             second = files.input_digest(session)
             (session / "boards/1.png").write_text("two")
             self.assertEqual(len({first, second, files.input_digest(session)}), 3)
+            self.assertEqual(list(files.input_digests(session)), ["boards"])
 
 
 if __name__ == "__main__":

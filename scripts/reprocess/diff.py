@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Says what differs between two results of a session: reprocess.sh --diff."""
+import json
+import sys
+from pathlib import Path
+
+from checks import fail
+from outcome import told_by
+
+
+def result_in(results, name):
+    for place in ("sessions", "failed"):
+        if (results / place / name / "row.json").is_file():
+            return results / place / name
+    fail(f"{results}: holds no result of {name}")
+
+
+def former_of(results, name, key):
+    folder = results / "former" / name
+    found = [former for former in folder.iterdir() if former.name.startswith(key)] if folder.is_dir() else []
+    if not found:
+        there = ", ".join(sorted(former.name for former in folder.iterdir())) if folder.is_dir() else "none"
+        which = f"former result {key}" if key else "former result"
+        fail(f"{results}: keeps no {which} of {name}; there are: {there}; --keep N keeps so many")
+    return max(found, key=lambda former: (former / "row.json").stat().st_mtime_ns)
+
+
+def load(folder):
+    row = json.loads((folder / "row.json").read_text())
+    file = folder / "session.json"
+    empty = {"metrics": [], "steps": [], "calibration": {}, "version": ""}
+    return row, empty | (json.loads(file.read_text()) if file.is_file() else {})
+
+
+def figures_of(session):
+    figures = {f"{metric['step']} {metric['name']}": metric["value"] for metric in session["metrics"]}
+    for name, value in session["calibration"].items():
+        for i, one in enumerate(value if isinstance(value, list) else [value]):
+            if isinstance(one, (int, float)):
+                figures[f"calibration {name}" + (f" {'xy'[i]}" if isinstance(value, list) else "")] = one
+    return figures
+
+
+def words(value):
+    return "none" if value is None else f"{value:.6g}"
+
+
+def lines_of(before, now):
+    """(row.json, session.json) of each."""
+    (old_row, old), (row, new) = before, now
+    yield f"verdict     {old_row['verdict']} -> {row['verdict']}" + (f": {row['reason']}" if row["reason"] else "")
+    parts, old_parts = row.get("parts", {}), old_row.get("parts", {})
+    changed = sorted(part for part in {*parts, *old_parts} if parts.get(part) != old_parts.get(part))
+    yield f"inputs      {', '.join(changed) if changed else 'the same'}"
+    same = " (the same)" if old["version"] == new["version"] else ""
+    yield f"version     {old['version'] or 'none'} -> {new['version'] or 'none'}{same}"
+    figures, old_figures = figures_of(new), figures_of(old)
+    differing = [name for name in {**old_figures, **figures} if figures.get(name) != old_figures.get(name)]
+    yield f"figures     {len(differing)} of {len({**old_figures, **figures})} differ"
+    for name in differing:
+        a, b = old_figures.get(name), figures.get(name)
+        by = f" ({b - a:+.3g})" if a is not None and b is not None else ""
+        yield f"  {name}: {words(a)} -> {words(b)}{by}"
+    looks = [told_by(session)["look"].split("; ") if session["steps"] else [] for session in (old, new)]
+    for sign, some, others in (("-", *looks), ("+", *reversed(looks))):
+        for line in some:
+            if line and line not in others:
+                yield f"  {sign} {line}"
+
+
+def main():
+    if len(sys.argv) not in (3, 4):
+        fail("--diff wants RESULTS CAMERA/SESSION and, if not the last former result, its KEY or OTHER_RESULTS")
+    results, name, other = Path(sys.argv[1]), sys.argv[2].strip("/"), (sys.argv[3:] or [""])[0]
+    now = result_in(results, name)
+    before = result_in(Path(other), name) if other and Path(other).is_dir() else former_of(results, name, other)
+    print(f"{before} -> {now}")
+    for line in lines_of(load(before), load(now)):
+        print(line)
+
+
+if __name__ == "__main__":
+    main()

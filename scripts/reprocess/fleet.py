@@ -1,0 +1,253 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which cameras changed over their sessions, and which lamps were moved, from fleet.csv and lamps.csv.
+
+A figure's sessions are tried for a step at each session and, of a camera, for a steady drift: the weighted means
+before and after, or the slope, in units of their standard deviations; the largest |z| is the change point. The
+chance of any false alarm in the whole fleet is FALSE_ALARM_RATE at most: half of it is for drifts and half for
+steps, of which there are more, and a p counts as many times as there are tests of its kind (Bonferroni), which
+holds however figures go together. Axes of a camera's figures are tested apart, as they do.
+
+Stated standard deviations leave out what differs between sessions and not within one (the lens, the map). Where
+neighbouring sessions of the whole fleet differ by more than is stated, the stated ones are multiplied by
+that factor. It is of the smaller 95 % of the differences, so that the few cameras and lamps that changed do not
+hide themselves, and larger by 20 / n for being known from n of them: of deviates z that are
+divided by a factor with a relative variance v, exp(z^4 v / 2) times as many are beyond z as of the true one, which
+z^2 v / 2 of it makes good, with v = 2 / n and z = 4.5. Of too few differences nothing is tested.
+
+A lamp that moves by d is seen d off by the others. As seen by fixes that rest on it, too, lamp i is then
+  P_ij d / P_ii,   P = I - 11'/n - q q^H / |q|^2,
+off: q are the map's places as complex numbers, less their mean, and what P takes off is the four unknowns of a fix,
+a similarity of the floor plan (level camera, lamps of about one height). The lamp with the largest change
+is called, its effect on the others is taken off, and they are tried again.
+"""
+import math
+import statistics
+from collections import defaultdict
+
+from dates import days_of
+from outcome import TWO
+
+FALSE_ALARM_RATE = 0.05
+FEWEST_DIFFERENCES = 20
+KEPT_SHARE = 0.95
+VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1.96) / 0.95
+LEAST_SD_MM = 1e-3
+FEWEST_LAMPS = 4  # of three a lamp that moved cannot be told
+
+
+def factor_of(differences):
+    """By how much differences, in units of their stated sd, are larger than these; None of too few."""
+    sizes = sorted(abs(difference) for difference in differences if difference)
+    if len(sizes) < FEWEST_DIFFERENCES:
+        return None
+    smaller = sizes[: math.ceil(KEPT_SHARE * len(sizes))]
+    scale = math.sqrt(statistics.fmean(size**2 for size in smaller) / VARIANCE_OF_KEPT)
+    return max(1.0, scale * (1 + 20 / len(sizes)))
+
+
+def neighbours(series):
+    """series: (value, sd). Differences of neighbours in units of their sd."""
+    return [(b - a) / math.hypot(s, t) for (a, s), (b, t) in zip(series, series[1:])]
+
+
+def steps(series):
+    """Of each session but the first: the change there and its sd."""
+    weights = [1 / sd**2 for _, sd in series]
+    total = sum(weights)
+    total_of = sum(weight * value for weight, (value, _) in zip(weights, series))
+    before = before_of = 0.0
+    for weight, (value, _) in zip(weights[:-1], series):
+        before += weight
+        before_of += weight * value
+        after = total - before
+        yield (total_of - before_of) / after - before_of / before, math.sqrt(1 / before + 1 / after)
+
+
+def drift(times, series):
+    """By how much a straight line changes from the first session to the last, and the sd; None in no time."""
+    weights = [1 / sd**2 for _, sd in series]
+    middle = sum(weight * time for weight, time in zip(weights, times)) / sum(weights)
+    spread = sum(weight * (time - middle) ** 2 for weight, time in zip(weights, times))
+    span = times[-1] - times[0]
+    if not spread > 0:
+        return None
+    slope = sum(weight * (time - middle) * value for weight, time, (value, _) in zip(weights, times, series)) / spread
+    return slope * span, span / math.sqrt(spread)
+
+
+def p_of(z):
+    """Of a normal deviate, both sides."""
+    return math.erfc(abs(z) / math.sqrt(2))
+
+
+def times_of(rows):
+    """Days, or, where not all have a date, the sessions' numbers."""
+    days = [days_of(row["date"]) for row in rows]
+    return list(range(len(rows))) if None in days else days
+
+
+def in_order(rows):
+    return sorted(rows, key=lambda row: (row["date"], row["session"], row["camera"]))
+
+
+def named(row):
+    return {"camera": row["camera"], "session": row["session"], "date": row["date"]}
+
+
+def camera_series(rows):
+    """Of each camera, by name: (rows, {figure: [(value, sd)]}) of the figures that all of its sessions state."""
+    by_camera = defaultdict(list)
+    for row in rows:
+        by_camera[row["camera"]].append(row)
+    found = {}
+    for camera, of_it in sorted(by_camera.items()):
+        of_it, figures = in_order(of_it), {}
+        for name, unit in TWO.items():
+            for axis in "xy":
+                figure = f"{name}_{axis}_{unit}"
+                stated = all(row[figure] and row[f"sd_{figure}"] and float(row[f"sd_{figure}"]) > 0 for row in of_it)
+                if stated and len(of_it) > 1:
+                    figures[figure] = [(float(row[figure]), float(row[f"sd_{figure}"])) for row in of_it]
+        found[camera] = (of_it, figures)
+    return found
+
+
+def kind_of(figure):
+    return figure.rsplit("_", 2)[0]
+
+
+def change_of(rows, series, tests):
+    """A step or a drift, whichever fits better; `p` is that of one of either kind so large anywhere in the fleet."""
+    found = [("step", k, change, sd) for k, (change, sd) in enumerate(steps(series), 1)]
+    if line := drift(times_of(rows), series):
+        found.append(("drift", len(rows) - 1, *line))
+    p = min(2 * tests[kind] * p_of(change / sd) for kind, _, change, sd in found)
+    kind, k, change, sd = max(found, key=lambda one: abs(one[2] / one[3]))
+    ends = {"before": named(rows[k - 1 if kind == "step" else 0]), "since": named(rows[k])}
+    return {"kind": kind, "change": change, "sd": sd, "p": min(1.0, p), **ends}
+
+
+def smallness(change):
+    return -abs(change["change"] / change["sd"])
+
+
+def changed_cameras(cameras, factors, tests):
+    alarms = []
+    for camera, (rows, figures) in cameras.items():
+        changes = []
+        for figure, series in figures.items():
+            if factor := factors.get(kind_of(figure)):
+                scaled = [(value, factor * sd) for value, sd in series]
+                changes.append({"figure": figure, **change_of(rows, scaled, tests)})
+        changes = sorted((one for one in changes if one["p"] < FALSE_ALARM_RATE), key=smallness)
+        if changes:
+            alarms.append({"camera": camera, "sessions": len(rows), "changes": changes})
+    return sorted(alarms, key=lambda alarm: smallness(alarm["changes"][0]))
+
+
+class Room:
+    """The lamps of a map over the sessions that were taken under them."""
+
+    def __init__(self, name, rows):
+        self.name = name
+        by_session = defaultdict(dict)
+        for row in rows:
+            by_session[row["camera"], row["session"]][int(row["lamp"])] = row
+        by_session = [lamps for lamps in by_session.values() if len(lamps) >= FEWEST_LAMPS]
+        self.sessions = in_order([next(iter(lamps.values())) | {"lamps": lamps} for lamps in by_session])
+        self.series = defaultdict(list)  # of a lamp: [session, place off as a complex number, sd_x, sd_y]
+        for i, session in enumerate(self.sessions):
+            for lamp, row in session["lamps"].items():
+                off = complex(float(row["offset_x_mm"]), float(row["offset_y_mm"]))
+                self.series[lamp].append([i, off, float(row["sd_offset_x_mm"]), float(row["sd_offset_y_mm"])])
+        for series in self.series.values():  # of few captures a scatter is small by chance
+            for axis in (2, 3):
+                usual = max(LEAST_SD_MM, statistics.median(one[axis] for one in series))
+                for one in series:
+                    one[axis] = max(one[axis], usual)
+        self.shares = {}
+
+    def along(self, lamp, factor=1.0):
+        """Of x and of y: [(value, sd)]."""
+        series = self.series[lamp]
+        x = [(one[1].real, factor * one[2]) for one in series]
+        return [x, [(one[1].imag, factor * one[3]) for one in series]]
+
+    def differences(self):
+        return [one for lamp in self.series for series in self.along(lamp) for one in neighbours(series)]
+
+    def tests(self):
+        return sum(len(series) - 1 for series in self.series.values())
+
+    def share(self, session, of, moved):
+        """By how much of a lamp's movement the fixes of a session see another one off."""
+        lamps = self.sessions[session]["lamps"]
+        key = (frozenset(lamps), of, moved)
+        if key not in self.shares:
+            place = {lamp: complex(float(row["map_x_m"]), float(row["map_y_m"])) for lamp, row in lamps.items()}
+            middle = sum(place.values()) / len(place)
+            q = {lamp: at - middle for lamp, at in place.items()}
+            square = sum(abs(at) ** 2 for at in q.values())
+            own = 1 - 1 / len(q) - abs(q[of]) ** 2 / square
+            self.shares[key] = (-1 / len(q) - q[of] * q[moved].conjugate() / square) / own if own > 1e-6 else 0
+        return self.shares[key]
+
+    def largest(self, factor):
+        """(chi-squared of 2 degrees, lamp, number in its series, change in x and y, their sd) of the change point."""
+        best = None
+        for lamp in sorted(self.series):
+            x, y = (steps(series) for series in self.along(lamp, factor))
+            for k, ((dx, sx), (dy, sy)) in enumerate(zip(x, y), 1):
+                chi2 = (dx / sx) ** 2 + (dy / sy) ** 2
+                if best is None or chi2 > best[0]:
+                    best = (chi2, lamp, k, complex(dx, dy), (sx, sy))
+        return best
+
+    def take_off(self, moved, since, change):
+        for lamp, series in self.series.items():
+            for one in series:
+                if one[0] >= since and moved in self.sessions[one[0]]["lamps"]:
+                    one[1] -= change if lamp == moved else self.share(one[0], lamp, moved) * change
+
+    def moved(self, factor, tests):
+        found = []
+        for _ in range(2 * len(self.series)):
+            best = self.largest(factor)
+            if best is None or 2 * tests["step"] * math.exp(-best[0] / 2) >= FALSE_ALARM_RATE:
+                break
+            chi2, lamp, k, change, sd = best
+            before, since = self.series[lamp][k - 1][0], self.series[lamp][k][0]
+            alike = {row["camera"] for row in self.sessions[:since]} & {row["camera"] for row in self.sessions[since:]}
+            ends = {"before": named(self.sessions[before]), "since": named(self.sessions[since])}
+            figures = {"moved_mm": [change.real, change.imag], "sd_mm": list(sd)}
+            figures |= {"p": 2 * tests["step"] * math.exp(-chi2 / 2), "other_cameras": not alike}
+            found.append({"room": self.name[0], "map": self.name[1], "lamp": lamp, **figures, **ends})
+            self.take_off(lamp, since, change)
+        return found
+
+
+def rooms_of(rows):
+    by_room = defaultdict(list)
+    for row in rows:
+        by_room[row["room"], row["map"]].append(row)
+    return [Room(name, of_it) for name, of_it in sorted(by_room.items())]
+
+
+def fleet_of(rows, lamp_rows):
+    """What changed, for changes.json: rows of fleet.csv and of lamps.csv."""
+    cameras, rooms = camera_series(rows), rooms_of(lamp_rows)
+    of_figures = [(kind_of(figure), series) for _, figures in cameras.values() for figure, series in figures.items()]
+    factors = {}
+    for name in TWO:
+        factors[name] = factor_of([one for kind, series in of_figures if kind == name for one in neighbours(series)])
+    pairs = sum(len(room.sessions) - 1 for room in rooms)  # the lamps of a session go together
+    enough = 2 * pairs >= FEWEST_DIFFERENCES
+    factors["lamps"] = factor_of([one for room in rooms for one in room.differences()]) if enough else None
+    tried = [series for kind, series in of_figures if factors[kind]]
+    tests = {"drift": len(tried), "step": sum(len(series) - 1 for series in tried)}
+    if factors["lamps"]:
+        tests["step"] += sum(room.tests() for room in rooms)
+    moved = [lamp for room in rooms for lamp in (room.moved(factors["lamps"], tests) if factors["lamps"] else [])]
+    alarms = changed_cameras(cameras, factors, tests)
+    return {"false_alarm_rate": FALSE_ALARM_RATE, "tests": tests, "factors": factors, "cameras": alarms, "lamps": moved}

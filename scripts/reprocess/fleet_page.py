@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""The overview's part about cameras and lamps over time."""
+import pictures
+from fleet import camera_series, kind_of, rooms_of, times_of
+from html_parts import picture, table
+from outcome import TWO
+
+MOST_PICTURES = 12
+
+
+def words_of(figure):
+    """ "focal_x_px" as "focal x (px)"."""
+    name, axis, unit = figure.rsplit("_", 2)
+    return f"{name.replace('_', ' ')} {axis} ({unit})"
+
+
+def when(end):
+    return f"{end['camera']}/{end['session']}" + (f" of {end['date']}" if end["date"] else "")
+
+
+def session_of(end):
+    return end["date"] or end["session"]
+
+
+def room_of(lamp):
+    return f"{lamp['room']} (map {lamp['map']})" if lamp["room"] else f"map {lamp['map']}"
+
+
+def chance(p):
+    return f"{p:.2g}" if p >= 1e-9 else "below 1e-9"
+
+
+def cameras(fleet, fleet_rows):
+    html, rows = "<h2>Cameras that changed</h2>\n", []
+    for alarm in fleet["cameras"]:
+        for change in alarm["changes"]:
+            ends = session_of(change["before"]), session_of(change["since"])
+            how = ("steadily, from {} to {}" if change["kind"] == "drift" else "at once, between {} and {}").format(*ends)
+            by = f"{change['change']:+.4g} ± {change['sd']:.2g}"
+            rows.append((alarm["camera"], words_of(change["figure"]), by, how, chance(change["p"])))
+    html += table(["camera", "figure", "change", "how and when", "chance in this fleet"], rows, "changes.json")
+    series = camera_series(fleet_rows)
+    for alarm in fleet["cameras"][:MOST_PICTURES]:
+        of_it, figures = series[alarm["camera"]]
+        first = alarm["changes"][0]
+        name = kind_of(first["figure"])
+        times = times_of(of_it)
+        both = {axis: figures.get(f"{name}_{axis}_{TWO[name]}") for axis in "xy"}
+        # From the first session, so that both axes are seen.
+        points = {
+            axis: [(time, value - one[0][0], fleet["factors"][name] * sd) for time, (value, sd) in zip(times, one)]
+            for axis, one in both.items()
+            if one
+        }
+        since = first["since"]["session"] if first["kind"] == "step" else None
+        at = next((time for time, row in zip(times, of_it) if row["session"] == since), None)
+        dated = all(row["date"] for row in of_it)
+        what = f"{name.replace('_', ' ')} from the first session ({TWO[name]})"
+        html += picture(pictures.over_time(points, f"change ({TWO[name]})", dated, at), f"{alarm['camera']}: {what}")
+    return html
+
+
+def lamps(fleet, lamp_rows):
+    html, rows = "<h2>Lamps that were moved</h2>\n", []
+    for lamp in fleet["lamps"]:
+        by = f"{abs(complex(*lamp['moved_mm'])):.2f} mm: x {lamp['moved_mm'][0]:+.2f}, y {lamp['moved_mm'][1]:+.2f}"
+        sure = "other cameras saw it before than after: it may be they" if lamp["other_cameras"] else ""
+        ends = when(lamp["before"]), when(lamp["since"])
+        rows.append((room_of(lamp), lamp["lamp"], by, *ends, chance(lamp["p"]), sure))
+    columns = ["room", "lamp", "moved by", "after", "not later than", "chance in this fleet", ""]
+    html += table(columns, rows, "changes.json")
+    rooms = {room.name: room for room in rooms_of(lamp_rows)}
+    for lamp in fleet["lamps"][:MOST_PICTURES]:
+        room = rooms[lamp["room"], lamp["map"]]
+        times, numbers = times_of(room.sessions), [one[0] for one in room.series[lamp["lamp"]]]
+        points = {
+            axis: [(times[i], value, sd) for i, (value, sd) in zip(numbers, series)]
+            for axis, series in zip("xy", room.along(lamp["lamp"], fleet["factors"]["lamps"]))
+        }
+        is_since = [all(row[key] == lamp["since"][key] for key in ("camera", "session")) for row in room.sessions]
+        what = f"lamp {lamp['lamp']} as the others see it, from its place in the map (mm)"
+        dated = all(row["date"] for row in room.sessions)
+        drawn = pictures.over_time(points, "offset (mm)", dated, times[is_since.index(True)])
+        html += picture(drawn, f"{room_of(lamp)}: {what}")
+    return html
+
+
+def page(fleet, fleet_rows, lamp_rows):
+    html = cameras(fleet, fleet_rows) if fleet["cameras"] else ""
+    html += lamps(fleet, lamp_rows) if fleet["lamps"] else ""
+    tested = {name: factor for name, factor in fleet["factors"].items() if factor}
+    if not tested:
+        return html + "<p>Too few sessions of a camera, or of a room, to tell whether cameras or lamps change.</p>\n"
+    if not html:
+        html = "<h2>Cameras and lamps over time</h2>\n"
+        html += "<p>No camera changed, and no lamp was moved, as far as can be seen.</p>\n"
+    wide = ", ".join(f"{name.replace('_', ' ')} {factor:.2g}" for name, factor in tested.items() if factor > 1)
+    rate = f"{100 * fleet['false_alarm_rate']:.0f} %"
+    drifts, steps = fleet["tests"]["drift"], fleet["tests"]["step"]
+    html += f"<p>{drifts} figures were tried for drifts, {steps} sessions of figures and lamps for steps; the chance of any "
+    html += f"false alarm in all of it is {rate} at most."
+    if wide:
+        html += f" Sessions differ by more than they state, and count so: {wide} times."
+    return html + " All figures: fleet.csv, lamps.csv.</p>\n"

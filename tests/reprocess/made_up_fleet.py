@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Results of a fleet that never was, with known truth: session.json as vlp-calibrate writes it."""
+import datetime
+import random
+
+# What sessions of datasets/archive state, and how many times as much they scatter.
+SDS = {"focal": ("px", 0.025, 1.7), "center": ("px", 0.029, 1.7), "zenith": ("deg", 0.006, 1.5)}
+SDS |= {"rotation_center": ("px", 0.013, 1.2), "lever_arm": ("mm", 0.075, 1.1), "dispersion_offset": ("px", 0.003, 5)}
+LAMP_SD_MM, LAMP_SCATTER = 0.06, 1.5
+PLACES = {i + 1: complex(-0.6 + 0.6 * (i % 3), -0.3 + 0.6 * (i // 3)) for i in range(6)}
+
+
+class Fleet:
+    """cameras x sessions a camera, evenly over a year, in two rooms by turns. drifts: {camera: {figure: whole change
+    of x and y}}; broken: {camera: (session, {figure: (x, y)})} at once; moved: [(room, lamp, day, mm as complex)].
+    honest: sessions scatter by what they state."""
+
+    def __init__(self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False):
+        self.chance = random.Random(seed)
+        self.cameras, self.sessions, self.honest = cameras, sessions, honest
+        self.drifts, self.broken, self.moved = dict(drifts), dict(broken), list(moved)
+        self.rooms = [self.errors_of_a_map() for _ in range(2)]
+
+    def errors_of_a_map(self):
+        return {lamp: complex(self.chance.gauss(0, 0.5), self.chance.gauss(0, 0.5)) for lamp in PLACES}
+
+    def day(self, camera, session):
+        return round(365 * (session * self.cameras + camera) / (self.cameras * self.sessions - 1))
+
+    def date(self, day):
+        return (datetime.date(2025, 1, 1) + datetime.timedelta(days=day)).isoformat()
+
+    def room(self, camera, session):
+        return (camera + session) % 2
+
+    def all(self):
+        """Of each session: camera, session, and its session.json."""
+        for camera in range(self.cameras):
+            usual = {name: (self.chance.gauss(0, 1), self.chance.gauss(0, 1)) for name in SDS}
+            usual["focal"] = (260 + usual["focal"][0], 260 + usual["focal"][1])
+            for session in range(self.sessions):
+                name = f"{self.date(self.day(camera, session))}-{session:02d}"
+                yield f"camera-{camera:02d}", name, self.result(camera, session, usual)
+
+    def result(self, camera, session, usual):
+        calibration = {"tilt_deg": 0.5}
+        for name, (unit, sd, factor) in SDS.items():
+            scatter = sd if self.honest else sd * factor
+            drift = self.drifts.get(camera, {}).get(name, (0, 0))
+            since, jump = self.broken.get(camera, (0, {}))
+            jump = jump.get(name, (0, 0)) if session >= since else (0, 0)
+            share = self.day(camera, session) / 365
+            values = [usual[name][i] + drift[i] * share + jump[i] + self.chance.gauss(0, scatter) for i in (0, 1)]
+            calibration |= {f"{name}_{unit}": values, f"{name}_sd_{unit}": [sd, sd]}
+        room = self.room(camera, session)
+        offsets = self.offsets(room, self.day(camera, session))
+        lamps = [
+            {
+                "lamp": lamp,
+                "captures": 12,
+                "map_m": [PLACES[lamp].real, PLACES[lamp].imag],
+                "offset_mm": [off.real, off.imag],
+                "offset_sd_mm": [LAMP_SD_MM * self.chance.uniform(0.7, 1.3) for _ in "xy"],
+            }
+            for lamp, off in offsets.items()
+        ]
+        inputs = [{"file": "lamps.yaml", "sha256": str(room) * 64}]
+        return {
+            "verdict": "pass",
+            "reason": "",
+            "metrics": [{"name": "rms_px", "step": "lens", "value": 0.02}],
+            "steps": [{"name": "check", "lamp_offsets": lamps}],
+            "calibration": calibration,
+            "history": [{"part": "rotation_center", "inputs": inputs}],
+        }
+
+    def offsets(self, room, day):
+        """Where the others see each lamp: by solving for the similarity of the others, lamp by lamp."""
+        now = dict(self.rooms[room])
+        for of_room, lamp, since, by in self.moved:
+            if of_room == room and day >= since:
+                now[lamp] += by
+        sd = LAMP_SD_MM * (1 if self.honest else LAMP_SCATTER) / 1.4  # the others' noise adds to a lamp's own
+        now = {lamp: error + complex(self.chance.gauss(0, sd), self.chance.gauss(0, sd)) for lamp, error in now.items()}
+        offsets = {}
+        for lamp in PLACES:
+            others = [other for other in PLACES if other != lamp]
+            middle = sum(PLACES[other] for other in others) / len(others)
+            shift = sum(now[other] for other in others) / len(others)
+            turn = sum((PLACES[other] - middle).conjugate() * (now[other] - shift) for other in others)
+            turn /= sum(abs(PLACES[other] - middle) ** 2 for other in others)
+            offsets[lamp] = now[lamp] - shift - turn * (PLACES[lamp] - middle)
+        return offsets
