@@ -33,6 +33,7 @@ FEWEST_DIFFERENCES = 20
 KEPT_SHARE = 0.95
 VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1.96) / 0.95
 LEAST_SD_MM = 1e-3
+WITH_LEVER_ARM = ("zenith", "rotation_center", "dispersion_offset")
 FEWEST_LAMPS = 4  # of three a lamp that moved cannot be told
 
 
@@ -96,20 +97,22 @@ def named(row):
 
 
 def camera_series(rows):
-    """Of each camera, by name: (rows, {figure: [(value, sd)]}) of the figures that all of its sessions state."""
+    """Of each camera, by name: {figure: (rows, [(value, sd)])}, of the sessions that state it. Where a camera has a
+    lever arm, a session that found none took it as zero, and has another zenith for that: it does not count."""
     by_camera = defaultdict(list)
     for row in rows:
         by_camera[row["camera"]].append(row)
     found = {}
     for camera, of_it in sorted(by_camera.items()):
-        of_it, figures = in_order(of_it), {}
+        of_it, found[camera] = in_order(of_it), {}
+        with_arm = [row for row in of_it if row["lever_arm_x_mm"]]
         for name, unit in TWO.items():
             for axis in "xy":
                 figure = f"{name}_{axis}_{unit}"
-                stated = all(row[figure] and row[f"sd_{figure}"] and float(row[f"sd_{figure}"]) > 0 for row in of_it)
-                if stated and len(of_it) > 1:
-                    figures[figure] = [(float(row[figure]), float(row[f"sd_{figure}"])) for row in of_it]
-        found[camera] = (of_it, figures)
+                some = with_arm if with_arm and name in WITH_LEVER_ARM else of_it
+                some = [row for row in some if row[figure] and float(row[f"sd_{figure}"] or 0) > 0]
+                if len(some) > 1:
+                    found[camera][figure] = (some, [(float(row[figure]), float(row[f"sd_{figure}"])) for row in some])
     return found
 
 
@@ -134,15 +137,15 @@ def smallness(change):
 
 def changed_cameras(cameras, factors, tests):
     alarms = []
-    for camera, (rows, figures) in cameras.items():
+    for camera, figures in cameras.items():
         changes = []
-        for figure, series in figures.items():
+        for figure, (rows, series) in figures.items():
             if factor := factors.get(kind_of(figure)):
                 scaled = [(value, factor * sd) for value, sd in series]
                 changes.append({"figure": figure, **change_of(rows, scaled, tests)})
         changes = sorted((one for one in changes if one["p"] < FALSE_ALARM_RATE), key=smallness)
         if changes:
-            alarms.append({"camera": camera, "sessions": len(rows), "changes": changes})
+            alarms.append({"camera": camera, "changes": changes})
     return sorted(alarms, key=lambda alarm: smallness(alarm["changes"][0]))
 
 
@@ -237,7 +240,7 @@ def rooms_of(rows):
 def fleet_of(rows, lamp_rows):
     """What changed, for changes.json: rows of fleet.csv and of lamps.csv."""
     cameras, rooms = camera_series(rows), rooms_of(lamp_rows)
-    of_figures = [(kind_of(figure), series) for _, figures in cameras.values() for figure, series in figures.items()]
+    of_figures = [(kind_of(figure), series) for figures in cameras.values() for figure, (_, series) in figures.items()]
     factors = {}
     for name in TWO:
         factors[name] = factor_of([one for kind, series in of_figures if kind == name for one in neighbours(series)])

@@ -42,17 +42,13 @@ def cameras(fleet, fleet_rows):
     html += table(["camera", "figure", "change", "how and when", "chance in this fleet"], rows, "changes.json")
     series = camera_series(fleet_rows)
     for alarm in fleet["cameras"][:MOST_PICTURES]:
-        of_it, figures = series[alarm["camera"]]
-        first = alarm["changes"][0]
-        name = kind_of(first["figure"])
-        times = times_of(of_it)
-        both = {axis: figures.get(f"{name}_{axis}_{TWO[name]}") for axis in "xy"}
-        # From the first session, so that both axes are seen.
-        points = {
-            axis: [(time, value - one[0][0], fleet["factors"][name] * sd) for time, (value, sd) in zip(times, one)]
-            for axis, one in both.items()
-            if one
-        }
+        figures, first = series[alarm["camera"]], alarm["changes"][0]
+        name, points = kind_of(first["figure"]), {}
+        of_it = figures[first["figure"]][0]
+        times, factor = times_of(of_it), fleet["factors"][name]
+        for axis in "xy":  # from the first session, so that both are seen
+            rows_of_it, one = figures.get(f"{name}_{axis}_{TWO[name]}", ([], []))
+            points[axis] = [(t, value - one[0][0], factor * sd) for t, (value, sd) in zip(times_of(rows_of_it), one)]
         since = first["since"]["session"] if first["kind"] == "step" else None
         at = next((time for time, row in zip(times, of_it) if row["session"] == since), None)
         dated = all(row["date"] for row in of_it)

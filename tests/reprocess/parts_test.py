@@ -361,6 +361,15 @@ class OverTime(unittest.TestCase):
         for name, (_, _, factor) in made_up_fleet.SDS.items():
             self.assertAlmostEqual(factors[name] / factor, 1.05, delta=0.12)
 
+    def test_a_session_without_a_lever_arm_is_not_held_against_the_others(self):
+        rows, lamps = fleet_rows(Fleet(1))
+        for without in ({}, {"lever_arm_x_mm": "", "lever_arm_y_mm": ""}):
+            one = rows[14]
+            rows[14] = one | without | {"zenith_x_deg": "9", "sd_zenith_x_deg": "0.0001", "rotation_center_y_px": "9"}
+            cameras = [alarm["camera"] for alarm in fleet.fleet_of(rows, lamps)["cameras"]]
+            self.assertEqual(cameras, [] if without else ["camera-01"])
+            rows[14] = one
+
     def test_of_too_few_sessions_says_nothing(self):
         found = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=2, sessions=3, broken={0: (1, {"center": (9, 9)})})))
         self.assertEqual((found["cameras"], found["lamps"], set(found["factors"].values())), ([], [], {None}))
