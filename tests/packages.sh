@@ -52,8 +52,10 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$VERSION_CODENAME" 
       test -s "/usr/share/man/man1/${program##*/}.1.gz"
     done
   fi
-  if has python3-vlp; then python3 ../../apps/python/example.py; fi
+  if has python3-vlp; then python3 ../../apps/python/example.py .; fi
   installed=$(dpkg-query -W -f "\${Package}\n" | grep vlp)
   apt-get purge -qq $installed >>/packages/install.log 2>&1
-  ! ls -d /usr/bin/vlp-* /usr/include/vlp /usr/lib/*/libvlp* /usr/share/doc/*vlp* 2>/dev/null'
+  left=$(ls -d /usr/bin/vlp-* /usr/include/vlp /usr/lib/*/libvlp* /usr/lib/python3/dist-packages/vlp* \
+    /usr/share/doc/*vlp* 2>/dev/null || true)
+  [ -z "$left" ] || { echo "left behind: $left"; exit 1; }'
 echo "packages.sh: $(cd "$scratch" && echo *.deb): made, installed, used, removed"
