@@ -3,7 +3,14 @@
 /// vlp-limits: what accuracy a room, a camera and their errors allow.
 #include <fmt/core.h>
 
+#include <spdlog/spdlog.h>
+
 #include <CLI/CLI.hpp>
+#include <array>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <vector>
 
 #include "app.h"
 #include "captures/csv_writer.h"
@@ -11,6 +18,7 @@
 #include "positioning/floor_limits.h"
 #include "positioning/floor_summary.h"
 #include "report/plots/floor_plot.h"
+#include "rig/input_error.h"
 
 namespace vlp {
 namespace {
@@ -20,48 +28,55 @@ struct Options {
   double height_m = 0;
   double yaw_deg = 0;
   double noise_px = 0, center_px = 0, tilt_deg = 0, lamp_map_mm = 0;
+  bool stated = false;
   double step_m = 0.05;
   std::vector<double> floor_m;  // x_min x_max y_min y_max
 };
 
-void write_map(const std::string& file, const std::vector<FloorLimit>& limits) {
+void write_map(const std::string& file, const FloorLimits& limits) {
   constexpr int digits = 6;
-  CsvWriter csv(
-      file, {"x_m", "y_m", "z_m", "yaw_rad", "lamps", "sd_x_m", "sd_y_m", "sd_z_m", "sd_yaw_rad",
-             "noise_m", "center_m", "tilt_m", "lamp_map_m", "horizontal_m"});
-  for (const FloorLimit& limit : limits) {
-    const auto& [position_m, yaw_rad] = limit.camera;
-    const auto at = [](double value) { return significant(value, digits); };
-    const std::string x = at(position_m.x()), y = at(position_m.y()), z = at(position_m.z());
-    const std::string yaw = at(yaw_rad), lamps = std::to_string(limit.lamps);
-    if (!limit.budget) {
-      csv.row({x, y, z, yaw, lamps, "", "", "", "", "", "", "", "", ""});
-      continue;
+  std::vector<std::string> header{"x_m",    "y_m",    "z_m",    "yaw_rad",   "lamps",
+                                  "sd_x_m", "sd_y_m", "sd_z_m", "sd_yaw_rad"};
+  for (const auto& [name, key] : limits.sources) header.push_back(fmt::format("{}_m", key));
+  header.emplace_back("horizontal_m");
+  CsvWriter csv(file, header);
+  const auto at = [](double value) { return significant(value, digits); };
+  for (const FloorLimits::Place& place : limits.places) {
+    const auto& [position_m, yaw_rad] = place.camera;
+    std::vector<std::string> row{at(position_m.x()), at(position_m.y()), at(position_m.z()),
+                                 at(yaw_rad), std::to_string(place.lamps)};
+    if (!place.parts.empty()) {
+      const Eigen::Vector4d sd = place.total().diagonal().cwiseSqrt();
+      for (const double one : sd) row.push_back(at(one));
+      for (const Matrix4& part : place.parts) row.push_back(at(spread_of(part).horizontal_m));
+      row.push_back(at(spread_of(place.total()).horizontal_m));
     }
-    const ErrorBudget& budget = *limit.budget;
-    const Eigen::Vector4d sd = budget.total().diagonal().cwiseSqrt();
-    const auto horizontal = [&](const Matrix4& covariance) {
-      return at(spread_of(covariance).horizontal_m);
-    };
-    csv.row({x, y, z, yaw, lamps, at(sd[0]), at(sd[1]), at(sd[2]), at(sd[3]),
-             horizontal(budget.noise), horizontal(budget.center), horizontal(budget.tilt),
-             horizontal(budget.lamp_map), horizontal(budget.total())});
+    row.resize(header.size());
+    csv.row(row);
   }
   csv.save();
 }
 
-void draw_map(const Options& options, const std::vector<FloorLimit>& limits, const LampMap& lamps) {
+void draw_map(const Options& options, const FloorLimits& limits, const LampMap& lamps) {
   FloorPlot plot{fmt::format("Camera at {} m, yaw {} deg", options.height_m, options.yaw_deg),
                  "horizontal standard deviation (mm)",
                  options.step_m,
                  {}};
-  for (const FloorLimit& limit : limits) {
-    plot.places.push_back({limit.camera.position_m.head<2>(), {}});
-    if (limit.budget) {
-      plot.places.back().value = 1e3 * spread_of(limit.budget->total()).horizontal_m;
-    }
+  for (const FloorLimits::Place& place : limits.places) {
+    plot.places.push_back({place.camera.position_m.head<2>(), {}});
+    if (place.parts.empty()) continue;
+    plot.places.back().value = 1e3 * spread_of(place.total()).horizontal_m;
   }
   draw_floor_plot(options.picture, plot, lamps);
+}
+
+/// What makes a source smaller.
+std::string_view remedy_of(std::string_view key) {
+  if (key == "lens") return "more views of the board, or vlp-adjust, which corrects the lens";
+  if (key == "zenith") return "more captures of the turn, or vlp-adjust with known places";
+  if (key == "offset") return "more captures at the known place, or vlp-adjust instead";
+  if (key == "lamp_map") return "a better survey, or vlp-adjust --refine-map with known places";
+  return "more lamps in view, larger in the image, or the mean of several captures";
 }
 
 void print_summary(const FloorSummary& summary, std::size_t places) {
@@ -72,11 +87,55 @@ void print_summary(const FloorSummary& summary, std::size_t places) {
   fmt::print("{:11}", "source");
   for (int i = 0; i < 3; ++i) fmt::print(" {:>10} {:>10}", "median", "worst");
   fmt::print("\n");
-  for (const auto& [source, median, worst] : summary.rows) {
-    fmt::print("{:11} {:10.3f} {:10.3f} {:10.3f} {:10.3f} {:10.4f} {:10.4f}\n", source,
+  const auto print = [](const FloorSummary::Row& row) {
+    const auto& [median, worst] = std::tie(row.median, row.worst);
+    fmt::print("{:11} {:10.3f} {:10.3f} {:10.3f} {:10.3f} {:10.4f} {:10.4f}\n", row.source.name,
                1e3 * median.horizontal_m, 1e3 * worst.horizontal_m, 1e3 * median.height_m,
                1e3 * worst.height_m, deg_from_rad(median.yaw_rad), deg_from_rad(worst.yaw_rad));
+  };
+  for (const FloorSummary::Row& row : summary.sources) print(row);
+  print(summary.together);
+}
+
+void print_advice(const FloorSummary& summary) {
+  const auto& [name, key] = summary.largest().source;
+  fmt::print("\nimprove     {} first, {:.0f} % of the horizontal variance: {}\n", name,
+             100 * summary.largest().share, remedy_of(key));
+}
+
+/// What calibration and map state of themselves.
+UnitErrors stated_errors(const Options& options, const LampMap& lamps,
+                         const Calibration& calibration) {
+  UnitErrors unit(lamps, calibration);
+  if (!unit.common().stated()) {
+    throw InputError(options.calibration,
+                     "states no errors of its own, and " + options.lamps +
+                         " no sd_m: state them with --center-px, --tilt-deg, --lamp-map-mm in "
+                         "place of --stated, or calibrate again");
   }
+  constexpr std::array<const char*, kCommonParts.size()> names{"lens", "zenith", "offset",
+                                                               "lamp map"};
+  std::string unstated;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (unit.common().stated(kCommonParts[i])) continue;
+    unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
+  }
+  if (!unstated.empty()) {
+    spdlog::warn("{}: the errors are not stated, and count as none", unstated);
+  }
+  return unit;
+}
+
+FloorLimits limits_of(const Options& options, const LampMap& lamps, const FloorGrid& grid) {
+  const Calibration calibration = read_calibration(options.calibration);
+  const double yaw_rad = rad_from_deg(options.yaw_deg);
+  if (options.stated) {
+    return floor_limits(stated_errors(options, lamps, calibration), grid, options.height_m, yaw_rad,
+                        options.noise_px);
+  }
+  return floor_limits(lamps, calibration.camera, grid, options.height_m, yaw_rad,
+                      {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
+                       1e-3 * options.lamp_map_mm});
 }
 
 void run(const Options& options) {
@@ -86,15 +145,11 @@ void run(const Options& options) {
     throw std::invalid_argument("--map and --picture name one file");
   }
   const LampMap lamps = read_lamp_map(options.lamps);
-  const Camera camera = read_calibration(options.calibration).camera;
   FloorGrid grid = floor_under(lamps, options.step_m);
   if (const auto& floor = options.floor_m; !floor.empty()) {
     grid = {floor[0], floor[1], floor[2], floor[3], options.step_m};
   }
-  const auto limits =
-      floor_limits(lamps, camera, grid, options.height_m, rad_from_deg(options.yaw_deg),
-                   {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
-                    1e-3 * options.lamp_map_mm});
+  const FloorLimits limits = limits_of(options, lamps, grid);
   const auto summary = summarize(limits);
   if (!summary) {
     throw Undetermined(
@@ -103,7 +158,8 @@ void run(const Options& options) {
   }
   if (!options.map.empty()) write_map(options.map, limits);
   if (!options.picture.empty()) draw_map(options, limits, lamps);
-  print_summary(*summary, limits.size());
+  print_summary(*summary, limits.places.size());
+  if (options.stated) print_advice(*summary);
 }
 
 }  // namespace
@@ -112,8 +168,10 @@ void run(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app(
       "The theoretical limit of positioning over a floor, and the error budget: what pixel noise,\n"
-      "image centre, tilt and lamp map each do to a fix. Nothing better can be reached with that\n"
-      "pixel noise, whatever the method.\n\n"
+      "image centre, tilt and lamp map each do to a fix; or, with --stated, what a calibration "
+      "and\n"
+      "its lamp map say of their own errors, and so what to improve first. Nothing better can be\n"
+      "reached with that pixel noise, whatever the method.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-limits --lamps datasets/example/lamps.yaml \\\n"
       "    --calibration datasets/example/calibration.yaml --height-m 0 \\\n"
@@ -121,7 +179,8 @@ int main(int argc, char** argv) {
       "vlp-limits");
   vlp::Options options;
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
-  app.add_option("--calibration", options.calibration, "Calibration; its camera part is used")
+  app.add_option("--calibration", options.calibration,
+                 "Calibration; its camera part is used, with --stated all of it")
       ->required();
   app.add_option("--height-m", options.height_m, "Height of the camera in the world")
       ->required()
@@ -130,13 +189,21 @@ int main(int argc, char** argv) {
                  "Standard deviation of each lamp's pixel, per axis")
       ->required()
       ->check(vlp::finite_positive());
-  app.add_option("--center-px", options.center_px, "... of the image centre, per axis (default 0)")
-      ->check(vlp::finite_not_negative());
-  app.add_option("--tilt-deg", options.tilt_deg, "... of the camera's tilt, per axis (default 0)")
-      ->check(vlp::finite_not_negative());
-  app.add_option("--lamp-map-mm", options.lamp_map_mm,
-                 "... of each lamp's position, per axis (default 0)")
-      ->check(vlp::finite_not_negative());
+  auto* center = app.add_option("--center-px", options.center_px,
+                                "... of the image centre, per axis (default 0)")
+                     ->check(vlp::finite_not_negative());
+  auto* tilt = app.add_option("--tilt-deg", options.tilt_deg,
+                              "... of the camera's tilt, per axis (default 0)")
+                   ->check(vlp::finite_not_negative());
+  auto* lamp_map = app.add_option("--lamp-map-mm", options.lamp_map_mm,
+                                  "... of each lamp's position, per axis (default 0)")
+                       ->check(vlp::finite_not_negative());
+  app.add_flag("--stated", options.stated,
+               "In place of these three: what the calibration states of lens, zenith and offset, "
+               "and the map (sd_m) or the calibration of the lamps")
+      ->excludes(center)
+      ->excludes(tilt)
+      ->excludes(lamp_map);
   app.add_option("--yaw-deg", options.yaw_deg, "Yaw of the camera (default 0)")
       ->check(vlp::finite());
   app.add_option("--floor-m", options.floor_m,

@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "geometry/types.h"
-#include "rig/calibration.h"
 
 /// What a step in a row makes of the errors of the steps before it, which it takes as exact: what
 /// RotationCenter::by_intrinsics, Dispersion::by_intrinsics and Dispersion::by_zenith say.
@@ -25,18 +24,5 @@ using SolvedWith = std::function<std::optional<Eigen::Vector2d>(const Eigen::Vec
 /// is not positive definite. exact: f(0).
 std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::Vector2d& exact,
                                    const MatrixX& covariance);
-
-/// With errors added to the intrinsics; the zenith stays, and center_px with it.
-Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
-
-/// With an error added to the zenith's normalized point (x/z, y/z). Precondition: there is a
-/// rotation centre.
-Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& error);
-
-/// The zenith's normalized point.
-Eigen::Vector2d zenith_point(const RotationCenter& center);
-
-/// fx, fy.
-Eigen::Vector2d focal_px_of(const Camera& camera);
 
 }  // namespace vlp

@@ -3,6 +3,7 @@
 #include "positioning/common_errors.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -10,37 +11,47 @@
 #include <cmath>
 #include <utility>
 
+#include "geometry/plane.h"
+#include "rig/calibration_error.h"
+
 namespace vlp {
 namespace {
 
-Eigen::Vector2d focal_of(const Calibration& calibration) {
-  return {calibration.camera.intrinsics[0], calibration.camera.intrinsics[1]};
-}
-
-/// Moves the zenith's normalized point, or the offset's.
-void move_zenith(Calibration& calibration, int axis, double by) {
-  RotationCenter& center = *calibration.rotation_center;
-  Eigen::Vector2d z = center.zenith_in_camera.head<2>() / center.zenith_in_camera.z();
-  z[axis] += by;
-  center.zenith_in_camera = z.homogeneous().normalized();
-  center.center_px[axis] += by * focal_of(calibration)[axis];
-}
-
-void move_offset(Calibration& calibration, int axis, double by) {
-  calibration.dispersion->offset_px[axis] += by * focal_of(calibration)[axis];
-}
-
-template <typename Move>
+/// By the two coordinates of an error.
+template <typename With>
 void add_turns(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
-               Correction correction, Move move) {
+               Correction correction, With with_error) {
   constexpr double step = 1e-5;  // of second order in it: 1e-10 is left
   for (int axis = 0; axis < 2; ++axis) {
-    Calibration less = calibration, more = calibration;
-    move(less, axis, -step);
-    move(more, axis, step);
+    const Eigen::Vector2d error = step * Eigen::Vector2d::Unit(axis);
+    const Calibration less = with_error(calibration, -error), more = with_error(calibration, error);
     turns.emplace_back((level_from_camera(more, correction) - level_from_camera(less, correction)) /
                        (2 * step));
   }
+}
+
+/// Of a covariance, what goes away when the errors of these rows get known: S_:P S_PP^-1 S_P:. In
+/// directions of which they know nothing but rounding, nothing.
+Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, Eigen::Index size) {
+  if (size == 0) return Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols());
+  if (first + size == covariance.rows()) return covariance;  // what is left is theirs alone
+  const auto columns = covariance.middleCols(first, size);
+  const Eigen::VectorXd sd = columns.middleRows(first, size).diagonal().cwiseMax(0).cwiseSqrt();
+  const Eigen::VectorXd inverse_sd =
+      (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      inverse_sd.asDiagonal() * columns.middleRows(first, size) * inverse_sd.asDiagonal());
+  constexpr double rounding = 1e-12;
+  const Eigen::ArrayXd values = eigen.eigenvalues();
+  const Eigen::VectorXd whitening =
+      (values > rounding * static_cast<double>(size))
+          .select(values.max(1e-300).rsqrt(), Eigen::ArrayXd::Zero(size));
+  const Eigen::MatrixXd root =
+      columns * inverse_sd.asDiagonal() * eigen.eigenvectors() * whitening.asDiagonal();
+  Eigen::MatrixXd known = root * root.transpose();
+  known.middleRows(first, size) = columns.transpose();
+  known.middleCols(first, size) = columns;
+  return known;
 }
 
 /// In units of the normalized plane.
@@ -70,10 +81,10 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
                       (correction == Correction::rotation || correction == Correction::all);
   const bool shifted = calibration.dispersion &&
                        (correction == Correction::dispersion || correction == Correction::all);
-  if (turned) add_turns(turns_, calibration, correction, move_zenith);
-  if (shifted) add_turns(turns_, calibration, correction, move_offset);
+  if (turned) add_turns(turns_, calibration, correction, with_zenith_error);
+  if (shifted) add_turns(turns_, calibration, correction, with_offset_error);
   const Eigen::Index first_lamp = shared(), zenith = intrinsics_;
-  const Eigen::Index offset = intrinsics_ + (turned ? 2 : 0);
+  offset_ = intrinsics_ + (turned ? 2 : 0);
   covariance_ =
       Eigen::MatrixXd::Zero(first_lamp + 3 * std::ssize(lamps), first_lamp + 3 * std::ssize(lamps));
   const auto& adjustment = calibration.adjustment;
@@ -82,6 +93,10 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   const bool lens = report && report->covariance && turned &&
                     calibration.rotation_center->by_intrinsics.has_value();
   complete_ = adjustment.has_value() || (lens && calibration.rotation_center->covariance);
+  const bool zenith_stated =
+      adjustment || (turned && calibration.rotation_center->covariance.has_value());
+  part_stated_ = {adjustment || lens, zenith_stated,
+                  !shifted || calibration.dispersion->covariance.has_value(), true};
   // Of each row, where it stands in the adjustment's covariance.
   std::vector<std::pair<Eigen::Index, Eigen::Index>> adjusted;
   if (adjustment) {
@@ -105,7 +120,7 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
       if (place != places.end()) ++lamps_elsewhere_;
     }
     if (!lamps[i].sd_m) {
-      complete_ = false;
+      complete_ = part_stated_.back() = false;
       continue;
     }
     covariance_.block<3, 3>(row, row) =
@@ -118,7 +133,7 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   }
   // From errors that are independent (lens, own of the zenith, own of the offset) to those there
   // are.
-  const Eigen::Vector2d focal_px = focal_of(calibration);
+  const Eigen::Vector2d focal_px = focal_px_of(calibration.camera);
   Eigen::MatrixXd passed_on = Eigen::MatrixXd::Identity(first_lamp, first_lamp);
   if (turned && !adjustment) {
     const RotationCenter& center = *calibration.rotation_center;
@@ -129,16 +144,16 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   }
   if (shifted) {
     const Dispersion& dispersion = *calibration.dispersion;
-    covariance_.block<2, 2>(offset, offset) = normalized(dispersion.covariance, focal_px);
+    covariance_.block<2, 2>(offset_, offset_) = normalized(dispersion.covariance, focal_px);
     if (dispersion.by_intrinsics) {
-      passed_on.block(offset, 0, 2, intrinsics_) = *dispersion.by_intrinsics;
+      passed_on.block(offset_, 0, 2, intrinsics_) = *dispersion.by_intrinsics;
     }
     if (turned) {
       // The offset takes up what the zenith lacks.
       const Eigen::Matrix2d by_zenith = dispersion.by_zenith
                                             ? Eigen::Matrix2d(*dispersion.by_zenith)
                                             : Eigen::Matrix2d(-Eigen::Matrix2d::Identity());
-      passed_on.middleRows<2>(offset) +=
+      passed_on.middleRows<2>(offset_) +=
           by_zenith * Eigen::MatrixXd(passed_on.middleRows<2>(zenith));
     }
   }
@@ -148,6 +163,21 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
         covariance_.leftCols(first_lamp).eval() * passed_on.transpose();
   }
   stated_ = adjustment.has_value() || covariance_.diagonal().maxCoeff() > 0;
+}
+
+CommonErrors CommonErrors::only(CommonPart part) const {
+  const std::array<Eigen::Index, kCommonParts.size() + 1> rows{0, intrinsics_, offset_, shared(),
+                                                               covariance_.rows()};
+  CommonErrors one = *this;
+  MatrixX rest = 0.5 * (covariance_ + covariance_.transpose());  // to the last bit
+  for (std::size_t i = 0;; ++i) {
+    one.covariance_ = known_by(rest, rows[i], rows[i + 1] - rows[i]);
+    if (kCommonParts[i] == part) break;
+    rest -= one.covariance_;
+  }
+  one.stated_ = one.covariance_.diagonal().maxCoeff() > 0;
+  one.complete_ = false;
+  return one;
 }
 
 CommonErrors::ByRay CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_base,
@@ -175,18 +205,60 @@ CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const Lev
   const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
   Effect effect;
   effect.by_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
-  effect.by_shared = d_z_d_base.lazyProduct(
-      effect_on_ray(level_from_base.transpose() * sighting.z.homogeneous(), lens));
+  // As effect_on_ray(), the narrow products first.
+  const Eigen::Vector3d ray =
+      camera_from_base_ * (level_from_base.transpose() * sighting.z.homogeneous());
+  effect.by_shared.resize(2, shared());
+  if (const auto seen = lens.project_with_jacobians(ray)) {
+    const Eigen::Matrix2d d_z_d_pixel = -d_z_d_base * base_from_camera_.leftCols<2>() *
+                                        seen->d_pixel_d_point.leftCols<2>().inverse();
+    effect.by_shared.leftCols(intrinsics_).noalias() =
+        d_z_d_pixel.lazyProduct(seen->d_pixel_d_parameters);
+  } else {
+    effect.by_shared.leftCols(intrinsics_).setZero();
+  }
+  for (std::size_t i = 0; i < turns_.size(); ++i) {
+    effect.by_shared.col(intrinsics_ + static_cast<Eigen::Index>(i)) =
+        d_z_d_base * (turns_[i] * ray);
+  }
   return effect;
 }
 
-Matrix4 CommonErrors::covariance_of(const ByShared& by_shared, std::span<const ByLamp> by_lamp,
-                                    std::span<const std::size_t> lamps) const {
+CommonErrors::Gain CommonErrors::gain_of(std::span<const Sighting> sightings,
+                                         std::span<const std::size_t> lamps,
+                                         const PoseEstimate& camera, const Lens& lens,
+                                         const Eigen::Matrix3d& level_from_base) const {
+  const LevelPose pose(camera.pose);
+  Gain gain(shared());
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const Sighting& sighting = sightings[i];
+    const Effect effect = effect_on(sighting, pose, lens, level_from_base);
+    Eigen::Matrix<double, 4, 2> d_fix_d_z;
+    if (sightings.size() == 1) {
+      // fix_one_lamp(): s = p - H e^{jg} z.
+      d_fix_d_z.setZero();
+      d_fix_d_z.topRows<2>() = -height_above(pose, sighting.lamp_m) * times_matrix(pose.heading);
+    } else {
+      const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
+      d_fix_d_z = camera.covariance * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
+                  (whitening.transpose() * whitening);
+    }
+    gain.by_shared.noalias() += d_fix_d_z.lazyProduct(effect.by_shared);
+    gain.add(lamps[i], d_fix_d_z * effect.by_lamp);
+  }
+  return gain;
+}
+
+Matrix4 CommonErrors::covariance_of(const Gain& gain) const {
+  const ByShared& by_shared = gain.by_shared;
+  const auto& by_lamp = gain.by_lamp;
   const Eigen::Index n = shared();
-  const auto at = [&](std::size_t i) { return n + 3 * static_cast<Eigen::Index>(lamps[i]); };
+  const auto at = [&gain, n](std::size_t i) {
+    return n + 3 * static_cast<Eigen::Index>(gain.lamps[i]);
+  };
   const ByShared with_shared = by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
   Eigen::Matrix4d sum = with_shared.lazyProduct(by_shared.transpose());
-  for (std::size_t i = 0; i < by_lamp.size(); ++i) {
+  for (std::size_t i = 0; i < gain.size; ++i) {
     // Half of the lamp's own, the shared ones, and the lamps before it.
     ByLamp other = 0.5 * by_lamp[i] * covariance_.block<3, 3>(at(i), at(i));
     other += by_shared.lazyProduct(covariance_.block(0, at(i), n, 3));

@@ -13,11 +13,18 @@
 #include "../geometry/types.h"
 #include "../rig/calibration.h"
 #include "../rig/lamp_map.h"
+#include "camera_mount.h"
 #include "correction.h"
 #include "frame_fix.h"
 #include "weighted_fix.h"
 
 namespace vlp {
+
+/// What errors are common to all fixes of a unit. The lever arm is none: it moves no fix of the
+/// camera.
+enum class CommonPart { lens, zenith, offset, lamps };
+inline constexpr std::array kCommonParts{CommonPart::lens, CommonPart::zenith, CommonPart::offset,
+                                         CommonPart::lamps};
 
 /// What calibration and lamp map got wrong, which all fixes of a unit have in common:
 ///   cov = (J' W J)^-1 + G C G',    G = (J' W J)^-1 J' W J_c,
@@ -39,6 +46,13 @@ class CommonErrors {
   /// Whether they are known of lens, zenith and every lamp of the map: only then can a lamp be told
   /// to be wrong.
   bool complete() const { return complete_; }
+  /// Whether the part's errors are known; also where there is no such part.
+  bool stated(CommonPart part) const { return part_stated_[static_cast<std::size_t>(part)]; }
+  /// One part of C, with the others taken as exact. The parts add up to C, and none makes a
+  /// variance negative: each is what would go away were it known exactly, when those before it, in
+  /// the order of kCommonParts, already are (block Cholesky). For steps in a row that is what each
+  /// has of its own, and the lens' part is with all that the steps after it make of its errors.
+  CommonErrors only(CommonPart part) const;
   /// Lamps of the adjustment that the map has elsewhere: what they have in common with the
   /// calibration is lost.
   int lamps_elsewhere() const { return lamps_elsewhere_; }
@@ -57,12 +71,29 @@ class CommonErrors {
   Effect effect_on(const Sighting& sighting, const LevelPose& pose, const Lens& lens,
                    const Eigen::Matrix3d& level_from_base) const;
 
-  /// What the errors do to a fix, by the shared ones and by each lamp's own: (X, Y, Z, yaw).
+  /// G: what the errors do to a fix, (X, Y, Z, yaw), by the shared ones and by each lamp's own.
   using ByShared = Eigen::Matrix<double, 4, Eigen::Dynamic, Eigen::ColMajor, 4, 20>;
   using ByLamp = Eigen::Matrix<double, 4, 3>;
-  /// G C G'; `lamps` are the indices of those of `by_lamp`.
-  Matrix4 covariance_of(const ByShared& by_shared, std::span<const ByLamp> by_lamp,
-                        std::span<const std::size_t> lamps) const;
+  struct Gain {
+    ByShared by_shared;
+    /// Of the lamps of the fix: which of the map they are. The first `size` hold something.
+    std::array<ByLamp, kMaxSightings> by_lamp;
+    std::array<std::size_t, kMaxSightings> lamps;
+    std::size_t size = 0;
+
+    explicit Gain(Eigen::Index shared) : by_shared(ByShared::Zero(4, shared)) {}
+    void add(std::size_t lamp, const ByLamp& effect) {
+      by_lamp[size] = effect;
+      lamps[size++] = lamp;
+    }
+  };
+  /// Of a fix of least squares (fix_weighted) with the covariance of `camera`, from sightings of
+  /// these lamps of the map; of a single one, of fix_one_lamp().
+  Gain gain_of(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
+               const PoseEstimate& camera, const Lens& lens,
+               const Eigen::Matrix3d& level_from_base) const;
+  /// G C G'.
+  Matrix4 covariance_of(const Gain& gain) const;
   /// Of one sighting's z.
   Matrix2 covariance_of(const Effect& effect, std::size_t lamp) const;
 
@@ -73,12 +104,14 @@ class CommonErrors {
   Eigen::Index shared() const { return intrinsics_ + std::ssize(turns_); }
 
  private:
-  Eigen::Index intrinsics_;
+  /// How many intrinsics, and where the offset stands.
+  Eigen::Index intrinsics_, offset_ = 0;
   Eigen::Matrix3d base_from_camera_, camera_from_base_;
   /// Derivatives of base_from_camera by the zenith's and the offset's coordinates.
   std::vector<Eigen::Matrix3d> turns_;
   MatrixX covariance_;
   bool stated_ = false, complete_ = false;
+  std::array<bool, kCommonParts.size()> part_stated_ = {};
   int lamps_elsewhere_ = 0;
 };
 

@@ -4,42 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "camera/lens.h"
+#include "positioning/lamps_in_view.h"
 
 namespace vlp {
 namespace {
-
-bool in_image(const Lens& lens, const Camera& camera, const Pose& pose,
-              const Eigen::Vector3d& x_in_world) {
-  const auto pixel = lens.project(level_from_world(pose, x_in_world));
-  return pixel && pixel->minCoeff() >= -0.5 && pixel->x() <= camera.imager_px[0] - 0.5 &&
-         pixel->y() <= camera.imager_px[1] - 0.5;
-}
-
-bool seen_whole(const Lens& lens, const Camera& camera, const Pose& pose, const Lamp& lamp) {
-  if (lamp.position_m.z() <= pose.position_m.z()) return false;
-  if (!in_image(lens, camera, pose, lamp.position_m)) return false;
-  constexpr int rim_points = 16;
-  const double radius_m = lamp.diameter_m.value_or(0) / 2;
-  for (int i = 0; i < rim_points && radius_m > 0; ++i) {
-    const double angle_rad = 2 * std::numbers::pi * i / rim_points;
-    const Eigen::Vector3d rim(std::cos(angle_rad), std::sin(angle_rad), 0);
-    if (!in_image(lens, camera, pose, lamp.position_m + radius_m * rim)) return false;
-  }
-  return true;
-}
-
-std::vector<Eigen::Vector3d> visible_lamps(const LampMap& map, const Camera& camera,
-                                           const Lens& lens, const Pose& pose) {
-  std::vector<Eigen::Vector3d> visible;
-  for (const Lamp& lamp : map.lamps) {
-    if (seen_whole(lens, camera, pose, lamp)) visible.push_back(lamp.position_m);
-  }
-  return visible;
-}
 
 int places_along(double min_m, double max_m, double step_m) {
   constexpr double most = 1e7, rounding = 1e-9;
@@ -51,6 +22,29 @@ int places_along(double min_m, double max_m, double step_m) {
   if (!(places <= most))
     throw std::invalid_argument("the floor has more than ten million places: take a larger step");
   return static_cast<int>(places);
+}
+
+std::vector<FloorLimits::Place> places_on(const FloorGrid& grid, double z_m, double yaw_rad) {
+  const int columns = places_along(grid.x_min_m, grid.x_max_m, grid.step_m);
+  const int rows = places_along(grid.y_min_m, grid.y_max_m, grid.step_m);
+  if (double{1} * columns * rows > 1e7) {
+    throw std::invalid_argument("the floor has more than ten million places: take a larger step");
+  }
+  std::vector<FloorLimits::Place> places;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const Eigen::Vector3d position_m(grid.x_min_m + column * grid.step_m,
+                                       grid.y_min_m + row * grid.step_m, z_m);
+      places.push_back({{position_m, yaw_rad}, 0, {}});
+    }
+  }
+  return places;
+}
+
+std::vector<Eigen::Vector3d> places_of(const LampMap& map, const std::vector<std::size_t>& lamps) {
+  std::vector<Eigen::Vector3d> places_m;
+  for (const std::size_t lamp : lamps) places_m.push_back(map.lamps[lamp].position_m);
+  return places_m;
 }
 
 }  // namespace
@@ -69,27 +63,46 @@ FloorGrid floor_under(const LampMap& map, double step_m) {
 
 std::vector<Eigen::Vector3d> visible_lamps(const LampMap& map, const Camera& camera,
                                            const Pose& pose) {
-  return visible_lamps(map, camera, Lens(camera.lens_model, camera.intrinsics), pose);
+  return places_of(map, lamps_in_view(map, Lens(camera.lens_model, camera.intrinsics),
+                                      camera.imager_px, Eigen::Matrix3d::Identity(), pose));
 }
 
-std::vector<FloorLimit> floor_limits(const LampMap& map, const Camera& camera,
-                                     const FloorGrid& grid, double z_m, double yaw_rad,
-                                     const ErrorSources& sources) {
+Matrix4 FloorLimits::Place::total() const {
+  Matrix4 sum = Matrix4::Zero();
+  for (const Matrix4& part : parts) sum += part;
+  return sum;
+}
+
+FloorLimits floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
+                         double z_m, double yaw_rad, const ErrorSources& sources) {
   const Lens lens(camera.lens_model, camera.intrinsics);
-  const int columns = places_along(grid.x_min_m, grid.x_max_m, grid.step_m);
-  const int rows = places_along(grid.y_min_m, grid.y_max_m, grid.step_m);
-  if (double{1} * columns * rows > 1e7) {
-    throw std::invalid_argument("the floor has more than ten million places: take a larger step");
+  FloorLimits limits{
+      {{"noise", "noise"}, {"centre", "center"}, {"tilt", "tilt"}, {"lamp map", "lamp_map"}},
+      places_on(grid, z_m, yaw_rad)};
+  for (FloorLimits::Place& place : limits.places) {
+    const auto lamps =
+        lamps_in_view(map, lens, camera.imager_px, Eigen::Matrix3d::Identity(), place.camera);
+    place.lamps = static_cast<int>(lamps.size());
+    const auto budget = error_budget(places_of(map, lamps), lens, place.camera, sources);
+    if (budget) place.parts = {budget->noise, budget->center, budget->tilt, budget->lamp_map};
   }
-  std::vector<FloorLimit> limits;
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const Pose pose{{grid.x_min_m + column * grid.step_m, grid.y_min_m + row * grid.step_m, z_m},
-                      yaw_rad};
-      const auto lamps = visible_lamps(map, camera, lens, pose);
-      limits.push_back(
-          {pose, static_cast<int>(lamps.size()), error_budget(lamps, lens, pose, sources)});
-    }
+  return limits;
+}
+
+FloorLimits floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m, double yaw_rad,
+                         double noise_px) {
+  FloorLimits limits{{{"noise", "noise"}, {"lens", "lens"}, {"zenith", "zenith"}},
+                     places_on(grid, z_m, yaw_rad)};
+  if (unit.has_offset()) limits.sources.push_back({"offset", "offset"});
+  limits.sources.push_back({"lamp map", "lamp_map"});
+  for (FloorLimits::Place& place : limits.places) {
+    const auto lamps = unit.lamps_seen_from(place.camera);
+    place.lamps = static_cast<int>(lamps.size());
+    const auto budget = unit.budget(place.camera, lamps, noise_px);
+    if (!budget) continue;
+    place.parts = {budget->noise, budget->lens, budget->zenith};
+    if (unit.has_offset()) place.parts.push_back(budget->offset);
+    place.parts.push_back(budget->lamp_map);
   }
   return limits;
 }

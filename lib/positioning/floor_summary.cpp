@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <vector>
 
 #include "geometry/median.h"
@@ -21,18 +20,23 @@ MedianAndWorst summary_of(const std::vector<double>& values) {
   return {lower_median(values), *std::max_element(values.begin(), values.end())};
 }
 
-FloorSummary::Row row_of(std::string_view source, std::span<const FloorLimit> limits,
-                         const std::function<Matrix4(const ErrorBudget&)>& covariance) {
+/// `covariance` of a place that has a fix.
+template <typename Covariance>
+FloorSummary::Row row_of(const FloorLimits::Source& source, const FloorLimits& limits,
+                         const Covariance& covariance) {
   std::vector<double> horizontal_m, height_m, yaw_rad;
-  for (const FloorLimit& limit : limits) {
-    if (!limit.budget) continue;
-    const FixSpread spread = spread_of(covariance(*limit.budget));
+  double part = 0, whole = 0;
+  for (const FloorLimits::Place& place : limits.places) {
+    if (place.parts.empty()) continue;
+    const FixSpread spread = spread_of(covariance(place));
     horizontal_m.push_back(spread.horizontal_m);
     height_m.push_back(spread.height_m);
     yaw_rad.push_back(spread.yaw_rad);
+    part += spread.horizontal_m * spread.horizontal_m;
+    whole += place.total().topLeftCorner<2, 2>().trace();
   }
   const auto h = summary_of(horizontal_m), z = summary_of(height_m), yaw = summary_of(yaw_rad);
-  return {source, {h.median, z.median, yaw.median}, {h.worst, z.worst, yaw.worst}};
+  return {source, {h.median, z.median, yaw.median}, {h.worst, z.worst, yaw.worst}, part / whole};
 }
 
 }  // namespace
@@ -42,17 +46,26 @@ FixSpread spread_of(const Matrix4& covariance) {
           std::sqrt(covariance(3, 3))};
 }
 
-std::optional<FloorSummary> summarize(std::span<const FloorLimit> limits) {
-  const auto with_fix = std::count_if(limits.begin(), limits.end(),
-                                      [](const FloorLimit& limit) { return bool(limit.budget); });
+const FloorSummary::Row& FloorSummary::largest() const {
+  return *std::max_element(sources.begin(), sources.end(),
+                           [](const Row& a, const Row& b) { return a.share < b.share; });
+}
+
+std::optional<FloorSummary> summarize(const FloorLimits& limits) {
+  const auto with_fix =
+      std::count_if(limits.places.begin(), limits.places.end(),
+                    [](const FloorLimits::Place& place) { return !place.parts.empty(); });
   if (with_fix == 0) return std::nullopt;
-  return FloorSummary{
-      {row_of("noise", limits, [](const ErrorBudget& budget) { return budget.noise; }),
-       row_of("centre", limits, [](const ErrorBudget& budget) { return budget.center; }),
-       row_of("tilt", limits, [](const ErrorBudget& budget) { return budget.tilt; }),
-       row_of("lamp map", limits, [](const ErrorBudget& budget) { return budget.lamp_map; }),
-       row_of("together", limits, [](const ErrorBudget& budget) { return budget.total(); })},
+  using Place = FloorLimits::Place;
+  FloorSummary summary{
+      {},
+      row_of({"together", "horizontal"}, limits, [](const Place& place) { return place.total(); }),
       static_cast<std::size_t>(with_fix)};
+  for (std::size_t i = 0; i < limits.sources.size(); ++i) {
+    summary.sources.push_back(
+        row_of(limits.sources[i], limits, [i](const Place& place) { return place.parts[i]; }));
+  }
+  return summary;
 }
 
 }  // namespace vlp

@@ -2,10 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <optional>
-#include <span>
-#include <string_view>
+#include <vector>
 
 #include "floor_limits.h"
 
@@ -24,16 +23,23 @@ FixSpread spread_of(const Matrix4& covariance);
 /// worst over the places that see two lamps or more, each figure on its own.
 struct FloorSummary {
   struct Row {
-    std::string_view source;
+    /// As in FloorLimits.
+    FloorLimits::Source source;
     FixSpread median;
     FixSpread worst;
+    /// Of the horizontal variances, summed over these places, what is this source's.
+    double share;
   };
-  /// noise, centre, tilt, lamp map, together.
-  std::array<Row, 5> rows;
+  /// In the order of the sources.
+  std::vector<Row> sources;
+  Row together;
   std::size_t places_with_fix;
+
+  /// The one with the largest share, which is to be improved first.
+  const Row& largest() const;
 };
 
 /// Nothing when no place has a fix.
-std::optional<FloorSummary> summarize(std::span<const FloorLimit> limits);
+std::optional<FloorSummary> summarize(const FloorLimits& limits);
 
 }  // namespace vlp

@@ -278,28 +278,10 @@ void Positioner::Impl::reject_unexplained(SightedFrame& frame,
 Matrix4 Positioner::Impl::common_covariance(const SightedFrame& frame,
                                             const Eigen::Matrix3d& level_from_base,
                                             const PoseEstimate& camera) const {
-  const LevelPose pose(camera.pose);
-  CommonErrors::ByShared by_shared = CommonErrors::ByShared::Zero(4, common_.shared());
-  std::array<CommonErrors::ByLamp, max_lamps> by_lamp;
   std::array<std::size_t, max_lamps> lamps;
-  for (std::size_t i = 0; i < frame.size; ++i) {
-    const Sighting& sighting = frame.sightings[i];
-    const auto effect = common_.effect_on(sighting, pose, lens_, level_from_base);
-    Eigen::Matrix<double, 4, 2> gain;
-    if (frame.size == 1) {
-      // fix_one_lamp(): s = p - H e^{jg} z.
-      gain.setZero();
-      gain.topRows<2>() = -height_above(pose, sighting.lamp_m) * times_matrix(pose.heading);
-    } else {
-      const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
-      gain = camera.covariance * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
-             (whitening.transpose() * whitening);
-    }
-    by_shared.noalias() += gain.lazyProduct(effect.by_shared);
-    by_lamp[i] = gain * effect.by_lamp;
-    lamps[i] = index_of(frame.ids[i]);
-  }
-  return common_.covariance_of(by_shared, {by_lamp.data(), frame.size}, {lamps.data(), frame.size});
+  for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = index_of(frame.ids[i]);
+  return common_.covariance_of(
+      common_.gain_of(frame.span(), {lamps.data(), frame.size}, camera, lens_, level_from_base));
 }
 
 /// The gain of the pixels, in standard deviations, is that of the body's least squares.
@@ -307,9 +289,7 @@ Matrix4 Positioner::Impl::common_covariance(const BodyFrame& frame, const Eigen:
                                             const BodyFix& fix) const {
   const PosedBody body(fix.state);
   const Eigen::Matrix3d body_from_base = body_from_camera_ * base_from_camera_.transpose();
-  CommonErrors::ByShared by_shared = CommonErrors::ByShared::Zero(4, common_.shared());
-  std::array<CommonErrors::ByLamp, max_lamps> by_lamp;
-  std::array<std::size_t, max_lamps> lamps;
+  CommonErrors::Gain whole(common_.shared());
   for (std::size_t i = 0; i < frame.size; ++i) {
     const BodySighting& seen = frame.sightings[i];
     const auto d_q = body.d_lamp_in_body(seen.lamp_m, seen.time_s);
@@ -320,12 +300,11 @@ Matrix4 Positioner::Impl::common_covariance(const BodyFrame& frame, const Eigen:
         fix.covariance.topRows<4>().lazyProduct(d_pixel_d_state.transpose());
     const Eigen::Matrix<double, 2, 3> d_pixel_d_ray = seen.whitened_pixel_from_ray * body_from_base;
     const Eigen::Matrix<double, 4, 3> by_ray = gain * d_pixel_d_ray;
-    by_shared.noalias() +=
+    whole.by_shared.noalias() +=
         by_ray.lazyProduct(common_.effect_on_ray(body_from_base.transpose() * seen.ray, lens_));
-    by_lamp[i] = gain * d_pixel_d_state.leftCols<3>();
-    lamps[i] = index_of(frame.ids[i]);
+    whole.add(index_of(frame.ids[i]), gain * d_pixel_d_state.leftCols<3>());
   }
-  return common_.covariance_of(by_shared, {by_lamp.data(), frame.size}, {lamps.data(), frame.size});
+  return common_.covariance_of(whole);
 }
 
 FixStatus Positioner::Impl::sight(std::span<const Detection> detections,

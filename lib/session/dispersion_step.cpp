@@ -12,6 +12,7 @@
 #include "geometry/frames.h"
 #include "positioning/positioner.h"
 #include "report/plots/calibration_plots.h"
+#include "rig/calibration_error.h"
 #include "rig/stage.h"
 
 namespace vlp {

@@ -13,6 +13,7 @@
 #include "calibration/rotation/turning_axis.h"
 #include "geometry/angles.h"
 #include "report/plots/calibration_plots.h"
+#include "rig/calibration_error.h"
 #include "rig/stage.h"
 #include "session/lamp_images.h"
 

@@ -3,8 +3,12 @@
 /// vlp-limits as its users call it.
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "captures/csv_reader.h"
+#include "rig/stage.h"
 #include "support/program.h"
+#include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -44,6 +48,55 @@ TEST(Limits, WritesTheMapAsATableAndAPicture) {
     EXPECT_EQ(map.number(row, map.required("center_m")), 0);
   }
   EXPECT_THAT(TemporaryFolder::content_of(folder / "map.png"), StartsWith("\x89PNG"));
+}
+
+/// A calibration of the tests' rig that states its zenith, and a map that states its survey.
+class StatedLimits : public testing::Test {
+ protected:
+  TemporaryFolder folder;
+  LampMap lamps = synthetic_lamps();
+  Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
+
+  StatedLimits() {
+    RotationCenter center = tilted_by(calibration.camera, 0.02, 1);
+    center.covariance = 1e-4 * Eigen::Matrix2d::Identity();
+    calibration = with_rotation_center(calibration, center, {});
+    for (Lamp& lamp : lamps.lamps) lamp.sd_m = 0.002;
+  }
+  ProgramResult run(const std::string& options) {
+    write_lamp_map(folder / "lamps.yaml", lamps);
+    write_calibration(folder / "calibration.yaml", calibration);
+    return run_program("vlp-limits --lamps " + (folder / "lamps.yaml").string() +
+                       " --calibration " + (folder / "calibration.yaml").string() +
+                       " --height-m 0 --noise-px 0.05 --step-m 0.2 " + options);
+  }
+};
+
+TEST_F(StatedLimits, SayWhatToImproveFirst) {
+  const auto result = run("--stated --map " + (folder / "map.csv").string());
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("improve     lamp map first, 99 % of the horizontal"));
+  EXPECT_THAT(result.output, HasSubstr("vlp-adjust --refine-map"));
+  EXPECT_THAT(result.errors, HasSubstr("lens: the errors are not stated, and count as none"));
+  const CsvTable map(folder / "map.csv");
+  ASSERT_GT(map.rows(), 0U);
+  for (std::size_t row = 0; row < map.rows(); ++row) {
+    double variance = 0;
+    for (const char* part : {"noise_m", "lens_m", "zenith_m", "lamp_map_m"}) {
+      variance += std::pow(map.number(row, map.required(part)), 2);
+    }
+    EXPECT_NEAR(map.number(row, map.required("horizontal_m")), std::sqrt(variance), 1e-8);
+    EXPECT_EQ(map.number(row, map.required("lens_m")), 0);
+  }
+}
+
+TEST_F(StatedLimits, WantErrorsThatAreStatedOnce) {
+  EXPECT_EQ(run("--stated --tilt-deg 1").exit_code, 2);
+  calibration.rotation_center->covariance.reset();
+  for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();
+  const auto result = run("--stated");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("calibration.yaml: states no errors of its own, and"));
 }
 
 TEST(Limits, EndsWithThreeWhereNoTwoLampsAreInView) {

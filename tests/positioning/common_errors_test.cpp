@@ -7,39 +7,15 @@
 #include <gtest/gtest.h>
 
 #include "positioning/positioner.h"
+#include "positioning/stated_rig.h"
 #include "support/near.h"
-#include "support/synthetic_rig.h"
 
 namespace vlp {
 namespace {
 
-class CommonPart : public testing::Test {
+class CommonToFixes : public testing::Test {
  protected:
-  SyntheticRig rig{
-      synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, -0.05, 0}, 0.4}, {}};
-
-  CommonPart() {
-    for (std::size_t i = 0; i < 8; ++i) {
-      rig.map.lamps[i].position_m.z() += 0.02 * static_cast<double>(i % 3);
-    }
-    rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
-  }
-
-  /// An adjustment with correlations all over.
-  void adjust(double size) {
-    Adjustment adjustment{{}, {}, {}, 1, 1, 0.1};
-    for (const Lamp& lamp : rig.map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
-    const Eigen::Index n = 12 + 4 + 24;
-    Random random(7);
-    Eigen::MatrixXd root(n, n);
-    for (double& one : root.reshaped()) one = 0.3 * random.normal();
-    root.diagonal().array() += 1;
-    Eigen::VectorXd scale = Eigen::VectorXd::Constant(n, 1e-4 * size);
-    scale.head<4>().setConstant(0.1 * size);
-    scale.tail<24>().setConstant(1e-3 * size);
-    adjustment.covariance = scale.asDiagonal() * root * root.transpose() * scale.asDiagonal();
-    rig.calibration.adjustment = adjustment;
-  }
+  StatedRig rig;
 
   static Eigen::Vector4d state_of(const Fix& fix) {
     Eigen::Vector4d state;
@@ -49,10 +25,10 @@ class CommonPart : public testing::Test {
 };
 
 /// G by differences of whole fixes: nothing is shared with the formula.
-class OfFixes : public CommonPart, public testing::WithParamInterface<Sensors> {};
+class OfFixes : public CommonToFixes, public testing::WithParamInterface<Sensors> {};
 
 TEST_P(OfFixes, IsThatOfThoseMadeWithEachParameterALittleOff) {
-  adjust(1);
+  rig.adjust(1);
   rig.calibration.camera.row_time_s = 3e-5;
   rig.calibration.camera.readout = Readout::rows;
   const Adjustment adjustment = *rig.calibration.adjustment;
@@ -108,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(Bodies, OfFixes,
                                          sensors(0.1, {}), sensors(0.1, KnownMotion::up_to(1, 1))),
                          name_of_body);
 
-TEST_F(CommonPart, OfASurveyIsItsStandardDeviationThroughTheFix) {
+TEST_F(CommonToFixes, OfASurveyIsItsStandardDeviationThroughTheFix) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, 0.1));
   const Matrix4 common = fix.estimate.covariance - fix.noise_covariance;
@@ -116,8 +92,8 @@ TEST_F(CommonPart, OfASurveyIsItsStandardDeviationThroughTheFix) {
   EXPECT_NEAR(std::sqrt(common(0, 0)), 0.00075, 0.00008);
 }
 
-TEST_F(CommonPart, NamesALampThatNothingUncertainExplains) {
-  adjust(0.3);
+TEST_F(CommonToFixes, NamesALampThatNothingUncertainExplains) {
+  rig.adjust(0.3);
   Random random(8);
   for (const double off_m : {0.01, 0.03}) {
     for (std::size_t moved = 0; moved < 8; ++moved) {
@@ -133,8 +109,8 @@ TEST_F(CommonPart, NamesALampThatNothingUncertainExplains) {
   }
 }
 
-TEST_F(CommonPart, LeavesLampsAloneThatTheSurveyExplains) {
-  adjust(3);
+TEST_F(CommonToFixes, LeavesLampsAloneThatTheSurveyExplains) {
+  rig.adjust(3);
   Random random(9);
   for (std::size_t moved = 0; moved < 8; ++moved) {
     SyntheticRig room = rig;

@@ -54,17 +54,19 @@ TEST(VisibleLamps, TurnWithTheCamera) {
 TEST(FloorLimits, CoverTheGridRowByRow) {
   const LampMap map = synthetic_lamps();
   const auto limits = floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
-  ASSERT_EQ(limits.size(), 4 * 3);
-  EXPECT_THAT(limits[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
-  for (const FloorLimit& limit : limits) EXPECT_EQ(limit.budget.has_value(), limit.lamps >= 2);
+  ASSERT_EQ(limits.places.size(), 4 * 3);
+  EXPECT_THAT(limits.places[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
+  for (const auto& place : limits.places) {
+    EXPECT_EQ(place.parts.size(), place.lamps >= 2 ? limits.sources.size() : 0);
+  }
 }
 
 TEST(FloorLimits, HaveNoBudgetWhereNoLampsAreSeen) {
   const auto limits =
       floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);
-  ASSERT_EQ(limits.size(), 1);
-  EXPECT_EQ(limits[0].lamps, 0);
-  EXPECT_FALSE(limits[0].budget);
+  ASSERT_EQ(limits.places.size(), 1);
+  EXPECT_EQ(limits.places[0].lamps, 0);
+  EXPECT_TRUE(limits.places[0].parts.empty());
 }
 
 TEST(FloorLimits, RefuseAGridThatIsNone) {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "calibration/adjustment/survey.h"
-#include "calibration/passed_on.h"
+#include "rig/calibration_error.h"
 #include "session/dispersion_step.h"
 #include "session/rotation_step.h"
 #include "support/judged.h"

@@ -19,6 +19,7 @@
 #include "positioning/consistent_fix.h"
 #include "positioning/frame_fix.h"
 #include "positioning/lean.h"
+#include "rig/calibration_error.h"
 #include "rig/find_lamp.h"
 
 namespace vlp {
@@ -103,7 +104,7 @@ Assembled assemble(const AdjustmentInput& input) {
   all.lamp_seen.resize(lamps_m.size());
   Eigen::Vector2d zenith(0, 0), arm_m(0, 0);
   if (center) {
-    zenith = center->zenith_in_camera.head<2>() / center->zenith_in_camera.z();
+    zenith = zenith_point(*center);
     arm_m = center->lever_arm_m.value_or(arm_m);
   }
   problem.state().segment<2>(layout.zenith) = zenith;

@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/unit_errors.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "positioning/correction.h"
+#include "positioning/lamps_in_view.h"
+
+namespace vlp {
+
+UnitErrors::UnitErrors(const LampMap& map, const Calibration& calibration)
+    : map_(map),
+      camera_(calibration.camera),
+      lens_(camera_.lens_model, camera_.intrinsics),
+      camera_from_level_(level_from_camera(calibration, Correction::all).inverse()),
+      whole_(map_.lamps, calibration, Correction::all),
+      parts_{whole_.only(CommonPart::lens), whole_.only(CommonPart::zenith),
+             whole_.only(CommonPart::offset), whole_.only(CommonPart::lamps)},
+      has_offset_(calibration.dispersion.has_value()) {}
+
+std::vector<std::size_t> UnitErrors::lamps_seen_from(const Pose& level) const {
+  return lamps_in_view(map_, lens_, camera_.imager_px, camera_from_level_, level);
+}
+
+std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const std::size_t> lamps,
+                                             double noise_px) const {
+  if (lamps.size() < 2 || lamps.size() > kMaxSightings) return std::nullopt;
+  const LevelPose pose(level);
+  std::vector<Sighting> sightings;
+  Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+  for (const std::size_t lamp : lamps) {
+    const Eigen::Vector3d& lamp_m = map_.lamps[lamp].position_m;
+    if (!(height_above(pose, lamp_m) > 0)) return std::nullopt;
+    const Prediction seen = predict(pose, lamp_m);
+    const auto projection = lens_.project_with_jacobians(camera_from_level_ * seen.z.homogeneous());
+    if (!projection) return std::nullopt;
+    const Eigen::Matrix2d d_pixel_d_z =
+        projection->d_pixel_d_point * camera_from_level_.leftCols<2>();
+    sightings.push_back({lamp_m, seen.z, d_pixel_d_z, noise_px});
+    const Eigen::Matrix<double, 2, 4> by_state = d_pixel_d_z * seen.d_z_d_state / noise_px;
+    information += by_state.transpose() * by_state;
+  }
+  const Eigen::LLT<Eigen::Matrix4d> factor(information);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::Matrix4d noise = factor.solve(Eigen::Matrix4d::Identity());
+  if (!noise.allFinite()) return std::nullopt;
+  const CommonErrors::Gain gain =
+      whole_.gain_of(sightings, lamps, {level, noise}, lens_, Eigen::Matrix3d::Identity());
+  const auto part = [&](CommonPart of) {
+    return parts_[static_cast<std::size_t>(of)].covariance_of(gain);
+  };
+  return UnitBudget{noise, part(CommonPart::lens), part(CommonPart::zenith),
+                    part(CommonPart::offset), part(CommonPart::lamps)};
+}
+
+}  // namespace vlp

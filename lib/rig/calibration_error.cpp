@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/calibration_error.h"
+
+#include <Eigen/Geometry>
+#include <iterator>
+
+namespace vlp {
+namespace {
+
+/// The pixel of the zenith in the undistorted image.
+void recenter(Calibration& calibration) {
+  if (!calibration.rotation_center) return;
+  const auto& k = calibration.camera.intrinsics;
+  RotationCenter& center = *calibration.rotation_center;
+  center.center_px = zenith_point(center).cwiseProduct(focal_px_of(calibration.camera)) +
+                     Eigen::Vector2d(k[2], k[3]);
+}
+
+}  // namespace
+
+Eigen::Vector2d focal_px_of(const Camera& camera) {
+  return {camera.intrinsics[0], camera.intrinsics[1]};
+}
+
+Eigen::Vector2d zenith_point(const RotationCenter& center) {
+  return center.zenith_in_camera.hnormalized();
+}
+
+Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error) {
+  auto& intrinsics = calibration.camera.intrinsics;
+  Eigen::Map<Eigen::VectorXd>(intrinsics.data(), std::ssize(intrinsics)) += error;
+  recenter(calibration);
+  return calibration;
+}
+
+Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& error) {
+  RotationCenter& center = *calibration.rotation_center;
+  center.zenith_in_camera = (zenith_point(center) + error).homogeneous().normalized();
+  recenter(calibration);
+  return calibration;
+}
+
+Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& error) {
+  calibration.dispersion->offset_px += error.cwiseProduct(focal_px_of(calibration.camera));
+  return calibration;
+}
+
+}  // namespace vlp

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "calibration.h"
+
+/// A calibration with an error added to one of its parts, in the units in which covariances and
+/// what a step passes on state it: intrinsics, and normalized points (x/z, y/z).
+namespace vlp {
+
+/// fx, fy.
+Eigen::Vector2d focal_px_of(const Camera& camera);
+
+/// The zenith's normalized point.
+Eigen::Vector2d zenith_point(const RotationCenter& center);
+
+/// With errors added to the intrinsics; the zenith stays, and center_px with it.
+Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
+
+/// With an error added to the zenith's normalized point. Precondition: there is a rotation centre.
+Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& error);
+
+/// With an error added to offset_px / f. Precondition: there is a dispersion.
+Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& error);
+
+}  // namespace vlp

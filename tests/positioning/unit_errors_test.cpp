@@ -1,0 +1,228 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The budget of a unit against what its fixes state, against fixes with drawn errors, and part by
+/// part.
+#include "positioning/unit_errors.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <numeric>
+
+#include "positioning/floor_limits.h"
+#include "positioning/floor_summary.h"
+#include "positioning/positioner.h"
+#include "positioning/stated_rig.h"
+#include "rig/calibration_error.h"
+#include "support/judged.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kNoise_px = 0.1;
+
+StatedRig adjusted() {
+  StatedRig rig;
+  rig.adjust(1);
+  return rig;
+}
+
+StatedRig in_a_row() {
+  StatedRig rig;
+  rig.calibrate_in_a_row();
+  return rig;
+}
+
+std::vector<std::size_t> all_lamps() {
+  std::vector<std::size_t> lamps(8);
+  std::iota(lamps.begin(), lamps.end(), 0U);
+  return lamps;
+}
+
+UnitBudget budget_of(const StatedRig& rig) {
+  return *UnitErrors(rig.map, rig.calibration).budget(rig.camera, all_lamps(), kNoise_px);
+}
+
+/// seen_from() knows of no dispersion.
+std::vector<Detection> detections_of(const StatedRig& rig) {
+  const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
+  const Eigen::Matrix3d camera_from_level =
+      level_from_camera(rig.calibration, Correction::all).inverse();
+  std::vector<Detection> detections;
+  for (const Lamp& lamp : rig.map.lamps) {
+    const auto pixel =
+        lens.project(camera_from_level * level_from_world(rig.camera, lamp.position_m));
+    detections.push_back({lamp.id, *pixel, kNoise_px});
+  }
+  return detections;
+}
+
+class OfAUnit : public testing::TestWithParam<StatedRig> {};
+
+TEST_P(OfAUnit, AddsUpToWhatItsFixesState) {
+  const StatedRig& rig = GetParam();
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections_of(rig));
+  ASSERT_TRUE(fix.ok());
+  ASSERT_EQ(fix.lamps, 8);
+  const UnitBudget budget = budget_of(rig);
+  const Eigen::Matrix4d common = fix.estimate.covariance - fix.noise_covariance;
+  const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
+  const Eigen::Matrix4d scale = sd * sd.transpose();
+  // To where the fix's iterations stop.
+  constexpr double stopped = 1e-8;
+  EXPECT_LT((budget.common() - common).cwiseQuotient(scale).cwiseAbs().maxCoeff(), stopped);
+  EXPECT_LT((budget.noise - fix.noise_covariance).cwiseQuotient(scale).cwiseAbs().maxCoeff(),
+            stopped);
+  EXPECT_EQ(budget.total(), Matrix4(budget.noise + budget.common()));
+}
+
+TEST_P(OfAUnit, TakesItsCovarianceApartToRounding) {
+  const StatedRig& rig = GetParam();
+  const UnitErrors unit(rig.map, rig.calibration);
+  const Eigen::MatrixXd& whole = unit.common().joint();
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(whole.rows(), whole.cols());
+  for (const CommonPart part : kCommonParts) sum += unit.common().only(part).joint();
+  const Eigen::VectorXd inverse_sd = whole.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_THAT(inverse_sd.asDiagonal() * (sum - whole) * inverse_sd.asDiagonal(),
+              IsNear(Eigen::MatrixXd::Zero(whole.rows(), whole.cols()), 1e-13));
+}
+
+TEST_P(OfAUnit, HasPartsThatAreVariancesEach) {
+  const UnitBudget budget = budget_of(GetParam());
+  for (const Matrix4& part :
+       {budget.noise, budget.lens, budget.zenith, budget.offset, budget.lamp_map}) {
+    const Eigen::Vector4d sd = budget.total().diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(
+        Eigen::Matrix4d(sd.asDiagonal() * part * sd.asDiagonal()));
+    EXPECT_GT(eigen.eigenvalues().minCoeff(), -1e-9);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Stated, OfAUnit, testing::Values(adjusted(), in_a_row()),
+                         [](const auto& one) { return one.index == 0 ? "Adjusted" : "InARow"; });
+
+TEST(UnitErrors, LackThePartThatIsExact) {
+  StatedRig rig = adjusted();
+  MatrixX& covariance = rig.calibration.adjustment->covariance;
+  const auto without = [&](Eigen::Index first, Eigen::Index size) {
+    StatedRig other = rig;
+    MatrixX& left = other.calibration.adjustment->covariance;
+    left.middleRows(first, size).setZero();
+    left.middleCols(first, size).setZero();
+    return budget_of(other);
+  };
+  const UnitBudget lens = without(0, 12), zenith = without(12, 2), map = without(16, 24);
+  EXPECT_TRUE(lens.lens.isZero(0) && zenith.zenith.isZero(0) && map.lamp_map.isZero(0));
+  for (const UnitBudget& budget : {lens, zenith, map}) {
+    EXPECT_GT(budget.common()(0, 0), 0);
+    EXPECT_TRUE(budget.offset.isZero(0));
+  }
+  covariance.setZero();
+  EXPECT_TRUE(budget_of(rig).common().isZero(0));
+}
+
+/// Of steps in a row each part is that of one of their own covariances alone.
+TEST(UnitErrors, TakeStepsInARowApart) {
+  const StatedRig rig = in_a_row();
+  const UnitBudget whole = budget_of(rig);
+  StatedRig only_lens = rig, only_zenith = rig, only_offset = rig, only_map = rig;
+  const auto clear = [](StatedRig& one, bool lens, bool zenith, bool offset, bool map) {
+    if (!lens) one.calibration.intrinsics_report->covariance->setZero();
+    if (!zenith) one.calibration.rotation_center->covariance->setZero();
+    if (!offset) one.calibration.dispersion->covariance->setZero();
+    for (Lamp& lamp : one.map.lamps) lamp.sd_m = map ? *lamp.sd_m : 0;
+    return budget_of(one).common();
+  };
+  const double small = 1e-9 * whole.common().cwiseAbs().maxCoeff();
+  EXPECT_THAT(whole.lens, IsNear(clear(only_lens, true, false, false, false), small));
+  EXPECT_THAT(whole.zenith, IsNear(clear(only_zenith, false, true, false, false), small));
+  EXPECT_THAT(whole.offset, IsNear(clear(only_offset, false, false, true, false), small));
+  EXPECT_THAT(whole.lamp_map, IsNear(clear(only_map, false, false, false, true), small));
+}
+
+/// Fixes of calibrations and maps drawn from what is stated, with the pixels' noise.
+TEST(UnitErrors, AreWhatFixesWithDrawnErrorsShow) {
+  const StatedRig rig = adjusted();
+  const UnitBudget budget = budget_of(rig);
+  const auto exact = detections_of(rig);
+  const Eigen::MatrixXd root = rig.calibration.adjustment->covariance.llt().matrixL();
+  Random random(11);
+  Judged judged;
+  Eigen::Matrix4d scatter = Eigen::Matrix4d::Zero();
+  constexpr int trials = 2000;
+  for (int trial = 0; trial < trials; ++trial) {
+    Eigen::VectorXd draw(root.cols());
+    for (double& one : draw) one = random.normal();
+    const Eigen::VectorXd error = root * draw;
+    Calibration calibration =
+        with_zenith_error(with_lens_error(rig.calibration, error.head<12>()), error.segment<2>(12));
+    calibration.adjustment.reset();
+    LampMap map = rig.map;
+    for (std::size_t i = 0; i < 8; ++i) {
+      map.lamps[i].position_m += error.segment<3>(16 + 3 * static_cast<Eigen::Index>(i));
+    }
+    const Fix fix = Positioner(map, calibration).locate(with_noise(exact, random));
+    ASSERT_TRUE(fix.ok());
+    const Eigen::Vector4d off = error_of(fix, rig.camera);
+    scatter += off * off.transpose() / trials;
+    judged.add(off, budget.total());
+  }
+  // Of 2000 draws a variance is known to 3.2 %, its root to half of that.
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(std::sqrt(scatter(i, i) / budget.total()(i, i)), 1, 0.06) << i;
+  }
+  EXPECT_NEAR(judged.mean(), 1, 0.06);
+  EXPECT_NEAR(judged.share(), 0.95, 0.02);
+}
+
+TEST(UnitErrors, SayWhatIsNotStated) {
+  StatedRig rig;
+  const auto stated = [&](CommonPart part) {
+    return UnitErrors(rig.map, rig.calibration).common().stated(part);
+  };
+  EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common().stated());
+  EXPECT_FALSE(stated(CommonPart::lens) || stated(CommonPart::zenith) || stated(CommonPart::lamps));
+  EXPECT_TRUE(stated(CommonPart::offset));  // there is none
+  rig = in_a_row();
+  for (const CommonPart part : kCommonParts) EXPECT_TRUE(stated(part));
+  rig.map.lamps[3].sd_m.reset();
+  rig.calibration.dispersion->covariance.reset();
+  EXPECT_FALSE(stated(CommonPart::lamps) || stated(CommonPart::offset));
+}
+
+TEST(UnitErrors, SeeWhatACameraThatLeansSees) {
+  StatedRig rig;
+  rig.map = lamp_map_of({{0, 0, 1.6}, {0.1, 0, 1.6}});
+  rig.camera = {{0, 0, 0}, 0};
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.9, 0);
+  EXPECT_TRUE(UnitErrors(rig.map, rig.calibration).lamps_seen_from(rig.camera).empty());
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.1, 0);
+  EXPECT_EQ(UnitErrors(rig.map, rig.calibration).lamps_seen_from(rig.camera).size(), 2U);
+}
+
+TEST(FloorLimits, OfAUnitNameWhatToImproveFirst) {
+  StatedRig rig = in_a_row();
+  const auto summary_of = [&](double map_sd_m, double noise_px) {
+    for (Lamp& lamp : rig.map.lamps) lamp.sd_m = map_sd_m;
+    const FloorLimits limits = floor_limits(UnitErrors(rig.map, rig.calibration),
+                                            {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
+    EXPECT_EQ(limits.sources.size(), 5U);
+    EXPECT_EQ(limits.places.size(), 15U);
+    return *summarize(limits);
+  };
+  EXPECT_EQ(summary_of(0.01, 0.1).largest().source.key, "lamp_map");
+  EXPECT_EQ(summary_of(1e-5, 5).largest().source.key, "noise");
+  const FloorSummary summary = summary_of(0.001, 0.1);
+  double shares = 0;
+  for (const auto& source : summary.sources) shares += source.share;
+  EXPECT_NEAR(shares, 1, 1e-12);
+  rig.calibration.dispersion.reset();
+  const FloorLimits without =
+      floor_limits(UnitErrors(rig.map, rig.calibration), {0, 0, 0, 0, 0.1}, 0, 0.4, 0.1);
+  EXPECT_EQ(without.sources.size(), 4U);
+}
+
+}  // namespace
+}  // namespace vlp

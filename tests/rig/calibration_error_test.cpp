@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/calibration_error.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+Calibration leaning() {
+  const Eigen::Vector2d zenith(0.02, -0.01);
+  Calibration calibration{
+      {"", {800, 600}, LensModel::pinhole, {500, 510, 400, 300}, {}, {}, {}}, {}, {}, {}, {}};
+  calibration.rotation_center = RotationCenter{
+      RotationModel::tilt, {410, 294.9}, zenith.homogeneous().normalized(), {}, {}, {}, {}};
+  calibration.dispersion = Dispersion{{0.5, -0.2}, 0.001, {0, 0}, 12};
+  return calibration;
+}
+
+TEST(CalibrationError, OfTheLensLeavesTheZenithAndMovesItsPixel) {
+  const Calibration moved = with_lens_error(leaning(), Eigen::Vector4d(10, -5, 1, 2));
+  EXPECT_EQ(moved.camera.intrinsics, (std::vector<double>{510, 505, 401, 302}));
+  EXPECT_EQ(moved.rotation_center->zenith_in_camera, leaning().rotation_center->zenith_in_camera);
+  EXPECT_THAT(moved.rotation_center->center_px,
+              IsNear(Eigen::Vector2d(401 + 0.02 * 510, 302 - 0.01 * 505), 1e-9));
+  Calibration alone = leaning();
+  alone.rotation_center.reset();
+  EXPECT_FALSE(with_lens_error(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
+}
+
+TEST(CalibrationError, OfTheZenithIsOfItsNormalizedPoint) {
+  const Calibration moved = with_zenith_error(leaning(), {0.001, 0.002});
+  EXPECT_THAT(zenith_point(*moved.rotation_center), IsNear(Eigen::Vector2d(0.021, -0.008), 1e-15));
+  EXPECT_NEAR(moved.rotation_center->zenith_in_camera.norm(), 1, 1e-15);
+  EXPECT_THAT(moved.rotation_center->center_px,
+              IsNear(Eigen::Vector2d(400 + 0.021 * 500, 300 - 0.008 * 510), 1e-9));
+}
+
+TEST(CalibrationError, OfTheOffsetIsInUnitsOfTheNormalizedPlane) {
+  const Calibration moved = with_offset_error(leaning(), {0.001, -0.002});
+  EXPECT_THAT(moved.dispersion->offset_px, IsNear(Eigen::Vector2d(1, -1.22), 1e-12));
+  EXPECT_EQ(moved.rotation_center->center_px, leaning().rotation_center->center_px);
+}
+
+}  // namespace
+}  // namespace vlp
