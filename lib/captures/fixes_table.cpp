@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <string_view>
+#include <system_error>
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
@@ -25,12 +27,14 @@ struct FixColumns {
         residual_px(csv.optional("residual_px")),
         time_s(csv.optional("time_s")),
         velocity{csv.optional("vx_m_per_s"), csv.optional("vy_m_per_s")},
-        lean{csv.optional("roll_rad"), csv.optional("pitch_rad")} {}
+        lean{csv.optional("roll_rad"), csv.optional("pitch_rad")},
+        rejected(csv.optional("rejected")) {}
 
   std::array<CsvTable::Column, 4> pose;
   std::array<std::optional<CsvTable::Column>, 4> sd, noise_sd;
   std::optional<CsvTable::Column> residual_px, time_s;
   std::array<std::optional<CsvTable::Column>, 2> velocity, lean;
+  std::optional<CsvTable::Column> rejected;
 };
 
 std::optional<Eigen::Vector2d> pair_in(
@@ -71,6 +75,23 @@ FixRow::Fix fix_in(const CsvTable& csv, std::size_t row, const FixColumns& colum
   fix.velocity_m_per_s = pair_in(csv, row, columns.velocity);
   if (const auto lean = pair_in(csv, row, columns.lean)) fix.inclination = {lean->x(), lean->y()};
   return fix;
+}
+
+/// Ids separated by blanks.
+std::vector<int> ids_in(const CsvTable& csv, std::size_t row, CsvTable::Column column) {
+  std::vector<int> ids;
+  std::string_view rest = csv.text(row, column);
+  while (!rest.empty()) {
+    const std::string_view word = rest.substr(0, rest.find(' '));
+    int id = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), id);
+    if (error != std::errc() || end != word.data() + word.size()) {
+      throw csv.error(row, column, "should be ids of lamps, separated by blanks");
+    }
+    ids.push_back(id);
+    rest.remove_prefix(std::min(rest.size(), word.size() + 1));
+  }
+  return ids;
 }
 
 constexpr int kDigits = 9;    // nanometres
@@ -182,6 +203,7 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
       throw csv.error(row, status, "should be UTF-8");
     }
     if (read.status == "ok") read.fix = fix_in(csv, row, columns);
+    if (columns.rejected) read.rejected = ids_in(csv, row, *columns.rejected);
     if (columns.time_s) read.time_s = csv.optional_number(row, *columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "holds no fix");

@@ -52,7 +52,7 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
 /// that is not there for all four is none; where the status is not "ok", the figures are not
 /// looked at. Throws InputError: see CsvTable; an image or a status that is empty; an image twice;
 /// a fix whose figures are not finite or further off than kFarthest_m, or an sd that is negative;
-/// no rows.
+/// lamps left out that are no ids; no rows.
 std::vector<FixRow> read_fixes(const std::filesystem::path& file);
 
 }  // namespace vlp

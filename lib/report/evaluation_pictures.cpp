@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "report/evaluation_pictures.h"
 
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "positioning/floor_summary.h"
+#include "positioning/unit_errors.h"
+#include "report/plots/budget_plot.h"
 #include "report/plots/cdf_plot.h"
 #include "report/plots/error_plot.h"
 #include "report/plots/round_numbers.h"
@@ -46,6 +54,44 @@ std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
   pictures.back().alt += " Half of the fixes are no further off than " + in_mm(curve.p50_m) +
                          ", nine tenths no further than " + in_mm(curve.p90_m) + ".";
   return pictures;
+}
+
+std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, const LampMap& lamps,
+                                            const Calibration& calibration) {
+  if (lamps.lamps.empty()) return std::nullopt;
+  const UnitErrors unit(lamps, calibration);
+  BudgetPlot plot{
+      "Where the uncertainty comes from", {"noise", "lens", "zenith", "offset", "lamp map"}, {}};
+  const auto horizontal = [](const Eigen::Vector4d& sd) { return sd.head<2>().squaredNorm(); };
+  for (const FixRow& row : fixes) {
+    if (!row.fix || !row.fix->sd || !row.fix->noise_sd) continue;
+    auto seen = unit.lamps_seen_from(row.fix->pose);
+    std::erase_if(seen, [&](std::size_t lamp) {
+      const auto& left_out = row.rejected;
+      return std::find(left_out.begin(), left_out.end(), lamps.lamps[lamp].id) != left_out.end();
+    });
+    constexpr double any_px = 1;  // the division does not depend on it
+    const auto budget = unit.budget(row.fix->pose, seen, any_px);
+    if (!budget) continue;
+    const double common_m = spread_of(budget->common()).horizontal_m;
+    if (!(common_m > 0)) continue;
+    const double noise_m2 = horizontal(*row.fix->noise_sd);
+    const double stated_m2 = std::max(0.0, horizontal(*row.fix->sd) - noise_m2);
+    const auto of = [&](const Matrix4& part) {
+      const double share = spread_of(part).horizontal_m / common_m;
+      return share * share * stated_m2;
+    };
+    plot.variances_m2.push_back(
+        {noise_m2, of(budget->lens), of(budget->zenith), of(budget->offset), of(budget->lamp_map)});
+  }
+  if (plot.variances_m2.empty()) return std::nullopt;
+  ReportPicture picture = report_picture(drawing_of(plot));
+  const std::vector<double> shares = plot.shares();
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    picture.alt += fmt::format("{} {} {:.0f} %", i == 0 ? "" : ",", plot.parts[i], 100 * shares[i]);
+  }
+  picture.alt += ".";
+  return picture;
 }
 
 ReportPicture drive_picture(const std::string& title, const std::vector<FixRow>& fixes,

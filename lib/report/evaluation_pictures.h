@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "evaluation/evaluation.h"
 #include "report/report_picture.h"
+#include "rig/calibration.h"
 #include "rig/lamp_map.h"
 
 namespace vlp {
@@ -15,6 +17,13 @@ namespace vlp {
 /// the floor. Throws InputError, see svg_of(). Precondition: there is a fix.
 std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
                                                const Evaluation& evaluation, const LampMap& lamps);
+
+/// What the stated uncertainty of fixes comes from, horizontally: of each its noise, and the part
+/// of calibration and map, divided as a fix from all lamps in view there, without those that were
+/// left out, would be (UnitErrors). Nothing when no fix states such a part. Throws InputError, see
+/// svg_of().
+std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, const LampMap& lamps,
+                                            const Calibration& calibration);
 
 /// A drive along a commanded line. Precondition: `fit` is that of the fixes.
 ReportPicture drive_picture(const std::string& title, const std::vector<FixRow>& fixes,

@@ -21,7 +21,7 @@ struct Kind {
   std::string_view caption, alt;
 };
 
-constexpr std::array<Kind, 7> kKinds = {
+constexpr std::array<Kind, 8> kKinds = {
     {{"intrinsics", ReportPart::camera,
       "Coverage: the corners of all views should reach the edges of the image. Residuals: short "
       "and "
@@ -50,6 +50,11 @@ constexpr std::array<Kind, 7> kKinds = {
      {"cdf", ReportPart::distribution,
       "The share of fixes that are no further off than so much; marks at half and at nine tenths.",
       "Cumulative distribution of the horizontal errors."},
+     {"budget", ReportPart::distribution,
+      "What the uncertainty of the fixes comes from, as they state it: noise, which averages out, "
+      "below, and what calibration and lamp map leave, which does not, above it. The largest part "
+      "is to be improved first.",
+      "Stacked horizontal variances of the fixes by their sources."},
      {"track", ReportPart::tracks,
       "Above: the commanded line and the fixes on the floor. Below: how far they are to the left "
       "of "

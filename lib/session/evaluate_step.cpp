@@ -92,6 +92,10 @@ std::string report_page(EvaluationReport subject) {
        evaluation_pictures(subject.input, subject.result.evaluation, subject.lamps)) {
     report.pictures.push_back(std::move(picture));
   }
+  if (report.calibration) {
+    auto budget = budget_picture(subject.input.fixes.rows, subject.lamps, *report.calibration);
+    if (budget) report.pictures.push_back(std::move(*budget));
+  }
   report.evaluation = std::move(subject.history);
   report.evaluation->part = "evaluation";
   return report_html(report);

@@ -116,6 +116,21 @@ TEST(FixesTable, HasTheNoisesPartAndTheLampsLeftOutWhereThereAreAny) {
   const auto read = read_fixes(folder / "whole.csv");
   EXPECT_FALSE(read[0].fix->noise_sd);
   EXPECT_EQ(read[1].fix->noise_sd, whole.fix->noise_sd);
+  EXPECT_TRUE(read[0].rejected.empty());
+  EXPECT_EQ(read[1].rejected, whole.rejected);
+}
+
+TEST(FixesTable, RefusesLampsLeftOutThatAreNoIds) {
+  const TemporaryFolder folder;
+  for (const char* ids : {"7;12", "lamp", "7 x", "7  12", "99999999999"}) {
+    const auto file =
+        folder.file("fixes.csv", std::string("image,status,x_m,y_m,z_m,yaw_rad,rejected\n"
+                                             "a,ok,0,0,0,0,") +
+                                     ids + "\n");
+    EXPECT_THAT(refusal_of([&] { read_fixes(file); }),
+                HasSubstr("fixes.csv:2: rejected: should be ids of lamps, separated by blanks"))
+        << ids;
+  }
 }
 
 }  // namespace

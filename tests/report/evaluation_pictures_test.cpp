@@ -35,6 +35,74 @@ TEST(EvaluationPictures, ShowsTheFloorWithWhatIsMissingAndTheDistribution) {
   EXPECT_THAT(pictures[1].alt, HasSubstr("further off than 2 mm"));
 }
 
+/// A room of four lamps with a survey of 2 mm; its camera leans and knows its zenith.
+struct StatedRoom {
+  LampMap lamps;
+  Calibration calibration{
+      {"", {800, 600}, LensModel::pinhole, {500, 500, 399.5, 299.5}, {}, {}, {}},
+      {},
+      RotationCenter{RotationModel::tilt,
+                     {404.5, 299.5},
+                     Eigen::Vector3d(0.01, 0, 1).normalized(),
+                     Matrix2(1e-2 * Matrix2::Identity())},
+      {},
+      {}};
+
+  StatedRoom() {
+    int id = 0;
+    for (const double x_m : {-0.5, 0.5}) {
+      for (const double y_m : {-0.4, 0.4}) {
+        lamps.lamps.push_back({++id, {x_m, y_m, 1.6}, {}, {}, {}});
+        lamps.lamps.back().sd_m = 0.002;
+      }
+    }
+  }
+
+  std::vector<FixRow> fixes() const {
+    std::vector<FixRow> rows{fix("a", 0, 0), fix("b", 0.1, 0.05), fix("c", 0, 0)};
+    for (FixRow& row : rows) {
+      row.fix->noise_sd = Eigen::Vector4d(3e-4, 3e-4, 1e-3, 1e-3);
+      row.fix->sd = Eigen::Vector4d(1e-3, 1e-3, 2e-3, 2e-3);
+    }
+    rows[2].fix->noise_sd.reset();  // it does not count
+    return rows;
+  }
+};
+
+TEST(EvaluationPictures, ShowsWhereTheStatedUncertaintyComesFrom) {
+  const StatedRoom room;
+  const auto picture = budget_picture(room.fixes(), room.lamps, room.calibration);
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(picture->part, ReportPart::distribution);
+  // 0.18 of the 2 mm^2 are noise.
+  EXPECT_THAT(picture->image, HasSubstr("noise, 9 %"));
+  EXPECT_THAT(picture->image, HasSubstr("lamp map, "));
+  EXPECT_THAT(picture->image, testing::Not(HasSubstr("offset, ")));
+  EXPECT_THAT(picture->alt, HasSubstr("noise 9 %, lens 0 %, zenith "));
+}
+
+TEST(EvaluationPictures, ShowsNoBudgetOfWhatIsNotStated) {
+  StatedRoom room;
+  EXPECT_FALSE(budget_picture(room.fixes(), {}, room.calibration));
+  auto fixes = room.fixes();
+  for (FixRow& row : fixes) row.fix->noise_sd.reset();
+  EXPECT_FALSE(budget_picture(fixes, room.lamps, room.calibration));
+  for (Lamp& lamp : room.lamps.lamps) lamp.sd_m.reset();
+  room.calibration.rotation_center->covariance.reset();
+  EXPECT_FALSE(budget_picture(room.fixes(), room.lamps, room.calibration));
+}
+
+/// A fix that left a lamp out has nothing of its error.
+TEST(EvaluationPictures, LeavesLampsOutOfTheBudgetAsTheFixDid) {
+  StatedRoom room;
+  room.lamps.lamps[0].sd_m = 0.1;
+  auto fixes = room.fixes();
+  EXPECT_THAT(budget_picture(fixes, room.lamps, room.calibration)->alt, HasSubstr("zenith 0 %"));
+  for (FixRow& row : fixes) row.rejected = {1};
+  EXPECT_THAT(budget_picture(fixes, room.lamps, room.calibration)->alt,
+              testing::Not(HasSubstr("zenith 0 %")));
+}
+
 TEST(EvaluationPictures, ShowsTheDriveAlongACommandedLine) {
   EvaluationInput with_line = input();
   with_line.line_m = {Eigen::Vector2d{0, 0}, Eigen::Vector2d{1, 0}};

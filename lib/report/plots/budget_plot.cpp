@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "report/plots/budget_plot.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <numeric>
+
+#include "captures/csv_writer.h"
+#include "report/plots/plot_parts.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kMostColumns = 200;
+constexpr std::array<const char*, 5> kPartColors{plot_colors::grey, plot_colors::blue,
+                                                 plot_colors::green, plot_colors::purple,
+                                                 plot_colors::vermillion};
+
+double sum_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+/// A line a column: the variances in mm^2.
+std::string columns_of(const BudgetPlot& plot) {
+  auto fixes = plot.variances_m2;
+  std::stable_sort(fixes.begin(), fixes.end(),
+                   [](const auto& a, const auto& b) { return sum_of(a) < sum_of(b); });
+  const std::size_t columns = std::min(fixes.size(), kMostColumns);
+  std::string rows;
+  for (std::size_t i = 1; i <= columns; ++i) {
+    for (const double variance_m2 : fixes[fixes.size() * i / columns - 1]) {
+      rows.append(significant(1e6 * variance_m2, kPlotDigits)).append(" ");
+    }
+    rows.append("\n");
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::vector<double> BudgetPlot::shares() const {
+  std::vector<double> shares(parts.size());
+  double whole = 0;
+  for (const auto& fix : variances_m2) {
+    for (std::size_t i = 0; i < fix.size(); ++i) shares[i] += fix[i];
+    whole += sum_of(fix);
+  }
+  for (double& share : shares) share /= whole;
+  return shares;
+}
+
+Drawing drawing_of(const BudgetPlot& plot) {
+  assert(!plot.variances_m2.empty() && plot.parts.size() <= kPartColors.size());
+  const std::vector<double> shares = plot.shares();
+  std::string layers;
+  for (std::size_t i = 0; i < plot.parts.size(); ++i) {
+    if (!(shares[i] > 0)) continue;
+    const std::string label = fmt::format("{}, {:.0f} %", plot.parts[i], 100 * shares[i]);
+    layers +=
+        fmt::format("{}$budget using {} linecolor rgb '{}' title {} noenhanced",
+                    layers.empty() ? "plot " : ", ", i + 1, kPartColors[i], gnuplot_quoted(label));
+  }
+  return {"budget", 720, 520,
+          data_block("budget", columns_of(plot)) + plot_settings() + "set title " +
+              gnuplot_quoted(plot.title) +
+              " noenhanced\n"
+              "set xlabel 'fixes, the most certain first'\n"
+              "set ylabel 'horizontal variance (mm²)'\n"
+              "set style data histograms\n"
+              "set style histogram rowstacked\n"
+              "set style fill solid 1 border rgb 'white'\n"
+              "set boxwidth 1\n"
+              "set yrange [0:*]\n"
+              "unset xtics\n" +
+              layers + "\n"};
+}
+
+}  // namespace vlp
