@@ -66,6 +66,27 @@ void fix_in_c(benchmark::State& state) {
 }
 BENCHMARK(fix_in_c)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
 
+/// The same with what calibration and lamp map state of their errors: lens, zenith, survey.
+void fix_with_the_common_part(benchmark::State& state) {
+  Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
+  SyntheticRig& rig = scene.rig;
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
+  rig.calibration.rotation_center->covariance = 1e-4 * Eigen::Matrix2d::Identity();
+  rig.calibration.rotation_center->by_intrinsics = MatrixX::Constant(2, 12, 1e-3);
+  rig.calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, {}};
+  rig.calibration.intrinsics_report->covariance = 1e-6 * MatrixX::Identity(12, 12);
+  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.001;
+  Random random(1);
+  scene.detections = with_noise(seen_from(rig, 0.1), random);
+  const Positioner positioner(rig.map, rig.calibration);
+  const Fix once = positioner.locate(scene.detections);
+  if (!once.ok() || once.noise_covariance == once.estimate.covariance) {
+    throw std::logic_error("no fix, or one without the common part");
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(scene.detections));
+}
+BENCHMARK(fix_with_the_common_part)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
+
 /// The same lamps from a camera that drives at 1 m/s, turns and leans, with more and more unknown.
 void fix_of_a_body(benchmark::State& state, const Sensors& sensors, const BodyMotion& motion) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.1, -0.05, 0}, 0.4}, motion}, {}};

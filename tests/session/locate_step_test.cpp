@@ -68,6 +68,41 @@ TEST(LocateFrames, SeesALampThatMovedWhereItIs) {
   }
 }
 
+/// 36 captures of a surveyed room by a camera whose zenith and lens are known; 12 of them see lamp
+/// 2, which hangs elsewhere than the map says.
+LocateInput room_with_a_moved_lamp(double by_m) {
+  SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
+  LocateInput input{{}, rig.map, rig.calibration};
+  Adjustment adjustment{{}, MatrixX::Zero(12 + 4 + 24, 12 + 4 + 24), {"made up"}, 1, 1, 0.1};
+  for (const Lamp& lamp : rig.map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
+  adjustment.covariance.diagonal().tail<24>().setConstant(1e-3 * 1e-3);
+  input.calibration.adjustment = adjustment;
+  rig.map.lamps[1].position_m.x() += by_m;
+  Random random(5);
+  for (int i = 0; i < 36; ++i) {
+    const double x_m = random.uniform(-0.3, 0.3), y_m = random.uniform(-0.1, 0.1);
+    rig.camera = {{x_m, y_m, 0}, 0.1 * i};
+    std::vector<Detection> seen = with_noise(seen_from(rig, 0.05), random);
+    if (i >= 12) std::erase_if(seen, [](const Detection& one) { return one.lamp == 2; });
+    input.frames.push_back({std::to_string(i), seen});
+  }
+  return input;
+}
+
+TEST(LocateFrames, SaysOfALampLeftOutHowFarItIsOff) {
+  const LocateResult found = locate_frames(room_with_a_moved_lamp(0.03));
+  EXPECT_THAT(found.warnings,
+              testing::Contains("lamp 2 is left out of 12 of 36 captures: 30 mm off"));
+  ASSERT_EQ(found.lamps_left_out.size(), 1U);
+  EXPECT_EQ(found.lamps_left_out[0].lamp, 2);
+  for (std::size_t i = 0; i < 36; ++i) {
+    EXPECT_THAT(found.rows[i].rejected,
+                testing::ElementsAreArray(std::vector<int>(i < 12 ? 1 : 0, 2)));
+  }
+  EXPECT_THAT(locate_frames(room_with_a_moved_lamp(0)).lamps_left_out, IsEmpty());
+}
+
 TEST(LocateFrames, UsesInclinationsWhereThereAreSome) {
   LocateInput input = example();
   const double x_m = locate_frames(input).rows[0].fix->pose.position_m.x();

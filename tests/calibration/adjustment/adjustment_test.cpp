@@ -75,6 +75,23 @@ TEST(Adjustment, NamesALampThatHasMovedAndKeepsTheOthersFromIt) {
   }
 }
 
+/// A survey of 0.5 mm, pixels as noisy as real captures' are: 3 mm is named whatever lamp it is.
+TEST(Adjustment, NamesALampThatIsThreeMillimetresOff) {
+  for (std::size_t moved = 0; moved < 8; ++moved) {
+    Random random(50 + moved);
+    Survey survey(0.0005);
+    survey.sigma_px = 0.1;
+    survey.five_places(1e-4);
+    survey.add_noise(random, true, true, true);
+    survey.input.lamps.lamps[moved].position_m.head<2>() =
+        survey.truth.map.lamps[moved].position_m.head<2>() + Eigen::Vector2d(0.0024, -0.0018);
+    const AdjustmentResult found = adjust_captures(survey.input);
+    ASSERT_TRUE(found.ok());
+    EXPECT_EQ(moved_lamps(found), std::vector<int>{static_cast<int>(moved) + 1});
+    EXPECT_THAT(survey.misplaced(moved, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
+  }
+}
+
 TEST(Adjustment, DoesNotSpreadAMovedLampWithoutKnownPlaces) {
   Survey survey(0.001);
   survey.turn({0, 0, 0}, 12);

@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/passed_on.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <vector>
+
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+/// Errors that are known only together: the second is nearly the first's negative.
+MatrixX together() {
+  MatrixX covariance(3, 3);
+  covariance << 4e-4, -3.9e-4, 0, -3.9e-4, 4e-4, 1e-7, 0, 1e-7, 1e-8;
+  return covariance;
+}
+
+TEST(JacobianOf, IsThatOfALinearStepWhateverTheCovariance) {
+  MatrixX expected(2, 3);
+  expected << 1, -2, 30, 0.5, 4, -7;
+  const Eigen::Vector2d exact(3, -1);
+  const auto solved = [&](const Eigen::VectorXd& error) {
+    return std::optional<Eigen::Vector2d>(exact + expected * error);
+  };
+  for (const MatrixX& covariance : {together(), MatrixX(1e-10 * MatrixX::Identity(3, 3))}) {
+    const auto found = jacobian_of(solved, exact, covariance);
+    ASSERT_TRUE(found);
+    EXPECT_THAT(*found, IsNear(expected, 1e-9));
+  }
+}
+
+TEST(JacobianOf, TriesErrorsAsLargeAsTheyAreTogether) {
+  std::vector<Eigen::VectorXd> tried;
+  const auto solved = [&](const Eigen::VectorXd& error) {
+    tried.push_back(error);
+    return std::optional<Eigen::Vector2d>(error.head<2>());
+  };
+  ASSERT_TRUE(jacobian_of(solved, {0, 0}, together()));
+  ASSERT_EQ(tried.size(), 3U);
+  MatrixX sum = MatrixX::Zero(3, 3);
+  for (const Eigen::VectorXd& error : tried) sum += error * error.transpose();
+  EXPECT_THAT(sum, IsNear(together(), 1e-15));
+  EXPECT_NEAR(tried[0][0], 0.02, 1e-15);  // one standard deviation, and the second with it
+  EXPECT_NEAR(tried[0][1], -0.0195, 1e-15);
+}
+
+/// The chord over one standard deviation, not the tangent: f = x^2 at x = 1 with sd 0.1.
+TEST(JacobianOf, OfACurveIsTheChordOverOneStandardDeviation) {
+  const auto solved = [](const Eigen::VectorXd& error) {
+    const double x = 1 + error[0];
+    return std::optional<Eigen::Vector2d>({x * x, 0});
+  };
+  const auto found = jacobian_of(solved, {1, 0}, 0.01 * MatrixX::Identity(1, 1));
+  ASSERT_TRUE(found);
+  EXPECT_NEAR((*found)(0, 0), 2.1, 1e-12);
+  EXPECT_EQ((*found)(1, 0), 0);
+}
+
+TEST(JacobianOf, IsNothingWhereASolveFindsNothingOrTheCovarianceIsNone) {
+  const auto nothing = [](const Eigen::VectorXd& error) {
+    return error[2] != 0 ? std::nullopt : std::optional<Eigen::Vector2d>({0, 0});
+  };
+  EXPECT_FALSE(jacobian_of(nothing, {0, 0}, together()));
+  const auto same = [](const Eigen::VectorXd&) { return std::optional<Eigen::Vector2d>({0, 0}); };
+  MatrixX negative = MatrixX::Identity(3, 3);
+  negative(2, 2) = -1;
+  EXPECT_FALSE(jacobian_of(same, {0, 0}, negative));
+  EXPECT_FALSE(jacobian_of(same, {0, 0}, MatrixX::Zero(3, 3)));
+  const auto not_finite = [](const Eigen::VectorXd&) {
+    return std::optional<Eigen::Vector2d>({NAN, 0});
+  };
+  EXPECT_FALSE(jacobian_of(not_finite, {0, 0}, together()));
+}
+
+}  // namespace
+}  // namespace vlp
