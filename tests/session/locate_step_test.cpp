@@ -98,7 +98,7 @@ TEST(LocateFrames, SaysOfALampLeftOutHowFarItIsOff) {
   EXPECT_EQ(found.lamps_left_out[0].lamp, 2);
   for (std::size_t i = 0; i < 36; ++i) {
     EXPECT_THAT(found.rows[i].rejected,
-                testing::ElementsAreArray(std::vector<int>(i < 12 ? 1 : 0, 2)));
+                testing::ElementsAreArray(std::vector<int>(i < 12 ? 1U : 0U, 2)));
   }
   EXPECT_THAT(locate_frames(room_with_a_moved_lamp(0)).lamps_left_out, IsEmpty());
 }

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <map>
+#include <numbers>
 
 #include "calibration/adjustment/adjustment_problem.h"
 #include "calibration/adjustment/survey.h"
@@ -73,7 +74,7 @@ class DenseAdjustment {
         own.on_spot = true;
         own.yaw = std::ssize(start);
         const int in_spot = k < 4 ? k : k - 4, captures = k < 4 ? 4 : 5;
-        start.push_back(0.3 + 2 * EIGEN_PI * in_spot / captures);
+        start.push_back(0.3 + 2 * std::numbers::pi * in_spot / captures);
       }
       own_.push_back(own);
       ++k;
