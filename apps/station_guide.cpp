@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <stdexcept>
+#include <utility>
 
 #include "station/station_screen.h"
 
@@ -46,7 +47,7 @@ bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bo
 }  // namespace
 
 void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
-                StepSources& sources, Terminal& terminal) {
+                StepSources& sources, const Spool& spool, Terminal& terminal) {
   using Clock = std::chrono::steady_clock;
   constexpr int look_every_ms = 50;
   Clock::time_point last = Clock::now();
@@ -58,6 +59,7 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
     changed = changed || !arrivals.empty();
     if (changed && terminal.interactive()) {
       auto lines = station_screen(unit);
+      for (ScreenLine& line : spool_lines(spool.state())) lines.push_back(std::move(line));
       lines.push_back({"q: verdict now   Ctrl-C: leave, to go on later"});
       terminal.draw(lines);
     }

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
+#include <tuple>
 
 #include "app.h"
 #include "captures/printable.h"
@@ -15,6 +17,7 @@
 #include "station/database_name.h"
 #include "station/export_runs.h"
 #include "station/publish_run.h"
+#include "station/spool.h"
 #include "station/station_config.h"
 #include "station/station_screen.h"
 
@@ -26,17 +29,48 @@ constexpr const char* kAny = "any";
 /// To stdout; what records hold of names is not for the terminal to obey.
 void say(const std::string& text) { fmt::print("{}", printable(text)); }
 
-Records records_of(const StationRecordsOptions& options) {
-  if (options.station.empty() == options.records.empty()) {
-    throw std::invalid_argument("which records? Give --station or --records");
+/// What is known of runs: the records, and of a station those that wait for them, which are brought
+/// there first.
+struct Known {
+  std::optional<Spool> spool;
+  std::optional<Records> records;
+  /// Why the records cannot be asked.
+  std::string away = {};
+
+  explicit Known(const StationRecordsOptions& options) {
+    if (options.station.empty() == options.records.empty()) {
+      throw std::invalid_argument("which records? Give --station or --records");
+    }
+    std::string where = options.records;
+    if (where.empty()) {
+      const StationConfig config = read_station(options.station);
+      where = config.records;
+      spool.emplace(config.spool, where);
+      spool->deliver();
+    }
+    try {
+      if (!is_server(where) && !std::filesystem::exists(where)) {
+        throw InputError(name_of_database(where), "there are no records");
+      }
+      records.emplace(where);
+    } catch (const InputError& error) {
+      away = error.what();
+      if (waiting().empty()) throw;
+    }
+    const std::string state = spool ? spool->state() : "";
+    if (!state.empty()) spdlog::warn("{}", printable(state));
   }
-  const std::string where =
-      options.records.empty() ? read_station(options.station).records : options.records;
-  if (!is_server(where) && !std::filesystem::exists(where)) {
-    throw InputError(name_of_database(where), "there are no records");
+
+  const std::vector<RunRecord>& waiting() {
+    static const std::vector<RunRecord> none;
+    return spool ? spool->waiting() : none;
   }
-  return Records(where);
-}
+  /// For what cannot do without them.
+  Records& all() {
+    if (!records) throw std::runtime_error(away);
+    return *records;
+  }
+};
 
 /// A filter in which "any" is not asked for.
 RunFilter asked(RunFilter filter) {
@@ -46,15 +80,47 @@ RunFilter asked(RunFilter filter) {
   return filter;
 }
 
+bool passes(const RunRecord& run, const RunFilter& filter) {
+  const auto is = [](const std::string& text, const std::string& wanted) {
+    return wanted.empty() || text == wanted;
+  };
+  return is(run.camera, filter.camera) && is(run.station, filter.station) &&
+         is(run.verdict, filter.verdict) && is(run.kind, filter.kind);
+}
+
+/// Of the records, if they answer, and of those that wait; from the first to the last.
+std::vector<RunSummary> runs_of(Known& known, const RunFilter& filter) {
+  std::vector<RunSummary> runs;
+  if (known.records) runs = known.records->list(filter);
+  for (const RunRecord& run : known.waiting()) {
+    const bool there = std::any_of(runs.begin(), runs.end(),
+                                   [&](const RunSummary& other) { return other.run == run.run; });
+    if (there || !passes(run, filter)) continue;
+    runs.push_back({run.run, run.kind, run.station, run.camera, run.ended_utc, run.verdict,
+                    "(waits here) " + run.causes});
+  }
+  std::stable_sort(runs.begin(), runs.end(), [](const RunSummary& a, const RunSummary& b) {
+    return std::tie(a.ended_utc, a.run) < std::tie(b.ended_utc, b.run);
+  });
+  const auto last = static_cast<std::size_t>(filter.last);
+  if (last > 0 && runs.size() > last) {
+    runs.erase(runs.begin(), runs.end() - static_cast<std::ptrdiff_t>(last));
+  }
+  return runs;
+}
+
 /// The run that is named, or the last that the filter lets through.
-RunRecord run_of(Records& records, const StationRecordsOptions& options) {
+RunRecord run_of(Known& known, const StationRecordsOptions& options) {
   std::string run = options.run;
   if (run.empty()) {
-    const auto runs = records.list(asked(options.filter));
+    const auto runs = runs_of(known, asked(options.filter));
     if (runs.empty()) throw std::invalid_argument("there is no such run");
     run = runs.back().run;
   }
-  auto record = records.find(run);
+  for (const RunRecord& waiting : known.waiting()) {
+    if (waiting.run == run) return waiting;
+  }
+  auto record = known.all().find(run);
   if (!record) throw std::invalid_argument("there is no run " + run);
   return *record;
 }
@@ -86,8 +152,8 @@ void check_one_station(const std::vector<TrendPoint>& points,
 }  // namespace
 
 void list_runs(const StationRecordsOptions& options) {
-  Records records = records_of(options);
-  const auto runs = records.list(asked(options.filter));
+  Known known(options);
+  const auto runs = runs_of(known, asked(options.filter));
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}\n";
   say(fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
   for (const RunSummary& run : runs) {
@@ -108,11 +174,12 @@ void list_runs(const StationRecordsOptions& options) {
     fmt::print(": yield {:.1f} % of {}", percent * double(passed) / double(judged), judged);
   }
   fmt::print("\n");
+  known.all();  // these are not all there are when the records are away
 }
 
 void show_run(const StationRecordsOptions& options) {
-  Records records = records_of(options);
-  const RunRecord record = run_of(records, options);
+  Known known(options);
+  const RunRecord record = run_of(known, options);
   for (const ScreenLine& line : verdict_screen(record)) say(fmt::format("{}\n", line.text));
   fmt::print("\nfigures without a gate\n");
   for (const CheckedMetric& figure : record.figures) {
@@ -132,8 +199,8 @@ void restore_run(const StationRecordsOptions& options) {
   if (options.station.empty() && options.output.empty()) {
     throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
   }
-  Records records = records_of(options);
-  const RunRecord record = run_of(records, options);
+  Known known(options);
+  const RunRecord record = run_of(known, options);
   const std::string contradiction = contradiction_of(record);
   if (!contradiction.empty()) throw InputError(record.run, contradiction);
   const std::filesystem::path results = options.output.empty()
@@ -143,7 +210,8 @@ void restore_run(const StationRecordsOptions& options) {
 }
 
 void export_runs(const StationRecordsOptions& options) {
-  Records records = records_of(options);
+  Known known(options);
+  Records& records = known.all();
   std::vector<RunRecord> runs;
   for (const RunSummary& run : records.list(asked(options.filter))) {
     if (auto record = records.find(run.run)) runs.push_back(std::move(*record));
@@ -160,7 +228,8 @@ void show_trend(const StationRecordsOptions& options) {
     for (const MetricKind& kind : kinds) names.append(names.empty() ? "" : ", ").append(kind.name);
     throw std::invalid_argument("there is no figure " + options.figure + "; there are: " + names);
   }
-  Records records = records_of(options);
+  Known known(options);
+  Records& records = known.all();
   const RunFilter filter = comparable(options);
   const auto points = records.trend(options.figure, filter);
   check_one_station(points, options);

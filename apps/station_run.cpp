@@ -6,12 +6,15 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <functional>
 #include <stdexcept>
 
 #include "app.h"
+#include "captures/printable.h"
 #include "detection/image_file.h"
 #include "rig/input_error.h"
 #include "station/publish_run.h"
+#include "station/spool.h"
 #include "station/verify_station.h"
 #include "station_guide.h"
 
@@ -22,34 +25,46 @@ namespace fs = std::filesystem;
 
 const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 
-/// Record, verdict, files. The verdict is said whatever cannot be written.
-void conclude(const RunRecord& record, const std::vector<ReportPicture>& pictures, Records& records,
-              const StationConfig& config, Terminal& terminal) {
+/// Keeps the run, says the verdict, writes its files; then the records, which may be away.
+void conclude(const RunRecord& record, const std::vector<ReportPicture>& pictures, Spool& spool,
+              const StationConfig& config, Terminal& terminal,
+              const std::function<void()>& put_away) {
   auto lines = verdict_screen(record);
   try {
-    records.keep(record);
+    spool.keep(record);
   } catch (const InputError&) {
-    lines.push_back({"NOT RECORDED: do it again when the records can be written", Tone::bad});
+    lines.push_back({"NOT RECORDED: do it again when the run can be kept", Tone::bad});
     terminal.print(lines);
     throw;
   }
   terminal.print(lines);
+  std::string unwritten;
   try {
     const fs::path folder = publish_run(record, pictures, config.results);
     spdlog::info("run {}: {}", record.run, folder.string());
+    put_away();
   } catch (const InputError& error) {
-    throw std::runtime_error(
-        fmt::format("{}; the verdict {} is recorded: 'vlp-station restore {}' writes the files",
-                    error.what(), record.verdict, record.run));
+    unwritten = error.what();
   }
+  spool.deliver();
+  terminal.print(spool_lines(spool.state()));
+  if (unwritten.empty()) return;
+  throw std::runtime_error(
+      fmt::format("{}; the verdict {} is recorded: 'vlp-station restore {}' writes the files",
+                  unwritten, record.verdict, record.run));
 }
 
 /// What can be known before the first image.
-void prepare(Unit& unit, const StationConfig& config, Records& records) {
-  records.check_writable();
-  check_results(config.results, unit.camera_id());
-  unit.refuse_images_of_others([&records, camera = unit.camera_id()](const std::string& sha256) {
-    return records.owner_of(sha256, camera);
+void prepare(Spool& spool, const StationConfig& config, const std::string& camera) {
+  check_results(config.results, camera);
+  spool.prepare();
+  if (const std::string state = spool.state(); !state.empty()) spdlog::warn("{}", printable(state));
+}
+
+void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
+  prepare(spool, config, unit.camera_id());
+  unit.refuse_images_of_others([&spool, camera = unit.camera_id()](const std::string& sha256) {
+    return spool.owner_of(sha256, camera);
   });
 }
 
@@ -74,23 +89,23 @@ void add_folders(Unit& unit, const fs::path& folder) {
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }
 
-void run_batch(const StationRunOptions& options, const StationConfig& config, Records& records) {
+void run_batch(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
   const std::string run = new_run();
   Unit unit(config, options.camera_id, kProgram, options.threads);
-  prepare(unit, config, records);
+  prepare(unit, spool, config);
   add_folders(unit, options.batch);
   unit.advance(true);
   const RunRecord record = record_of(unit, run, kProgram);
   Terminal terminal;
-  conclude(record, unit.pictures(), records, config, terminal);
+  conclude(record, unit.pictures(), spool, config, terminal, [] {});
   throw_unless_passed(record);
 }
 
-void run_watched(const StationRunOptions& options, const StationConfig& config, Records& records) {
+void run_watched(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
   StepSources sources(options.sources, config.type.imager_px);
   Unit unit(config, options.camera_id, kProgram, options.threads);
-  prepare(unit, config, records);
-  WatchedRun watched(unit, records);
+  prepare(unit, spool, config);
+  WatchedRun watched(unit, spool);
   Terminal terminal;
   if (const auto& finished = watched.finished()) {
     terminal.print(verdict_screen(*finished));
@@ -99,11 +114,10 @@ void run_watched(const StationRunOptions& options, const StationConfig& config, 
     return throw_unless_passed(*finished);
   }
   spdlog::info("run {}; images go to {}/STEP", watched.run(), watched.folder().string());
-  guide_unit(options, unit, watched, sources, terminal);
+  guide_unit(options, unit, watched, sources, spool, terminal);
   unit.advance(true);
   const RunRecord record = record_of(unit, watched.run(), kProgram);
-  conclude(record, unit.pictures(), records, config, terminal);
-  watched.put_away();
+  conclude(record, unit.pictures(), spool, config, terminal, [&] { watched.put_away(); });
   throw_unless_passed(record);
 }
 
@@ -111,24 +125,24 @@ void run_watched(const StationRunOptions& options, const StationConfig& config, 
 
 void run_unit(const StationRunOptions& options) {
   const StationConfig config = read_station(options.station);
-  Records records(config.records);
-  if (options.batch.empty()) return run_watched(options, config, records);
-  run_batch(options, config, records);
+  Spool spool(config.spool, config.records);
+  if (options.batch.empty()) return run_watched(options, config, spool);
+  run_batch(options, config, spool);
 }
 
 void run_verify(const StationRunOptions& options) {
   const StationConfig config = read_station(options.station);
   if (!config.golden) throw InputError(options.station, "has no golden unit: add the key 'golden'");
-  Records records(config.records);
-  records.check_writable();
-  check_results(config.results, config.golden->camera_id);
+  Spool spool(config.spool, config.records);
+  prepare(spool, config, config.golden->camera_id);
   const fs::path arrived = config.captures / config.golden->camera_id;
   const bool batch = !options.batch.empty();
   const auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
                                                  new_run(), kProgram, options.threads);
   Terminal terminal;
-  conclude(record, pictures, records, config, terminal);
-  if (!batch) put_away(arrived, record.run);
+  conclude(record, pictures, spool, config, terminal, [&, run = record.run] {
+    if (!batch) put_away(arrived, run);
+  });
   throw_unless_passed(record, "station " + record.station + " has moved");
 }
 

@@ -105,7 +105,11 @@ void Terminal::print(const std::vector<ScreenLine>& lines) {
   for (const auto& [line, tone] : lines) {
     text += toned(printable(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
   }
-  if (!interactive_) return fmt::print("{}", text);
+  if (!interactive_) {
+    fmt::print("{}", text);
+    std::fflush(stdout);  // what comes next may take its time
+    return;
+  }
   show(text, lines.size());
   drawn_ = 0;
   last_.clear();

@@ -5,6 +5,7 @@
 #include <libpq-fe.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <map>
 #include <memory>
 
@@ -14,6 +15,8 @@ namespace vlp {
 namespace {
 
 constexpr const char* kScheme = "://";
+constexpr const char* kPatience = "connect_timeout";
+constexpr int kPatience_s = 10, kPatienceWithFile_s = 5;
 
 /// What libpq makes of a connection string; empty when it cannot.
 std::map<std::string, std::string> parts_of(const std::string& where) {
@@ -78,9 +81,19 @@ std::string connection_of(const std::string& where) {
       connection += c;
     }
   }
-  if (parts_of(where).contains("connect_timeout")) return connection;
-  return connection + (connection.find('?') == std::string::npos ? "?" : "&") +
-         "connect_timeout=10";
+  if (parts_of(where).contains(kPatience)) return connection;
+  return connection.append(connection.find('?') == std::string::npos ? "?" : "&")
+      .append(kPatience)
+      .append("=")
+      .append(std::to_string(kPatience_s));
+}
+
+int patience_s(const std::string& where) {
+  if (!is_server(where)) return kPatienceWithFile_s;
+  const auto parts = parts_of(where);
+  const auto said = parts.find(kPatience);
+  // What is no number libpq refuses.
+  return said == parts.end() ? kPatience_s : std::atoi(said->second.c_str());
 }
 
 }  // namespace vlp

@@ -15,8 +15,12 @@ bool is_server(const std::string& where);
 std::string name_of_database(const std::string& where);
 
 /// What SOCI's PostgreSQL takes for a connection string. SOCI 4.0 reads one without a parameter as
-/// the name of a database, and takes blanks and quotes for its own. It waits ten seconds for the
-/// server unless connect_timeout says otherwise. Precondition: is_server().
+/// the name of a database, and takes blanks and quotes for its own. It says how long to wait for
+/// the server, patience_s(). Precondition: is_server().
 std::string connection_of(const std::string& where);
+
+/// How long a database that does not answer is waited for, in seconds: a server as connect_timeout
+/// says, 0 or less for ever, ten without it; a file that another program writes, five.
+int patience_s(const std::string& where);
 
 }  // namespace vlp

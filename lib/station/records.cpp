@@ -2,12 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/records.h"
 
+#include <fcntl.h>
 #include <soci/postgresql/soci-postgresql.h>
 #include <soci/sqlite3/soci-sqlite3.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <thread>
 
 #include "rig/input_error.h"
 #include "station/database_name.h"
@@ -16,14 +23,13 @@
 namespace vlp {
 namespace {
 
-/// In seconds. Others that write a run need some milliseconds each.
-constexpr int kPatience_s = 30;
-
 /// What a connection has to be told each time that it is made.
-void set_up(soci::session& sql) {
+void set_up(soci::session& sql, int patience_s) {
   if (sql.get_backend_name() == "postgresql") {
     sql << "SET client_min_messages TO warning";
-    sql << "SET lock_timeout TO '" + std::to_string(kPatience_s) + "s'";
+    // Before this program gives up, so that the server says what it waits for.
+    constexpr int of_patience_ms = 900;
+    sql << "SET lock_timeout TO " + std::to_string(std::max(patience_s, 0) * of_patience_ms);
     return;
   }
   // What is committed is on the disk; a second connection sees runs whole.
@@ -35,34 +41,86 @@ void open(soci::session& sql, const std::string& where) {
   if (is_server(where)) {
     sql.open(soci::postgresql, connection_of(where));
   } else {
-    sql.open(soci::sqlite3, "dbname=\"" + where + "\" timeout=" + std::to_string(kPatience_s));
+    sql.open(soci::sqlite3,
+             "dbname=\"" + where + "\" timeout=" + std::to_string(patience_s(where)));
   }
-  set_up(sql);
 }
+
+/// Ends a connection on which nothing was heard for so long: libpq waits for the answer of a server
+/// that is frozen for ever, and what limits the server sets itself are frozen with it.
+class Watch {
+ public:
+  Watch(soci::session& sql, int patience_s) : patience_(patience_s) {
+    if (patience_s <= 0 || sql.get_backend_name() != "postgresql") return;
+    const auto* server = static_cast<soci::postgresql_session_backend*>(sql.get_backend());
+    // Of its own: libpq closes its socket when the connection is lost, and another may get the
+    // number.
+    socket_ = ::fcntl(PQsocket(server->conn_), F_DUPFD_CLOEXEC, 0);
+    if (socket_ >= 0) thread_ = std::thread([this] { wait(); });
+  }
+  ~Watch() {
+    if (socket_ < 0) return;
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+    ::close(socket_);
+  }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+
+  /// From now on again.
+  void heard() {
+    const std::lock_guard lock(mutex_);
+    last_ = Clock::now();
+  }
+  bool ended_it() {
+    const std::lock_guard lock(mutex_);
+    return ended_it_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void wait() {
+    std::unique_lock lock(mutex_);
+    while (!over_) {
+      const auto until = last_ + patience_;
+      if (Clock::now() >= until) {
+        ended_it_ = true;
+        ::shutdown(socket_, SHUT_RDWR);
+        return;
+      }
+      changed_.wait_until(lock, until);
+    }
+  }
+
+  std::chrono::seconds patience_;
+  Clock::time_point last_ = Clock::now();
+  bool over_ = false, ended_it_ = false;
+  int socket_ = -1;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::thread thread_;
+};
 
 }  // namespace
 
 struct Records::Database {
   /// For messages.
   std::string name;
+  int patience_s = 0;
   soci::session sql;
 
   /// Tables are there; from then on a connection that was lost is made again.
   bool ready = false;
 
-  /// Errors name the database. The action may be done twice.
+  /// Errors name the database.
   template <typename Action>
-  auto run(const Action& action) {
+  auto named(const Action& action) {
     try {
-      try {
-        return action();
-      } catch (const soci::soci_error&) {
-        if (!ready || sql.is_connected()) throw;
-      }
-      // A unit takes its minutes: meanwhile the server was started anew, or the network fell
-      // asleep.
-      sql.reconnect();
-      set_up(sql);
       return action();
     } catch (const InputError&) {
       throw;
@@ -71,20 +129,50 @@ struct Records::Database {
       std::replace_if(
           what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
       const bool away = name.starts_with("postgresql://") && !sql.is_connected();
-      throw InputError(name,
-                       away ? "the server of the records cannot be reached; when it answers, the "
-                              "same command goes on: " +
-                                  what
-                            : "the records: " + what);
+      throw InputError(name, away ? "the server of the records cannot be reached: " + what
+                                  : "the records: " + what);
     } catch (const std::exception& error) {
       throw InputError(name, error.what());
+    }
+  }
+
+  /// The action may be done twice. It takes the watch, to tell of what it hears in between.
+  template <typename Action>
+  auto run(const Action& action, int times_the_patience = 1) {
+    return named([&] {
+      try {
+        return watched(action, times_the_patience);
+      } catch (const soci::soci_error&) {
+        if (!ready || sql.is_connected()) throw;
+      }
+      // A unit takes its minutes: meanwhile the server was started anew, or the network fell
+      // asleep.
+      sql.reconnect();
+      set_up(sql, patience_s);
+      return watched(action, times_the_patience);
+    });
+  }
+
+ private:
+  template <typename Action>
+  auto watched(const Action& action, int times_the_patience) {
+    Watch watch(sql, times_the_patience * patience_s);
+    try {
+      return action(watch);
+    } catch (const soci::soci_error&) {
+      if (!watch.ended_it()) throw;
+      throw InputError(name, "the server of the records has not answered for " +
+                                 std::to_string(times_the_patience * patience_s) + " s");
     }
   }
 };
 
 namespace {
 
-void put_figures(soci::session& sql, const RunRecord& record) {
+/// Times the patience: the server gathers them before it sends the first.
+constexpr int kManyRows = 10;
+
+void put_figures(soci::session& sql, const RunRecord& record, Watch& watch) {
   int place = 0;
   for (const CheckedMetric& figure : record.figures) {
     const double value = figure.value.value_or(0), gate = figure.limit.value_or(0);
@@ -97,15 +185,17 @@ void put_figures(soci::session& sql, const RunRecord& record) {
         soci::use(record.run), soci::use(place), soci::use(figure.name),
         soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least), soci::use(met),
         soci::use(figure.unit);
+    watch.heard();
   }
 }
 
-void put_images(soci::session& sql, const RunRecord& record) {
+void put_images(soci::session& sql, const RunRecord& record, Watch& watch) {
   for (const auto& [step, name, sha256, refused] : record.images) {
     sql << "INSERT INTO images (run, step, image, sha256, refused) VALUES (:run, :step, :image, "
            ":sha256, :refused)",
         soci::use(record.run), soci::use(step), soci::use(name), soci::use(sha256),
         soci::use(refused);
+    watch.heard();
   }
 }
 
@@ -138,8 +228,10 @@ std::vector<Row> last_of(std::vector<Row> rows, int last) {
 
 Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
   database_->name = name_of_database(where);
-  database_->run([&] {
-    open(database_->sql, where);
+  database_->patience_s = patience_s(where);
+  database_->named([&] { open(database_->sql, where); });
+  database_->run([&](Watch&) {
+    set_up(database_->sql, database_->patience_s);
     make_record_tables(database_->sql);
   });
   database_->ready = true;
@@ -148,7 +240,7 @@ Records::Records(const std::string& where) : database_(std::make_unique<Database
 Records::~Records() = default;
 
 void Records::keep(const RunRecord& record) {
-  database_->run([&] {
+  database_->run([&](Watch& watch) {
     soci::session& sql = database_->sql;
     soci::transaction transaction(sql);
     // Writes first, so that it waits for others before it has read anything.
@@ -165,15 +257,15 @@ void Records::keep(const RunRecord& record) {
     insert.define_and_bind();
     insert.execute(true);
     if (insert.get_affected_rows() > 0) {
-      put_figures(sql, record);
-      put_images(sql, record);
+      put_figures(sql, record, watch);
+      put_images(sql, record, watch);
     }
     transaction.commit();
   });
 }
 
 void Records::check_writable() {
-  database_->run([&] {
+  database_->run([&](Watch&) {
     soci::transaction transaction(database_->sql);
     database_->sql << "UPDATE vlp_schema SET version = version";
     transaction.rollback();
@@ -181,7 +273,7 @@ void Records::check_writable() {
 }
 
 std::string Records::owner_of(const std::string& sha256, const std::string& other_than_camera) {
-  return database_->run([&] {
+  return database_->run([&](Watch&) {
     std::string camera, run;
     database_->sql << "SELECT runs.camera, runs.run FROM images JOIN runs ON runs.run = images.run "
                       "WHERE images.sha256 = :sha256 AND images.refused = '' AND runs.camera <> "
@@ -192,57 +284,64 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
 }
 
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
-  return database_->run([&] {
-    RunSummary row;
-    std::vector<RunSummary> rows;
-    soci::statement statement(database_->sql);
-    statement.exchange(soci::into(row.run));
-    statement.exchange(soci::into(row.kind));
-    statement.exchange(soci::into(row.station));
-    statement.exchange(soci::into(row.camera));
-    statement.exchange(soci::into(row.ended_utc));
-    statement.exchange(soci::into(row.verdict));
-    statement.exchange(soci::into(row.causes));
-    bind(statement, filter);
-    statement.alloc();
-    statement.prepare("SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
-                      condition(filter) + " ORDER BY ended_utc, run");
-    statement.define_and_bind();
-    statement.execute();
-    while (statement.fetch()) rows.push_back(row);
-    return last_of(std::move(rows), filter.last);
-  });
+  return database_->run(
+      [&](Watch&) {
+        RunSummary row;
+        std::vector<RunSummary> rows;
+        soci::statement statement(database_->sql);
+        statement.exchange(soci::into(row.run));
+        statement.exchange(soci::into(row.kind));
+        statement.exchange(soci::into(row.station));
+        statement.exchange(soci::into(row.camera));
+        statement.exchange(soci::into(row.ended_utc));
+        statement.exchange(soci::into(row.verdict));
+        statement.exchange(soci::into(row.causes));
+        bind(statement, filter);
+        statement.alloc();
+        statement.prepare(
+            "SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
+            condition(filter) + " ORDER BY ended_utc, run");
+        statement.define_and_bind();
+        statement.execute();
+        while (statement.fetch()) rows.push_back(row);
+        return last_of(std::move(rows), filter.last);
+      },
+      kManyRows);
 }
 
 std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilter& filter) {
-  return database_->run([&] {
-    TrendPoint row;
-    std::vector<TrendPoint> rows;
-    soci::statement statement(database_->sql);
-    statement.exchange(soci::into(row.run));
-    statement.exchange(soci::into(row.station));
-    statement.exchange(soci::into(row.camera));
-    statement.exchange(soci::into(row.verdict));
-    statement.exchange(soci::into(row.value));
-    bind(statement, filter);
-    statement.exchange(soci::use(figure));
-    statement.alloc();
-    statement.prepare(
-        "SELECT runs.run, runs.station, runs.camera, runs.verdict, figures.value FROM runs JOIN "
-        "figures ON "
-        "figures.run = runs.run " +
-        condition(filter) +
-        " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, "
-        "runs.run");
-    statement.define_and_bind();
-    statement.execute();
-    while (statement.fetch()) rows.push_back(row);
-    return last_of(std::move(rows), filter.last);
-  });
+  return database_->run(
+      [&](Watch&) {
+        TrendPoint row;
+        std::vector<TrendPoint> rows;
+        soci::statement statement(database_->sql);
+        statement.exchange(soci::into(row.run));
+        statement.exchange(soci::into(row.station));
+        statement.exchange(soci::into(row.camera));
+        statement.exchange(soci::into(row.verdict));
+        statement.exchange(soci::into(row.value));
+        bind(statement, filter);
+        statement.exchange(soci::use(figure));
+        statement.alloc();
+        statement.prepare(
+            "SELECT runs.run, runs.station, runs.camera, runs.verdict, "
+            "figures.value FROM runs "
+            "JOIN "
+            "figures ON "
+            "figures.run = runs.run " +
+            condition(filter) +
+            " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, "
+            "runs.run");
+        statement.define_and_bind();
+        statement.execute();
+        while (statement.fetch()) rows.push_back(row);
+        return last_of(std::move(rows), filter.last);
+      },
+      kManyRows);
 }
 
 std::optional<RunRecord> Records::find(const std::string& run) {
-  return database_->run([&]() -> std::optional<RunRecord> {
+  return database_->run([&](Watch&) -> std::optional<RunRecord> {
     soci::session& sql = database_->sql;
     RunRecord record;
     soci::statement select(sql);

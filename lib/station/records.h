@@ -32,9 +32,10 @@ struct TrendPoint {
 /// The records of one or more stations in a database: a file of SQLite, or PostgreSQL by a
 /// connection string postgresql://... Tables are made when they are not there, those of an earlier
 /// version brought up to date; of a later one they are refused. Any number of programs may use it
-/// at once: each run is written in one transaction, which waits up to half a minute for another's.
-/// What is kept is on the disk. A connection that was lost is made again. All throw InputError that
-/// names the database, but no password.
+/// at once: each run is written in one transaction, which waits for another's. What is kept is on
+/// the disk. A connection that was lost is made again. All throw InputError that names the
+/// database, but no password, also when the database does not answer for patience_s(), ten times as
+/// long where many runs are asked for.
 class Records {
  public:
   explicit Records(const std::string& where);

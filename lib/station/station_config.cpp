@@ -131,6 +131,8 @@ StationConfig read_station(const fs::path& file) {
   config.captures = path_of(document.required("captures"), file);
   config.results = path_of(document.required("results"), file);
   config.records = records_of(document.required("records"), file);
+  const auto spool = document.optional("spool");
+  config.spool = spool ? path_of(*spool, file) : file.parent_path() / "spool";
   document.finish();
   const auto& lamps = config.lamps.lamps;
   if (std::none_of(lamps.begin(), lamps.end(), [](const Lamp& l) { return l.frequency_hz; })) {

@@ -65,6 +65,9 @@ struct StationConfig {
   std::string records;
   /// SHA-256 of the digests of station.yaml and of the files that it names.
   std::string sha256;
+  /// The folder in which runs wait for the records, `spool` beside the station unless it says
+  /// another.
+  std::filesystem::path spool;
 };
 
 /// The metrics of a unit, and those that its gates can be of.

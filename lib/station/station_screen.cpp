@@ -8,6 +8,7 @@
 #include <span>
 #include <sstream>
 
+#include "captures/printable.h"
 #include "station/guidance.h"
 
 namespace vlp {
@@ -104,6 +105,12 @@ std::string last_image_line(const Unit& unit, StationStep step, const std::strin
   const std::string outcome =
       found == images.end() ? "waits for the step before" : outcome_of(found->second);
   return fmt::format("{} {}: {} ({})", name_of(step), image, outcome, count_of(unit, step));
+}
+
+std::vector<ScreenLine> spool_lines(const std::string& state) {
+  std::vector<ScreenLine> lines;
+  if (!state.empty()) add_wrapped(lines, "Records", printable(state), Tone::bad);
+  return lines;
 }
 
 std::vector<ScreenLine> verdict_screen(const RunRecord& record) {

@@ -13,17 +13,12 @@
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "station/publish_run.h"
+#include "station/station_folders.h"
 
 namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
-
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw InputError(folder, "cannot be made: " + error.message());
-}
 
 /// Changes when the tables that tell the captures' places do.
 std::string state_of_tables(const fs::path& folder) {
@@ -48,9 +43,9 @@ std::string camera_id_problem(const std::string& camera_id) {
   return "a camera's id has letters, digits, '-', '_' and '.', up to 64, no '.' first";
 }
 
-WatchedRun::WatchedRun(Unit& unit, Records& records)
+WatchedRun::WatchedRun(Unit& unit, Spool& spool)
     : unit_(unit), folder_(unit.config().captures / unit.camera_id()) {
-  begin(records);
+  begin(spool);
   if (finished_) return;
   for (const StationStep step : kStationSteps) {
     make_folder(folder_ / name_of(step));
@@ -64,7 +59,7 @@ WatchedRun::~WatchedRun() {
   if (lock_ >= 0) ::close(lock_);
 }
 
-void WatchedRun::begin(Records& records) {
+void WatchedRun::begin(Spool& spool) {
   make_folder(folder_);
   const fs::path lock = folder_ / ".lock", state = folder_ / ".run";
   lock_ = ::open(lock.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
@@ -76,7 +71,7 @@ void WatchedRun::begin(Records& records) {
   if (fs::exists(state)) {
     run_ = read_text_file(state, longest);
     run_.erase(std::find(run_.begin(), run_.end(), '\n'), run_.end());
-    finished_ = records.find(run_);
+    finished_ = spool.find(run_);
     if (!finished_) return;  // goes on
     publish_run(*finished_, {}, unit_.config().results);
     put_away();

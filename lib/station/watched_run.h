@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "station/records.h"
+#include "station/spool.h"
 #include "station/unit.h"
 #include "station/watched_folder.h"
 
@@ -25,7 +25,7 @@ class WatchedRun {
  public:
   /// Makes the folders. Throws InputError: another program works on this camera, a folder cannot be
   /// made.
-  WatchedRun(Unit& unit, Records& records);
+  WatchedRun(Unit& unit, Spool& spool);
   ~WatchedRun();
   WatchedRun(const WatchedRun&) = delete;
   WatchedRun& operator=(const WatchedRun&) = delete;
@@ -48,11 +48,11 @@ class WatchedRun {
   const std::string& run() const { return run_; }
   const std::filesystem::path& folder() const { return folder_; }
 
-  /// After the record is kept.
+  /// After the run is kept.
   void put_away() { vlp::put_away(folder_, run_); }
 
  private:
-  void begin(Records& records);
+  void begin(Spool& spool);
 
   Unit& unit_;
   std::filesystem::path folder_;

@@ -235,6 +235,39 @@ TEST_F(Station, LosesNoVerdictWhenItsFilesCannotBeWritten) {
   EXPECT_THAT(this->result("0001", "report.html"), HasSubstr("<strong>INVALID"));
 }
 
+/// Records away: units get their verdicts all the same, and nothing is lost.
+TEST_F(Station, KeepsRunsHereWhileTheRecordsAreAway) {
+  change("station.yaml", "records: records.db", "records: share/records.db");
+  change("scene.yaml", "count: 16", "count: 4");
+  render("boards");
+  const auto first = run_program(batch("0001"));
+  EXPECT_EQ(first.exit_code, 3);
+  EXPECT_THAT(first.errors, HasSubstr("runs are kept here: "));
+  EXPECT_THAT(first.output,
+              AllOf(HasSubstr("INVALID   camera 0001"), HasSubstr("Records  kept here, 1 waiting:"),
+                    HasSubstr("share/records.db")));
+  // Guards go on with what is kept here.
+  const auto second = run_program(batch("0002"));
+  EXPECT_THAT(second.errors, HasSubstr("4 of 4 images refused: 4 already of camera 0001"));
+  EXPECT_THAT(second.output, HasSubstr("kept here, 2 waiting"));
+  const auto listed = records("list");
+  EXPECT_EQ(listed.exit_code, 2) << "these may not be all";
+  EXPECT_THAT(listed.output,
+              AllOf(HasSubstr("(waits here) boards"), HasSubstr("2 runs, 0 passed")));
+  EXPECT_THAT(listed.errors, HasSubstr("kept here, 2 waiting"));
+  EXPECT_EQ(records("export -o " + (folder / "runs.csv").string()).exit_code, 2);
+  const auto shown = records("show --camera-id 0002");
+  EXPECT_EQ(shown.exit_code, 0);
+  EXPECT_THAT(shown.output, HasSubstr("INVALID   camera 0002"));
+
+  fs::create_directory(folder / "station/share");
+  const auto there = records("list");
+  EXPECT_EQ(there.exit_code, 0) << there.errors;
+  EXPECT_THAT(there.output, AllOf(HasSubstr("2 runs, 0 passed"), Not(HasSubstr("waits"))));
+  EXPECT_TRUE(fs::is_empty(folder / "station/spool"));
+  EXPECT_THAT(records("list").output, HasSubstr("2 runs"));
+}
+
 /// A station that is watched: exit code 1 for an alarm, of what can be compared.
 TEST_F(Station, WatchesATrend) {
   change("scene.yaml", "count: 16", "count: 4");

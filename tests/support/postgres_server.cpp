@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "support/postgres_server.h"
 
+#include <signal.h>
 #include <stdlib.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
 #include <vector>
 
 namespace vlp {
@@ -46,8 +48,8 @@ PostgresServer::PostgresServer() {
   if (as_owner("initdb " + data + "--auth=trust --username=vlp --no-sync --encoding=UTF8") != 0) {
     return;
   }
-  const std::string start = "-c listen_addresses= -c fsync=off -k " + folder;
-  if (as_owner("pg_ctl " + data + "-w -o \"" + start + "\" start") != 0) return;
+  start();
+  if (as_owner("pg_ctl " + data + "status") != 0) return;
   uri_ = "postgresql://vlp@/postgres?host=" + folder;
 }
 
@@ -57,8 +59,30 @@ std::string PostgresServer::plain_uri() const {
   return "postgresql://vlp@" + host + "/postgres";
 }
 
+void PostgresServer::stop() const {
+  as_owner("pg_ctl -D '" + folder_.string() + "/data' -m immediate stop");
+}
+
+void PostgresServer::start() const {
+  as_owner("pg_ctl -D '" + folder_.string() +
+           "/data' -w -o \"-c listen_addresses= -c fsync=off -k " + folder_.string() + "\" start");
+}
+
+void PostgresServer::signal(int number) const {
+  long postmaster = 0;
+  std::ifstream(folder_ / "data/postmaster.pid") >> postmaster;
+  if (postmaster <= 1) return;
+  const std::string process = "/proc/" + std::to_string(postmaster);
+  std::ifstream children(process + "/task/" + std::to_string(postmaster) + "/children");
+  ::kill(static_cast<pid_t>(postmaster), number);
+  for (long child = 0; children >> child;) ::kill(static_cast<pid_t>(child), number);
+}
+
+void PostgresServer::freeze() const { signal(SIGSTOP); }
+void PostgresServer::thaw() const { signal(SIGCONT); }
+
 PostgresServer::~PostgresServer() {
-  if (!uri_.empty()) as_owner("pg_ctl -D '" + folder_.string() + "/data' -m immediate stop");
+  if (!uri_.empty()) stop();
   std::error_code ignored;
   fs::remove_all(folder_, ignored);
 }

@@ -23,8 +23,16 @@ class PostgresServer {
   /// The same without a parameter: the socket's folder stands for the host.
   std::string plain_uri() const;
 
+  /// At once, as by a power cut; and again.
+  void stop() const;
+  void start() const;
+  /// Its processes stand still (SIGSTOP), or go on.
+  void freeze() const;
+  void thaw() const;
+
  private:
   int as_owner(const std::string& command) const;
+  void signal(int number) const;
 
   std::filesystem::path folder_;
   std::string uri_;

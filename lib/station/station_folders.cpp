@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/station_folders.h"
+
+#include <fmt/core.h>
+
+#include "rig/file.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+
+namespace fs = std::filesystem;
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw InputError(folder, "cannot be made: " + error.message());
+}
+
+void check_room(const fs::path& folder, std::uintmax_t bytes) {
+  constexpr double megabyte = 1e6;
+  make_folder(folder);
+  std::error_code error;
+  const fs::space_info space = fs::space(folder, error);
+  if (!error && space.available < bytes) {
+    throw InputError(folder,
+                     fmt::format("has room for {:.1f} MB, the results of a run may need "
+                                 "{:.0f}: make room before the unit is begun",
+                                 double(space.available) / megabyte, double(bytes) / megabyte));
+  }
+  const fs::path probe = folder / ".writable";
+  write_file(probe, "results can be written here\n");
+  fs::remove(probe, error);
+}
+
+}  // namespace vlp

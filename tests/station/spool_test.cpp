@@ -1,0 +1,352 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/spool.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "rig/child_process.h"
+#include "station/station_config.h"
+#include "support/postgres_server.h"
+#include "support/random.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+using testing::StartsWith;
+
+constexpr std::size_t kImagesOfARun = 30;
+
+/// With digests of its own.
+RunRecord numbered_run(int number) {
+  RunRecord run;
+  run.run = "20261121T134501Z-" + std::to_string(100000 + number);
+  run.kind = "unit";
+  run.station = "station-1";
+  run.camera = "camera-" + std::to_string(number);
+  run.begun_utc = begun_utc(run.run);
+  run.ended_utc = "2026-11-21T13:50:01Z";
+  run.judge({{"the lens is \"blurred\"", true}, {"second", false}});
+  run.program = "vlp-station 0";
+  run.libraries = "none";
+  run.config_sha256 = std::string(64, 'a');
+  run.calibration = "format: vlp-calibration/1\n";
+  run.figures = check_all({{"rms_px", 1}, {"tilt_deg", 2}},
+                          {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, unit_metrics());
+  for (std::size_t i = 0; i < kImagesOfARun; ++i) {
+    run.images.push_back({"boards", std::to_string(1000 + i) + ".png",
+                          "digest-" + std::to_string(number) + "-" + std::to_string(i), ""});
+  }
+  return run;
+}
+
+/// The names of all runs in the records; each is whole.
+std::set<std::string> whole_runs(const std::string& where) {
+  Records records(where);
+  std::set<std::string> names;
+  for (const RunSummary& run : records.list({})) {
+    const auto kept = records.find(run.run);
+    EXPECT_THAT(kept->images, SizeIs(kImagesOfARun));
+    EXPECT_THAT(kept->figures, SizeIs(3));
+    EXPECT_TRUE(names.insert(run.run).second);
+  }
+  return names;
+}
+
+double seconds_of(const std::function<void()>& action) {
+  const auto begun = std::chrono::steady_clock::now();
+  action();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+}
+
+TEST(SpooledRun, IsReadAsItWasWritten) {
+  const TemporaryFolder folder;
+  RunRecord run = numbered_run(1);
+  for (const RunField& field : run_fields()) run.*field.text += "\n\"\\ \xc3\xbc\t{}\n";
+  run.images[1].refused = "too dark";
+  const RunRecord read = read_run(folder.file("run.json", text_of_run(run)));
+  for (const RunField& field : run_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
+  ASSERT_THAT(read.figures, SizeIs(run.figures.size()));
+  for (std::size_t i = 0; i < run.figures.size(); ++i) {
+    EXPECT_EQ(read.figures[i].name, run.figures[i].name);
+    EXPECT_EQ(read.figures[i].unit, run.figures[i].unit);
+    EXPECT_EQ(read.figures[i].value, run.figures[i].value);  // to the last bit
+    EXPECT_EQ(read.figures[i].limit, run.figures[i].limit);
+    EXPECT_EQ(read.figures[i].asked, run.figures[i].asked);
+  }
+  ASSERT_THAT(read.images, SizeIs(run.images.size()));
+  EXPECT_EQ(read.images[1].refused, "too dark");
+  EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
+}
+
+TEST(SpooledRun, MayHaveNamesThatAreNoText) {
+  const TemporaryFolder folder;
+  RunRecord run = numbered_run(1);
+  run.images[0].name = "\xff\x1b[31m.png";
+  EXPECT_EQ(read_run(folder.file("run.json", text_of_run(run))).images[0].name,
+            "\\xff\\x1b[31m.png");
+}
+
+TEST(SpooledRun, IsRefusedWithItsFile) {
+  const TemporaryFolder folder;
+  const std::string text = text_of_run(numbered_run(1));
+  for (const std::string& bad :
+       {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
+        std::string(text).replace(text.find("vlp-run/1"), 9, "vlp-run/2"),
+        std::string(text).replace(text.find("\"figures\""), 9, "\"figurer\"")}) {
+    EXPECT_THAT(refusal_of([&] { read_run(folder.file("bad.json", bad)); }),
+                HasSubstr("bad.json: is no run of a station"));
+  }
+}
+
+TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "away/records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are kept here: "), HasSubstr("records.db")));
+  for (int i = 0; i < 3; ++i) spool.keep(numbered_run(i));
+  spool.deliver();
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 3 waiting: "), HasSubstr("records.db")));
+  EXPECT_EQ(spool.find(numbered_run(1).run)->camera, "camera-1");
+  EXPECT_FALSE(spool.find("another"));
+  // Guards go on with what is known here.
+  EXPECT_EQ(spool.owner_of("digest-2-7", "camera-1"),
+            "camera camera-2: run " + numbered_run(2).run);
+  EXPECT_EQ(spool.owner_of("digest-2-7", "camera-2"), "");
+
+  fs::create_directory(folder / "away");
+  Spool later(folder / "spool", where);
+  later.prepare();
+  EXPECT_EQ(later.state(), "");
+  EXPECT_THAT(later.waiting(), IsEmpty());
+  EXPECT_THAT(whole_runs(where), SizeIs(3));
+  EXPECT_EQ(Records(where).find(numbered_run(1).run)->figures[0].value, 0.1 + 0.2);
+  EXPECT_EQ(later.owner_of("digest-2-7", "camera-1"),
+            "camera camera-2: run " + numbered_run(2).run);
+}
+
+TEST(Spool, IsNotHeldUpByWhatIsNoRun) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.keep(numbered_run(1));
+  folder.file("spool/0.json", "{}\n");
+  folder.file("spool/.1.json.tmp-1-0", "{");
+  spool.deliver();
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("0.json")));
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+}
+
+TEST(Spool, ThatCannotBeWrittenPassesRunsOn) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder.file("spool", ""), where);
+  EXPECT_THAT(refusal_of([&] { spool.prepare(); }), HasSubstr("spool: cannot be made"));
+  spool.keep(numbered_run(1));
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+  Spool neither(folder / "spool", (folder / "away/records.db").string());
+  EXPECT_THAT(
+      refusal_of([&] { neither.keep(numbered_run(2)); }),
+      AllOf(HasSubstr("spool: neither here can a run be kept"), HasSubstr("away/records.db")));
+}
+
+TEST(Spool, RefusesWhatIsNoConnectionString) {
+  EXPECT_THAT(refusal_of([&] { Spool("spool", "postgresql://vlp:a@b@/c"); }),
+              HasSubstr("is not of the form"));
+}
+
+TEST(Spool, WaitsForALockedFileNotLong) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  { const Records made(where); }
+  const auto locked = folder / "locked", done = folder / "done";
+  const auto client = folder.file("lock.py",
+                                  "import os, sqlite3, sys, time\n"
+                                  "database = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+                                  "database.execute('BEGIN EXCLUSIVE')\n"
+                                  "open(sys.argv[2], 'w')\n"
+                                  "for i in range(600):\n"
+                                  "    if os.path.exists(sys.argv[3]): break\n"
+                                  "    time.sleep(0.05)\n");
+  const std::string command =
+      "python3 " + client.string() + " " + where + " " + locked.string() + " " + done.string();
+  std::thread other([&] { EXPECT_EQ(std::system(command.c_str()), 0); });
+  while (!fs::exists(locked)) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  Spool spool(folder / "spool", where);
+  spool.keep(numbered_run(1));
+  EXPECT_LT(seconds_of([&] { spool.deliver(); }), 15);
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), HasSubstr("locked")));
+  folder.file("done", "");
+  other.join();
+  Spool(folder / "spool", where).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+}
+
+TEST(Spool, OutlastsAFullDisk) {
+  const TemporaryFolder folder;
+  const auto small = folder / "small";
+  fs::create_directory(small);
+  if (::mount("none", small.c_str(), "tmpfs", 0, "size=128k") != 0) {
+    GTEST_SKIP() << "no small file system can be mounted here";
+  }
+  const std::string where = (small / "records.db").string();
+  {
+    Spool spool(folder / "spool", where);
+    for (int i = 0; i < 40; ++i) spool.keep(numbered_run(i));
+    spool.deliver();
+    const std::size_t there = whole_runs(where).size();
+    EXPECT_LT(there, 40u);
+    EXPECT_THAT(spool.waiting(), SizeIs(40 - there));
+    EXPECT_THAT(spool.state(), HasSubstr("full"));
+    // Records that are full are read all the same.
+    EXPECT_EQ(spool.owner_of("digest-0-1", "b"), "camera camera-0: run " + numbered_run(0).run);
+  }
+  ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
+  Spool(folder / "spool", where).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(40));
+  ::umount(small.c_str());
+}
+
+TEST(Spool, OfSeveralProgramsLosesNothing) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  for (int i = 0; i < 25; ++i) spool.keep(numbered_run(i));
+  std::vector<pid_t> children;
+  for (int program = 1; program <= 3; ++program) {
+    children.push_back(start_child([&, program] {
+      Spool own(folder / "spool", where);
+      for (int i = 0; i < 5; ++i) {
+        own.keep(numbered_run(100 * program + i));
+        own.deliver();
+      }
+    }));
+  }
+  for (const pid_t child : children) {
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    EXPECT_EQ(status, 0);
+  }
+  spool.deliver();
+  EXPECT_EQ(spool.state(), "");
+  EXPECT_THAT(whole_runs(where), SizeIs(40));
+}
+
+/// A program that keeps one run after another is killed at random moments; with
+/// VLP_STATION_KILLS=200 as it was tried once.
+void kill_while_keeping(const TemporaryFolder& folder, const std::string& where, int kills) {
+  const auto log = folder / "kept";
+  if (const char* text = std::getenv("VLP_STATION_KILLS")) kills = std::atoi(text);
+  Random random(7);
+  for (int i = 0; i < kills; ++i) {
+    const pid_t child = start_child([&] {
+      Spool spool(folder / "spool", where);
+      const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+      for (int run = 1000 * i; run < 1000 * i + 1000; ++run) {
+        spool.keep(numbered_run(run));
+        const std::string line = numbered_run(run).run + "\n";  // kept, as far as anybody is told
+        if (::write(file, line.data(), line.size()) < 0) std::abort();
+        spool.deliver();
+      }
+    });
+    const int wait_us = static_cast<int>(1e6 * random.uniform(0, 0.15));
+    std::this_thread::sleep_for(std::chrono::microseconds(wait_us));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ::waitpid(child, &status, 0);
+  }
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  EXPECT_EQ(spool.state(), "");
+  const auto runs = whole_runs(where);
+  std::istringstream kept(TemporaryFolder::content_of(log));
+  int count = 0;
+  for (std::string run; std::getline(kept, run); ++count) EXPECT_TRUE(runs.contains(run)) << run;
+  EXPECT_GT(count, 0);
+  // What was killed between keeping and telling may be there, too.
+  EXPECT_LE(runs.size(), static_cast<std::size_t>(count + kills));
+}
+
+TEST(Spool, LosesNothingWhenItIsKilled) {
+  const TemporaryFolder folder;
+  kill_while_keeping(folder, (folder / "records.db").string(), 15);
+}
+
+TEST(Spool, OutlastsItsServer) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  const TemporaryFolder folder;
+  const std::string where = server.uri() + "&connect_timeout=2";
+  const auto spool = [&] { return Spool(folder / "spool", where); };
+  kill_while_keeping(folder, where, 5);
+  const std::size_t before = whole_runs(where).size();
+
+  // Stopped before the record; new units begin.
+  Spool running = spool();
+  running.prepare();
+  server.stop();
+  running.keep(numbered_run(-1));
+  running.deliver();
+  EXPECT_THAT(running.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+                                     HasSubstr("server of the records cannot be reached")));
+  Spool begun = spool();
+  begun.prepare();
+  begun.keep(numbered_run(-2));
+  begun.deliver();
+  EXPECT_THAT(begun.state(), StartsWith("kept here, 2 waiting: "));
+  server.start();
+  Spool(spool()).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(before + 2));
+
+  // Frozen, with a connection and without: nobody waits for it without a word, nor twice.
+  Spool connected = spool();
+  connected.prepare();
+  EXPECT_EQ(connected.state(), "");
+  server.freeze();
+  EXPECT_LT(seconds_of([&] { EXPECT_EQ(connected.owner_of("digest-1-1", "b"), ""); }), 8);
+  connected.keep(numbered_run(-3));
+  EXPECT_LT(seconds_of([&] { connected.deliver(); }), 1);
+  EXPECT_THAT(connected.state(),
+              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("has not answered for 2 s")));
+  Spool fresh = spool();
+  EXPECT_LT(seconds_of([&] { fresh.prepare(); }), 8);
+  EXPECT_THAT(fresh.state(), StartsWith("kept here, 1 waiting: "));
+  server.thaw();
+  Spool(spool()).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(before + 3));
+
+  // Killed in the middle of many.
+  for (int i = 0; i < 200; ++i) fresh.keep(numbered_run(1'000'000 + i));
+  std::thread power([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));
+    server.stop();
+  });
+  Spool(spool()).deliver();
+  power.join();
+  const std::size_t waiting = fresh.waiting().size();
+  server.start();
+  EXPECT_GT(waiting, 0u) << "the server was stopped too late for this machine";
+  for (int i = 0; i < 5 && !fresh.waiting().empty(); ++i) Spool(spool()).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(before + 203));
+}
+
+}  // namespace
+}  // namespace vlp
