@@ -7,15 +7,19 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <tuple>
+#include <utility>
 
 #include "app.h"
 #include "captures/printable.h"
 #include "rig/input_error.h"
+#include "station/capability.h"
 #include "station/control_chart.h"
 #include "station/database_name.h"
 #include "station/export_runs.h"
+#include "station/measurement_study.h"
 #include "station/publish_run.h"
 #include "station/spool.h"
 #include "station/station_config.h"
@@ -85,7 +89,8 @@ bool passes(const RunRecord& run, const RunFilter& filter) {
     return wanted.empty() || text == wanted;
   };
   return is(run.camera, filter.camera) && is(run.station, filter.station) &&
-         is(run.verdict, filter.verdict) && is(run.kind, filter.kind);
+         is(run.verdict, filter.verdict) && is(run.kind, filter.kind) &&
+         run.ended_utc >= filter.since && (filter.until.empty() || run.ended_utc < filter.until);
 }
 
 /// Of the records, if they answer, and of those that wait; from the first to the last.
@@ -125,15 +130,57 @@ RunRecord run_of(Known& known, const StationRecordsOptions& options) {
   return *record;
 }
 
-/// What a trend is of unless it is asked for more: units that passed, of the station.
+/// What is compared unless it is asked for otherwise: units of the station.
 RunFilter comparable(const StationRecordsOptions& options) {
   RunFilter filter = options.filter;
-  if (filter.verdict.empty()) filter.verdict = name_of(Verdict::pass);
   if (filter.kind.empty()) filter.kind = "unit";
   if (filter.station.empty() && !options.station.empty()) {
     filter.station = read_station(options.station).station;
   }
   return asked(filter);
+}
+
+/// The values of runs that were judged, unless one verdict is asked for.
+std::vector<TrendPoint> judged(Records& records, const std::string& figure,
+                               const RunFilter& filter) {
+  auto points = records.trend(figure, filter);
+  if (filter.verdict.empty()) {
+    std::erase_if(
+        points, [](const TrendPoint& point) { return point.verdict == name_of(Verdict::invalid); });
+  }
+  return points;
+}
+
+MetricKind figure_of(const StationRecordsOptions& options) {
+  const auto kinds = unit_metrics();
+  const auto kind = std::find_if(kinds.begin(), kinds.end(),
+                                 [&](const MetricKind& any) { return any.name == options.figure; });
+  if (kind != kinds.end()) return *kind;
+  std::string names;
+  for (const MetricKind& any : kinds) names.append(names.empty() ? "" : ", ").append(any.name);
+  throw std::invalid_argument("there is no figure " + options.figure + "; there are: " + names);
+}
+
+/// The gate of a figure: the station's, or that of the last of the runs.
+std::optional<double> gate_of(const std::string& figure, const StationRecordsOptions& options,
+                              Records& records, const std::vector<TrendPoint>& points) {
+  if (!options.station.empty()) {
+    for (const Gate& gate : read_station(options.station).gates) {
+      if (gate.metric == figure) return gate.limit;
+    }
+    return std::nullopt;
+  }
+  const auto last = points.empty() ? std::nullopt : records.find(points.back().run);
+  if (!last) return std::nullopt;
+  for (const CheckedMetric& any : last->figures) {
+    if (any.name == figure) return any.limit;
+  }
+  return std::nullopt;
+}
+
+ToleranceLimits limits_of(const MetricKind& kind, std::optional<double> gate) {
+  if (kind.asked == Direction::at_least) return {gate, std::nullopt};
+  return {std::nullopt, gate};
 }
 
 /// Records that several stations share, when nothing says of which.
@@ -221,16 +268,11 @@ void export_runs(const StationRecordsOptions& options) {
 }
 
 void show_trend(const StationRecordsOptions& options) {
-  const auto kinds = unit_metrics();
-  if (std::none_of(kinds.begin(), kinds.end(),
-                   [&](const auto& kind) { return kind.name == options.figure; })) {
-    std::string names;
-    for (const MetricKind& kind : kinds) names.append(names.empty() ? "" : ", ").append(kind.name);
-    throw std::invalid_argument("there is no figure " + options.figure + "; there are: " + names);
-  }
+  const MetricKind kind = figure_of(options);
   Known known(options);
   Records& records = known.all();
-  const RunFilter filter = comparable(options);
+  RunFilter filter = comparable(options);
+  if (options.filter.verdict.empty()) filter.verdict = name_of(Verdict::pass);
   const auto points = records.trend(options.figure, filter);
   check_one_station(points, options);
   constexpr std::size_t least = 2;
@@ -241,20 +283,112 @@ void show_trend(const StationRecordsOptions& options) {
   std::vector<double> values;
   values.reserve(points.size());
   for (const TrendPoint& point : points) values.push_back(point.value);
+  const auto alarms = chart_alarms(values, options.rules);
   const ControlChart chart = control_chart(values);
-  if (!options.output.empty()) draw_trend(options.output, options.figure, points);
-  fmt::print("{} of {} runs\nmean      {:.4g}\nlimits    {:.4g} to {:.4g}\n", options.figure,
-             points.size(), chart.mean, chart.lower, chart.upper);
-  for (const std::size_t i : chart.outside) {
-    say(fmt::format("outside   {} {} {:.4g}\n", points[i].run, points[i].camera, values[i]));
+  const auto gate = gate_of(options.figure, options, records, points);
+  if (!options.output.empty()) draw_trend(options.output, options.figure, points, alarms, gate);
+  say(fmt::format("{} of {} runs, {} to {}\nmean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n",
+                  options.figure, points.size(), points.front().ended_utc, points.back().ended_utc,
+                  chart.mean, kind.unit, chart.lower, chart.upper));
+  if (gate) fmt::print("gate      {} {:.4g}\n", words_of(kind.asked), *gate);
+  for (const ChartAlarm& alarm : alarms) {
+    const TrendPoint& point = points[alarm.index];
+    say(fmt::format("{} {} {} {:.4g}  {}: {}\n", point.ended_utc, point.run, point.camera,
+                    point.value, alarm.rule, alarm.meaning));
   }
-  for (const std::size_t i : chart.drifting) {
-    say(fmt::format("drift     {} {} {:.4g}: the eighth or more in a row on one side\n",
-                    points[i].run, points[i].camera, values[i]));
+  if (alarms.empty()) return;
+  throw GateNotMet(fmt::format("{}: {} alarms, the last {} at {}", options.figure, alarms.size(),
+                               alarms.back().rule, points[alarms.back().index].run));
+}
+
+void show_capability(const StationRecordsOptions& options) {
+  std::vector<MetricKind> kinds = unit_metrics();
+  if (!options.figure.empty()) kinds = {figure_of(options)};
+  Known known(options);
+  Records& records = known.all();
+  const RunFilter filter = comparable(options);
+  constexpr const char* head = "{:<22}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<22}{}\n";
+  std::string rows;
+  for (const MetricKind& kind : kinds) {
+    const auto points = judged(records, kind.name, filter);
+    check_one_station(points, options);
+    std::vector<double> values;
+    for (const TrendPoint& point : points) values.push_back(point.value);
+    const auto gate = gate_of(kind.name, options, records, points);
+    const auto found = capability(values, limits_of(kind, gate));
+    if (!found) continue;
+    const auto index = [](const CapabilityIndex& of) {
+      return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
+    };
+    rows += fmt::format(
+        head, kind.name, found->count, fmt::format("{:.4g}", found->mean),
+        fmt::format("{:.3g}", found->within_sd), fmt::format("{:.3g}", found->overall_sd),
+        fmt::format("{} {:.4g}", kind.asked == Direction::at_least ? ">=" : "<=", gate.value_or(0)),
+        index(found->cpk), index(found->ppk));
   }
-  if (chart.outside.empty() && chart.drifting.empty()) return;
-  throw GateNotMet(fmt::format("{}: {} of the runs outside the limits, {} in a drift",
-                               options.figure, chart.outside.size(), chart.drifting.size()));
+  if (rows.empty()) {
+    throw Undetermined(
+        "no figure with a gate has two values that differ, of runs that were judged");
+  }
+  say(fmt::format(head, "figure", "runs", "mean", "sd within", "overall", "gate", "Cpk (95 %)",
+                  "Ppk (95 %)") +
+      rows);
+}
+
+void show_study(const StationRecordsOptions& options) {
+  const MetricKind kind = figure_of(options);
+  Known known(options);
+  Records& records = known.all();
+  RunFilter filter = options.filter;
+  if (filter.kind.empty()) filter.kind = "unit";
+  const auto points = judged(records, options.figure, asked(filter));
+  std::map<std::string, std::size_t> runs;
+  for (const TrendPoint& point : points) ++runs[point.camera];
+  std::vector<StudyValue> values;
+  for (const TrendPoint& point : points) {
+    const bool named = std::count(options.units.begin(), options.units.end(), point.camera) > 0;
+    if (named || (options.units.empty() && runs[point.camera] > 1)) {
+      values.push_back({point.camera, point.station, point.value});
+    }
+  }
+  const MeasurementStudy study = measurement_study(values);
+  const ToleranceLimits limits = limits_of(kind, gate_of(options.figure, options, records, points));
+  say(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}\n\n", options.figure,
+                  study.units, study.stations, study.repeats, study.mean, kind.unit));
+  fmt::print("{:<18}{:>5}{:>14}{:>14}\n", "", "dof", "squares", "mean square");
+  for (const auto& [name, line] :
+       {std::pair("units", study.unit), std::pair("stations", study.station),
+        std::pair("units x stations", study.both), std::pair("error", study.error)}) {
+    fmt::print("{:<18}{:>5}{:>14.5g}{:>14.5g}\n", name, line.dof, line.sum_of_squares,
+               line.mean_square());
+  }
+  if (study.interaction_p) {
+    fmt::print("units x stations by chance with p = {:.3f}: {}\n", *study.interaction_p,
+               study.pooled ? "taken as error" : "of its own");
+  }
+  fmt::print("\n{:<34}{:>12}{:>14}\n", "", "sd", "% of total");
+  const auto part = [&](const char* name, double sd) {
+    constexpr double percent = 100;
+    fmt::print("{:<34}{:>12.5g}{:>14.1f}\n", name, sd,
+               study.total > 0 ? percent * sd / study.total : 0);
+  };
+  part("repeatability (EV)", study.repeatability);
+  if (study.stations > 1) {
+    part("stations (AV)", study.of_station);
+    part("units x stations (INT)", study.of_both);
+  }
+  part("measuring, all of it (GRR)", study.measuring);
+  part("units (PV)", study.of_unit);
+  part("total (TV)", study.total);
+  if (const auto categories = study.distinct_categories()) {
+    fmt::print("distinct categories (ndc){:>21}\n", *categories);
+  }
+  if (const auto share = study.percent_of_tolerance(limits)) {
+    fmt::print("measuring / tolerance (P/T){:>19.1f} %\n", *share);
+  }
+  if (study.stations == 1) {
+    fmt::print("\nOne station: nothing is known of what stations differ by.\n");
+  }
 }
 
 }  // namespace vlp

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "station/records.h"
 
@@ -14,6 +15,10 @@ struct StationRecordsOptions {
   std::string station, records;
   RunFilter filter;
   std::string run, figure, output;
+  /// Of a control chart.
+  std::vector<std::string> rules{"western-electric"};
+  /// Of a study: its units; those with two runs or more when there is none.
+  std::vector<std::string> units;
 };
 
 /// vlp-station list: a line for each run.
@@ -24,8 +29,14 @@ void show_run(const StationRecordsOptions& options);
 void restore_run(const StationRecordsOptions& options);
 /// vlp-station export: CSV, a line for each run, or JSON with all there is.
 void export_runs(const StationRecordsOptions& options);
-/// vlp-station trend: a figure over the runs, as a picture with a control chart's limits; of units
-/// of the station that passed, unless the filter says otherwise. Throws GateNotMet for an alarm.
+/// vlp-station trend: a figure over the runs, with a control chart's limits and rules, also as a
+/// picture; of units of the station that passed, unless the filter says otherwise. Throws
+/// GateNotMet for an alarm.
 void show_trend(const StationRecordsOptions& options);
+/// vlp-station capability: how the figures that have gates scatter, compared with them.
+void show_capability(const StationRecordsOptions& options);
+/// vlp-station study: what measuring adds to a figure, of units that were measured several times on
+/// each of the stations.
+void show_study(const StationRecordsOptions& options);
 
 }  // namespace vlp

@@ -59,6 +59,9 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
       ->check(CLI::IsMember({"PASS", "FAIL", "INVALID", "any"}));
   command->add_option("--kind", options.filter.kind, "Only units, or only golden units")
       ->check(CLI::IsMember({"unit", "golden", "any"}));
+  command->add_option("--since", options.filter.since,
+                      "Only those that ended at this UTC or later, 2026-11-21 or 2026-11-21T13:45");
+  command->add_option("--until", options.filter.until, "Only those that ended before this UTC");
   command->add_option("--last", options.filter.last, "Only the last so many")
       ->check(CLI::Range(1, 1'000'000));
   return command;
@@ -74,10 +77,12 @@ int main(int argc, char** argv) {
       "check to PASS, FAIL (exit code 1: the camera) or INVALID (3: the station, the operator, an "
       "early\n"
       "end: do it again), as its images arrive or from full folders (--batch);\n"
-      "'verify' measures a reference camera; 'list', 'show', 'export' and 'trend' tell of the "
-      "records,\n"
-      "'restore' writes a run's files again. Runs wait in the station's 'spool' while the records\n"
-      "cannot be reached.\n"
+      "'verify' measures a reference camera; 'list', 'show', 'export', 'trend', 'capability' and "
+      "'study'\n"
+      "tell of the records, 'restore' writes a run's files again. Runs wait in the station's "
+      "'spool' "
+      "while\n"
+      "the records cannot be reached.\n"
       "vlp-station COMMAND --help tells more.\n\n"
       "Example, from the project's folder:\n"
       "  mkdir -p out && cp -rT datasets/station out/station\n"
@@ -105,14 +110,35 @@ int main(int argc, char** argv) {
                       "The folder of results (default: the station's); in it CAMERA/RUN/");
   auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
   exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
+  constexpr const char* which = "Which: rms_px, check_mean_mm, ...";
   auto* trend = vlp::add_records(
       app, "trend",
       "A figure over the runs, with the limits of a control chart; exit code 1 for an alarm. Of "
       "units "
       "of the station that passed, unless --verdict, --kind or --of-station says otherwise",
       records);
-  trend->add_option("figure", records.figure, "Which: rms_px, check_mean_mm, ...")->required();
+  trend->add_option("figure", records.figure, which)->required();
   trend->add_option("-o,--output", records.output, "Draw it, .png or .svg");
+  trend
+      ->add_option(
+          "--rules", records.rules,
+          "What is an alarm: western-electric (four rules), nelson (eight), one of them as "
+          "nelson-3, ewma (default: western-electric)")
+      ->option_text("RULE ...");
+  auto* capable = vlp::add_records(app, "capability",
+                                   "How figures scatter compared with their gates: Cpk, Ppk, with "
+                                   "95 % intervals. Of units of the "
+                                   "station that were judged",
+                                   records);
+  capable->add_option("figure", records.figure, "Only this: rms_px, check_mean_mm, ...");
+  auto* study = vlp::add_records(app, "study",
+                                 "What measuring adds to a figure: repeatability and "
+                                 "reproducibility (%GRR, ndc) of units that "
+                                 "were run as often on each station",
+                                 records);
+  study->add_option("figure", records.figure, which)->required();
+  study->add_option("--units", records.units, "Its cameras (default: those with two runs or more)")
+      ->option_text("ID ...");
   return vlp::run_app(app, argc, argv, [&] {
     if (app.got_subcommand("run")) vlp::run_unit(run);
     if (app.got_subcommand("verify")) vlp::run_verify(run);
@@ -121,5 +147,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("restore")) vlp::restore_run(records);
     if (app.got_subcommand("export")) vlp::export_runs(records);
     if (app.got_subcommand("trend")) vlp::show_trend(records);
+    if (app.got_subcommand("capability")) vlp::show_capability(records);
+    if (app.got_subcommand("study")) vlp::show_study(records);
   });
 }

@@ -205,12 +205,14 @@ std::string condition(const RunFilter& filter) {
   if (!filter.station.empty()) text += " AND runs.station = :station";
   if (!filter.verdict.empty()) text += " AND runs.verdict = :verdict";
   if (!filter.kind.empty()) text += " AND runs.kind = :kind";
+  if (!filter.since.empty()) text += " AND runs.ended_utc >= :since";
+  if (!filter.until.empty()) text += " AND runs.ended_utc < :until";
   return text;
 }
 
 void bind(soci::statement& statement, const RunFilter& filter) {
-  for (const std::string* value :
-       {&filter.camera, &filter.station, &filter.verdict, &filter.kind}) {
+  for (const std::string* value : {&filter.camera, &filter.station, &filter.verdict, &filter.kind,
+                                   &filter.since, &filter.until}) {
     if (!value->empty()) statement.exchange(soci::use(*value));
   }
 }
@@ -319,12 +321,13 @@ std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilte
         statement.exchange(soci::into(row.station));
         statement.exchange(soci::into(row.camera));
         statement.exchange(soci::into(row.verdict));
+        statement.exchange(soci::into(row.ended_utc));
         statement.exchange(soci::into(row.value));
         bind(statement, filter);
         statement.exchange(soci::use(figure));
         statement.alloc();
         statement.prepare(
-            "SELECT runs.run, runs.station, runs.camera, runs.verdict, "
+            "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, "
             "figures.value FROM runs "
             "JOIN "
             "figures ON "

@@ -14,6 +14,8 @@ namespace vlp {
 /// Which runs; what is empty is not asked for.
 struct RunFilter {
   std::string camera, station, verdict, kind;
+  /// Those that ended at this UTC or later, and before that one, as 2026-11-21 or 2026-11-21T13:45.
+  std::string since, until;
   /// The last ones; 0 for all.
   int last = 0;
 };
@@ -25,7 +27,7 @@ struct RunSummary {
 
 /// A figure of one run.
 struct TrendPoint {
-  std::string run, station, camera, verdict;
+  std::string run, station, camera, verdict, ended_utc;
   double value;
 };
 

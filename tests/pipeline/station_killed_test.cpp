@@ -149,24 +149,25 @@ TEST_F(StationKilled, SurvivesAFullDisk) {
   // Full while the unit is worked on, so that a record fits in part.
   for (const int free_bytes : {4096, 12288}) {
     fs::resize_file(fill, 0);
+    const std::string camera = "c" + std::to_string(free_bytes);
     for (const auto& image : images("boards")) {
-      fs::create_directories(captures("c") / "boards");
-      drop(image, captures("c") / "boards");
+      fs::create_directories(captures(camera) / "boards");
+      drop(image, captures(camera) / "boards");
     }
     const auto full =
-        run_program("(until [ -d " + small.string() +
-                    "/c ]; do sleep 0.05; done; sleep 0.5; head -c 12000000 /dev/zero >" + fill +
+        run_program("(until [ -d " + small.string() + "/" + camera +
+                    " ]; do sleep 0.05; done; sleep 0.5; head -c 12000000 /dev/zero >" + fill +
                     "; truncate -s -" + std::to_string(free_bytes) + " " + fill + ") & " +
-                    run("c", "--idle-s 3") + "; code=$?; wait; exit $code");
+                    run(camera, "--idle-s 3") + "; code=$?; wait; exit $code");
     EXPECT_THAT(full.exit_code, testing::AnyOf(2, 3)) << full.errors;
-    EXPECT_THAT(full.output, HasSubstr("INVALID   camera c"));
+    EXPECT_THAT(full.output, HasSubstr("INVALID   camera " + camera));
     if (full.exit_code == 2) {
       EXPECT_THAT(full.errors, HasSubstr("results"));
     }
   }
   fs::remove(fill);
   EXPECT_THAT(records("list --camera-id b").output, HasSubstr("1 runs, 0 passed"));
-  for (const char* camera : {"a", "b", "c"}) {
+  for (const char* camera : {"a", "b", "c4096", "c12288"}) {
     if (!fs::exists(small / camera)) continue;
     for (const auto& run : fs::directory_iterator(small / camera)) {
       EXPECT_EQ(records("show " + run.path().filename().string()).exit_code, 0)

@@ -274,12 +274,14 @@ TEST_F(Station, WatchesATrend) {
   render("boards");
   ASSERT_EQ(run_program(batch()).exit_code, 3);  // makes the tables
   const auto add = [&](int first, const std::string& of, const std::string& kind,
-                       const std::string& verdict, const std::vector<double>& values) {
+                       const std::string& verdict, const std::vector<double>& values,
+                       const std::string& camera = "a") {
     std::string sql;
     for (std::size_t i = 0; i < values.size(); ++i) {
       const std::string run = std::to_string(first + static_cast<int>(i));
       sql.append("INSERT INTO runs SELECT '").append(run).append("', '").append(kind);
-      sql.append("', '").append(of).append("', 'a', '', '").append(run).append("', '");
+      sql.append("', '").append(of).append("', '").append(camera).append("', '', '");
+      sql.append(run).append("', '");
       sql.append(verdict).append("', '', '', '', '', '';\n");
       sql.append("INSERT INTO figures VALUES ('").append(run).append("', 1, 'rms_px', ");
       sql.append(std::to_string(values[i])).append(", NULL, 0, 1, 'px');\n");
@@ -313,7 +315,30 @@ TEST_F(Station, WatchesATrend) {
   add(500, "station-1", "unit", "PASS", {7});
   const auto alarm = records("trend rms_px");
   EXPECT_EQ(alarm.exit_code, 1);
-  EXPECT_THAT(alarm.output, HasSubstr("outside   500"));
+  EXPECT_THAT(alarm.output, HasSubstr("500 500 a 7  western-electric-1: more than 3 sigmas"));
+  EXPECT_THAT(records("trend rms_px --rules nelson ewma").output, HasSubstr("nelson-1: "));
+  EXPECT_EQ(records("trend rms_px --rules western-electric-2").exit_code, 0);
+  EXPECT_THAT(records("trend rms_px --rules none").errors, HasSubstr("there is no rule none"));
+  EXPECT_THAT(records("trend rms_px --until 200").output, HasSubstr("10 runs, 100 to 109"));
+  EXPECT_THAT(records("list --since 400 --until 460").output, HasSubstr("2 runs"));
+
+  // Failed units count in the capability; those that were not judged do not.
+  EXPECT_THAT(records("capability rms_px").output, ContainsRegex("rms_px +13 .*<= 0.3 +-"));
+  EXPECT_EQ(records("capability tilt_deg").exit_code, 3);
+  for (const int which : {0, 1}) {
+    const std::string camera = which == 0 ? "m1" : "m2";
+    add(600 + 20 * which, "station-1", "unit", "PASS", {which + 1.0, which + 1.2}, camera);
+    add(610 + 20 * which, "station-2", "unit", "PASS", {which + 1.1, which + 1.3}, camera);
+  }
+  // By hand: squares of units 2, stations 0.02, both 0, error 0.08 with 4 + 1 degrees of freedom.
+  const auto study = records("study rms_px --units m1 m2");
+  EXPECT_EQ(study.exit_code, 0) << study.errors;
+  EXPECT_THAT(study.output,
+              AllOf(HasSubstr("2 units, 2 stations, 2 runs each, mean 1.65 px"),
+                    ContainsRegex("\\(EV\\) +0.12649"), ContainsRegex("\\(AV\\) +0.031623"),
+                    ContainsRegex("\\(GRR\\) +0.13038"), ContainsRegex("\\(PV\\) +0.70427"),
+                    ContainsRegex("ndc\\) +7\n")));
+  EXPECT_THAT(records("study rms_px --units m1").errors, HasSubstr("two units or more"));
 }
 
 /// What is at full scale hides edges and stripes.

@@ -266,7 +266,7 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
         spool.deliver();
       }
     });
-    const int wait_us = static_cast<int>(1e6 * random.uniform(0, 0.15));
+    const int wait_us = static_cast<int>(1e6 * random.uniform(0, 0.25));
     std::this_thread::sleep_for(std::chrono::microseconds(wait_us));
     ::kill(child, SIGKILL);
     int status = 0;

@@ -1,0 +1,16 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+namespace vlp {
+
+/// P(X <= x) of chi squared, of any positive degrees of freedom: the regularized incomplete gamma
+/// function P(dof / 2, x / 2) (NIST DLMF 8.7.1 below the mean, 8.9.2 above).
+double chi_square_cdf(double x, double dof);
+/// Its inverse, to rounding. Precondition: 0 < probability < 1.
+double chi_square_quantile(double probability, double dof);
+
+/// P(X > x) of Fisher's F: the regularized incomplete beta function (NIST DLMF 8.17.22).
+double f_upper_tail(double x, double dof_above, double dof_below);
+
+}  // namespace vlp
