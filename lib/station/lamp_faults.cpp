@@ -8,6 +8,8 @@
 #include <cmath>
 #include <optional>
 #include <set>
+#include <tuple>
+#include <utility>
 
 #include "calibration/levelling/map_doubt.h"
 #include "positioning/positioner.h"
@@ -72,9 +74,9 @@ std::vector<std::string> unseen(std::span<const Frame> frames, const LampMap& ma
 }  // namespace
 
 std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
-                                     const Calibration& calibration) {
+                                     const Calibration& calibration, double fits_px) {
   constexpr std::size_t least_frames = 3, least_lamps = 4;
-  constexpr double fits_px = 1, far_better = 0.3;
+  constexpr double far_better = 0.3;
   if (frames.size() < least_frames) return {};
   std::vector<std::string> faults = unseen(frames, map);
   std::string doubt = doubt_of_map(frames, map, calibration);
@@ -90,6 +92,84 @@ std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMa
                   fmt::format("lamp {} is loose: it does not hang where the map says", mend.lamp));
   }
   return faults;
+}
+
+std::vector<std::string> place_faults(std::span<const Frame> frames, const LampMap& map,
+                                      const Calibration& calibration, const CapturesTable& places) {
+  struct Error {
+    std::string image;
+    double horizontal_m;
+  };
+  const Positioner positioner(map, calibration);
+  std::vector<Error> errors;
+  for (const Frame& frame : frames) {
+    const auto place = places.find(frame.image);
+    if (place == places.end() || place->second.place == PlaceOf::axis) continue;
+    const auto& [x_m, y_m] = std::tie(place->second.x_m, place->second.y_m);
+    const Fix fix = positioner.locate(frame.detections);
+    if (!x_m || !y_m || !fix.ok() || fix.lamps < 3) continue;
+    const auto& position_m = fix.estimate.pose.position_m;
+    errors.push_back({frame.image, std::hypot(position_m.x() - *x_m, position_m.y() - *y_m)});
+  }
+  constexpr std::size_t least = 5, few = 10;
+  constexpr double least_m = 0.005, times = 8, millimetres = 1e3;
+  if (errors.size() < least) return {};
+  std::vector<double> sizes_m;
+  sizes_m.reserve(errors.size());
+  for (const Error& error : errors) sizes_m.push_back(error.horizontal_m);
+  const auto middle = sizes_m.begin() + static_cast<std::ptrdiff_t>(sizes_m.size() / 2);
+  std::nth_element(sizes_m.begin(), middle, sizes_m.end());
+  const double typical_m = *middle;
+  std::vector<std::string> faults;
+  for (const auto& [image, horizontal_m] : errors) {
+    if (horizontal_m < std::max(least_m, times * typical_m)) continue;
+    faults.push_back(
+        fmt::format("{} was not taken where its table says: it is {:.1f} mm off, others {:.2g} mm",
+                    image, millimetres * horizontal_m, millimetres * typical_m));
+  }
+  if (faults.size() > std::max<std::size_t>(1, errors.size() / few)) return {};
+  return faults;
+}
+
+std::optional<double> row_time_that_fits(std::span<const double> frequencies_hz, const LampMap& map,
+                                         double row_time_s) {
+  constexpr double alike = 0.01, farthest = 1.4, most = 0.8;
+  constexpr std::size_t least_lamps = 3;
+  // Each light may be each lamp: what fits most of the others, too, is what is the matter.
+  std::size_t best = 0;
+  double best_misfit = 0;
+  std::optional<double> found_s;
+  for (const double hypothesis_hz : frequencies_hz) {
+    for (const Lamp& as : map.lamps) {
+      if (!as.frequency_hz) continue;
+      const double ratio = *as.frequency_hz / hypothesis_hz;
+      if (ratio > farthest || ratio < 1 / farthest) continue;
+      std::set<double> lamps_hz;
+      std::size_t fitting = 0;
+      double misfit = 0;
+      for (const double frequency_hz : frequencies_hz) {
+        double nearest = alike, lamp_hz = 0;
+        for (const Lamp& lamp : map.lamps) {
+          const double off =
+              lamp.frequency_hz ? std::abs(ratio * frequency_hz / *lamp.frequency_hz - 1) : 1;
+          if (off < nearest) std::tie(nearest, lamp_hz) = std::pair(off, *lamp.frequency_hz);
+        }
+        if (nearest >= alike) continue;
+        ++fitting;
+        misfit += nearest;
+        lamps_hz.insert(lamp_hz);
+      }
+      const bool better = fitting > best || (fitting == best && misfit < best_misfit);
+      if (lamps_hz.size() < least_lamps || !better) continue;
+      best = fitting;
+      best_misfit = misfit;
+      found_s = row_time_s / ratio;
+    }
+  }
+  if (static_cast<double>(best) < most * static_cast<double>(frequencies_hz.size())) {
+    return std::nullopt;
+  }
+  return found_s;
 }
 
 }  // namespace vlp

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
@@ -15,8 +17,23 @@ namespace vlp {
 /// What is wrong with the lamps of a station, as far as captures that do not fit the map tell it:
 /// two that are swapped, or a map that is mirrored (calibration/levelling/map_doubt.h); one that
 /// hangs elsewhere, when the map without it fits far better; one that is never seen.
-/// One line for people each; nothing when the map fits, or nothing single mends it.
+/// One line for people each; nothing when the map fits to `fits_px`, the mean residual per capture,
+/// or nothing single mends it. A camera that is being calibrated may be a pixel off; of one that is
+/// known less is asked.
 std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
-                                     const Calibration& calibration);
+                                     const Calibration& calibration, double fits_px = 1);
+
+/// Captures that were taken elsewhere than their table says: fixes of three lamps or more, not more
+/// than a tenth of them, that are off by more than 5 mm and 8 times what the others are off by. One
+/// line for people each.
+std::vector<std::string> place_faults(std::span<const Frame> frames, const LampMap& map,
+                                      const Calibration& calibration, const CapturesTable& places);
+
+/// The row time that the camera has in truth, when lights that are like no lamp would all be lamps
+/// of the map with it: `frequencies_hz` are theirs with `row_time_s`, f' = f row_time_s / true row
+/// time. Four fifths of them, of three lamps or more, have to fit to 1 %, and it has to lie within
+/// 40 %.
+std::optional<double> row_time_that_fits(std::span<const double> frequencies_hz, const LampMap& map,
+                                         double row_time_s);
 
 }  // namespace vlp

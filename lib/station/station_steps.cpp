@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <utility>
@@ -40,6 +41,11 @@ void compare(const Camera& type, LensResult& result) {
       projection_difference(result.solution.lens(), Lens(type.lens_model, nominal), type.imager_px,
                             [](const Eigen::Vector2d&) { return 1.0; });
   if (difference) result.metrics.push_back({"nominal_px", difference->worst_px});
+  const auto& report = result.calibration.intrinsics_report;
+  const auto [x_m, y_m] =
+      report ? report->board_warp_m.value_or(std::array{0.0, 0.0}) : std::array{0.0, 0.0};
+  const double bend_m = std::max({std::abs(x_m), std::abs(y_m), std::abs(x_m + y_m)});
+  result.metrics.push_back({"board_bend_mm", kMillimetres * bend_m});
 }
 
 LampCaptures captures_of(const StationConfig& config, const Calibration& calibration,

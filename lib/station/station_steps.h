@@ -17,7 +17,7 @@
 /// left to who calls.
 namespace vlp {
 
-/// The lens; metrics, too: focal_percent, center_px, nominal_px, against the type's.
+/// The lens; metrics, too: focal_percent, center_px, nominal_px, against the type's, board_bend_mm.
 StepResult solve_boards(const StationConfig& config, const std::string& camera_id,
                         const std::vector<BoardView>& views);
 

@@ -37,6 +37,8 @@ struct UnitImage {
   /// Of the other steps.
   std::vector<Detection> lamps = {};
   int lights_cut = 0, lights_unknown = 0;
+  /// Of those whose stripes are plain, but like no lamp's, with the row time of the camera's type.
+  std::vector<double> unknown_hz = {};
 };
 
 /// What a board image shows, refused when it cannot be read, is too dark, overexposed (a quarter of

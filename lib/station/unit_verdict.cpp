@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "session/session_folder.h"
 #include "station/guidance.h"
 #include "station/lamp_faults.h"
 #include "station/unit.h"
@@ -50,12 +51,36 @@ Refusals refusals(const UnitStep& state, const StationConfig& config) {
           2 * blurred > refused && blurred >= enough_to_blame(config)};
 }
 
+/// That the lights of images that were refused are the lamps, with another row time; empty
+/// otherwise.
+std::string row_time_fault(const UnitStep& state, const StationConfig& config) {
+  std::vector<double> frequencies_hz;
+  for (const auto& [name, image] : state.images) {
+    if (image.refused.empty()) continue;
+    frequencies_hz.insert(frequencies_hz.end(), image.unknown_hz.begin(), image.unknown_hz.end());
+  }
+  constexpr std::size_t least = 6;
+  if (frequencies_hz.size() < least) return "";
+  const double row_time_s = config.type.row_time_s.value_or(0);
+  const auto found_s = row_time_that_fits(frequencies_hz, config.lamps, row_time_s);
+  constexpr double microseconds = 1e6;
+  if (!found_s) return "";
+  return fmt::format(
+      "the row time of the camera's type, {:.2f} us, is not this camera's: with {:.2f} us its "
+      "lights "
+      "are the lamps of the map",
+      microseconds * row_time_s, microseconds * *found_s);
+}
+
 /// What stands in the way of a step that did not end well.
 void add_problems(const Unit& unit, StationStep step, const std::string& ended,
                   std::vector<Cause>& causes) {
   const UnitStep& state = unit.step(step);
   if (state.done()) return;
   const Refusals refused = refusals(state, unit.config());
+  if (std::string fault = row_time_fault(state, unit.config()); !fault.empty()) {
+    causes.push_back({std::move(fault)});
+  }
   if (!refused.text.empty()) {
     causes.push_back({fmt::format("{} ({}): {}", name_of(step), count_of(unit, step), refused.text),
                       refused.blurred});
@@ -109,8 +134,8 @@ bool add_causes_of(const Unit& unit, StationStep step, const std::vector<Checked
   return true;
 }
 
-/// What the captures of all steps tell of the lamps.
-std::vector<std::string> lamp_faults_of(const Unit& unit) {
+/// What the captures of all steps tell of the lamps, and those of the check of its points.
+std::vector<std::string> station_faults_of(const Unit& unit) {
   const auto known = unit.calibration();
   if (!known) return {};
   std::vector<Frame> frames;
@@ -118,7 +143,10 @@ std::vector<std::string> lamp_faults_of(const Unit& unit) {
        {StationStep::rotation, StationStep::dispersion, StationStep::check}) {
     for (Frame& frame : frames_of(unit.step(each))) frames.push_back(std::move(frame));
   }
-  return lamp_faults(frames, unit.config().lamps, *known);
+  auto faults = lamp_faults(frames, unit.config().lamps, *known);
+  const UnitStep& check = unit.step(StationStep::check);
+  if (!faults.empty() || !check.result || !check.result->ok()) return faults;
+  return place_faults(frames_of(check), unit.config().lamps, *known, captures_in(check.folder));
 }
 
 }  // namespace
@@ -164,7 +192,7 @@ std::vector<Cause> Unit::causes() const {
   if (causes.empty()) return causes;
   // The lens was measured without the lamps.
   std::vector<Cause> faults;
-  for (std::string& fault : lamp_faults_of(*this)) faults.push_back({std::move(fault)});
+  for (std::string& fault : station_faults_of(*this)) faults.push_back({std::move(fault)});
   causes.insert(causes.begin() + of_boards, faults.begin(), faults.end());
   return causes;
 }

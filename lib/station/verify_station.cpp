@@ -55,6 +55,9 @@ class Verification {
     const auto frames = frames_of(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = captures_in(step.folder);
+    if (each == StationStep::check) {
+      places_ = place_faults(frames, config_.lamps, golden_.calibration, places);
+    }
     add(name_of(each), each == StationStep::check
                            ? check_fixes(config_, golden_.calibration, frames, places)
                            : solve_dispersion(config_, golden_.calibration, frames, places));
@@ -67,13 +70,16 @@ class Verification {
       // It is the station that is measured, and fails by its figures.
       if (!figure.met()) causes_.push_back({cause_of(figure), figure.value.has_value()});
     }
-    if (!causes_.empty()) {
-      const auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration);
-      std::vector<Cause> first;
-      first.reserve(faults.size());
-      for (const std::string& fault : faults) first.push_back({fault, true});
-      causes_.insert(causes_.begin(), first.begin(), first.end());
+    // Whatever the gates are of: this camera is known.
+    constexpr double fits_px = 0.25;
+    const auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration, fits_px);
+    std::vector<Cause> first;
+    first.reserve(faults.size() + places_.size());
+    for (const std::string& fault : faults) first.push_back({fault, true});
+    if (first.empty()) {
+      for (const std::string& fault : places_) first.push_back({fault, false});
     }
+    causes_.insert(causes_.begin(), first.begin(), first.end());
     RunRecord record{.run = run,
                      .kind = "golden",
                      .station = config_.station,
@@ -125,6 +131,8 @@ class Verification {
   std::vector<Metric> values_ = {};
   std::vector<StepPicture> drawn_ = {};
   std::vector<Cause> causes_ = {};
+  /// Captures of the check that were taken elsewhere.
+  std::vector<std::string> places_ = {};
   std::vector<RunRecord::Image> images_ = {};
 };
 

@@ -170,6 +170,20 @@ TEST_F(Station, JudgesNoUnitForWhatIsNotItsFault) {
   EXPECT_THAT(places.errors, HasSubstr("not judged: check: nothing tells where"));
   fs::rename(folder / "captures.csv", table);
 
+  // One capture of the check beside where its table has it.
+  const std::string said = TemporaryFolder::content_of(table);
+  std::smatch x_m;
+  ASSERT_TRUE(std::regex_search(said, x_m, std::regex("0003\\.png,[^,]*,([^,]*),")));
+  std::string moved = said;
+  moved.replace(static_cast<std::size_t>(x_m.position(1)), x_m.str(1).size(),
+                std::to_string(std::stod(x_m.str(1)) + 0.02));
+  folder.file("unit/check/captures.csv", moved);
+  const auto elsewhere = run_program(batch());
+  EXPECT_EQ(elsewhere.exit_code, 3);
+  EXPECT_THAT(elsewhere.errors,
+              HasSubstr("not judged: 0003.png was not taken where its table says: it is 20.0 mm"));
+  folder.file("unit/check/captures.csv", said);
+
   // Images of one step in the folder of another.
   const auto boards = folder / "unit/boards", check = folder / "unit/check";
   fs::rename(boards, folder / "unit/kept");
@@ -185,7 +199,15 @@ TEST_F(Station, JudgesNoUnitForWhatIsNotItsFault) {
   const auto boards_as_check = run_program(batch());
   EXPECT_EQ(boards_as_check.exit_code, 3);
   EXPECT_THAT(boards_as_check.errors, HasSubstr("not judged: check"));
-  EXPECT_THAT(records("list").output, HasSubstr("3 runs, 0 passed, 0 failed, 3 invalid\n"));
+  EXPECT_THAT(records("list").output, HasSubstr("4 runs, 0 passed, 0 failed, 4 invalid\n"));
+
+  // Another row time than the camera's: no light is like a lamp.
+  change("camera_type.yaml", "row_time_s: 3.0e-05", "row_time_s: 3.3e-05");
+  const auto row_time = run_program(batch());
+  EXPECT_EQ(row_time.exit_code, 3);
+  EXPECT_THAT(row_time.errors,
+              AllOf(HasSubstr("not judged: the row time of the camera's type, 33.00 us, is not"),
+                    ContainsRegex("with (29[.]9|30[.]0)[0-9] us its lights are the lamps")));
 }
 
 /// One unit's images, as another's.
@@ -365,8 +387,9 @@ TEST_P(FaultyLens, IsNamedAsTheCause) {
   change("station.yaml", "board_views: 16", "board_views: 12");
   render("boards");
   const auto result = run_program(batch());
-  // Too little light is the station's.
-  const bool invalid = GetParam().cause.starts_with("boards");
+  // Too little light is the station's, and so is the board.
+  const bool invalid =
+      GetParam().cause.starts_with("boards") || GetParam().cause.starts_with("the board");
   EXPECT_EQ(result.exit_code, invalid ? 3 : 1);
   EXPECT_THAT(result.output, HasSubstr(invalid ? "INVALID   camera" : "FAIL   camera"));
   // The cause is the first that is named, before what follows from it.
@@ -381,6 +404,8 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(LensFault{"decentred", "402.3, 297.4", "418.3, 285.4", "the lens is decentred"},
                     LensFault{"blurred", "blur_px: 0.7", "blur_px: 2.5", "the lens is blurred"},
                     LensFault{"wrong", "[520, 520.6", "[480, 480.5", "wrong lens"},
+                    LensFault{"bent", "warp_m: [0.0003, -0.0002]", "warp_m: [0.01, -0.0002]",
+                              "the board is bent"},
                     LensFault{"dark",
                               "white_e_per_s: 2.4e+6\n  black_e_per_s: 1.5e+5\n"
                               "  surround_e_per_s: 6.0e+5",

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "captures/detections_table.h"
+#include "positioning/positioner.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 #include "support/datasets.h"
@@ -56,6 +57,78 @@ TEST_F(LampFaults, NameOneThatIsNeverSeen) {
   }
   EXPECT_THAT(lamp_faults(frames, map, calibration),
               ElementsAre(HasSubstr("lamp " + std::to_string(id) + " is never seen")));
+}
+
+/// Of a camera that is known.
+TEST_F(LampFaults, NameOneThatMovedAFewMillimetres) {
+  constexpr double fits_px = 0.25;
+  EXPECT_THAT(lamp_faults(frames, map, calibration, fits_px), IsEmpty());
+  for (std::size_t i = 0; i < map.lamps.size(); ++i) {
+    LampMap moved = map;
+    moved.lamps[i].position_m += Eigen::Vector3d(0.004, 0, 0);
+    EXPECT_THAT(lamp_faults(frames, moved, calibration, fits_px),
+                ElementsAre(HasSubstr("lamp " + std::to_string(map.lamps[i].id) + " is loose")));
+  }
+}
+
+/// Places as the fixes have them, in the table of a check.
+struct PlaceFaults : LampFaults {
+  PlaceFaults() {
+    const Positioner positioner(map, calibration);
+    for (const Frame& frame : frames) {
+      const Fix fix = positioner.locate(frame.detections);
+      if (!fix.ok()) continue;
+      Capture& place = places[frame.image];
+      place.x_m = fix.estimate.pose.position_m.x() + 3e-4;
+      place.y_m = fix.estimate.pose.position_m.y();
+    }
+  }
+  CapturesTable places;
+};
+
+TEST_F(PlaceFaults, NameTheOnePointThatIsElsewhere) {
+  EXPECT_THAT(place_faults(frames, map, calibration, places), IsEmpty());
+  for (const std::size_t which : {std::size_t{0}, std::size_t{17}, frames.size() - 1}) {
+    CapturesTable wrong = places;
+    wrong.at(frames[which].image).y_m.value() += 0.02;
+    EXPECT_THAT(
+        place_faults(frames, map, calibration, wrong),
+        ElementsAre(testing::AllOf(testing::StartsWith(frames[which].image + " was not taken"),
+                                   HasSubstr("20.0 mm off, others 0.3 mm"))));
+  }
+}
+
+/// Then it is not the points.
+TEST_F(PlaceFaults, NameNoneWhereManyAreElsewhere) {
+  for (std::size_t i = 0; i < frames.size(); i += 4) places[frames[i].image].y_m = 0.5;
+  EXPECT_THAT(place_faults(frames, map, calibration, places), IsEmpty());
+}
+
+TEST(RowTime, IsThatWithWhichTheLightsAreTheLamps) {
+  LampMap map;
+  for (const double frequency_hz : {500., 640., 800., 1000., 1280., 1600.}) {
+    Lamp lamp{};
+    lamp.position_m.setZero();
+    lamp.frequency_hz = frequency_hz;
+    map.lamps.push_back(lamp);
+  }
+  constexpr double row_time_s = 3e-5;
+  for (const double ratio : {0.9, 1.1, 1.05}) {
+    std::vector<double> seen_hz;
+    for (int i = 0; i < 24; ++i) {
+      const double noise = 1 + 0.002 * (i % 3 - 1);
+      const Lamp& lamp = map.lamps[static_cast<std::size_t>(i) % 4];
+      seen_hz.push_back(*lamp.frequency_hz * ratio * noise);
+    }
+    seen_hz.push_back(3210);  // something else
+    const auto found_s = row_time_that_fits(seen_hz, map, row_time_s);
+    ASSERT_TRUE(found_s) << ratio;
+    EXPECT_NEAR(*found_s / (row_time_s * ratio), 1, 0.003);
+  }
+  // Lights of another kind.
+  EXPECT_FALSE(row_time_that_fits(std::vector<double>{510, 700, 905, 1033, 1111, 1401, 1777}, map,
+                                  row_time_s));
+  EXPECT_FALSE(row_time_that_fits(std::vector<double>{}, map, row_time_s));
 }
 
 }  // namespace

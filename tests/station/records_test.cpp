@@ -403,13 +403,15 @@ TEST(ExportRuns, WritesCsv) {
   const auto file = folder / "runs.csv";
   write_runs(file, {sample(run_of(1), "a", 0.25), sample(run_of(2), "b", 1.5), with_all_texts()});
   const std::string csv = TemporaryFolder::content_of(file);
-  EXPECT_EQ(first_line(csv),
-            "run,kind,station,camera,begun_utc,ended_utc,verdict,causes,program,config_sha256,"
-            "blur_px,focal_percent,center_px,nominal_px,rms_px,uncertainty_px,halves_px,coverage,"
-            "views,board_tilt_deg,rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_"
-            "mm,dispersion_mm,"
-            "dispersion_offset_px,world_mm,check_fixes,check_lamps,check_lamps_seen,check_mean_mm,"
-            "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
+  EXPECT_EQ(
+      first_line(csv),
+      "run,kind,station,camera,begun_utc,ended_utc,verdict,causes,program,config_sha256,"
+      "blur_px,focal_percent,center_px,nominal_px,board_bend_mm,rms_px,uncertainty_px,halves_px,"
+      "coverage,"
+      "views,board_tilt_deg,rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_"
+      "mm,dispersion_mm,"
+      "dispersion_offset_px,world_mm,check_fixes,check_lamps,check_lamps_seen,check_mean_mm,"
+      "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
   EXPECT_THAT(csv, HasSubstr("2026-11-21T13:45:01Z,2026-11-21T13:45:01Z,PASS"));
   EXPECT_THAT(csv, HasSubstr("; second"));
   for (const RunField& field : run_fields()) {
