@@ -47,7 +47,7 @@ bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bo
 }  // namespace
 
 void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
-                StepSources& sources, const Spool& spool, Terminal& terminal) {
+                StepSources& sources, Spool& spool, Terminal& terminal) {
   using Clock = std::chrono::steady_clock;
   constexpr int look_every_ms = 50;
   Clock::time_point last = Clock::now();

@@ -11,6 +11,6 @@ namespace vlp {
 /// Takes a unit's images as they come and guides the operator, until the unit is done, or hopeless,
 /// or the operator wants the verdict. Throws std::runtime_error when the operator leaves.
 void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
-                StepSources& sources, const Spool& spool, Terminal& terminal);
+                StepSources& sources, Spool& spool, Terminal& terminal);
 
 }  // namespace vlp

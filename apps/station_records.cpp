@@ -52,6 +52,15 @@ struct Known {
       spool.emplace(config.spool, where);
       spool->deliver();
     }
+    // Not waited for twice.
+    if (spool) away = spool->away();
+    if (away.empty()) open(where);
+    if (!away.empty() && waiting().empty()) throw std::runtime_error(away);
+    const std::string state = spool ? spool->state() : "";
+    if (!state.empty()) spdlog::warn("{}", printable(state));
+  }
+
+  void open(const std::string& where) {
     try {
       if (!is_server(where) && !std::filesystem::exists(where)) {
         throw InputError(name_of_database(where), "there are no records");
@@ -59,12 +68,8 @@ struct Known {
       records.emplace(where);
     } catch (const InputError& error) {
       away = error.what();
-      if (waiting().empty()) throw;
     }
-    const std::string state = spool ? spool->state() : "";
-    if (!state.empty()) spdlog::warn("{}", printable(state));
   }
-
   const std::vector<RunRecord>& waiting() {
     static const std::vector<RunRecord> none;
     return spool ? spool->waiting() : none;
@@ -96,8 +101,10 @@ bool passes(const RunRecord& run, const RunFilter& filter) {
 /// Of the records, if they answer, and of those that wait; from the first to the last.
 std::vector<RunSummary> runs_of(Known& known, const RunFilter& filter) {
   std::vector<RunSummary> runs;
+  // First, so that a run that another program brings there meanwhile is in one of the two.
+  const std::vector<RunRecord> waiting = known.waiting();
   if (known.records) runs = known.records->list(filter);
-  for (const RunRecord& run : known.waiting()) {
+  for (const RunRecord& run : waiting) {
     const bool there = std::any_of(runs.begin(), runs.end(),
                                    [&](const RunSummary& other) { return other.run == run.run; });
     if (there || !passes(run, filter)) continue;
@@ -141,12 +148,14 @@ RunFilter comparable(const StationRecordsOptions& options) {
 }
 
 /// The values of runs that were judged, unless one verdict is asked for.
-std::vector<TrendPoint> judged(Records& records, const std::string& figure,
-                               const RunFilter& filter) {
+std::vector<TrendPoint> judged(Records& records, const std::string& figure, RunFilter filter) {
+  if (!filter.verdict.empty()) return records.trend(figure, filter);
+  const auto last = static_cast<std::size_t>(std::exchange(filter.last, 0));
   auto points = records.trend(figure, filter);
-  if (filter.verdict.empty()) {
-    std::erase_if(
-        points, [](const TrendPoint& point) { return point.verdict == name_of(Verdict::invalid); });
+  std::erase_if(points,
+                [](const TrendPoint& point) { return point.verdict == name_of(Verdict::invalid); });
+  if (last > 0 && points.size() > last) {
+    points.erase(points.begin(), points.end() - static_cast<std::ptrdiff_t>(last));
   }
   return points;
 }
@@ -313,6 +322,7 @@ void show_capability(const StationRecordsOptions& options) {
     const auto points = judged(records, kind.name, filter);
     check_one_station(points, options);
     std::vector<double> values;
+    values.reserve(points.size());
     for (const TrendPoint& point : points) values.push_back(point.value);
     const auto gate = gate_of(kind.name, options, records, points);
     const auto found = capability(values, limits_of(kind, gate));

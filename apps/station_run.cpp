@@ -28,7 +28,7 @@ const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 /// Keeps the run, says the verdict, writes its files; then the records, which may be away.
 void conclude(const RunRecord& record, const std::vector<ReportPicture>& pictures, Spool& spool,
               const StationConfig& config, Terminal& terminal,
-              const std::function<void()>& put_away) {
+              const std::function<void()>& mark_kept, const std::function<void()>& put_away) {
   auto lines = verdict_screen(record);
   try {
     spool.keep(record);
@@ -37,21 +37,23 @@ void conclude(const RunRecord& record, const std::vector<ReportPicture>& picture
     terminal.print(lines);
     throw;
   }
+  mark_kept();
   terminal.print(lines);
-  std::string unwritten;
+  std::string undone, mend;
   try {
+    mend = fmt::format("'vlp-station restore {}' writes the files", record.run);
     const fs::path folder = publish_run(record, pictures, config.results);
     spdlog::info("run {}: {}", record.run, folder.string());
+    mend = "move the folder there before the next run";
     put_away();
   } catch (const InputError& error) {
-    unwritten = error.what();
+    undone = error.what();
   }
   spool.deliver();
   terminal.print(spool_lines(spool.state()));
-  if (unwritten.empty()) return;
+  if (undone.empty()) return;
   throw std::runtime_error(
-      fmt::format("{}; the verdict {} is recorded: 'vlp-station restore {}' writes the files",
-                  unwritten, record.verdict, record.run));
+      fmt::format("{}; the verdict {} is recorded: {}", undone, record.verdict, mend));
 }
 
 /// What can be known before the first image.
@@ -97,7 +99,8 @@ void run_batch(const StationRunOptions& options, const StationConfig& config, Sp
   unit.advance(true);
   const RunRecord record = record_of(unit, run, kProgram);
   Terminal terminal;
-  conclude(record, unit.pictures(), spool, config, terminal, [] {});
+  conclude(
+      record, unit.pictures(), spool, config, terminal, [] {}, [] {});
   throw_unless_passed(record);
 }
 
@@ -117,7 +120,9 @@ void run_watched(const StationRunOptions& options, const StationConfig& config, 
   guide_unit(options, unit, watched, sources, spool, terminal);
   unit.advance(true);
   const RunRecord record = record_of(unit, watched.run(), kProgram);
-  conclude(record, unit.pictures(), spool, config, terminal, [&] { watched.put_away(); });
+  conclude(
+      record, unit.pictures(), spool, config, terminal, [&] { watched.mark_kept(); },
+      [&] { watched.put_away(); });
   throw_unless_passed(record);
 }
 
@@ -140,9 +145,11 @@ void run_verify(const StationRunOptions& options) {
   const auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
                                                  new_run(), kProgram, options.threads);
   Terminal terminal;
-  conclude(record, pictures, spool, config, terminal, [&, run = record.run] {
-    if (!batch) put_away(arrived, run);
-  });
+  conclude(
+      record, pictures, spool, config, terminal, [] {},
+      [&, run = record.run] {
+        if (!batch) put_away(arrived, run);
+      });
   throw_unless_passed(record, "station " + record.station + " has moved");
 }
 

@@ -92,8 +92,12 @@ int patience_s(const std::string& where) {
   if (!is_server(where)) return kPatienceWithFile_s;
   const auto parts = parts_of(where);
   const auto said = parts.find(kPatience);
+  if (said == parts.end()) return kPatience_s;
   // What is no number libpq refuses.
-  return said == parts.end() ? kPatience_s : std::atoi(said->second.c_str());
+  constexpr long a_day_s = 86'400;
+  constexpr int decimal = 10;
+  return static_cast<int>(
+      std::clamp(std::strtol(said->second.c_str(), nullptr, decimal), 0L, a_day_s));
 }
 
 }  // namespace vlp

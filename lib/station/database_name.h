@@ -20,7 +20,8 @@ std::string name_of_database(const std::string& where);
 std::string connection_of(const std::string& where);
 
 /// How long a database that does not answer is waited for, in seconds: a server as connect_timeout
-/// says, 0 or less for ever, ten without it; a file that another program writes, five.
+/// says, a day at most, 0 (also for less) for ever, ten without it; a file that another program
+/// writes, five.
 int patience_s(const std::string& where);
 
 }  // namespace vlp

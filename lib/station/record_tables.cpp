@@ -118,9 +118,12 @@ bool made_by_another(const soci::postgresql_soci_error& error) {
 
 }  // namespace
 
-void make_record_tables(soci::session& sql) {
+bool has_record_tables(soci::session& sql) {
   // Versions only grow. Without a lock, so that who may only read can.
-  if (version_of(sql) == kSchema) return;
+  return version_of(sql) == kSchema;
+}
+
+void make_record_tables(soci::session& sql) {
   try {
     make_or_migrate(sql);
   } catch (const soci::postgresql_soci_error& error) {

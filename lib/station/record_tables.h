@@ -6,10 +6,13 @@
 
 namespace vlp {
 
+/// Whether the tables are those of the present version; looks without a lock. Throws as
+/// make_record_tables().
+bool has_record_tables(soci::session& sql);
+
 /// Makes the tables of the records when they are not there, the same in SQLite and PostgreSQL, and
-/// brings those of an earlier version up to date, wholly or not at all. Those of the present
-/// version are only read. Throws soci::soci_error, and std::runtime_error for tables of a later
-/// version.
+/// brings those of an earlier version up to date, wholly or not at all. Throws soci::soci_error,
+/// and std::runtime_error for tables of a later version.
 void make_record_tables(soci::session& sql);
 
 }  // namespace vlp

@@ -29,11 +29,14 @@ void set_up(soci::session& sql, int patience_s) {
     sql << "SET client_min_messages TO warning";
     // Before this program gives up, so that the server says what it waits for.
     constexpr int of_patience_ms = 900;
-    sql << "SET lock_timeout TO " + std::to_string(std::max(patience_s, 0) * of_patience_ms);
+    sql << "SET lock_timeout TO " + std::to_string(patience_s * of_patience_ms);
+    // What is committed is on the disk, whatever the server is told to do otherwise.
+    sql << "SET synchronous_commit TO on";
     return;
   }
-  // What is committed is on the disk; a second connection sees runs whole.
-  sql << "PRAGMA synchronous = FULL";
+  // What is committed is on the disk, its folder too: without it a power cut could bring the
+  // journal back and take a run away; a second connection sees runs whole.
+  sql << "PRAGMA synchronous = EXTRA";
   sql << "PRAGMA foreign_keys = ON";
 }
 
@@ -44,6 +47,19 @@ void open(soci::session& sql, const std::string& where) {
     sql.open(soci::sqlite3,
              "dbname=\"" + where + "\" timeout=" + std::to_string(patience_s(where)));
   }
+}
+
+/// Whether another try may do: another program holds a lock, or the file cannot be opened or read.
+bool may_pass(const soci::soci_error& error) {
+  if (const auto* file = dynamic_cast<const soci::sqlite3_soci_error*>(&error)) {
+    constexpr int without_extension = 0xff;
+    const int result = file->result() & without_extension;
+    return result == SQLITE_BUSY || result == SQLITE_LOCKED || result == SQLITE_CANTOPEN ||
+           result == SQLITE_IOERR;
+  }
+  const auto* server = dynamic_cast<const soci::postgresql_soci_error*>(&error);
+  constexpr const char* lock_not_available = "55P03";
+  return server != nullptr && server->sqlstate() == lock_not_available;
 }
 
 /// Ends a connection on which nothing was heard for so long: libpq waits for the answer of a server
@@ -129,8 +145,9 @@ struct Records::Database {
       std::replace_if(
           what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
       const bool away = name.starts_with("postgresql://") && !sql.is_connected();
-      throw InputError(name, away ? "the server of the records cannot be reached: " + what
-                                  : "the records: " + what);
+      if (away) throw RecordsAway(name, "the server of the records cannot be reached: " + what);
+      if (may_pass(error)) throw RecordsAway(name, "the records: " + what);
+      throw InputError(name, "the records: " + what);
     } catch (const std::exception& error) {
       throw InputError(name, error.what());
     }
@@ -148,8 +165,13 @@ struct Records::Database {
       // A unit takes its minutes: meanwhile the server was started anew, or the network fell
       // asleep.
       sql.reconnect();
-      set_up(sql, patience_s);
-      return watched(action, times_the_patience);
+      return watched(
+          [&](Watch& watch) {
+            set_up(sql, patience_s);
+            watch.heard();
+            return action(watch);
+          },
+          times_the_patience);
     });
   }
 
@@ -161,8 +183,8 @@ struct Records::Database {
       return action(watch);
     } catch (const soci::soci_error&) {
       if (!watch.ended_it()) throw;
-      throw InputError(name, "the server of the records has not answered for " +
-                                 std::to_string(times_the_patience * patience_s) + " s");
+      throw RecordsAway(name, "the server of the records has not answered for " +
+                                  std::to_string(times_the_patience * patience_s) + " s");
     }
   }
 };
@@ -171,6 +193,31 @@ namespace {
 
 /// Times the patience: the server gathers them before it sends the first.
 constexpr int kManyRows = 10;
+/// The same; an hour, where the patience is not said, for an index of all images there are.
+constexpr int kAllTables = 360;
+
+/// The texts of a run; nothing when it is not kept.
+std::optional<RunRecord> texts_of(soci::session& sql, const std::string& run) {
+  RunRecord record;
+  soci::statement select(sql);
+  std::string columns;
+  for (const auto& [name, text, label, in_csv] : run_fields()) {
+    columns.append(columns.empty() ? "" : ", ").append(name);
+    select.exchange(soci::into(record.*text));
+  }
+  select.exchange(soci::use(run, "key"));
+  select.alloc();
+  select.prepare("SELECT " + columns + " FROM runs WHERE run = :key");
+  select.define_and_bind();
+  if (!select.execute(true)) return std::nullopt;
+  return record;
+}
+
+bool same_texts(const RunRecord& a, const RunRecord& b) {
+  const auto fields = run_fields();
+  return std::all_of(fields.begin(), fields.end(),
+                     [&](const RunField& field) { return a.*field.text == b.*field.text; });
+}
 
 void put_figures(soci::session& sql, const RunRecord& record, Watch& watch) {
   int place = 0;
@@ -232,10 +279,12 @@ Records::Records(const std::string& where) : database_(std::make_unique<Database
   database_->name = name_of_database(where);
   database_->patience_s = patience_s(where);
   database_->named([&] { open(database_->sql, where); });
-  database_->run([&](Watch&) {
+  const bool are_there = database_->run([&](Watch& watch) {
     set_up(database_->sql, database_->patience_s);
-    make_record_tables(database_->sql);
+    watch.heard();
+    return has_record_tables(database_->sql);
   });
+  if (!are_there) database_->run([&](Watch&) { make_record_tables(database_->sql); }, kAllTables);
   database_->ready = true;
 }
 
@@ -258,9 +307,12 @@ void Records::keep(const RunRecord& record) {
                    ") ON CONFLICT (run) DO NOTHING");
     insert.define_and_bind();
     insert.execute(true);
+    watch.heard();
     if (insert.get_affected_rows() > 0) {
       put_figures(sql, record, watch);
       put_images(sql, record, watch);
+    } else if (const auto kept = texts_of(sql, record.run); !kept || !same_texts(*kept, record)) {
+      throw InputError(database_->name, "has another run " + record.run);
     }
     transaction.commit();
   });
@@ -346,18 +398,8 @@ std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilte
 std::optional<RunRecord> Records::find(const std::string& run) {
   return database_->run([&](Watch&) -> std::optional<RunRecord> {
     soci::session& sql = database_->sql;
-    RunRecord record;
-    soci::statement select(sql);
-    std::string columns;
-    for (const auto& [name, text, label, in_csv] : run_fields()) {
-      columns.append(columns.empty() ? "" : ", ").append(name);
-      select.exchange(soci::into(record.*text));
-    }
-    select.exchange(soci::use(run, "key"));
-    select.alloc();
-    select.prepare("SELECT " + columns + " FROM runs WHERE run = :key");
-    select.define_and_bind();
-    if (!select.execute(true)) return std::nullopt;
+    std::optional<RunRecord> found = texts_of(sql, run);
+    if (!found) return found;
     CheckedMetric figure;
     double value = 0, gate = 0;
     int at_least = 0;
@@ -373,7 +415,7 @@ std::optional<RunRecord> Records::find(const std::string& run) {
       figure.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
       figure.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
       figure.asked = at_least != 0 ? Direction::at_least : Direction::at_most;
-      record.figures.push_back(figure);
+      found->figures.push_back(figure);
     }
     RunRecord::Image image;
     soci::statement images =
@@ -382,8 +424,8 @@ std::optional<RunRecord> Records::find(const std::string& run) {
          soci::into(image.step), soci::into(image.name), soci::into(image.sha256),
          soci::into(image.refused), soci::use(run));
     images.execute();
-    while (images.fetch()) record.images.push_back(image);
-    return record;
+    while (images.fetch()) found->images.push_back(image);
+    return found;
   });
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "rig/input_error.h"
 #include "station/run_record.h"
 
 namespace vlp {
@@ -31,13 +32,21 @@ struct TrendPoint {
   double value;
 };
 
+/// Records that give no answer, or are locked: a later try may do.
+class RecordsAway : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 /// The records of one or more stations in a database: a file of SQLite, or PostgreSQL by a
 /// connection string postgresql://... Tables are made when they are not there, those of an earlier
 /// version brought up to date; of a later one they are refused. Any number of programs may use it
 /// at once: each run is written in one transaction, which waits for another's. What is kept is on
 /// the disk. A connection that was lost is made again. All throw InputError that names the
-/// database, but no password, also when the database does not answer for patience_s(), ten times as
-/// long where many runs are asked for.
+/// database, but no password; it is RecordsAway when the server cannot be reached (also for a wrong
+/// password, which nothing tells from other refusals), the file cannot be opened, another program
+/// holds a lock, or no answer came for patience_s(), ten times as long where many runs are asked
+/// for, 360 times where tables are made or brought up to date.
 class Records {
  public:
   explicit Records(const std::string& where);
@@ -45,7 +54,8 @@ class Records {
   Records(const Records&) = delete;
   Records& operator=(const Records&) = delete;
 
-  /// Keeps a run, whole or not at all. One that is kept already stays as it is.
+  /// Keeps a run, whole or not at all. One that is kept already stays as it is; another of its name
+  /// is refused.
   void keep(const RunRecord& record);
   /// All of one run; nothing when it is not kept.
   std::optional<RunRecord> find(const std::string& run);

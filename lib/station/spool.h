@@ -15,10 +15,12 @@
 namespace vlp {
 
 /// A station's runs on their way to its records, which need not be there: each waits, whole, as a
-/// file of the spool, RUN.json (`vlp-run/1`), until the records have it. Nothing is lost, whatever
-/// is killed and when: a file appears as a whole and goes when the run is committed. Nothing is
-/// twice: records keep a run by its name, once. Any number of programs may use a spool at once.
-/// Records that did not answer are left alone for a minute, so that a unit waits for them once.
+/// file of the spool, RUN.json (`vlp-run/1`), until the records have it that it is for; it goes
+/// into no others, so that stations with other records may share a folder. Nothing is lost,
+/// whatever is killed and when: a file appears as a whole and goes when the run is committed.
+/// Nothing is twice: records keep a run by its name, once. Any number of programs may use a spool
+/// at once. Records that did not answer are left alone for a minute, so that a unit waits for them
+/// once.
 class Spool {
  public:
   /// The folder is made when it is needed. `records` is as Records takes it; nothing is reached for
@@ -29,46 +31,66 @@ class Spool {
   Spool& operator=(const Spool&) = delete;
 
   /// Before the first image: throws InputError when no run could be kept in the folder. Records
-  /// that cannot be reached or written are no error, see state().
+  /// that are away or cannot be written are no error, see state(); those that another try does not
+  /// open, of a later version or no database, are. This alone makes a database that is not there:
+  /// elsewhere it may be on a share that is not mounted.
   void prepare();
   /// Keeps a run in the folder; where that cannot be written, in the records. Throws InputError
   /// when neither can be.
   void keep(const RunRecord& run);
   /// Brings what waits to the records, from the first to the last. It begins no other run after ten
-  /// seconds, so that a backlog keeps nobody waiting. A run that the records refuse holds up no
-  /// other.
+  /// seconds, so that a backlog keeps nobody waiting, nor after records that are away. A run that
+  /// the records refuse holds up no other.
   void deliver();
-  /// "kept here, 3 waiting: WHY", or why the records are away; empty when they have all.
-  std::string state() const;
+  /// "kept here, 3 waiting: WHY", or why the records are away; how many are here for other records,
+  /// and how many digests owner_of() has looked for here only. Empty when there is nothing to tell.
+  std::string state();
+  /// Why the records are away, since they were asked last; empty when they are not.
+  const std::string& away() const { return away_; }
 
-  /// Those that wait, from the first to the last; without files that are no runs.
+  /// Those that wait for these records, from the first to the last; without files that are no runs.
   const std::vector<RunRecord>& waiting();
-  /// A run that waits, or that the records have when they answer.
+  /// A run that waits, for whichever records, or that the records have; nothing, too, when these do
+  /// not answer, see away().
   std::optional<RunRecord> find(const std::string& run);
   /// Records::owner_of() of those that wait and, when they answer, the records.
   std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
 
  private:
-  std::vector<std::filesystem::path> files() const;
+  std::vector<std::filesystem::path> files();
+  void read();
+  void open();
   template <typename Action>
-  bool ask(const Action& action);
-  void put_off();
+  std::string ask(const Action& action);
+  bool may_ask() const;
+  void put_off(const std::string& why);
 
   std::filesystem::path folder_;
-  std::string where_;
+  /// `name_` is what files of runs for these records say.
+  std::string where_, name_;
   std::unique_ptr<Records> records_;
-  /// Why the records could not be asked, or did not take a run.
-  std::string problem_;
+  /// Why the records are away; why they did not take a run, or a file could not be read.
+  std::string away_, problem_;
   std::chrono::steady_clock::time_point ask_again_;
-  /// What waiting() has read, and of which files.
+  /// What read() has found, for these records and for others, and in which files.
   std::vector<std::filesystem::path> known_files_;
-  std::vector<RunRecord> known_;
+  std::vector<RunRecord> known_, others_;
+  std::string other_records_;
+  std::size_t not_asked_ = 0;
 };
 
-/// All of a run as `vlp-run/1`: a JSON object with the texts of run_fields(), "figures" and
-/// "images". Bytes that are no text stand as printable() has them.
-std::string text_of_run(const RunRecord& run);
+/// A run and the records that it is for: a server as name_of_database() has it, or the whole path
+/// of a file.
+struct SpooledRun {
+  RunRecord run;
+  std::string records;
+};
+
+/// All of a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(), "figures"
+/// and "images". Bytes that are no text stand as printable() has them.
+std::string text_of_run(const SpooledRun& spooled);
+/// A text of run_fields() that is not there is empty: the program that wrote it did not know it.
 /// Throws InputError with the file, also when it is no run.
-RunRecord read_run(const std::filesystem::path& file);
+SpooledRun read_run(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -20,6 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kKept = "kept";
+
 /// Changes when the tables that tell the captures' places do.
 std::string state_of_tables(const fs::path& folder) {
   std::string state;
@@ -70,8 +72,16 @@ void WatchedRun::begin(Spool& spool) {
   constexpr std::size_t longest = 100;
   if (fs::exists(state)) {
     run_ = read_text_file(state, longest);
+    const bool kept = run_.ends_with(fmt::format("\n{}\n", kKept));
     run_.erase(std::find(run_.begin(), run_.end(), '\n'), run_.end());
     finished_ = spool.find(run_);
+    if (!finished_ && kept) {
+      throw InputError(
+          folder_,
+          fmt::format("run {} is kept, but its record cannot be read ({}): "
+                      "begin again when it can, or move the folder away",
+                      run_, spool.away().empty() ? "the records do not have it" : spool.away()));
+    }
     if (!finished_) return;  // goes on
     publish_run(*finished_, {}, unit_.config().results);
     put_away();
@@ -109,6 +119,13 @@ std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
   }
   if (!arrivals.empty() || reread) unit_.advance(false);
   return arrivals;
+}
+
+void WatchedRun::mark_kept() const {
+  try {
+    write_file(folder_ / ".run", fmt::format("{}\n{}\n", run_, kKept));
+  } catch (const InputError&) {  // put_away() will tell; records refuse a second verdict of a run
+  }
 }
 
 void WatchedRun::discard(StationStep step, const std::string& image) {

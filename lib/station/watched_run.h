@@ -20,11 +20,12 @@ void put_away(const std::filesystem::path& folder, const std::string& run);
 /// A run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. The folders are the truth: an
 /// image that is taken away is no longer of the unit, one that is overwritten counts anew, so does
 /// a captures.csv, and a program that starts again after it was killed goes on where it was, with
-/// the same name of the run (file `.run` there). One program at a time.
+/// the same name of the run (file `.run` there, with a second line when the run is kept). One
+/// program at a time.
 class WatchedRun {
  public:
   /// Makes the folders. Throws InputError: another program works on this camera, a folder cannot be
-  /// made.
+  /// made, a run that is kept was not put away and its record cannot be read.
   WatchedRun(Unit& unit, Spool& spool);
   ~WatchedRun();
   WatchedRun(const WatchedRun&) = delete;
@@ -48,7 +49,8 @@ class WatchedRun {
   const std::string& run() const { return run_; }
   const std::filesystem::path& folder() const { return folder_; }
 
-  /// After the run is kept.
+  /// After the run is kept: from then on it is not judged again, though the records be away.
+  void mark_kept() const;
   void put_away() { vlp::put_away(folder_, run_); }
 
  private:

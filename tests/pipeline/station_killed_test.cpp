@@ -91,7 +91,7 @@ void StationKilled::expect_all_there() const {
   EXPECT_EQ(results, runs.size());
 }
 
-// With VLP_STATION_KILLS=100 as the station was tried once.
+// As often as VLP_STATION_KILLS says.
 TEST_F(StationKilled, GoesOnWhereItWas) {
   render();
   kill_again_and_again(number_of("VLP_STATION_KILLS", 4));
@@ -125,6 +125,29 @@ TEST_F(StationKilled, AfterItsVerdictItSaysItAgain) {
   EXPECT_THAT(again.output, HasSubstr("INVALID   camera b"));
   EXPECT_NE(result("b", "report.html"), "");
   EXPECT_TRUE(fs::exists(away));
+  EXPECT_FALSE(fs::exists(captures("b")));
+  EXPECT_EQ(kept().size(), 1u);
+}
+
+/// The same while the records, which have the run, are away: it is not judged again.
+TEST_F(StationKilled, AfterItsVerdictItWaitsForTheRecords) {
+  change("station.yaml", "records: records.db", "records: share/records.db");
+  const auto share = folder / "station/share", unmounted = folder / "station/unmounted";
+  fs::create_directory(share);
+  prepare("b");
+  EXPECT_EQ(run_program(run("b", "-q --idle-s 0.2")).exit_code, 3);
+  for (const auto& entry : fs::directory_iterator(folder / "station/captures")) {
+    fs::rename(entry.path(), captures("b"));  // as it was before the end
+    break;
+  }
+  fs::rename(share, unmounted);
+  const auto away = run_program(run("b", "--idle-s 0.2"));
+  EXPECT_EQ(away.exit_code, 2);
+  EXPECT_THAT(away.errors, testing::AllOf(HasSubstr("is kept, but its record cannot be read"),
+                                          HasSubstr("share/records.db")));
+  EXPECT_TRUE(fs::exists(captures("b")));
+  fs::rename(unmounted, share);
+  EXPECT_EQ(run_program(run("b", "--idle-s 60")).exit_code, 3);
   EXPECT_FALSE(fs::exists(captures("b")));
   EXPECT_EQ(kept().size(), 1u);
 }

@@ -80,8 +80,10 @@ void check_records(const std::string& where) {
   for (int i = 0; i < 4; ++i) {
     records.keep(sample(run_of(i), i == 2 ? "b" : "a", i == 3 ? 1.5 : 0.1 * i));
   }
-  // Kept once, and as it was the first time.
-  records.keep(sample(run_of(0), "other", 0.7));
+  // Kept once; another of its name is refused.
+  records.keep(sample(run_of(0), "a", 0));
+  EXPECT_THAT(refusal_of([&] { records.keep(sample(run_of(0), "other", 0.7)); }),
+              HasSubstr("has another run " + run_of(0)));
   const auto all = records.list({});
   ASSERT_THAT(all, SizeIs(4));
   EXPECT_EQ(all[0].camera, "a");

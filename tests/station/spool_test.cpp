@@ -9,7 +9,9 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
+#include <functional>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -80,7 +82,8 @@ TEST(SpooledRun, IsReadAsItWasWritten) {
   RunRecord run = numbered_run(1);
   for (const RunField& field : run_fields()) run.*field.text += "\n\"\\ \xc3\xbc\t{}\n";
   run.images[1].refused = "too dark";
-  const RunRecord read = read_run(folder.file("run.json", text_of_run(run)));
+  const auto [read, records] = read_run(folder.file("run.json", text_of_run({run, "records.db"})));
+  EXPECT_EQ(records, "records.db");
   for (const RunField& field : run_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
   ASSERT_THAT(read.figures, SizeIs(run.figures.size()));
   for (std::size_t i = 0; i < run.figures.size(); ++i) {
@@ -99,13 +102,13 @@ TEST(SpooledRun, MayHaveNamesThatAreNoText) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.images[0].name = "\xff\x1b[31m.png";
-  EXPECT_EQ(read_run(folder.file("run.json", text_of_run(run))).images[0].name,
+  EXPECT_EQ(read_run(folder.file("run.json", text_of_run({run, "records.db"}))).run.images[0].name,
             "\\xff\\x1b[31m.png");
 }
 
 TEST(SpooledRun, IsRefusedWithItsFile) {
   const TemporaryFolder folder;
-  const std::string text = text_of_run(numbered_run(1));
+  const std::string text = text_of_run({numbered_run(1), "records.db"});
   for (const std::string& bad :
        {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
         std::string(text).replace(text.find("vlp-run/1"), 9, "vlp-run/2"),
@@ -130,6 +133,7 @@ TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
   EXPECT_EQ(spool.owner_of("digest-2-7", "camera-1"),
             "camera camera-2: run " + numbered_run(2).run);
   EXPECT_EQ(spool.owner_of("digest-2-7", "camera-2"), "");
+  EXPECT_THAT(spool.state(), HasSubstr("; 1 images were not looked up in the records"));
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
@@ -146,6 +150,7 @@ TEST(Spool, IsNotHeldUpByWhatIsNoRun) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
+  spool.prepare();
   spool.keep(numbered_run(1));
   folder.file("spool/0.json", "{}\n");
   folder.file("spool/.1.json.tmp-1-0", "{");
@@ -159,12 +164,70 @@ TEST(Spool, ThatCannotBeWrittenPassesRunsOn) {
   const std::string where = (folder / "records.db").string();
   Spool spool(folder.file("spool", ""), where);
   EXPECT_THAT(refusal_of([&] { spool.prepare(); }), HasSubstr("spool: cannot be made"));
+  { const Records made(where); }
   spool.keep(numbered_run(1));
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   Spool neither(folder / "spool", (folder / "away/records.db").string());
   EXPECT_THAT(
       refusal_of([&] { neither.keep(numbered_run(2)); }),
       AllOf(HasSubstr("spool: neither here can a run be kept"), HasSubstr("away/records.db")));
+}
+
+TEST(Spool, BringsRunsToTheRecordsTheyAreFor) {
+  const TemporaryFolder folder;
+  const std::string a = (folder / "a.db").string(), b = (folder / "b.db").string();
+  { const Records made_a(a), made_b(b); }
+  Spool of_a(folder / "spool", a), of_b(folder / "spool", b);
+  of_a.keep(numbered_run(1));
+  of_b.prepare();
+  EXPECT_THAT(whole_runs(b), IsEmpty());
+  EXPECT_THAT(of_b.state(), AllOf(StartsWith("1 here for other records"), HasSubstr("a.db")));
+  EXPECT_THAT(of_b.waiting(), IsEmpty());
+  EXPECT_TRUE(of_b.find(numbered_run(1).run)) << "a run is not judged twice for that";
+  EXPECT_EQ(of_b.owner_of("digest-1-7", "b"), "camera camera-1: run " + numbered_run(1).run);
+  of_b.keep(numbered_run(2));
+  of_b.deliver();
+  EXPECT_THAT(whole_runs(b), SizeIs(1));
+  // The same records, by another name of the file.
+  Spool(folder / "spool", (folder / "spool/../a.db").string()).deliver();
+  EXPECT_EQ(whole_runs(a), std::set<std::string>{numbered_run(1).run});
+  EXPECT_EQ(of_b.state(), "");
+}
+
+TEST(Spool, LosesNoSecondVerdictOfARun) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  spool.keep(numbered_run(1));
+  spool.deliver();
+  spool.keep(numbered_run(1));  // the same, as after a kill before its file was removed
+  spool.deliver();
+  EXPECT_EQ(spool.state(), "");
+  RunRecord again = numbered_run(1);
+  again.ended_utc = "2026-11-21T14:50:01Z";
+  spool.keep(again);
+  spool.keep(numbered_run(2));
+  spool.deliver();
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+                                   HasSubstr("has another run " + again.run)));
+  EXPECT_THAT(whole_runs(where), SizeIs(2));
+  EXPECT_EQ(Records(where).find(again.run)->ended_utc, numbered_run(1).ended_utc);
+}
+
+/// What is not there may be on a share that is not mounted.
+TEST(Spool, MakesADatabaseBeforeAUnitOnly) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.keep(numbered_run(1));
+  spool.deliver();
+  EXPECT_FALSE(spool.find("another"));
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+                                   HasSubstr("records.db: there are no records")));
+  EXPECT_FALSE(fs::exists(where));
+  Spool(folder / "spool", where).prepare();
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
 TEST(Spool, RefusesWhatIsNoConnectionString) {
@@ -188,7 +251,11 @@ TEST(Spool, WaitsForALockedFileNotLong) {
   const std::string command =
       "python3 " + client.string() + " " + where + " " + locked.string() + " " + done.string();
   std::thread other([&] { EXPECT_EQ(std::system(command.c_str()), 0); });
-  while (!fs::exists(locked)) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!fs::exists(locked) && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(fs::exists(locked));
   Spool spool(folder / "spool", where);
   spool.keep(numbered_run(1));
   EXPECT_LT(seconds_of([&] { spool.deliver(); }), 15);
@@ -199,6 +266,12 @@ TEST(Spool, WaitsForALockedFileNotLong) {
   EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
+/// Unmounts, whatever becomes of the test.
+struct SmallDisk {
+  fs::path folder;
+  ~SmallDisk() { ::umount2(folder.c_str(), MNT_DETACH); }
+};
+
 TEST(Spool, OutlastsAFullDisk) {
   const TemporaryFolder folder;
   const auto small = folder / "small";
@@ -206,9 +279,11 @@ TEST(Spool, OutlastsAFullDisk) {
   if (::mount("none", small.c_str(), "tmpfs", 0, "size=128k") != 0) {
     GTEST_SKIP() << "no small file system can be mounted here";
   }
+  const SmallDisk disk{small};
   const std::string where = (small / "records.db").string();
   {
     Spool spool(folder / "spool", where);
+    spool.prepare();
     for (int i = 0; i < 40; ++i) spool.keep(numbered_run(i));
     spool.deliver();
     const std::size_t there = whole_runs(where).size();
@@ -221,13 +296,13 @@ TEST(Spool, OutlastsAFullDisk) {
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
   Spool(folder / "spool", where).deliver();
   EXPECT_THAT(whole_runs(where), SizeIs(40));
-  ::umount(small.c_str());
 }
 
 TEST(Spool, OfSeveralProgramsLosesNothing) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
+  spool.prepare();
   for (int i = 0; i < 25; ++i) spool.keep(numbered_run(i));
   std::vector<pid_t> children;
   for (int program = 1; program <= 3; ++program) {
@@ -249,8 +324,8 @@ TEST(Spool, OfSeveralProgramsLosesNothing) {
   EXPECT_THAT(whole_runs(where), SizeIs(40));
 }
 
-/// A program that keeps one run after another is killed at random moments; with
-/// VLP_STATION_KILLS=200 as it was tried once.
+/// A program that keeps one run after another is killed at random moments, as often as
+/// VLP_STATION_KILLS says.
 void kill_while_keeping(const TemporaryFolder& folder, const std::string& where, int kills) {
   const auto log = folder / "kept";
   if (const char* text = std::getenv("VLP_STATION_KILLS")) kills = std::atoi(text);
@@ -258,6 +333,7 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
   for (int i = 0; i < kills; ++i) {
     const pid_t child = start_child([&] {
       Spool spool(folder / "spool", where);
+      spool.prepare();
       const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
       for (int run = 1000 * i; run < 1000 * i + 1000; ++run) {
         spool.keep(numbered_run(run));
@@ -324,6 +400,8 @@ TEST(Spool, OutlastsItsServer) {
   EXPECT_LT(seconds_of([&] { EXPECT_EQ(connected.owner_of("digest-1-1", "b"), ""); }), 8);
   connected.keep(numbered_run(-3));
   EXPECT_LT(seconds_of([&] { connected.deliver(); }), 1);
+  EXPECT_FALSE(connected.find("another"));
+  EXPECT_THAT(connected.away(), HasSubstr("has not answered for 2 s"));
   EXPECT_THAT(connected.state(),
               AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("has not answered for 2 s")));
   Spool fresh = spool();
@@ -332,6 +410,17 @@ TEST(Spool, OutlastsItsServer) {
   server.thaw();
   Spool(spool()).deliver();
   EXPECT_THAT(whole_runs(where), SizeIs(before + 3));
+  // Once, too, while several wait.
+  Spool several = spool();
+  several.prepare();
+  server.freeze();
+  for (int i = 4; i < 10; ++i) several.keep(numbered_run(-i));
+  EXPECT_LT(seconds_of([&] { several.deliver(); }), 5);
+  EXPECT_THAT(several.state(),
+              AllOf(StartsWith("kept here, 6 waiting: "), HasSubstr("has not answered for 2 s")));
+  server.thaw();
+  Spool(spool()).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(before + 9));
 
   // Killed in the middle of many.
   for (int i = 0; i < 200; ++i) fresh.keep(numbered_run(1'000'000 + i));
@@ -345,7 +434,7 @@ TEST(Spool, OutlastsItsServer) {
   server.start();
   EXPECT_GT(waiting, 0u) << "the server was stopped too late for this machine";
   for (int i = 0; i < 5 && !fresh.waiting().empty(); ++i) Spool(spool()).deliver();
-  EXPECT_THAT(whole_runs(where), SizeIs(before + 203));
+  EXPECT_THAT(whole_runs(where), SizeIs(before + 209));
 }
 
 }  // namespace

@@ -82,7 +82,10 @@ void PostgresServer::freeze() const { signal(SIGSTOP); }
 void PostgresServer::thaw() const { signal(SIGCONT); }
 
 PostgresServer::~PostgresServer() {
-  if (!uri_.empty()) stop();
+  if (!uri_.empty()) {
+    thaw();
+    stop();
+  }
   std::error_code ignored;
   fs::remove_all(folder_, ignored);
 }
