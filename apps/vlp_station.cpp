@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-station: a factory's calibration station: units to a verdict, and their records.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <string>
 
 #include "app.h"
 #include "station/watched_run.h"
@@ -45,6 +50,27 @@ void add_verify(CLI::App& app, StationRunOptions& options) {
       ->check(CLI::Range(1, 1024));
 }
 
+/// A UTC as records have it, 2026-11-21T13:45:01Z, or its beginning from the day on.
+const CLI::Validator kUtc(
+    [](const std::string& text) -> std::string {
+      const std::string form = "0000-00-00T00:00:00Z";
+      constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};
+      bool good = std::find(lengths.begin(), lengths.end(), text.size()) != lengths.end();
+      for (std::size_t i = 0; good && i < text.size(); ++i) {
+        good = form[i] == '0' ? text[i] >= '0' && text[i] <= '9' : text[i] == form[i];
+      }
+      if (good) {
+        const auto at = [&](std::size_t begin) {
+          return static_cast<unsigned>(std::stoul(text.substr(begin, 2)));
+        };
+        constexpr std::size_t month = 5, day = 8;
+        const std::chrono::year year(std::stoi(text.substr(0, 4)));
+        good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok();
+      }
+      return good ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
+    },
+    "");
+
 /// What the commands on records share.
 CLI::App* add_records(CLI::App& app, const char* name, const char* what,
                       StationRecordsOptions& options) {
@@ -59,9 +85,12 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
       ->check(CLI::IsMember({"PASS", "FAIL", "INVALID", "any"}));
   command->add_option("--kind", options.filter.kind, "Only units, or only golden units")
       ->check(CLI::IsMember({"unit", "golden", "any"}));
-  command->add_option("--since", options.filter.since,
-                      "Only those that ended at this UTC or later, 2026-11-21 or 2026-11-21T13:45");
-  command->add_option("--until", options.filter.until, "Only those that ended before this UTC");
+  command
+      ->add_option("--since", options.filter.since,
+                   "Only those that ended at this UTC or later, 2026-11-21 or 2026-11-21T13:45")
+      ->check(kUtc);
+  command->add_option("--until", options.filter.until, "Only those that ended before this UTC")
+      ->check(kUtc);
   command->add_option("--last", options.filter.last, "Only the last so many")
       ->check(CLI::Range(1, 1'000'000));
   return command;

@@ -37,6 +37,8 @@ Cells cells_of(const std::vector<StudyValue>& values) {
     stations.insert(station);
   }
   if (cells.size() < 2) throw std::invalid_argument("a study needs two units or more");
+  // By name: the loop adds the stations that a unit lacks.
+  const std::string first = cells.begin()->second.begin()->first;
   const std::size_t repeats = cells.begin()->second.begin()->second.size();
   for (auto& [unit, of_unit] : cells) {
     for (const std::string& station : stations) {
@@ -45,8 +47,7 @@ Cells cells_of(const std::vector<StudyValue>& values) {
       throw std::invalid_argument(fmt::format(
           "unit {} has {} runs on {}, {} has {} on {}: a study needs as many of each unit on each "
           "station, two or more",
-          unit, found, station, cells.begin()->first, repeats,
-          cells.begin()->second.begin()->first));
+          unit, found, station, cells.begin()->first, repeats, first));
     }
   }
   return cells;

@@ -168,6 +168,10 @@ TEST(MeasurementStudy, SaysWhatIsMissing) {
   values.pop_back();
   EXPECT_THAT(study_refusal([&] { measurement_study(values); }),
               HasSubstr("unit 101 has 1 runs on 1, 100 has 2 on 0"));
+  values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
+  values.erase(values.begin(), values.begin() + 2);
+  EXPECT_THAT(study_refusal([&] { measurement_study(values); }),
+              HasSubstr("unit 100 has 0 runs on 0, 100 has 2 on 1"));
 }
 
 }  // namespace
