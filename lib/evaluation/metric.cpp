@@ -128,8 +128,7 @@ constexpr std::array kMetricKinds{
         "worse_mm", "mm", MetricSource::reference,
         "by how much the mean error is certainly larger than that of --compare (lower end of "
         "the difference's interval; 0 where that is no more than 1 um or 1 % of theirs): 0 fails "
-        "on "
-        "the verdict 'worse'; of fewer than 20 stations or captures nothing is certain",
+        "on the verdict 'worse'; of fewer than 20 stations or captures nothing is certain",
         "the fixes are worse than those they are compared with"},
 };
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <set>
 #include <stdexcept>
 
 #include "calibration/intrinsics/known_region.h"
@@ -265,6 +266,12 @@ std::optional<Eigen::Vector2d> off_m(const LocateInput& input, std::size_t frame
   return (seen_m - lamp->position_m).head<2>();
 }
 
+bool has_a_lamp_twice(const std::vector<Detection>& detections) {
+  std::set<int> ids;
+  for (const Detection& one : detections) ids.insert(one.lamp);
+  return ids.size() < detections.size();
+}
+
 /// Of those that two captures or more see beside two other lamps or more.
 std::vector<LampOffset> offsets_of_lamps(const LocateInput& input, const PositionerOptions& how) {
   const Positioner positioner(input.lamps, input.calibration, how);
@@ -273,6 +280,7 @@ std::vector<LampOffset> offsets_of_lamps(const LocateInput& input, const Positio
   std::map<int, std::vector<Eigen::Vector2d>> seen;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     const auto& [image, detections] = input.frames[i];
+    if (has_a_lamp_twice(detections)) continue;  // which of the two it is nobody knows
     for (const Detection& one : detections) {
       std::vector<Detection> others;
       std::copy_if(detections.begin(), detections.end(), std::back_inserter(others),

@@ -41,7 +41,7 @@ struct LampLeftOut {
 
 /// Where the other lamps see a lamp, on the ceiling and in the world, less where the map has it:
 /// the mean over captures, and its standard deviation by their scatter. A lamp that moves by d is
-/// seen d off, the others less, and in other directions.
+/// seen d off, the others otherwise.
 struct LampOffset {
   int lamp;
   int captures;

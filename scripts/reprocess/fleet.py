@@ -13,7 +13,8 @@ neighbouring sessions of the whole fleet differ by more than is stated, the stat
 that factor. It is of the smaller 95 % of the differences, so that the few cameras and lamps that changed do not
 hide themselves, and larger by 20 / n for being known from n of them: of deviates z that are
 divided by a factor with a relative variance v, exp(z^4 v / 2) times as many are beyond z as of the true one, which
-z^2 v / 2 of it makes good, with v = 2 / n and z = 4.5. Of too few differences nothing is tested.
+z^2 v / 2 of it makes good, with z = 4.5. v = 2 / n is not derived but chosen on the safe side, since a few are left
+out and neighbours go together: of all of n independent ones it would be 1 / (2 n). Of too few differences nothing is tested.
 
 A lamp that moves by d is seen d off by the others. As seen by fixes that rest on it, too, lamp i is then
   P_ij d / P_ii,   P = I - 11'/n - q q^H / |q|^2,
@@ -89,7 +90,9 @@ def times_of(rows):
 
 
 def in_order(rows):
-    return sorted(rows, key=lambda row: (row["date"], row["session"], row["camera"]))
+    """By date, or, where not all have one, by the sessions' names."""
+    dated = all(row["date"] for row in rows)
+    return sorted(rows, key=lambda row: (row["date"] if dated else "", row["session"], row["camera"]))
 
 
 def named(row):
@@ -104,13 +107,14 @@ def camera_series(rows):
         by_camera[row["camera"]].append(row)
     found = {}
     for camera, of_it in sorted(by_camera.items()):
-        of_it, found[camera] = in_order(of_it), {}
+        found[camera] = {}
         with_arm = [row for row in of_it if row["lever_arm_x_mm"]]
         for name, unit in TWO.items():
             for axis in "xy":
                 figure = f"{name}_{axis}_{unit}"
                 some = with_arm if with_arm and name in WITH_LEVER_ARM else of_it
                 some = [row for row in some if row[figure] and float(row[f"sd_{figure}"] or 0) > 0]
+                some = in_order(some)
                 if len(some) > 1:
                     found[camera][figure] = (some, [(float(row[figure]), float(row[f"sd_{figure}"])) for row in some])
     return found
@@ -121,12 +125,13 @@ def kind_of(figure):
 
 
 def change_of(rows, series, tests):
-    """A step or a drift, whichever fits better; `p` is that of one of either kind so large anywhere in the fleet."""
+    """A step or a drift, whichever chance gives less often; `p`: one of its kind so large anywhere in the fleet, twice
+    for the two kinds."""
     found = [("step", k, change, sd) for k, (change, sd) in enumerate(steps(series), 1)]
     if line := drift(times_of(rows), series):
         found.append(("drift", len(rows) - 1, *line))
-    p = min(2 * tests[kind] * p_of(change / sd) for kind, _, change, sd in found)
-    kind, k, change, sd = max(found, key=lambda one: abs(one[2] / one[3]))
+    chances = [(2 * tests[kind] * p_of(change / sd), -abs(change / sd)) for kind, _, change, sd in found]
+    (p, _), (kind, k, change, sd) = min(zip(chances, found))
     ends = {"before": named(rows[k - 1 if kind == "step" else 0]), "since": named(rows[k])}
     return {"kind": kind, "change": change, "sd": sd, "p": min(1.0, p), **ends}
 
@@ -244,7 +249,7 @@ def fleet_of(rows, lamp_rows):
     factors = {}
     for name in TWO:
         factors[name] = factor_of([one for kind, series in of_figures if kind == name for one in neighbours(series)])
-    pairs = sum(len(room.sessions) - 1 for room in rooms)  # the lamps of a session go together
+    pairs = sum(max(0, len(room.sessions) - 1) for room in rooms)  # the lamps of a session go together
     enough = 2 * pairs >= FEWEST_DIFFERENCES
     factors["lamps"] = factor_of([one for room in rooms for one in room.differences()]) if enough else None
     tried = [series for kind, series in of_figures if factors[kind]]

@@ -49,7 +49,7 @@ def figures_of(folder, session):
 
 
 def told_by(session):
-    """What there is to look at: numbers, ids, and words."""
+    """What there is to look at: numbers, ids, and words, of which `look` is a list."""
     words, skipped, left_out, warnings = [], 0, {}, 0
     for step in session["steps"]:
         of_step = step.get("warnings", [])
@@ -62,7 +62,7 @@ def told_by(session):
         for lamp in step.get("lamps_left_out", []):
             left_out[lamp["lamp"]] = left_out.get(lamp["lamp"], 0) + lamp["captures"]
     lamps = ", ".join(f"{lamp} ({captures})" for lamp, captures in sorted(left_out.items()))
-    return {"warnings": warnings, "images_skipped": skipped, "lamps_left_out": lamps, "look": "; ".join(words)}
+    return {"warnings": warnings, "images_skipped": skipped, "lamps_left_out": lamps, "look": words}
 
 
 def calibration_of(session):
@@ -98,7 +98,7 @@ def outcome_of(folder, name, ended, said):
     verdict = session["verdict"]
     if verdict == "pass" and (told["look"] or told["lamps_left_out"]):
         verdict = "look"
-    outcome |= {"verdict": verdict, "reason": session["reason"], **told}
+    outcome |= {"verdict": verdict, "reason": session["reason"], **told, "look": "; ".join(told["look"])}
     if verdict == "no result":
         return outcome
     return outcome | figures_of(folder, session) | calibration_of(session)

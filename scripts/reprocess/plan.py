@@ -4,8 +4,9 @@
 
 Writes into RESULTS/.state: run.json (toolbox and options), shards/N.list (a session a line, with the
 number, size and latest change of its files: a glance that tells which shards to look into), shards.txt
-(how many), again.txt (rows to make again), dates.csv (dates and rooms of sessions) and compare.json. What has
-not changed is not touched, so that Snakemake runs the rest.
+(how many), again.txt (rows to make again), keep.txt (how many former results stay; no reason to run a shard again),
+dates.csv (dates and rooms of sessions) and compare.json. What has not changed is not touched, so that Snakemake
+runs the rest.
 """
 import argparse
 import re
@@ -106,11 +107,11 @@ def main():
         "camera": " ".join(options.camera_option),
         "session_gates": str(options.session_gates.resolve()) if options.session_gates else "",
         "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
-        "keep": options.keep,
         **toolbox(options.bin),
     }
     count = write_shards(archive, state, options.shard_size, options.at_a_time)
     write_whole(state / "again.txt", "".join(again(state, results / "summary.csv")))
+    write_if_other(state / "keep.txt", f"{options.keep}\n")
     write_if_other(state / "run.json", json_text(run))
     previous = options.previous.resolve() if options.previous else None
     compare = {

@@ -71,15 +71,16 @@ def same_file(source, target):
 
 
 def put_aside(place, name, keep):
-    """The former result goes to former/, by its key, of which so many stay; with none it is gone."""
+    """The former result goes to former/, by its key, of which so many stay; with none, and of a crash, it is gone."""
     old = STATE / "old" / name
     shutil.rmtree(old, ignore_errors=True)
     old.parent.mkdir(parents=True, exist_ok=True)
     place.rename(old)
     former = Path("former") / name
-    if keep > 0:
+    row = json.loads((old / "row.json").read_text()) if keep > 0 else None
+    if row and row["verdict"] != "crashed":
         former.mkdir(parents=True, exist_ok=True)
-        kept = former / json.loads((old / "row.json").read_text())["key"][:12]
+        kept = former / row["key"][:12]
         shutil.rmtree(kept, ignore_errors=True)
         old.rename(kept)
     else:
@@ -125,7 +126,7 @@ def tell_run(shard, row, cost, size):
         ran.write(f"{row['camera']}/{row['session']}\t{row['verdict']}\t{cost}\t{size}\n")
 
 
-def reprocess(run, shard, names, lock):
+def reprocess(run, shard, names, lock, keep):
     work = (STATE / "work" / shard).absolute()
     rows, made = [], 0
     for name in names:
@@ -137,7 +138,7 @@ def reprocess(run, shard, names, lock):
             outcome, cost = calibrate(run, name, work, lock)
             row = outcome | {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
             write_whole(COSTS / name, cost)
-            tell_run(shard, row, cost, publish(row, work, run["keep"]))
+            tell_run(shard, row, cost, publish(row, work, keep))
             shutil.rmtree(work / name)
             made += 1
         rows.append(row | {"cpu_s": stated_cost(name)})
@@ -148,13 +149,13 @@ def reprocess(run, shard, names, lock):
 
 def main():
     shard = sys.argv[1]
-    run = json.loads((STATE / "run.json").read_text())
+    run, keep = json.loads((STATE / "run.json").read_text()), int((STATE / "keep.txt").read_text())
     lines = (STATE / "shards" / f"{shard}.list").read_text().splitlines()
     (STATE / "locks").mkdir(exist_ok=True)
     with open(STATE / "locks" / shard, "w") as lock:
         # A job that the cluster gave up may still be at work.
         fcntl.flock(lock, fcntl.LOCK_EX)
-        rows = reprocess(run, shard, [line.split("\t")[0] for line in lines], lock)
+        rows = reprocess(run, shard, [line.split("\t")[0] for line in lines], lock, keep)
     write_whole(STATE / "rows" / f"{shard}.csv", table(ALL, rows))
 
 

@@ -58,7 +58,7 @@ TEST(Cautions, TellOfFewUnits) {
 TEST(Cautions, TellOfALimitThatIsBeaten) {
   Evaluation limited = evaluation(1000);
   EXPECT_EQ(caution_of_limit(limited), "");
-  limited.limit = LimitRatio{0.609, 1e-3, 36};
+  limited.limit = LimitRatio{0.609, 1e-3, 36, 1.0 / 12};
   EXPECT_THAT(
       caution_of_limit(limited),
       HasSubstr("0.609 times the theoretical limit, which nothing beats: the stated noise"));

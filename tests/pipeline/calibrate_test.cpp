@@ -399,8 +399,9 @@ TEST_F(SmallSession, StatesHowWellTheCalibrationIsKnown) {
       EXPECT_LT(sd.get<double>(), 1) << name;
     }
   }
-  EXPECT_NEAR(std::hypot(figures["zenith_deg"][0].get<double>(), figures["zenith_deg"][1]),
-              figures["tilt_deg"].get<double>(), 1e-3);
+  EXPECT_NEAR(
+      std::hypot(figures["zenith_deg"][0].get<double>(), figures["zenith_deg"][1].get<double>()),
+      figures["tilt_deg"].get<double>(), 1e-3);
   std::size_t lamps = 0;
   for (const auto& step : json["steps"]) {
     if (step.contains("lamp_offsets")) lamps += step["lamp_offsets"].size();

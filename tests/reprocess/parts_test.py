@@ -256,6 +256,9 @@ class Shard(unittest.TestCase):
             self.assertEqual(Path("former/c/s/3key3key3key/session.json").read_text(), "3key")
             self.assertEqual(Path("sessions/c/s/session.json").read_text(), "4key")
             self.assertEqual(publish("5key", 0), [])
+            self.assertEqual(publish("6key", 1, "crashed"), ["5key5key5key"])
+            self.assertEqual(publish("7key", 1), ["5key5key5key"])  # a crash does not push it out
+            self.assertEqual(publish("8key", 1), ["7key7key7key"])
 
 
 class Diff(unittest.TestCase):
@@ -269,13 +272,13 @@ class Diff(unittest.TestCase):
             return {"verdict": verdict, "reason": "", "parts": parts}, session
 
         before = result("pass", [260, 261], 0.2, [], {"lamps.yaml": "a", "check": "b"})
-        now = result("look", [260, 261.5], 0.3, ["the residuals show"], {"lamps.yaml": "c", "check": "b"})
+        now = result("look", [260, 261.5], 0.3, ["the residuals; they show"], {"lamps.yaml": "c", "check": "b"})
         said = "\n".join(diff.lines_of(before, now))
         for words in ("verdict     pass -> look", "inputs      lamps.yaml\n", "1 -> 1 (the same)", "2 of 4 differ"):
             self.assertIn(words, said)
         self.assertIn("  evaluate mean_mm: 0.2 -> 0.3 (+0.1)", said)
         self.assertIn("  calibration focal_px y: 261 -> 261.5 (+0.5)", said)
-        self.assertIn("  + check: the residuals show", said)
+        self.assertIn("  + check: the residuals; they show", said)
         self.assertEqual(len(said.splitlines()), 7)
 
 
@@ -374,6 +377,28 @@ class OverTime(unittest.TestCase):
         found = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=2, sessions=3, broken={0: (1, {"center": (9, 9)})})))
         self.assertEqual((found["cameras"], found["lamps"], set(found["factors"].values())), ([], [], {None}))
         self.assertEqual(fleet.fleet_of([], [])["cameras"], [])
+
+    def test_a_room_whose_sessions_see_too_few_lamps_takes_nothing_off(self):
+        rows, lamps = fleet_rows(Fleet(1))
+        expected = fleet.fleet_of(rows, lamps)["factors"]["lamps"]
+        self.assertIsNotNone(expected)
+        few = [lamps[0] | {"room": f"room {i}"} for i in range(1000)]
+        self.assertEqual(fleet.fleet_of(rows, lamps + few)["factors"]["lamps"], expected)
+
+    def test_sessions_without_a_date_put_all_in_the_order_of_names(self):
+        rows = [{"camera": "c", "session": f"s{i}", "date": f"2026-01-{20 - i}"} for i in (2, 0, 1)]
+        self.assertEqual([row["session"] for row in fleet.in_order(rows)], ["s2", "s1", "s0"])
+        rows[0]["date"] = ""
+        self.assertEqual([row["session"] for row in fleet.in_order(rows)], ["s0", "s1", "s2"])
+        self.assertEqual(fleet.times_of(fleet.in_order(rows)), [0, 1, 2])
+
+    def test_a_change_is_of_the_kind_that_its_p_is_of(self):
+        series = [(value, 1.0) for value in (0, 0, 0, 6, 6, 6)]
+        rows = [{"camera": "c", "session": f"s{i}", "date": ""} for i in range(6)]
+        for tests, kind in (({"step": 5, "drift": 1}, "step"), ({"step": 50000, "drift": 1}, "drift")):
+            found = fleet.change_of(rows, series, tests)
+            self.assertEqual(found["kind"], kind)
+            self.assertAlmostEqual(found["p"], 2 * tests[kind] * fleet.p_of(found["change"] / found["sd"]))
 
     def test_steps_and_drifts_are_those_of_least_squares(self):
         series = [(1.0, 0.5), (2.0, 1.0), (4.0, 0.25)]

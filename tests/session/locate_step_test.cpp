@@ -53,12 +53,14 @@ TEST(LocateFrames, SeesALampThatMovedWhereItIs) {
     rig.body.pose = {{0.1 * i, -0.05 * i, 0}, 1.5 * i};
     input.frames.push_back({std::to_string(i), seen_from(rig, 0)});
   }
+  input.frames.push_back({"twice", input.frames.back().detections});
+  input.frames.back().detections.push_back(input.frames.back().detections.front());
   EXPECT_THAT(locate_frames(input).lamp_offsets, IsEmpty()) << "was not asked";
   input.lamp_offsets = true;
   const auto offsets = locate_frames(input).lamp_offsets;
   ASSERT_EQ(offsets.size(), rig.map.lamps.size());
   for (const LampOffset& offset : offsets) {
-    EXPECT_EQ(offset.captures, 4);
+    EXPECT_EQ(offset.captures, 4) << "not that with a lamp twice";
     if (offset.lamp == rig.map.lamps.front().id) {
       EXPECT_LT((offset.offset_m - moved_m).norm(), 1e-8) << offset.offset_m.transpose();
       EXPECT_LT(offset.sd_m.norm(), 1e-8);

@@ -57,33 +57,35 @@ std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
 
 bool LimitRatio::beaten() const {
   constexpr double sure = 3;
-  return horizontal < 1 - sure / std::sqrt(4 * static_cast<double>(fixes));
+  return horizontal < 1 - sure * sd;
 }
 
 std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,
                                       const std::vector<TruthRow>& truth, const LampMap& lamps,
                                       const Camera& camera, double noise_px, int threads) {
   const Lens lens(camera.lens_model, camera.intrinsics);
-  std::vector<double> limits_m2(errors.size());  // 0: none
+  std::vector<Eigen::Matrix2d> limits_m2(errors.size(), Eigen::Matrix2d::Zero());  // 0: none
   in_parallel(errors.size(), threads, [&](std::size_t i) {
     const TruthRow& place = truth[errors[i].truth];
     if (!place.z_m || !place.yaw_rad) return;
     const Pose pose{{place.xy_m.x(), place.xy_m.y(), *place.z_m}, *place.yaw_rad};
     const auto budget =
         error_budget(visible_lamps(lamps, camera, pose), lens, pose, {noise_px, 0, 0, 0});
-    if (budget) limits_m2[i] = budget->noise(0, 0) + budget->noise(1, 1);
+    if (budget) limits_m2[i] = budget->noise.topLeftCorner<2, 2>();
   });
-  double errors_m2 = 0, limit_m2 = 0;
+  double errors_m2 = 0, limit_m2 = 0, variance_m4 = 0;
   std::size_t fixes = 0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (!(limits_m2[i] > 0)) continue;
+    if (!(limits_m2[i].trace() > 0)) continue;
     errors_m2 += errors[i].horizontal_m.squaredNorm();
-    limit_m2 += limits_m2[i];
+    limit_m2 += limits_m2[i].trace();
+    variance_m4 += 2 * limits_m2[i].squaredNorm();
     ++fixes;
   }
   if (fixes == 0) return std::nullopt;
   return LimitRatio{std::sqrt(errors_m2 / limit_m2),
-                    std::sqrt(limit_m2 / static_cast<double>(fixes)), fixes};
+                    std::sqrt(limit_m2 / static_cast<double>(fixes)), fixes,
+                    std::sqrt(variance_m4) / (2 * limit_m2)};
 }
 
 }  // namespace vlp

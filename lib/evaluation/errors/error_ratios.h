@@ -40,9 +40,12 @@ struct LimitRatio {
   double limit_m;
   /// Fixes at whose true pose there is a limit.
   std::size_t fixes;
+  /// Of `horizontal` by chance, where it is 1: sqrt(sum 2 tr C^2) / (2 sum tr C) of normal errors
+  /// with the limits' covariances C of x and y; 1 / sqrt(4 n) of n round ones, all as large.
+  double sd;
 
-  /// By more than chance allows in 1 of 700 cases: the ratio of 2 n normal errors has a standard
-  /// deviation of 1 / sqrt(4 n), and what errors have in common only adds to them.
+  /// By more than chance allows in 1 of 700 cases, three sd; what errors have in common only adds
+  /// to them.
   bool beaten() const;
 };
 /// The limit at the true pose of each fix: ErrorBudget::noise, Cramer-Rao, for a level camera that

@@ -39,27 +39,36 @@ TEST(StatedRatio, IsOneWhenErrorsAreAsStated) {
   EXPECT_FALSE(stated_ratio(fixes, {errors[0]}));
 }
 
-/// Four lamps round the camera, 2 m above it, and a focal length of 500 px: sd(X) = sd(Y) =
-/// (H / f) noise / sqrt(4), see ErrorBudget::noise.
-TEST(LimitRatio, IsErrorsOverTheFormulasLimit) {
+/// Four lamps round the origin at a height of 2 m.
+LampMap four_lamps() {
   LampMap lamps;
   for (const auto& [x, y] : {std::pair(1.0, 1.0), {-1.0, 1.0}, {-1.0, -1.0}, {1.0, -1.0}}) {
     lamps.lamps.push_back({static_cast<int>(lamps.lamps.size()), {x, y, 2}, {}, {}, {}});
   }
-  const Camera camera{
+  return lamps;
+}
+
+Camera pinhole() {
+  return {
       "c", {1000, 1000}, *lens_model_from_name("LENSMODEL_PINHOLE"), {500, 500, 500, 500}, {}, {},
       {}};
+}
+
+/// Four lamps round the camera, 2 m above it, and a focal length of 500 px: sd(X) = sd(Y) =
+/// (H / f) noise / sqrt(4), see ErrorBudget::noise.
+TEST(LimitRatio, IsErrorsOverTheFormulasLimit) {
   const double sd_m = 2.0 / 500 * 0.1 / 2, limit_m = sd_m * std::sqrt(2);
   const std::vector<TruthRow> truth{
       {"a", {0, 0}, 0, 0.3}, {"b", {90, 0}, 0, 0}, {"c", {0, 0}, {}, 0}};
   const auto ratio = limit_ratio({{0, {0, 3 * limit_m}, {}, {}, 0, 0},
                                   {1, {5, 5}, {}, {}, 1, 1},   // sees no lamp
                                   {2, {5, 5}, {}, {}, 2, 2}},  // at an unknown height
-                                 truth, lamps, camera, 0.1, 2);
+                                 truth, four_lamps(), pinhole(), 0.1, 2);
   ASSERT_TRUE(ratio);
   EXPECT_EQ(ratio->fixes, 1);
   EXPECT_NEAR(ratio->limit_m, limit_m, 1e-9);
   EXPECT_NEAR(ratio->horizontal, 3, 1e-6);
+  EXPECT_NEAR(ratio->sd, 1 / std::sqrt(4.0), 1e-6);
 }
 
 TEST(LimitRatio, IsBeatenByMoreThanChanceAlone) {
@@ -70,12 +79,45 @@ TEST(LimitRatio, IsBeatenByMoreThanChanceAlone) {
     for (int trial = 0; trial < trials; ++trial) {
       double squares = 0;
       for (int i = 0; i < 2 * fixes; ++i) squares += std::pow(random.normal(), 2);
-      count += LimitRatio{std::sqrt(squares / (2 * fixes)) / stated, 1, fixes}.beaten() ? 1 : 0;
+      const double ratio = std::sqrt(squares / (2 * fixes)) / stated;
+      count += LimitRatio{ratio, 1, fixes, 1 / std::sqrt(4.0 * fixes)}.beaten() ? 1 : 0;
     }
     return count;
   };
   EXPECT_LE(beaten(1), 10);  // 2.7 are expected
   EXPECT_EQ(beaten(1.0 / 0.609), trials);
+}
+
+/// Every sixth camera is 10 m below the lamps, the others 2 m: their limit is five times as large,
+/// and a few fixes make up most of the ratio.
+TEST(LimitRatio, IsNoOftenerBeatenByChanceWhereLimitsDiffer) {
+  Random random(4);
+  constexpr int trials = 300;
+  constexpr std::size_t fixes = 60;
+  const LampMap lamps = four_lamps();
+  const Camera camera = pinhole();
+  constexpr double sd_per_m = 0.1 / 500 / 2;  // see above
+  std::vector<TruthRow> truth;
+  for (std::size_t i = 0; i < fixes; ++i) truth.push_back({"", {0, 0}, i % 6 == 0 ? -8.0 : 0, 0});
+  int beaten = 0, as_if_equal = 0;
+  double square = 0, sd = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    std::vector<FixError> errors;
+    for (std::size_t i = 0; i < fixes; ++i) {
+      const double sd_m = sd_per_m * (2 - *truth[i].z_m);
+      const double x_m = sd_m * random.normal(), y_m = sd_m * random.normal();
+      errors.push_back({i, {x_m, y_m}, {}, {}, i, i});
+    }
+    const auto ratio = limit_ratio(errors, truth, lamps, camera, 0.1, 1);
+    ASSERT_TRUE(ratio);
+    sd = ratio->sd;
+    square += std::pow(ratio->horizontal - 1, 2) / trials;
+    beaten += ratio->beaten() ? 1 : 0;
+    as_if_equal += ratio->horizontal < 1 - 3 / std::sqrt(4.0 * fixes) ? 1 : 0;
+  }
+  EXPECT_NEAR(std::sqrt(square) / sd, 1, 0.13);  // three standard errors
+  EXPECT_LE(beaten, 3);                          // 0.1 are expected
+  EXPECT_GE(as_if_equal, 8);                     // 22 are expected: unequal limits matter here
 }
 
 }  // namespace
