@@ -123,8 +123,10 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   log_to_stderr(app.get_name(), false, false);
   if (argc == 3 && std::string_view(argv[1]) == "--reference") {
     const std::string text = reference_of(app, argv[2]);
-    std::fputs(text.c_str(), stdout);
-    return text.empty() || std::fflush(stdout) != 0 ? kBadInput : kDone;
+    if (!text.empty()) {  // of another name the parser complains
+      std::fputs(text.c_str(), stdout);
+      return std::fflush(stdout) != 0 ? kBadInput : kDone;
+    }
   }
   try {
     app.parse(argc, argv);

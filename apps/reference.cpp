@@ -4,8 +4,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cctype>
 #include <functional>
 #include <sstream>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "help_formatter.h"

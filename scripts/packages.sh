@@ -7,20 +7,34 @@
 #
 #   scripts/packages.sh [-o FOLDER] [COMPONENT...]
 #
-#   -o FOLDER   where to write them (default: build/packages)
+#   -o FOLDER   where to write them (default: build/packages of the project)
 #   COMPONENT   positioning, development, tools or python (default: all)
 set -euo pipefail
-cd "$(dirname "$0")/.."
+project=$(cd "$(dirname "$0")/.." && pwd)
 
-folder=$PWD/build/packages
-if [ "${1:-}" = -o ]; then
-  mkdir -p "$2"
-  folder=$(realpath "$2")
-  shift 2
-fi
-case ${1:-} in -*) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit 2 ;; esac
+folder=$project/build/packages
+refuse() {
+  echo "packages.sh: $1; see packages.sh --help" >&2
+  exit 2
+}
+while [[ ${1:-} == -* ]]; do
+  case $1 in
+    -o) [ $# -gt 1 ] || refuse "-o wants a folder"
+        folder=$(realpath -m "$2"); shift 2 ;;
+    -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
+    *) refuse "unknown option $1" ;;
+  esac
+done
+cd "$project"
 
-# Where Debian has its libraries and zsh looks; nothing has to be compiled anew for it.
+# Where Debian has its libraries and zsh looks; nothing has to be compiled anew for it. The build is left as
+# it was: cmake --install goes where it went before.
+before=()
+for name in CMAKE_INSTALL_PREFIX CMAKE_INSTALL_LIBDIR; do
+  value=$(sed -n "s/^$name:[A-Z]*=//p" build/CMakeCache.txt 2>/dev/null || true)
+  if [ -n "$value" ]; then before+=("-D$name=$value"); else before+=("-U$name"); fi
+done
+trap 'cmake "${before[@]}" "$project/build" >/dev/null' EXIT
 cmake --preset release -DCMAKE_INSTALL_PREFIX=/usr \
   -DCMAKE_INSTALL_LIBDIR="lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)"
 targets=("${@/#/vlp_package_}")

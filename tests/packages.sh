@@ -12,13 +12,22 @@
 #
 # Exit code 75 when there is no root (tests/bare_root.sh).
 set -euo pipefail
-cd "$(dirname "$0")/.."
+project=$(cd "$(dirname "$0")/.." && pwd)
 
 root=()
-if [ "${1:-}" = --root ]; then
-  root=(--root "$2")
-  shift 2
-fi
+refuse() {
+  echo "packages.sh: $1; see packages.sh --help" >&2
+  exit 2
+}
+while [[ ${1:-} == -* ]]; do
+  case $1 in
+    --root) [ $# -gt 1 ] || refuse "--root wants a folder"
+            root=(--root "$(realpath -m "$2")"); shift 2 ;;
+    -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
+    *) refuse "unknown option $1" ;;
+  esac
+done
+cd "$project"
 [ -n "$(command -v lintian)" ] || { echo "packages.sh: lintian is missing; scripts/setup.sh installs it" >&2; exit 1; }
 scratch=$(mktemp --directory --tmpdir packages-XXXXXX)
 trap 'rm -rf "$scratch"' EXIT
@@ -42,7 +51,9 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$VERSION_CODENAME" 
     /packages/robot | grep "^x "
     c++ -std=c++20 -x c++ ../../tests/consumer/same_fix/same_fix.cpp -o /packages/robot \
       $(pkg-config --cflags --libs vlp-positioning)
-    /packages/robot | grep -c "^0 "
+    fixes=$(/packages/robot)
+    echo "$fixes"
+    [ "$(grep -c "^0 " <<<"$fixes")" = 2 ]
   fi
   if has vlp-tools; then
     vlp-locate detections.csv --lamps lamps.yaml --calibration calibration.yaml -o /packages/fixes.csv

@@ -93,7 +93,7 @@ typedef struct vlp_sensors {
 } vlp_sensors;
 
 typedef struct vlp_fix {
-  /* As vlp_locate() gave it. What follows `unknown_lamps` is zero unless this is VLP_OK. */
+  /* As vlp_locate() gave it. What follows `stamp` is zero unless this is VLP_OK. */
   int32_t status;
   /* Detections whose id is not in the map; they are left out. */
   int32_t unknown_lamps;

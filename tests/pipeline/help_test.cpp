@@ -142,13 +142,21 @@ TEST_P(Help, IsWhatTheShellsComplete) {
   for (const std::string& option : options_in(run_program(program + " --help").output)) {
     EXPECT_THAT(offered, testing::Contains(option));
   }
+  const TemporaryFolder folder;
+  const std::string file = "'" + (folder / "completion.zsh").string() + "'";
   const auto zsh = run_program("command -v zsh >/dev/null || exit 77; " + program +
-                               " --reference zsh >completion.zsh && zsh -n completion.zsh");
+                               " --reference zsh >" + file + " && zsh -n " + file);
   if (zsh.exit_code != 77) {
     EXPECT_EQ(zsh.exit_code, 0);
     EXPECT_EQ(zsh.errors, "");
   }
-  std::filesystem::remove("completion.zsh");
+}
+
+TEST_P(Help, RefusesAReferenceThatThereIsNot) {
+  const auto result = run_program(std::string(GetParam()) + " --reference odd");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.output, "");
+  EXPECT_THAT(result.errors, HasSubstr("unknown: --reference"));
 }
 
 TEST(Completion, KnowsChoicesCommandsAndFiles) {

@@ -114,16 +114,24 @@ TEST(SharedLibrary, HasNoTypeWhoseLayoutChangesWithTheProcessor) {
   }
   // The compiler's own account of every class of the headers, for an old processor and a new one.
   const TemporaryFolder folder;
+  folder.file("empty.cpp", "");
+  const std::string begin = "cd '" + (folder / "").string() + "' && c++ -std=c++20 -fsyntax-only ";
+  if (run_program(begin + "-fdump-lang-class=classes empty.cpp").exit_code != 0) {
+    GTEST_SKIP() << "c++ has no -fdump-lang-class";
+  }
+#if defined(__x86_64__)
+  const std::vector<std::string> processors = {"", "-mavx512f -mfma"};
+#else
+  const std::vector<std::string> processors = {""};
+#endif
   std::string all;
   for (const std::string& header : headers()) all.append("#include \"" + header + "\"\n");
   const auto source = folder.file("all.cpp", all);
   std::string first;
-  for (const char* processor : {"", "-mavx512f -mfma"}) {
-    const auto result = run_program("cd '" + (folder / "").string() +
-                                    "' && c++ -std=c++20 -fsyntax-only -I'" VLP_SOURCE_DIR
-                                    "/lib' -isystem '" VLP_EIGEN_DIR "' " +
-                                    processor + " -fdump-lang-class=classes all.cpp && " +
-                                    "grep -A 2 '^Class vlp' classes");
+  for (const std::string& processor : processors) {
+    const auto result =
+        run_program(begin + "-I'" VLP_SOURCE_DIR "/lib' -isystem '" VLP_EIGEN_DIR "' " + processor +
+                    " -fdump-lang-class=classes all.cpp && " + "grep -A 2 '^Class vlp' classes");
     ASSERT_EQ(result.exit_code, 0) << result.errors;
     if (first.empty()) first = result.output;
     EXPECT_EQ(result.output, first) << processor;
