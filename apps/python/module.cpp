@@ -6,8 +6,12 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -40,13 +44,27 @@ constexpr int kStatuses = static_cast<int>(FixStatus::row_time_unknown) + 1;
 
 Doubles doubles(std::vector<py::ssize_t> shape) { return Doubles(std::move(shape)); }
 
-/// An array of so many columns; one row may be given without its brackets.
+/// Of an array of so many columns.
 std::size_t rows_of(const Doubles& array, py::ssize_t columns, const char* name) {
   if (array.ndim() != 2 || array.shape(1) != columns) {
     throw std::invalid_argument(std::string(name) + " should have the shape (n, " +
                                 std::to_string(columns) + ")");
   }
   return static_cast<std::size_t>(array.shape(0));
+}
+
+/// numpy would cut 1.7 to 1 and wrap what an int does not hold.
+Integers integers_of(const py::object& given, const char* name) {
+  const auto array = py::array::ensure(given);
+  const char kind = array ? array.dtype().kind() : '?';
+  const bool whole = kind == 'i' || kind == 'u' || (array && array.size() == 0);
+  const auto wide = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(
+      whole ? array : py::array());
+  const auto fits = [](std::int64_t value) { return std::in_range<int>(value); };
+  if (!whole || !std::all_of(wide.data(), wide.data() + wide.size(), fits)) {
+    throw std::invalid_argument(std::string(name) + " should be integers, of 32 bits");
+  }
+  return Integers::ensure(wide);
 }
 
 void check_length(const py::array& array, std::size_t length, const char* name) {
@@ -172,9 +190,9 @@ std::vector<Detection> detections_of(const Integers& lamps, const Doubles& pixel
   return detections;
 }
 
-Fix locate(const Positioner& positioner, const Integers& lamps, const Doubles& pixels,
+Fix locate(const Positioner& positioner, const py::object& lamps, const Doubles& pixels,
            const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
-  return positioner.locate(detections_of(lamps, pixels, sigma_px), sensors);
+  return positioner.locate(detections_of(integers_of(lamps, "lamps"), pixels, sigma_px), sensors);
 }
 
 /// Where each run of equal numbers begins, and the end.
@@ -188,10 +206,11 @@ std::vector<std::size_t> frames_in(const Integers& frames) {
   return begins;
 }
 
-py::dict locate_frames(const Positioner& positioner, const Integers& frames, const Integers& lamps,
-                       const Doubles& pixels, const std::optional<Doubles>& sigma_px,
-                       const Sensors& sensors) {
-  const auto detections = detections_of(lamps, pixels, sigma_px);
+py::dict locate_frames(const Positioner& positioner, const py::object& frame_of_each,
+                       const py::object& lamps, const Doubles& pixels,
+                       const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
+  const auto detections = detections_of(integers_of(lamps, "lamps"), pixels, sigma_px);
+  const Integers frames = integers_of(frame_of_each, "frames");
   check_length(frames, detections.size(), "frames");
   const auto begins = frames_in(frames);
   const auto n = static_cast<py::ssize_t>(begins.size()) - 1;
@@ -274,8 +293,24 @@ py::tuple arrays_of(const std::vector<Detection>& detections) {
   return py::make_tuple(lamps, pixels, sigma_px);
 }
 
-py::tuple detect(const LampDetector& detector, const py::array& array) {
+/// And the size of the images that it is for.
+struct ImageDetector {
+  LampDetector detector;
+  std::array<int, 2> imager_px;
+};
+
+std::string in_px(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
+  const auto& [detector, imager_px] = of_camera;
   const cv::Mat image = image_of(array);
+  if (image.cols != imager_px[0] || image.rows != imager_px[1]) {
+    throw std::invalid_argument("the image is " + in_px(image.cols, image.rows) +
+                                ", the calibration's camera has " +
+                                in_px(imager_px[0], imager_px[1]) + " px");
+  }
   std::vector<Detection> detections;
   {
     const py::gil_scoped_release others_may_run;
@@ -288,14 +323,14 @@ py::tuple detect(const LampDetector& detector, const py::array& array) {
   return arrays_of(detections);
 }
 
-LampDetector detector_of(const LampMap& map, const Calibration& calibration,
-                         const std::optional<std::filesystem::path>& classifier) {
+ImageDetector detector_of(const LampMap& map, const Calibration& calibration,
+                          const std::optional<std::filesystem::path>& classifier) {
   if (!calibration.camera.row_time_s) {
     throw std::invalid_argument("the calibration has no row_time_s, by which lamps are told apart");
   }
   std::optional<LampClassifier> trained;
   if (classifier) trained = read_lamp_classifier(*classifier);
-  return {map, detector_camera(calibration), std::move(trained)};
+  return {{map, detector_camera(calibration), std::move(trained)}, calibration.camera.imager_px};
 }
 
 // Tables
@@ -478,13 +513,13 @@ PYBIND11_MODULE(vlp, m) {
           "in `frames`. A dict of arrays, a row for each frame: frame, status (an index of\n"
           "STATUSES, 0: ok), position_m, yaw_rad, covariance, residual_px, lamps.");
 
-  py::class_<LampDetector>(m, "LampDetector", "Finds and identifies the lamps of a map in images.")
+  py::class_<ImageDetector>(m, "LampDetector", "Finds and identifies the lamps of a map in images.")
       .def(py::init(&detector_of), "lamp_map"_a, "calibration"_a, "classifier"_a = py::none(),
            "classifier: the file of one that vlp-train made, instead of the map's frequencies.")
       .def("detect", &detect, "image"_a,
            "(lamps, pixels, sigma_px) of the lamps wholly in view, as Positioner.locate takes "
            "them;\n"
-           "the image has the shape (rows, columns), uint8 or uint16.");
+           "the image has the camera's shape (rows, columns), uint8 or uint16.");
 
   m.def("read_detections", &detections_table, "file"_a,
         "detections.csv as a dict: images, and for each detection frames (an index of images),\n"

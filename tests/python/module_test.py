@@ -89,10 +89,18 @@ class Module(unittest.TestCase):
             self.positioner.locate([1, 2], [1.0, 2])
         with self.assertRaisesRegex(ValueError, "one for each"):
             self.positioner.locate([1, 2, 3], [[1.0, 2], [3, 4]])
+        for lamps in ([1.7, 2], ["1", "2"], [True, False], [1, 1 + 2**32], [[1], [2, 3]], None):
+            with self.assertRaisesRegex(ValueError, "lamps should be integers"):
+                self.positioner.locate(lamps, [[1.0, 2], [3, 4]])
+        with self.assertRaisesRegex(ValueError, "frames should be integers"):
+            self.positioner.locate_frames([0.5, 1], [1, 2], [[1.0, 2], [3, 4]])
+        self.assertEqual(self.positioner.locate([], np.zeros((0, 2))).status, "too_few_lamps")
         with self.assertRaisesRegex(ValueError, "correction"):
             vlp.Positioner(self.lamps, self.calibration, correction="some")
         with self.assertRaisesRegex(ValueError, "uint8"):
             vlp.LampDetector(self.lamps, self.calibration).detect(np.zeros((5, 5)))
+        with self.assertRaisesRegex(ValueError, "is 800 x 599, .* has 800 x 600 px"):
+            vlp.LampDetector(self.lamps, self.calibration).detect(np.zeros((599, 800), np.uint8))
         with self.assertRaises(ValueError):
             vlp.Lens("LENSMODEL_NONE", [1, 1, 0, 0])
 
