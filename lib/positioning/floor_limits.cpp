@@ -43,6 +43,7 @@ std::vector<FloorLimits::Place> places_on(const FloorGrid& grid, double z_m, dou
 
 std::vector<Eigen::Vector3d> places_of(const LampMap& map, const std::vector<std::size_t>& lamps) {
   std::vector<Eigen::Vector3d> places_m;
+  places_m.reserve(lamps.size());
   for (const std::size_t lamp : lamps) places_m.push_back(map.lamps[lamp].position_m);
   return places_m;
 }

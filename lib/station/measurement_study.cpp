@@ -72,6 +72,7 @@ MeasurementStudy analysis_of(const Cells& cells) {
     of_cells.insert(of_cells.end(), means.begin(), means.end());
   }
   std::vector<double> of_stations;
+  of_stations.reserve(by_station.size());
   for (const auto& [station, means] : by_station) of_stations.push_back(mean_of(means));
   study.mean = mean_of(of_units);
   const auto p = static_cast<double>(study.units), o = static_cast<double>(study.stations),

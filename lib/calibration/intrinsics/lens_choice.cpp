@@ -47,14 +47,19 @@ double mean_of(const Squares& squares) {
   return std::accumulate(squares.begin(), squares.end(), 0.0) / static_cast<double>(squares.size());
 }
 
-/// Whether `a` is above `b` in the mean by no more than two standard errors of the difference.
-bool as_good(const Squares& a, const Squares& b) {
-  constexpr double errors = 2;
+/// The mean over the views of log(a / b), and its standard error.
+struct Excess {
+  double mean, error;
+};
+
+Excess excess(const Squares& a, const Squares& b) {
   const auto n = static_cast<double>(a.size());
-  const double mean = mean_of(a) - mean_of(b);
-  double spread = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) spread += std::pow(a[i] - b[i] - mean, 2);
-  return mean <= errors * std::sqrt(spread / (n - 1) / n);
+  double sum = 0, spread = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += std::log(a[i] / b[i]);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    spread += std::pow(std::log(a[i] / b[i]) - sum / n, 2);
+  }
+  return {sum / n, std::sqrt(spread / (n - 1) / n)};
 }
 
 /// Takes the views from all models that none of them fits: what is wrong with those is not the
@@ -97,17 +102,20 @@ std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
     squares.push_back(judged(with_model));
   }
   leave_out_bad_views(squares);
+  constexpr double errors = 2;
   LensChoice choice{};
   const Squares* best = nullptr;
   for (std::size_t i = 0; i < kModels.size(); ++i) {
     choice.tried.push_back({kModels[i]});
     if (!squares[i]) continue;
     choice.tried.back().rms_px = std::sqrt(mean_of(*squares[i]));
-    if (best == nullptr || mean_of(*squares[i]) < mean_of(*best)) best = &*squares[i];
+    if (best == nullptr || excess(*squares[i], *best).mean < 0) best = &*squares[i];
   }
   if (best == nullptr) return {};
   for (std::size_t i = 0; i < kModels.size(); ++i) {
-    if (!squares[i] || !as_good(*squares[i], *best)) continue;
+    if (!squares[i]) continue;
+    const auto [mean, error] = excess(*squares[i], *best);
+    if (mean > errors * error) continue;
     choice.model = kModels[i];
     break;
   }

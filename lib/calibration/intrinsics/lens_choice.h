@@ -31,13 +31,14 @@ struct LensChoice {
 /// The lens model that the views call for, by cross-validation: the views go into three parts in
 /// turn, every model with distortion is solved for with two of them (solve_intrinsics()) and judged
 /// by the third, where only poses are fitted (held_out_rms_px()), until each view has been judged
-/// once. Taken is the model with the fewest parameters whose mean squared residual is no more than
-/// two standard errors above that of the best, the standard error being that of the mean difference
-/// of the two, view by view: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
+/// once. A model is worse than another by the mean over the views of the logarithm of the ratio of
+/// their squared residuals, in which the views of a few places do not outweigh the rest. Taken is
+/// the model with the fewest parameters that is worse than the best by no more than two standard
+/// errors of that: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
 /// Classification and Regression Trees, 1984, 3.4.3, which with one error would take a model larger
-/// than the lens in one of six cases. Views that every model leaves three times the usual
-/// residual of do not count. input.lens_model is not looked at. Nothing when no model fits the
-/// views, or there are fewer than kLeastViewsToChoose.
+/// than the lens in one of six cases. Views that every model leaves three times the usual residual
+/// of do not count. input.lens_model is not looked at. Nothing when no model fits the views, or
+/// there are fewer than kLeastViewsToChoose.
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input);
 
 /// In words: the models with what they left, the one taken first.
