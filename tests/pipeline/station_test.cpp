@@ -305,7 +305,7 @@ TEST_F(Station, WatchesATrend) {
       const std::string run = std::to_string(first + static_cast<int>(i));
       sql.append("INSERT INTO runs SELECT '").append(run).append("', '").append(kind);
       sql.append("', '").append(of).append("', '").append(camera).append("', '', '");
-      sql.append(run).append("', '");
+      sql.append("2").append(run).append("-01-01T00:00:00Z', '");  // a year each
       sql.append(verdict).append("', '', '', '', '', '';\n");
       sql.append("INSERT INTO figures VALUES ('").append(run).append("', 1, 'rms_px', ");
       sql.append(std::to_string(values[i])).append(", NULL, 0, 1, 'px');\n");
@@ -339,12 +339,15 @@ TEST_F(Station, WatchesATrend) {
   add(500, "station-1", "unit", "PASS", {7});
   const auto alarm = records("trend rms_px");
   EXPECT_EQ(alarm.exit_code, 1);
-  EXPECT_THAT(alarm.output, HasSubstr("500 500 a 7  western-electric-1: more than 3 sigmas"));
+  EXPECT_THAT(alarm.output,
+              HasSubstr("2500-01-01T00:00:00Z 500 a 7  western-electric-1: more than 3 sigmas"));
   EXPECT_THAT(records("trend rms_px --rules nelson ewma").output, HasSubstr("nelson-1: "));
   EXPECT_EQ(records("trend rms_px --rules western-electric-2").exit_code, 0);
   EXPECT_THAT(records("trend rms_px --rules none").errors, HasSubstr("there is no rule none"));
-  EXPECT_THAT(records("trend rms_px --until 200").output, HasSubstr("10 runs, 100 to 109"));
-  EXPECT_THAT(records("list --since 400 --until 460").output, HasSubstr("2 runs"));
+  EXPECT_THAT(records("trend rms_px --until 2200-01-01").output,
+              HasSubstr("10 runs, 2100-01-01T00:00:00Z to 2109-01-01T00:00:00Z"));
+  EXPECT_THAT(records("list --since 2400-01-01 --until 2460-01-01").output, HasSubstr("2 runs"));
+  EXPECT_EQ(records("list --since 21.11.2026").exit_code, 2);
 
   // Failed units count in the capability; those that were not judged do not.
   EXPECT_THAT(records("capability rms_px").output, ContainsRegex("rms_px +13 .*<= 0.3 +-"));
