@@ -31,7 +31,7 @@ struct Options {
   CaptureOptions images;  // but for the sets
   std::vector<std::string> sets, turns;
   std::string refined_map;
-  std::optional<double> map_sd_m, place_sd_m;
+  std::optional<double> map_sd_m, place_sd_m, lens_sd_px;
 };
 
 /// A folder of images, or a table, and the captures.csv in its folder.
@@ -89,11 +89,17 @@ void print_summary(const AdjustmentResult& found, const Calibration& before) {
   if (found.lens_freedom > 0) {
     fmt::print("lens        corrected: chi-squared {:.1f}, {} expected\n", found.lens_chi_squared,
                found.lens_freedom);
+    const auto& lens = found.camera.intrinsics;
+    const Eigen::VectorXd sd = found.surveyed_covariance.diagonal().head<4>().cwiseSqrt();
+    fmt::print(
+        "            fx fy {:.3f} {:.3f} px, sd {:.3f} {:.3f}; cx cy {:.3f} {:.3f} px, sd {:.3f} "
+        "{:.3f}\n",
+        lens[0], lens[1], sd[0], sd[1], lens[2], lens[3], sd[2], sd[3]);
   } else {
     const bool stated = before.intrinsics_report && before.intrinsics_report->covariance;
     fmt::print("lens        {}\n", stated ? "as it was: the captures tell nothing of it"
                                           : "taken as exact: the calibration has no covariance of "
-                                            "it");
+                                            "it (see --lens-sd-px)");
   }
   fmt::print("residual    {:.4f} px per axis\n", found.residual_px);
   for (const auto& place : found.places) {
@@ -133,6 +139,7 @@ void run(const CLI::App& app, const Options& options) {
   input.calibration_file = images.calibration;
   input.map_sd_m = options.map_sd_m;
   input.place_sd_m = options.place_sd_m;
+  input.lens_sd_px = options.lens_sd_px;
   input.refine_map = !options.refined_map.empty();
   for (const std::string& set : options.sets) {
     input.sets.push_back(read_set(options, set, false, input.lamps, input.calibration));
@@ -193,6 +200,11 @@ int main(int argc, char** argv) {
       ->check(vlp::finite_not_negative());
   app.add_option("--place-sd-m", options.place_sd_m,
                  "Standard deviation per axis of places that state none, those of truth.csv too")
+      ->check(vlp::finite_positive());
+  app.add_option("--lens-sd-px", options.lens_sd_px,
+                 "Of a lens whose calibration states no covariance: by how much each of its "
+                 "parameters may be off, as the shift of the image that it makes, rms; such a lens "
+                 "is then estimated (default: it is exact)")
       ->check(vlp::finite_positive());
   vlp::add_detect_options(app, options.images);
   return vlp::run_app(app, argc, argv, [&] {

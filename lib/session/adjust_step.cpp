@@ -56,6 +56,16 @@ AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& re
                      "calibration from before");
   }
   AdjustmentInput all{{}, input.lamps, input.calibration};
+  if (input.lens_sd_px) {
+    auto& report = all.calibration.intrinsics_report;
+    if (report && report->covariance) {
+      throw InputError(input.calibration_file,
+                       "states the covariance of its lens: --lens-sd-px is for a lens that "
+                       "states none");
+    }
+    if (!report) report.emplace();
+    report->covariance = stated_lens_covariance(all.calibration.camera, *input.lens_sd_px);
+  }
   for (Lamp& lamp : all.lamps.lamps) {
     if (!lamp.sd_m) lamp.sd_m = input.map_sd_m;
     if (!lamp.sd_m) {

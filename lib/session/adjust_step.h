@@ -31,6 +31,8 @@ struct AdjustStepInput {
   std::filesystem::path calibration_file;
   /// Of lamps, and of places, that state none.
   std::optional<double> map_sd_m, place_sd_m;
+  /// Of a lens that states none: stated_lens_covariance(); without it such a lens is exact.
+  std::optional<double> lens_sd_px = {};
   /// The covariance that is kept is that of the refined map, else that of the map as surveyed.
   bool refine_map = false;
 };
@@ -42,7 +44,8 @@ struct AdjustStepResult : StepResult {
 /// One adjustment of all sets (calibration/adjustment). Metrics: tilt_deg, and where it is known
 /// lever_arm_mm. undetermined, wrong_map. Warns of lamps that have moved, of places and of a lens
 /// that the captures contradict, of residuals that sigma_px does not explain. Throws InputError
-/// when a lamp or a place states no standard deviation, or the calibration is adjusted already.
+/// when a lamp or a place states no standard deviation, when the lens states one and lens_sd_px
+/// does, too, or the calibration is adjusted already.
 AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry);
 
 }  // namespace vlp

@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include "calibration/adjustment/adjustment.h"
 #include "captures/csv_reader.h"
 #include "captures/detections_table.h"
 #include "support/program.h"
@@ -95,6 +96,25 @@ TEST_F(Adjust, WantsToKnowWhatTheSurveyIsWorth) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("lamps.yaml: lamp 1 has no sd_m"));
   EXPECT_EQ(adjust("--map-sd-m 0.001").exit_code, 0);
+}
+
+TEST_F(Adjust, EstimatesALensThatStatesNothing) {
+  const std::vector<double> truth = rig.calibration.camera.intrinsics;
+  rig.calibration.camera.intrinsics[0] *= 0.97;
+  EXPECT_THAT(adjust("--map-sd-m 0.001").output,
+              HasSubstr("taken as exact: the calibration has no"));
+  const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("lens        corrected"));
+  EXPECT_NEAR(read_calibration(folder / "adjusted.yaml").camera.intrinsics[0] / truth[0], 1, 1e-3);
+}
+
+TEST_F(Adjust, RefusesAStatementOfALensThatMakesItsOwn) {
+  rig.calibration.intrinsics_report.emplace();
+  rig.calibration.intrinsics_report->covariance = stated_lens_covariance(rig.calibration.camera, 1);
+  const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("camera.yaml: states the covariance of its lens"));
 }
 
 TEST_F(Adjust, NamesAMovedLamp) {

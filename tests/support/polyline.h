@@ -4,21 +4,27 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <limits>
 #include <vector>
 
 namespace vlp {
 
-/// Distance of a point from the nearest point of a polyline.
-inline double distance_from(const std::vector<Eigen::Vector2d>& polyline,
-                            const Eigen::Vector2d& point) {
-  double nearest = std::numeric_limits<double>::infinity();
+/// The nearest point of a polyline.
+inline Eigen::Vector2d nearest_on(const std::vector<Eigen::Vector2d>& polyline,
+                                  const Eigen::Vector2d& point) {
+  Eigen::Vector2d nearest = polyline.front();
   for (std::size_t i = 1; i < polyline.size(); ++i) {
     const Eigen::Vector2d begin = polyline[i - 1], along = polyline[i] - begin;
     const double share = std::clamp((point - begin).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    nearest = std::min(nearest, (begin + share * along - point).norm());
+    const Eigen::Vector2d on = begin + share * along;
+    if ((on - point).squaredNorm() < (nearest - point).squaredNorm()) nearest = on;
   }
   return nearest;
+}
+
+/// Distance of a point from it.
+inline double distance_from(const std::vector<Eigen::Vector2d>& polyline,
+                            const Eigen::Vector2d& point) {
+  return (nearest_on(polyline, point) - point).norm();
 }
 
 }  // namespace vlp

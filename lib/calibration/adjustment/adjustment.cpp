@@ -448,6 +448,26 @@ std::string undetermined_by(const AdjustmentProblem& problem, const Eigen::Matri
 
 }  // namespace
 
+MatrixX stated_lens_covariance(const Camera& camera, double sd_px) {
+  const Lens lens(camera.lens_model, camera.intrinsics);
+  constexpr int across = 16;
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(std::ssize(camera.intrinsics));
+  int rays = 0;
+  for (int i = 0; i < across * across; ++i) {
+    const Eigen::Vector2d share((i % across + 0.5) / across, (i / across + 0.5) / across);
+    const auto ray = lens.unproject(
+        {share.x() * camera.imager_px[0] - 0.5, share.y() * camera.imager_px[1] - 0.5});
+    if (!ray) continue;
+    const auto seen = lens.project_with_jacobians(ray->direction);
+    if (!seen) continue;
+    squares += seen->d_pixel_d_parameters.colwise().squaredNorm().transpose() / 2;
+    ++rays;
+  }
+  // A lens that shows no ray of the image stays as it is.
+  const Eigen::ArrayXd variances = sd_px * sd_px * rays / squares.array();
+  return Eigen::MatrixXd((squares.array() > 0).select(variances, 0).matrix().asDiagonal());
+}
+
 AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentLimits& limits) {
   AdjustmentResult result;
   Assembled all = assemble(input);

@@ -112,6 +112,11 @@ struct AdjustmentResult {
   bool ok() const { return undetermined.empty(); }
 };
 
+/// The covariance of a lens whose calibration states none, for AdjustmentInput: an error of any of
+/// its intrinsics, taken alone, moves the pixels of a grid over the image by `sd_px` (rms per
+/// axis); those of different intrinsics are independent. Precondition: sd_px is positive.
+MatrixX stated_lens_covariance(const Camera& camera, double sd_px);
+
 /// Robust twice over: a loss of Cauchy on detections, lamps and places finds what is wrong, and
 /// the last solution is plain least squares without it. A lamp is said to have moved when its
 /// survey contradicts everything else (the test of Baarda, chi-squared of three at 1e-4); the worst

@@ -148,6 +148,46 @@ TEST(Adjustment, CorrectsTheLensWithinItsCovarianceAndNamesAnotherLens) {
   EXPECT_TRUE(wrong.lens_contradicted) << wrong.lens_chi_squared << " of " << wrong.lens_freedom;
 }
 
+TEST(StatedLensCovariance, IsOfWhatMovesTheImageBySoMuch) {
+  const Camera camera{"", {800, 600}, LensModel::pinhole, {500, 400, 399.5, 299.5}, {}, {}, {}};
+  const MatrixX covariance = stated_lens_covariance(camera, 3);
+  // Rays evenly over the image: (u - cx) / fx has the mean square (800^2 - 50^2) / 12 / 500^2.
+  const double x = (640000 - 2500) / 12.0 / 250000, y = (360000 - 37.5 * 37.5) / 12.0 / 160000;
+  // Per axis: what moves one of them alone moves both by half as much, in squares.
+  EXPECT_NEAR(covariance(0, 0), 9 / (x / 2), 1e-6);
+  EXPECT_NEAR(covariance(1, 1), 9 / (y / 2), 1e-6);
+  EXPECT_NEAR(covariance(2, 2), 18, 1e-9);
+  EXPECT_NEAR(covariance(3, 3), 18, 1e-9);
+  EXPECT_EQ(covariance(0, 1), 0);
+}
+
+/// A lens from elsewhere, its focal lengths 4 % too small and its distortion another's.
+TEST(Adjustment, FindsALensOfWhichNothingIsStated) {
+  Random random(8);
+  Survey survey(0.002);
+  Camera& camera = survey.input.calibration.camera;
+  const std::vector<double> truth = camera.intrinsics;
+  survey.five_places(1e-4);
+  survey.add_noise(random, true, true, true);
+  camera.intrinsics[0] *= 0.96;
+  camera.intrinsics[1] *= 0.97;
+  camera.intrinsics[2] += 5;
+  camera.intrinsics[4] += 0.03;
+  survey.input.calibration.intrinsics_report.emplace();
+  survey.input.calibration.intrinsics_report->covariance = stated_lens_covariance(camera, 10);
+  const AdjustmentResult found = adjust_captures(survey.input);
+  ASSERT_TRUE(found.ok()) << found.undetermined;
+  EXPECT_FALSE(found.lens_contradicted);
+  EXPECT_TRUE(moved_lamps(found).empty());
+  EXPECT_LT(found.residual_px, 1.1 * survey.sigma_px);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double sd = std::sqrt(found.refined_covariance(static_cast<int>(i), static_cast<int>(i)));
+    EXPECT_LT(sd, 0.5);
+    EXPECT_NEAR(found.camera.intrinsics[i], truth[i], 3 * sd);
+  }
+  EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 2e-4));
+}
+
 TEST(Adjustment, LeavesOutDetectionsOfAnotherLamp) {
   Survey survey;
   survey.five_places(1e-4);

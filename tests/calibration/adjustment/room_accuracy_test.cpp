@@ -15,6 +15,8 @@ namespace {
 
 struct Means {
   double fix_xy_m = 0, fix_z_m = 0, map_xy_m = 0, map_z_m = 0;
+  /// e' cov^-1 e per coordinate, of all lamps of the map together.
+  double map_squared = 0;
 };
 
 /// Means over trials: of fixes' distances, heights' errors, and the same of the lamps of the map.
@@ -43,11 +45,15 @@ Means over_trials(double map_sd_m, bool places_are_wrong, int trials) {
       sums.fix_xy_m += error.head<2>().norm() / (trials * checks);
       sums.fix_z_m += std::abs(error[2]) / (trials * checks);
     }
+    Eigen::VectorXd errors_m(24);
     for (std::size_t i = 0; i < 8; ++i) {
       const Eigen::Vector3d error_m = survey.misplaced(i, found.refined);
+      errors_m.segment<3>(3 * static_cast<Eigen::Index>(i)) = error_m;
       sums.map_xy_m += error_m.head<2>().norm() / (8 * trials);
       sums.map_z_m += std::abs(error_m.z()) / (8 * trials);
     }
+    const Eigen::MatrixXd covariance = found.refined_covariance.bottomRightCorner<24, 24>();
+    sums.map_squared += errors_m.dot(covariance.ldlt().solve(errors_m)) / (24 * trials);
   }
   return sums;
 }
@@ -64,12 +70,16 @@ class RoomAccuracy : public testing::TestWithParam<Room> {};
 TEST_P(RoomAccuracy, OfFixesAtOtherPlacesAndOfTheRefinedMap) {
   const Room& the = GetParam();
   const Means found = over_trials(the.map_sd_m, the.places_are_wrong, 10);
-  std::printf("%s: fixes %.4f mm, height %.4f mm; map %.4f mm, height %.4f mm\n", the.name,
-              1e3 * found.fix_xy_m, 1e3 * found.fix_z_m, 1e3 * found.map_xy_m, 1e3 * found.map_z_m);
+  std::printf("%s: fixes %.4f mm, height %.4f mm; map %.4f mm, height %.4f mm, squared %.3f\n",
+              the.name, 1e3 * found.fix_xy_m, 1e3 * found.fix_z_m, 1e3 * found.map_xy_m,
+              1e3 * found.map_z_m, found.map_squared);
   EXPECT_LT(found.fix_xy_m, the.limits.fix_xy_m);
   EXPECT_LT(found.fix_z_m, the.limits.fix_z_m);
   EXPECT_LT(found.map_xy_m, the.limits.map_xy_m);
   EXPECT_LT(found.map_z_m, the.limits.map_z_m);
+  if (the.places_are_wrong) {  // as wrong as they are said to be
+    EXPECT_NEAR(found.map_squared, 1, 0.25);
+  }
 }
 
 // Places that are right, with 0.1 mm stated, and places that are wrong by that.
