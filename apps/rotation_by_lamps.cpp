@@ -3,14 +3,12 @@
 #include "rotation_by_lamps.h"
 
 #include <fmt/core.h>
-#include <spdlog/spdlog.h>
 
 #include "app.h"
-#include "calibration/levelling/levelling.h"
 #include "capture_options.h"
 #include "history.h"
 #include "print_rotation.h"
-#include "rig/stage.h"
+#include "session/rotation_step.h"
 #include "step_outcome.h"
 
 namespace vlp {
@@ -33,13 +31,6 @@ void report(const Levelling& result, const Camera& camera) {
   fmt::print("residual    {:.4f} px per axis, {:.4f} px for a level camera{}\n", result.residual_px,
              result.residual_before_px, result.corrections.empty() ? "" : " and the map as it was");
   if (!result.corrections.empty()) print_corrections(result);
-  constexpr double much = 3;
-  if (result.excess > much) {
-    spdlog::warn(
-        "the residuals are {:.1f} times what sigma_px lets expect: lamp map or lens are a little "
-        "wrong, and the tilt, too, may be wrong by more than its sd{}",
-        result.excess, result.corrections.empty() ? "; --refine-map may help" : "");
-  }
 }
 
 }  // namespace
@@ -50,23 +41,14 @@ void rotate_by_lamps(const CLI::App& app, const CaptureOptions& images,
   check_output(images.output, inputs);
   check_further_output("--refine-map", refined_map, images.output, inputs);
   const LampCaptures input = read_captures_of(images);
-  const auto& [frames, lamps, lamps_file, calibration] = input;
-  check_lamps(frames, lamps, lamps_file);
-  StepResult step;
-  if (doubts_map(input, camera_alone(calibration), step)) require(step);
-  LevellingOptions options;
-  options.refine_map = !refined_map.empty();
-  const Levelling result = level_by_lamps(frames, lamps, calibration.camera, options);
-  if (!result.undetermined.empty()) {
-    step.fail(StepFailure::undetermined, result.undetermined);
-    blame_map(input, camera_alone(calibration), step);
-    require(step);
-  }
-  HistoryEntry entry = history_entry(app, inputs);
-  if (options.refine_map) write_lamp_map(refined_map, result.map);
-  write_calibration(images.output,
-                    with_rotation_center(calibration, result.center, std::move(entry)));
-  report(result, calibration.camera);
+  check_lamps(input.frames, input.lamps, input.lamps_file);
+  const LevellingResult result =
+      solve_levelling(input, !refined_map.empty(), history_entry(app, inputs));
+  tell(result);
+  require(result);
+  if (!refined_map.empty()) write_lamp_map(refined_map, result.levelling.map);
+  write_calibration(images.output, result.calibration);
+  report(result.levelling, input.calibration.camera);
 }
 
 }  // namespace vlp

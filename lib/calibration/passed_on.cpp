@@ -6,12 +6,12 @@
 
 namespace vlp {
 
-std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::Vector2d& exact,
+std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::VectorXd& exact,
                                    const MatrixX& covariance) {
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return {};
   const Eigen::MatrixXd lower = factor.matrixL();
-  Eigen::MatrixXd moved(lower.cols(), 2);
+  Eigen::MatrixXd moved(lower.cols(), exact.size());
   for (Eigen::Index i = 0; i < lower.cols(); ++i) {
     const auto by_one = solved(lower.col(i));
     if (!by_one) return {};

@@ -9,12 +9,12 @@
 #include "geometry/types.h"
 
 /// What a step in a row makes of the errors of the steps before it, which it takes as exact: what
-/// RotationCenter::by_intrinsics, Dispersion::by_intrinsics and Dispersion::by_zenith say.
+/// by_intrinsics, by_zenith and the like of RotationCenter and Dispersion say.
 namespace vlp {
 
-/// Two numbers that are solved for, when what the solve takes as exact is off by `error`; nothing
+/// The numbers that are solved for, when what the solve takes as exact is off by `error`; nothing
 /// when it finds none.
-using SolvedWith = std::function<std::optional<Eigen::Vector2d>(const Eigen::VectorXd& error)>;
+using SolvedWith = std::function<std::optional<Eigen::VectorXd>(const Eigen::VectorXd& error)>;
 
 /// d solved / d error, a column for each error. From one solve for each column of the lower
 /// Cholesky factor L of the errors' covariance,
@@ -22,7 +22,7 @@ using SolvedWith = std::function<std::optional<Eigen::Vector2d>(const Eigen::Vec
 /// so that errors are tried as large as they are, and those that are known only together, as
 /// coefficients of a lens are, move together. Nothing where a solve finds nothing or the covariance
 /// is not positive definite. exact: f(0).
-std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::Vector2d& exact,
+std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::VectorXd& exact,
                                    const MatrixX& covariance);
 
 }  // namespace vlp

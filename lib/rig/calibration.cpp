@@ -126,6 +126,14 @@ RotationCenter read_rotation_center(YamlMap map, std::size_t intrinsics) {
   if (const auto value = map.optional("by_intrinsics")) {
     center.by_intrinsics = read_matrix(*value, 2, intrinsics);
   }
+  if (const auto value = map.optional("lever_arm_by_zenith")) {
+    if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
+    center.lever_arm_by_zenith = read_matrix(*value, 2, 2);
+  }
+  if (const auto value = map.optional("lever_arm_by_intrinsics")) {
+    if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
+    center.lever_arm_by_intrinsics = read_matrix(*value, 2, intrinsics);
+  }
   map.finish();
   return center;
 }

@@ -69,6 +69,11 @@ struct RotationCenter {
   /// What an error of the intrinsics does to the zenith's normalized point (x/z, y/z), a column
   /// each: `covariance` is that of the captures alone, with the lens taken as exact.
   std::optional<MatrixX> by_intrinsics = {};
+  /// What an error of the zenith's normalized point goes together with in the lever arm, in metres,
+  /// where the same captures tell both; and what an error of the intrinsics does to it, a column
+  /// each. The rest of lever_arm_covariance is its own.
+  std::optional<Matrix2> lever_arm_by_zenith = {};
+  std::optional<MatrixX> lever_arm_by_intrinsics = {};
 };
 
 /// The dispersion calibration (Chen and Guan, section 3.2).

@@ -88,6 +88,12 @@ void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
     emit_covariance(out, "lever_arm_covariance", *center.lever_arm_covariance);
   }
   if (center.by_intrinsics) emit_matrix(out, "by_intrinsics", *center.by_intrinsics);
+  if (center.lever_arm_by_zenith) {
+    emit_matrix(out, "lever_arm_by_zenith", *center.lever_arm_by_zenith);
+  }
+  if (center.lever_arm_by_intrinsics) {
+    emit_matrix(out, "lever_arm_by_intrinsics", *center.lever_arm_by_intrinsics);
+  }
   out << YAML::EndMap;
 }
 

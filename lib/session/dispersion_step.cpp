@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "calibration/passed_on.h"
@@ -93,14 +94,18 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
       1e3 * arm_m.norm(), 1e3 * beside_m.norm()));
 }
 
+/// The captures with their places, which of an axis depend on the calibration.
+using CapturesWith = std::function<std::vector<StationCapture>(const Calibration& calibration)>;
+
 /// How the offset moves with lens and zenith, where these say how well they are known.
-void pass_on(DispersionResult& result, std::span<const StationCapture> captures,
-             const LampCaptures& input, DispersionMethod method, DispersionCircle circle) {
+void pass_on(DispersionResult& result, const CapturesWith& captures_with, const LampCaptures& input,
+             DispersionMethod method, DispersionCircle circle) {
   Dispersion& dispersion = result.fit.dispersion;
-  const auto offset_with = [&](const Calibration& moved) -> std::optional<Eigen::Vector2d> {
-    const DispersionFit fit = fit_dispersion(captures, input.lamps, moved, method, circle);
+  const auto offset_with = [&](const Calibration& moved) -> std::optional<Eigen::VectorXd> {
+    const DispersionFit fit =
+        fit_dispersion(captures_with(moved), input.lamps, moved, method, circle);
     if (fit.status != DispersionStatus::ok) return {};
-    return fit.dispersion.offset_px.cwiseQuotient(focal_px_of(moved.camera));
+    return Eigen::VectorXd(fit.dispersion.offset_px.cwiseQuotient(focal_px_of(moved.camera)));
   };
   const Eigen::Vector2d exact =
       dispersion.offset_px.cwiseQuotient(focal_px_of(input.calibration.camera));
@@ -130,12 +135,20 @@ void pass_on(DispersionResult& result, std::span<const StationCapture> captures,
       "part of them: vlp-adjust states them");
 }
 
-/// Places of the axis are good to what the lever arm is: that goes into the offset.
+/// Places of the axis are good to what the lever arm is: what does not go with the zenith goes into
+/// the offset.
 void add_lever_arm(Dispersion& dispersion, const LampCaptures& input, double height_m) {
-  const auto& covariance_m2 = input.calibration.rotation_center->lever_arm_covariance;
-  if (!covariance_m2 || !dispersion.covariance || !(height_m > 0)) return;
-  const Eigen::Vector2d px_per_m = focal_px_of(input.calibration.camera) / height_m;
-  *dispersion.covariance += px_per_m.asDiagonal() * *covariance_m2 * px_per_m.asDiagonal();
+  const RotationCenter& center = *input.calibration.rotation_center;
+  if (!center.lever_arm_covariance || !dispersion.covariance || !(height_m > 0)) return;
+  const Eigen::Vector2d focal_px = focal_px_of(input.calibration.camera);
+  Matrix2 covariance_m2 = *center.lever_arm_covariance;
+  if (center.lever_arm_by_zenith && center.covariance) {
+    const Matrix2 per_px = *center.lever_arm_by_zenith * focal_px.cwiseInverse().asDiagonal();
+    covariance_m2 -= per_px * *center.covariance * per_px.transpose();
+  }
+  const Eigen::Vector2d px_per_m = focal_px / height_m;
+  const Matrix2 added = px_per_m.asDiagonal() * covariance_m2 * px_per_m.asDiagonal();
+  *dispersion.covariance += 0.5 * (added + added.transpose());
 }
 
 }  // namespace
@@ -156,8 +169,13 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
                 "camera: vlp-rotation finds it from captures at two heights");
     return result;
   }
-  const std::vector<StationCapture> captures =
-      of_axis ? at_cameras(places, input.lamps, levelled) : places.captures;
+  const CapturesWith captures_with = [&](const Calibration& calibration) {
+    if (!of_axis) return places.captures;
+    Calibration without = calibration;
+    without.dispersion.reset();
+    return at_cameras(places, input.lamps, without);
+  };
+  const std::vector<StationCapture> captures = captures_with(levelled);
   result.fit = fit_dispersion(captures, input.lamps, input.calibration, method, circle);
   const DispersionFit& fit = result.fit;
   std::string why(explanation_of(fit.status));
@@ -189,7 +207,7 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   if (of_axis) {
     add_lever_arm(result.fit.dispersion, input, mean_height_m(places, input.lamps, levelled));
   }
-  pass_on(result, captures, input, method, circle);
+  pass_on(result, captures_with, input, method, circle);
   result.calibration = with_dispersion(input.calibration, fit.dispersion, std::move(entry));
   result.drawing = [fit] { return drawing_of(plot_of("Fixes at a known station", fit)); };
   return result;

@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "calibration/levelling/map_doubt.h"
@@ -44,30 +45,49 @@ RotationFit fit_of(const SpotCaptures& spot, const Camera& camera, RotationMetho
   return fit_circle_centers(spot, camera).mean;
 }
 
-/// How the zenith moves with the lens, where that says how well it is known. What was estimated
-/// stays what is.
-void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMethod method) {
+/// The zenith's point, and the lever arm where there is one.
+Eigen::VectorXd solved_of(const RotationCenter& center) {
+  Eigen::VectorXd solved(center.lever_arm_m ? 4 : 2);
+  solved.head<2>() = zenith_point(center);
+  if (center.lever_arm_m) solved.tail<2>() = *center.lever_arm_m;
+  return solved;
+}
+
+/// How zenith and lever arm move with the lens, where that says how well it is known. `center_with`
+/// is the centre with another lens, or nothing.
+void pass_on_lens(
+    RotationCenter& center, const LampCaptures& input,
+    const std::function<std::optional<RotationCenter>(const Camera& camera)>& center_with,
+    StepResult& result) {
   const auto& report = input.calibration.intrinsics_report;
   if (!report || !report->covariance) return;
-  RotationCenter& center = result.fit.center;
-  const auto zenith_with = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::Vector2d> {
-    const Camera camera = with_lens_error(camera_alone(input.calibration), error).camera;
+  const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
+    const auto moved = center_with(with_lens_error(camera_alone(input.calibration), error).camera);
+    if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
+    return solved_of(*moved);
+  };
+  if (const auto jacobian = jacobian_of(with_error, solved_of(center), *report->covariance)) {
+    center.by_intrinsics = jacobian->topRows(2);
+    if (center.lever_arm_m) center.lever_arm_by_intrinsics = jacobian->bottomRows(2);
+    return;
+  }
+  result.warnings.emplace_back(
+      "how the lens' errors move the zenith cannot be told, and sd of fixes will lack them: "
+      "vlp-adjust states them");
+}
+
+/// The same, where the captures that it was estimated from stay what they are.
+void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMethod method) {
+  const auto center_with = [&](const Camera& camera) -> std::optional<RotationCenter> {
     const SpotCaptures spot = spot_captures(input.frames, input.lamps, camera);
     if (spot.status != SpotStatus::ok || spot.heights.size() != result.spot.heights.size() ||
         spot.left_out.size() != result.spot.left_out.size()) {
       return {};
     }
     const RotationFit fit = fit_of(spot, camera, method);
-    if (!fit.converged || fit.center.lever_arm_m.has_value() != center.lever_arm_m.has_value()) {
-      return {};
-    }
-    return zenith_point(fit.center);
+    return fit.converged ? std::optional(fit.center) : std::nullopt;
   };
-  center.by_intrinsics = jacobian_of(zenith_with, zenith_point(center), *report->covariance);
-  if (center.by_intrinsics) return;
-  result.warnings.emplace_back(
-      "how the lens' errors move the zenith cannot be told, and sd of fixes will lack them: "
-      "vlp-adjust states them");
+  pass_on_lens(result.fit.center, input, center_with, result);
 }
 
 /// A height in metres, without a sign where it rounds to zero.
@@ -169,6 +189,39 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
   result.drawing = [title, spot = result.spot, circles = result.circles, fit = result.fit, camera] {
     return drawing_of(plot_of(title, spot, circles, fit, camera));
   };
+  return result;
+}
+
+LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
+  LevellingResult result;
+  const Calibration alone = camera_alone(input.calibration);
+  if (doubts_map(input, alone, result)) return result;
+  LevellingOptions options;
+  options.refine_map = refine_map;
+  const auto levelled = [&](const Camera& camera) {
+    return level_by_lamps(input.frames, input.lamps, camera, options);
+  };
+  Levelling& levelling = result.levelling;
+  levelling = levelled(input.calibration.camera);
+  if (!levelling.undetermined.empty()) {
+    result.fail(StepFailure::undetermined, levelling.undetermined);
+    blame_map(input, alone, result);
+    return result;
+  }
+  const auto center_with = [&](const Camera& camera) {
+    const Levelling other = levelled(camera);
+    return other.undetermined.empty() ? std::optional(other.center) : std::nullopt;
+  };
+  pass_on_lens(levelling.center, input, center_with, result);
+  result.metrics = {{"tilt_deg", deg_from_rad(tilt_of(levelling.center).angle_rad)}};
+  constexpr double much = 3;
+  if (levelling.excess > much) {
+    result.warnings.push_back(fmt::format(
+        "the residuals are {:.1f} times what sigma_px lets expect: lamp map or lens are a little "
+        "wrong, and the tilt, too, may be wrong by more than its sd{}",
+        levelling.excess, refine_map ? "" : "; --refine-map may help"));
+  }
+  result.calibration = with_rotation_center(input.calibration, levelling.center, std::move(entry));
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "calibration/levelling/levelling.h"
 #include "calibration/rotation/circle_center.h"
 #include "captures/detections_table.h"
 #include "rig/lamp_map.h"
@@ -47,5 +48,13 @@ struct RotationResult : StepResult {
 /// rotation_spread_px, tilt_deg, and where they are known rotation_sd_px, lever_arm_mm. wrong_map,
 /// undetermined.
 RotationResult solve_rotation(const LampCaptures& input, RotationMethod method, HistoryEntry entry);
+
+struct LevellingResult : StepResult {
+  Levelling levelling;
+};
+
+/// Tilt, and on request the lamp map, from captures taken anywhere (calibration/levelling).
+/// Metrics: tilt_deg. wrong_map, undetermined.
+LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry);
 
 }  // namespace vlp

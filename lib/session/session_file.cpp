@@ -25,20 +25,6 @@ Json sd_of(const std::optional<Matrix2>& covariance, double factor) {
   return {factor * std::sqrt((*covariance)(0, 0)), factor * std::sqrt((*covariance)(1, 1))};
 }
 
-/// Of the zenith's normalized point, of the captures and of the lens. Without that of the lens,
-/// where it is known how this moves with it, there is none.
-std::optional<Matrix2> zenith_covariance(const Calibration& calibration) {
-  const auto& center = calibration.rotation_center;
-  const auto& lens = calibration.intrinsics_report;
-  if (!center->covariance) return std::nullopt;
-  const Eigen::Vector2d per_px = focal_px_of(calibration.camera).cwiseInverse();
-  Matrix2 covariance = per_px.asDiagonal() * *center->covariance * per_px.asDiagonal();
-  if (!lens || !lens->covariance) return covariance;
-  if (!center->by_intrinsics) return std::nullopt;
-  covariance += *center->by_intrinsics * *lens->covariance * center->by_intrinsics->transpose();
-  return covariance;
-}
-
 Json calibration_of(const Calibration& calibration) {
   const auto& in = calibration.camera.intrinsics;
   Json json{{"lens_model", name_of(calibration.camera.lens_model)},
@@ -59,7 +45,7 @@ Json calibration_of(const Calibration& calibration) {
     json["tilt_azimuth_deg"] = deg_from_rad(azimuth_rad);
     const Eigen::Vector2d zenith = zenith_point(*center);
     json["zenith_deg"] = {kDegrees * zenith.x(), kDegrees * zenith.y()};
-    json["zenith_sd_deg"] = sd_of(zenith_covariance(calibration), kDegrees);
+    json["zenith_sd_deg"] = sd_of(whole_zenith_covariance(calibration), kDegrees);
     if (const auto& arm_m = center->lever_arm_m) {
       json["lever_arm_mm"] = {kMillimetres * arm_m->x(), kMillimetres * arm_m->y()};
       json["lever_arm_sd_mm"] = sd_of(center->lever_arm_covariance, kMillimetres);
@@ -67,7 +53,7 @@ Json calibration_of(const Calibration& calibration) {
   }
   if (const auto& dispersion = calibration.dispersion) {
     json["dispersion_offset_px"] = {dispersion->offset_px.x(), dispersion->offset_px.y()};
-    json["dispersion_offset_sd_px"] = sd_of(dispersion->covariance, 1);
+    json["dispersion_offset_sd_px"] = sd_of(whole_offset_covariance(calibration), 1);
     json["dispersion_radius_mm"] = kMillimetres * dispersion->radius_m;
   }
   return json;

@@ -24,7 +24,7 @@ TEST(JacobianOf, IsThatOfALinearStepWhateverTheCovariance) {
   expected << 1, -2, 30, 0.5, 4, -7;
   const Eigen::Vector2d exact(3, -1);
   const auto solved = [&](const Eigen::VectorXd& error) {
-    return std::optional<Eigen::Vector2d>(exact + expected * error);
+    return std::optional<Eigen::VectorXd>(exact + expected * error);
   };
   for (const MatrixX& covariance : {together(), MatrixX(1e-10 * MatrixX::Identity(3, 3))}) {
     const auto found = jacobian_of(solved, exact, covariance);
@@ -37,9 +37,9 @@ TEST(JacobianOf, TriesErrorsAsLargeAsTheyAreTogether) {
   std::vector<Eigen::VectorXd> tried;
   const auto solved = [&](const Eigen::VectorXd& error) {
     tried.push_back(error);
-    return std::optional<Eigen::Vector2d>(error.head<2>());
+    return std::optional<Eigen::VectorXd>(error.head<2>());
   };
-  ASSERT_TRUE(jacobian_of(solved, {0, 0}, together()));
+  ASSERT_TRUE(jacobian_of(solved, Eigen::Vector2d(0, 0), together()));
   ASSERT_EQ(tried.size(), 3U);
   MatrixX sum = MatrixX::Zero(3, 3);
   for (const Eigen::VectorXd& error : tried) sum += error * error.transpose();
@@ -52,9 +52,9 @@ TEST(JacobianOf, TriesErrorsAsLargeAsTheyAreTogether) {
 TEST(JacobianOf, OfACurveIsTheChordOverOneStandardDeviation) {
   const auto solved = [](const Eigen::VectorXd& error) {
     const double x = 1 + error[0];
-    return std::optional<Eigen::Vector2d>({x * x, 0});
+    return std::optional<Eigen::VectorXd>(Eigen::Vector2d(x * x, 0));
   };
-  const auto found = jacobian_of(solved, {1, 0}, 0.01 * MatrixX::Identity(1, 1));
+  const auto found = jacobian_of(solved, Eigen::Vector2d(1, 0), 0.01 * MatrixX::Identity(1, 1));
   ASSERT_TRUE(found);
   EXPECT_NEAR((*found)(0, 0), 2.1, 1e-12);
   EXPECT_EQ((*found)(1, 0), 0);
@@ -62,18 +62,20 @@ TEST(JacobianOf, OfACurveIsTheChordOverOneStandardDeviation) {
 
 TEST(JacobianOf, IsNothingWhereASolveFindsNothingOrTheCovarianceIsNone) {
   const auto nothing = [](const Eigen::VectorXd& error) {
-    return error[2] != 0 ? std::nullopt : std::optional<Eigen::Vector2d>({0, 0});
+    return error[2] != 0 ? std::nullopt : std::optional<Eigen::VectorXd>(Eigen::Vector2d(0, 0));
   };
-  EXPECT_FALSE(jacobian_of(nothing, {0, 0}, together()));
-  const auto same = [](const Eigen::VectorXd&) { return std::optional<Eigen::Vector2d>({0, 0}); };
+  EXPECT_FALSE(jacobian_of(nothing, Eigen::Vector2d(0, 0), together()));
+  const auto same = [](const Eigen::VectorXd&) {
+    return std::optional<Eigen::VectorXd>(Eigen::Vector2d(0, 0));
+  };
   MatrixX negative = MatrixX::Identity(3, 3);
   negative(2, 2) = -1;
-  EXPECT_FALSE(jacobian_of(same, {0, 0}, negative));
-  EXPECT_FALSE(jacobian_of(same, {0, 0}, MatrixX::Zero(3, 3)));
+  EXPECT_FALSE(jacobian_of(same, Eigen::Vector2d(0, 0), negative));
+  EXPECT_FALSE(jacobian_of(same, Eigen::Vector2d(0, 0), MatrixX::Zero(3, 3)));
   const auto not_finite = [](const Eigen::VectorXd&) {
-    return std::optional<Eigen::Vector2d>({NAN, 0});
+    return std::optional<Eigen::VectorXd>(Eigen::Vector2d(NAN, 0));
   };
-  EXPECT_FALSE(jacobian_of(not_finite, {0, 0}, together()));
+  EXPECT_FALSE(jacobian_of(not_finite, Eigen::Vector2d(0, 0), together()));
 }
 
 }  // namespace

@@ -141,13 +141,16 @@ int RobustFit::degrees_of_freedom() const {
   return all->NumResiduals() - free_parameters(*all);
 }
 
-std::optional<Matrix2> RobustFit::covariance(const double* parameter) const {
+std::optional<Matrix2> RobustFit::covariance(const double* parameter, const double* other) const {
   // Ceres goes through the parameters by their addresses, and with them goes the rounding.
   const Places places = places_in_order();
   parameter = places.of(parameter);
+  other = places.of(other);
   const auto all = problem(0, places);
-  if (!all->HasParameterBlock(parameter) || all->IsParameterBlockConstant(parameter)) {
-    return std::nullopt;
+  for (const double* wanted : {parameter, other}) {
+    if (!all->HasParameterBlock(wanted) || all->IsParameterBlockConstant(wanted)) {
+      return std::nullopt;
+    }
   }
   const int excess = all->NumResiduals() - free_parameters(*all);
   if (excess <= 0) return std::nullopt;
@@ -161,12 +164,12 @@ std::optional<Matrix2> RobustFit::covariance(const double* parameter) const {
   options.num_threads = 1;
   ceres::Covariance inverse(options);
   Eigen::Matrix<double, 2, 2, Eigen::RowMajor> block;
-  const std::vector<std::pair<const double*, const double*>> wanted{{parameter, parameter}};
+  const std::vector<std::pair<const double*, const double*>> wanted{{parameter, other}};
   if (!inverse.Compute(wanted, all.get()) ||
-      !inverse.GetCovarianceBlock(parameter, parameter, block.data())) {
+      !inverse.GetCovarianceBlock(parameter, other, block.data())) {
     return std::nullopt;
   }
-  block = 0.5 * (block + block.transpose()).eval();
+  if (parameter == other) block = 0.5 * (block + block.transpose()).eval();
   return Matrix2(block * (squares / excess));
 }
 

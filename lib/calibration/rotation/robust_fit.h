@@ -42,9 +42,13 @@ class RobustFit {
   const std::vector<double>& lengths() const { return lengths_; }
   /// Rows of the residuals that are used, less the parameters that are free.
   int degrees_of_freedom() const;
-  /// Of a parameter block of two, for the scatter found: s^2 (J^T J)^-1. Nothing when there are no
-  /// more residuals than parameters, or the residuals do not determine it.
-  std::optional<Matrix2> covariance(const double* parameter) const;
+  /// Of parameter blocks of two, for the scatter found: their block of s^2 (J^T J)^-1, a row for
+  /// each of the first. Nothing when there are no more residuals than parameters, or the residuals
+  /// do not determine it.
+  std::optional<Matrix2> covariance(const double* parameter, const double* other) const;
+  std::optional<Matrix2> covariance(const double* parameter) const {
+    return covariance(parameter, parameter);
+  }
 
  private:
   struct Block {

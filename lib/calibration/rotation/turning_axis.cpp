@@ -3,6 +3,7 @@
 #include "calibration/rotation/turning_axis.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -93,11 +94,15 @@ RotationFit fit_axis(const SpotCaptures& spot, const Camera& camera, bool lever_
     if (!result.converged) return result;
     if (!lever_arm || scale_to_map(spot, state)) break;
   }
-  result.center = rotation_center_at(state.zenith, RotationModel::tilt, camera,
-                                     fit.covariance(state.zenith.data()));
+  const auto zenith_covariance = fit.covariance(state.zenith.data());
+  result.center = rotation_center_at(state.zenith, RotationModel::tilt, camera, zenith_covariance);
   if (lever_arm) {
     result.center.lever_arm_m = state.lever_arm_m;
     result.center.lever_arm_covariance = fit.covariance(state.lever_arm_m.data());
+    const auto with_zenith = fit.covariance(state.lever_arm_m.data(), state.zenith.data());
+    if (zenith_covariance && with_zenith) {
+      result.center.lever_arm_by_zenith = *with_zenith * zenith_covariance->inverse();
+    }
   }
   describe(result, fit, spot);
   result.yaws_rad = std::move(state.yaws_rad);
