@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "camera/lens_model.h"
 #include "detection/image_file.h"
 #include "detection/lights/lights_table.h"
 #include "progress.h"
@@ -24,6 +25,16 @@ void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTe
   app.add_option("--calibration", options.calibration, texts.calibration)->required();
   app.add_option("-o,--output", options.output, texts.output)->required();
   add_detect_options(app, options);
+}
+
+void add_lens_option(CLI::App& app, std::string& lens) {
+  app.add_option("--lens", lens,
+                 "Lens model (default: LENSMODEL_OPENCV8); auto: the one that the views call for, "
+                 "by what each leaves of views that took no part")
+      ->check([](const std::string& name) {
+        const bool known = name == kChosenLens || lens_model_from_name(name);
+        return known ? std::string() : "the models are: auto, " + lens_model_names();
+      });
 }
 
 void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {

@@ -45,6 +45,12 @@ void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTe
 /// Adds --readout rows|columns.
 void add_readout_option(CLI::App& app, std::optional<Readout>& readout);
 
+/// The lens model that --lens has for the one that the views call for.
+inline constexpr const char* kChosenLens = "auto";
+
+/// Adds --lens MODEL|auto, of those programs that find a lens.
+void add_lens_option(CLI::App& app, std::string& lens);
+
 /// Adds --max-mpx.
 void add_max_mpx_option(CLI::App& app, double& max_mpx);
 

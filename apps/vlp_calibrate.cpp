@@ -88,7 +88,8 @@ void print_summary(const SessionResult& result, const std::string& results) {
 }
 
 void run(Options options) {
-  options.how.lens_model = *lens_model_from_name(options.lens);
+  options.how.choose_lens_model = options.lens == kChosenLens;
+  if (const auto model = lens_model_from_name(options.lens)) options.how.lens_model = *model;
   options.how.program = {"vlp-calibrate", VLP_VERSION};
   Log log;
   const SessionResult result =
@@ -136,11 +137,7 @@ int main(int argc, char** argv) {
                  "session.json and what each step wrote; made when it is not there")
       ->required();
   app.add_option("--camera-id", how.camera_id, "Name of the camera (default: camera)");
-  app.add_option("--lens", options.lens, "Lens model (default: LENSMODEL_OPENCV8)")
-      ->check([](const std::string& name) {
-        return vlp::lens_model_from_name(name) ? std::string()
-                                               : "the models are: " + vlp::lens_model_names();
-      });
+  vlp::add_lens_option(app, options.lens);
   app.add_option("--row-time-s", how.row_time_s,
                  "Time from one row of the read-out to the next (default: found from rotation)")
       ->check(CLI::Range(1e-8, 1e-3));

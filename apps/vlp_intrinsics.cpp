@@ -27,8 +27,6 @@
 namespace vlp {
 namespace {
 
-constexpr const char* kChosen = "auto";
-
 struct Options {
   std::vector<std::string> images;
   std::string board, output, cache, ros, kalibr, opencv, plot;
@@ -71,7 +69,7 @@ void write_exports(const Options& options, const Camera& camera) {
   if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
 }
 
-bool chooses_lens(const Options& options) { return options.lens == kChosen; }
+bool chooses_lens(const Options& options) { return options.lens == kChosenLens; }
 
 /// Throws std::invalid_argument for a format that has no lens model like the camera's, before
 /// anything is written.
@@ -144,14 +142,7 @@ void add_options(CLI::App& app, Options& options) {
                  "(of lens models that mrcal has) and .corners.vnl go beside it")
       ->required();
   app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
-  app.add_option(
-         "--lens", options.lens,
-         "Lens model (default: LENSMODEL_OPENCV8); auto: the one that the views call for, by "
-         "what each leaves of views that took no part")
-      ->check([](const std::string& name) {
-        const bool known = name == kChosen || lens_model_from_name(name);
-        return known ? std::string() : "the models are: auto, " + lens_model_names();
-      });
+  add_lens_option(app, options.lens);
   app.add_option("--row-time-s", options.row_time_s,
                  "Time from one row of the read-out to the next, which every program that finds "
                  "lamps needs; vlp-train --row-time finds it, too")

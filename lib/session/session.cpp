@@ -145,7 +145,9 @@ class SessionRun {
     };
     std::vector<StepOutputs> steps;
     std::vector<std::string> lens{"lens.yaml"};
-    if (has_mrcal(options_.lens_model)) lens.emplace_back("lens.cameramodel");
+    if (options_.choose_lens_model || has_mrcal(options_.lens_model)) {
+      lens.emplace_back("lens.cameramodel");
+    }
     steps.push_back(
         {"lens", session_.camera() ? std::vector<std::string>() : with_picture(lens, "lens.svg")});
     steps.push_back({"row-time", std::vector<std::string>{"camera.yaml"}});
@@ -252,7 +254,8 @@ class SessionRun {
     if (options_.readout) {
       text += options_.readout == Readout::rows ? " --readout rows" : " --readout columns";
     }
-    return text + " --lens " + std::string(name_of(options_.lens_model));
+    text += " --lens ";
+    return text.append(options_.choose_lens_model ? "auto" : name_of(options_.lens_model));
   }
 
   bool find_lens() {
@@ -269,9 +272,11 @@ class SessionRun {
       camera.lens_model = options_.lens_model;
       camera.row_time_s = options_.row_time_s;
       camera.readout = options_.readout;
+      LensInput input{std::move(seen.views), board, session_.board(), camera};
+      input.choose_lens_model = options_.choose_lens_model;
       LensResult lens =
-          solve_lens({std::move(seen.views), board, session_.board(), camera},
-                     history(camera_options(), {session_.board(), session_.boards()}));
+          solve_lens(input, history(camera_options(), {session_.board(), session_.boards()}));
+      if (lens.choice) lens.notes.push_back("lens model: " + words_of(*lens.choice));
       lens.skipped.insert(lens.skipped.begin(), seen.skipped.begin(), seen.skipped.end());
       return Work{lens, [this, lens] {
                     if (has_mrcal(lens.calibration.camera.lens_model)) {
@@ -432,7 +437,7 @@ class SessionRun {
       if (is_stated) stated.append(stated.empty() ? "" : ", ").append(what);
     };
     add(options_.camera_id != unstated.camera_id, "name");
-    add(options_.lens_model != unstated.lens_model, "lens model");
+    add(options_.choose_lens_model || options_.lens_model != unstated.lens_model, "lens model");
     add(options_.row_time_s.has_value(), "row time");
     add(options_.readout.has_value(), "read-out");
     return stated;

@@ -31,6 +31,8 @@ struct SessionOptions {
   ProgramVersion program;
   std::string camera_id = "camera";
   LensModel lens_model = LensModel::opencv8;
+  /// Takes the model that the views call for instead (calibration/intrinsics/lens_choice.h).
+  bool choose_lens_model = false;
   std::optional<double> row_time_s = {};
   std::optional<Readout> readout = {};
   /// vlp-gates/1 of session_metrics(), for a session that has no gates.yaml of its own; may be

@@ -182,6 +182,17 @@ TEST_F(SmallSession, FollowsWhatIsInItsFolder) {
   EXPECT_FALSE(fs::exists(folder / "results/report.html"));
 }
 
+TEST_F(SmallSession, TakesTheLensModelThatItsBoardsCallFor) {
+  const std::string chosen = "--row-time-s 3e-5 --readout rows --lens auto";
+  const auto run = calibrate(chosen);
+  EXPECT_LE(run.exit_code, 1) << run.errors;
+  EXPECT_THAT(run.errors, HasSubstr("lens model: LENSMODEL_OPENCV"));
+  EXPECT_THAT(result("lens.yaml"), HasSubstr("--lens auto"));
+  EXPECT_TRUE(fs::exists(folder / "results/lens.cameramodel"));
+  EXPECT_THAT(calibrate(chosen).output, HasSubstr("lens          as before"));
+  EXPECT_THAT(calibrate().output, Not(HasSubstr("lens          as before")));
+}
+
 TEST_F(SmallSession, FailsWithTheLensWhoseGatesAreNotMet) {
   std::size_t views = 0;
   for (const auto& image : fs::directory_iterator(folder / "a session/boards")) {
