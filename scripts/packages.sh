@@ -35,8 +35,14 @@ for name in CMAKE_INSTALL_PREFIX CMAKE_INSTALL_LIBDIR; do
   if [ -n "$value" ]; then before+=("-D$name=$value"); else before+=("-U$name"); fi
 done
 trap 'cmake "${before[@]}" "$project/build" >/dev/null' EXIT
-cmake --preset release -DCMAKE_INSTALL_PREFIX=/usr \
-  -DCMAKE_INSTALL_LIBDIR="lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)"
+installed=(-DCMAKE_INSTALL_PREFIX=/usr
+           -DCMAKE_INSTALL_LIBDIR="lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)")
+# The preset is for a build that is not there yet; it would set what else was chosen for one that is.
+if [ -e build/CMakeCache.txt ]; then
+  cmake "${installed[@]}" build
+else
+  cmake --preset release "${installed[@]}"
+fi
 targets=("${@/#/vlp_package_}")
 [ $# -gt 0 ] || targets=(vlp_packages)
 cmake --build build --target "${targets[@]}"

@@ -28,6 +28,7 @@ tests=(
   chromium-headless-shell python3  # the report is opened in a browser
   debootstrap lintian  # of tests/bare_root.sh and tests/packages.sh
   groff zsh  # manual pages and completions are checked by them
+  abigail-tools  # the library's ABI is
 )
 # Snakemake, and a Slurm on one machine for the tests of its profile.
 batch=(snakemake slurmctld slurmd slurm-client munge procps)

@@ -5,16 +5,18 @@
 # Debian packages, made and checked by lintian, then installed, used and removed in a bare root of this
 # machine's release, as a user of theirs has it. Only the superuser can, and with a network.
 #
-#   tests/packages.sh [--root DIR] [COMPONENT...]
+#   tests/packages.sh [--root DIR] [--made FOLDER RELEASE] [COMPONENT...]
 #
 #   --root DIR   make the root there and keep it, or use the one that is there (default: a temporary one)
+#   --made FOLDER RELEASE
+#                take the packages there, which were made on another release, and a root of that
 #   COMPONENT    as of scripts/packages.sh
 #
 # Exit code 75 when there is no root (tests/bare_root.sh).
 set -euo pipefail
 project=$(cd "$(dirname "$0")/.." && pwd)
 
-root=()
+root=() made='' release=''
 refuse() {
   echo "packages.sh: $1; see packages.sh --help" >&2
   exit 2
@@ -23,27 +25,54 @@ while [[ ${1:-} == -* ]]; do
   case $1 in
     --root) [ $# -gt 1 ] || refuse "--root wants a folder"
             root=(--root "$(realpath -m "$2")"); shift 2 ;;
+    --made) [ $# -gt 2 ] || refuse "--made wants a folder and a release"
+            made=$(realpath "$2") release=$3; shift 3 ;;
     -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
     *) refuse "unknown option $1" ;;
   esac
 done
 cd "$project"
+# What is asked for has to be there; python3-vlp is made where pybind11 is.
+declare -A package_of=([positioning]=libvlp-positioning0 [development]=libvlp-positioning-dev [tools]=vlp-tools
+                       [python]=python3-vlp)
+asked=()
+for component in "$@"; do
+  [ -n "${package_of[$component]:-}" ] || refuse "unknown component $component"
+  asked+=("${package_of[$component]}")
+done
+[ $# -gt 0 ] || asked=(libvlp-positioning0 libvlp-positioning-dev vlp-tools)
+[[ " $* " != *" development "* || " $* " == *" positioning "* ]] ||
+  refuse "development installs with positioning beside it: name both"
 [ -n "$(command -v lintian)" ] || { echo "packages.sh: lintian is missing; scripts/setup.sh installs it" >&2; exit 1; }
 scratch=$(mktemp --directory --tmpdir packages-XXXXXX)
 trap 'rm -rf "$scratch"' EXIT
 chmod 755 "$scratch"
-scripts/packages.sh -o "$scratch" "$@"
+if [ "$made" ]; then cp "$made"/*.deb "$scratch"; else scripts/packages.sh -o "$scratch" "$@"; fi
+for package in "${asked[@]}"; do
+  compgen -G "$scratch/${package}_*.deb" >/dev/null || { echo "packages.sh: $package was not made" >&2; exit 1; }
+done
 lintian --fail-on error --allow-root "$scratch"/*.deb
 
-. /etc/os-release
+[ "$release" ] || release=$(. /etc/os-release && echo "$VERSION_CODENAME")
 # The packages are what is newest in the root, and nothing of the project is built there.
-tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$VERSION_CODENAME" '
+tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$release" '
   export DEBIAN_FRONTEND=noninteractive
+  begin=$SECONDS
   apt-get update -qq
   apt-get install -qq --no-install-recommends /packages/*.deb >/packages/install.log 2>&1 ||
     { tail /packages/install.log; exit 1; }
   has() { dpkg-query -W "$1" >/dev/null 2>&1; }
   cd datasets/example
+  if has vlp-tools; then
+    vlp-locate detections.csv --lamps lamps.yaml --calibration calibration.yaml -o /packages/fixes.csv
+    vlp-evaluate /packages/fixes.csv --truth truth.csv --gate mean_mm=1 --report /packages/report.html
+    grep -q "<strong>PASS</strong>" /packages/report.html
+    echo "a first report $((SECONDS - begin)) s after the first command"
+    for program in /usr/bin/vlp-*; do
+      "$program" --version
+      test -s "/usr/share/man/man1/${program##*/}.1.gz"
+    done
+  fi
   if has libvlp-positioning-dev; then
     apt-get install -qq --no-install-recommends g++ pkg-config >>/packages/install.log 2>&1
     sed -n "/^\`\`\`c\$/,/^\`\`\`\$/{/^\`\`\`/!p}" ../../lib/README.md >/packages/robot.c
@@ -54,14 +83,6 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$VERSION_CODENAME" 
     fixes=$(/packages/robot)
     echo "$fixes"
     [ "$(grep -c "^0 " <<<"$fixes")" = 2 ]
-  fi
-  if has vlp-tools; then
-    vlp-locate detections.csv --lamps lamps.yaml --calibration calibration.yaml -o /packages/fixes.csv
-    vlp-evaluate /packages/fixes.csv --truth truth.csv --gate mean_mm=1 --report /packages/report.html
-    for program in /usr/bin/vlp-*; do
-      "$program" --version
-      test -s "/usr/share/man/man1/${program##*/}.1.gz"
-    done
   fi
   if has python3-vlp; then python3 ../../apps/python/example.py .; fi
   installed=$(dpkg-query -W -f "\${Package}\n" | grep vlp)

@@ -53,18 +53,23 @@ std::size_t rows_of(const Doubles& array, py::ssize_t columns, const char* name)
   return static_cast<std::size_t>(array.shape(0));
 }
 
+template <typename Wide>
+bool all_fit(const py::array& array) {
+  const auto wide = py::array_t<Wide, py::array::c_style | py::array::forcecast>::ensure(array);
+  return wide && std::all_of(wide.data(), wide.data() + wide.size(),
+                             [](Wide value) { return std::in_range<int>(value); });
+}
+
 /// numpy would cut 1.7 to 1 and wrap what an int does not hold.
 Integers integers_of(const py::object& given, const char* name) {
   const auto array = py::array::ensure(given);
   const char kind = array ? array.dtype().kind() : '?';
-  const bool whole = kind == 'i' || kind == 'u' || (array && array.size() == 0);
-  const auto wide = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(
-      whole ? array : py::array());
-  const auto fits = [](std::int64_t value) { return std::in_range<int>(value); };
-  if (!whole || !std::all_of(wide.data(), wide.data() + wide.size(), fits)) {
-    throw std::invalid_argument(std::string(name) + " should be integers, of 32 bits");
-  }
-  return Integers::ensure(wide);
+  // Of an empty list numpy makes an array of floats.
+  const bool whole = (kind == 'i' && all_fit<std::int64_t>(array)) ||
+                     (kind == 'u' && all_fit<std::uint64_t>(array)) ||
+                     (kind == 'f' && array.size() == 0);
+  if (!whole) throw std::invalid_argument(std::string(name) + " should be integers, of 32 bits");
+  return Integers::ensure(array);
 }
 
 void check_length(const py::array& array, std::size_t length, const char* name) {
@@ -84,6 +89,10 @@ Doubles array_of(const Matrix4& matrix) {
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.mutable_data()) = matrix;
   return array;
 }
+
+/// Of a frame without a fix the library says nothing more than why.
+const Eigen::Vector3d kNowhere(kNone, kNone, kNone);
+const Matrix4 kUnknown = Matrix4::Constant(kNone);
 
 // Lamp map, calibration, lens
 
@@ -269,16 +278,15 @@ std::string shown(const Fix& fix) {
 
 // Lamps in images
 
+/// Of the array's own memory, where its rows follow each other: what is given has to outlive it.
 cv::Mat image_of(const py::array& array) {
   const bool bytes = py::isinstance<py::array_t<std::uint8_t>>(array);
   if (array.ndim() != 2 || array.size() == 0 ||
       !(bytes || py::isinstance<py::array_t<std::uint16_t>>(array))) {
     throw std::invalid_argument("an image should have the shape (rows, columns), uint8 or uint16");
   }
-  const auto rows = py::array::ensure(array, py::array::c_style);
-  return cv::Mat(static_cast<int>(rows.shape(0)), static_cast<int>(rows.shape(1)),
-                 bytes ? CV_8U : CV_16U, const_cast<void*>(rows.data()))
-      .clone();
+  return {static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)),
+          bytes ? CV_8U : CV_16U, const_cast<void*>(array.data())};
 }
 
 py::tuple arrays_of(const std::vector<Detection>& detections) {
@@ -305,7 +313,8 @@ std::string in_px(int width, int height) {
 
 py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
   const auto& [detector, imager_px] = of_camera;
-  const cv::Mat image = image_of(array);
+  const auto rows = py::array::ensure(array, py::array::c_style);
+  const cv::Mat image = image_of(rows);
   if (image.cols != imager_px[0] || image.rows != imager_px[1]) {
     throw std::invalid_argument("the image is " + in_px(image.cols, image.rows) +
                                 ", the calibration's camera has " +
@@ -461,21 +470,27 @@ PYBIND11_MODULE(vlp, m) {
            "time_s"_a = py::none(),
            "inclination_rad: (roll, pitch), and its standard deviation, with which they are\n"
            "estimated. height_and_yaw: of the camera, for fixes of one lamp. velocity_m_per_s: in\n"
-           "the level frame; with standard deviations it is estimated. height_m: (z, sd).");
+           "the level frame; with standard deviations it is estimated. height_m: (z, sd), with a\n"
+           "standard deviation that is positive.");
 
-  py::class_<Fix>(m, "Fix", "The answer to one frame.")
+  py::class_<Fix>(m, "Fix", "The answer to one frame; figures are NaN where it is not ok.")
       .def_property_readonly("ok", &Fix::ok)
       .def_property_readonly("status", [](const Fix& fix) { return name_of(fix.status); })
       .def_property_readonly("explanation",
                              [](const Fix& fix) { return explanation_of(fix.status); })
       .def_property_readonly("position_m",
-                             [](const Fix& fix) { return array_of(fix.estimate.pose.position_m); })
-      .def_property_readonly("yaw_rad", [](const Fix& fix) { return fix.estimate.pose.yaw_rad; })
+                             [](const Fix& fix) {
+                               return array_of(fix.ok() ? fix.estimate.pose.position_m : kNowhere);
+                             })
       .def_property_readonly(
-          "covariance", [](const Fix& fix) { return array_of(fix.estimate.covariance); },
+          "yaw_rad", [](const Fix& fix) { return fix.ok() ? fix.estimate.pose.yaw_rad : kNone; })
+      .def_property_readonly(
+          "covariance",
+          [](const Fix& fix) { return array_of(fix.ok() ? fix.estimate.covariance : kUnknown); },
           "(4, 4), of x, y, z, yaw: all that is known of the error.")
       .def_property_readonly(
-          "noise_covariance", [](const Fix& fix) { return array_of(fix.noise_covariance); },
+          "noise_covariance",
+          [](const Fix& fix) { return array_of(fix.ok() ? fix.noise_covariance : kUnknown); },
           "The part that is of this frame alone and averages out.")
       .def_property_readonly(
           "lean_rad",
@@ -491,7 +506,8 @@ PYBIND11_MODULE(vlp, m) {
             return Pair{fix.body->velocity_m_per_s.x(), fix.body->velocity_m_per_s.y()};
           },
           "In the world, where it was estimated.")
-      .def_readonly("residual_px", &Fix::residual_px)
+      .def_property_readonly("residual_px",
+                             [](const Fix& fix) { return fix.ok() ? fix.residual_px : kNone; })
       .def_readonly("lamps", &Fix::lamps, "That the fix rests on.")
       .def_readonly("rejected_lamps", &Fix::rejected_lamps)
       .def_readonly("unknown_lamps", &Fix::unknown_lamps)

@@ -89,12 +89,15 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
       Eigen::MatrixXd::Zero(first_lamp + 3 * std::ssize(lamps), first_lamp + 3 * std::ssize(lamps));
   const auto& adjustment = calibration.adjustment;
   const auto& report = calibration.intrinsics_report;
-  // The zenith leans against the lens: without how it does, the lens' errors would count twice.
-  const bool lens = report && report->covariance && turned &&
-                    calibration.rotation_center->by_intrinsics.has_value();
-  complete_ = adjustment.has_value() || (lens && calibration.rotation_center->covariance);
+  // What was calibrated with a lens leans against it: without how it does, the lens' errors would
+  // count twice.
+  const bool lens_counts_once = turned    ? calibration.rotation_center->by_intrinsics.has_value()
+                                : shifted ? calibration.dispersion->by_intrinsics.has_value()
+                                          : true;
+  const bool lens = report && report->covariance && lens_counts_once;
   const bool zenith_stated =
       adjustment || (turned && calibration.rotation_center->covariance.has_value());
+  complete_ = adjustment || (lens && zenith_stated);
   part_stated_ = {adjustment || lens, zenith_stated,
                   !shifted || calibration.dispersion->covariance.has_value(), true};
   // Of each row, where it stands in the adjustment's covariance.
@@ -249,7 +252,12 @@ CommonErrors::Gain CommonErrors::gain_of(std::span<const Sighting> sightings,
   return gain;
 }
 
-Matrix4 CommonErrors::covariance_of(const Gain& gain) const {
+template <int States>
+Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::covariance_of(
+    const GainOf<States>& gain) const {
+  using ByShared = typename GainOf<States>::ByShared;
+  using ByLamp = typename GainOf<States>::ByLamp;
+  using Covariance = Eigen::Matrix<double, States, States>;
   const ByShared& by_shared = gain.by_shared;
   const auto& by_lamp = gain.by_lamp;
   const Eigen::Index n = shared();
@@ -257,7 +265,7 @@ Matrix4 CommonErrors::covariance_of(const Gain& gain) const {
     return n + 3 * static_cast<Eigen::Index>(gain.lamps[i]);
   };
   const ByShared with_shared = by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
-  Eigen::Matrix4d sum = with_shared.lazyProduct(by_shared.transpose());
+  Covariance sum = with_shared.lazyProduct(by_shared.transpose());
   for (std::size_t i = 0; i < gain.size; ++i) {
     // Half of the lamp's own, the shared ones, and the lamps before it.
     ByLamp other = 0.5 * by_lamp[i] * covariance_.block<3, 3>(at(i), at(i));
@@ -265,11 +273,14 @@ Matrix4 CommonErrors::covariance_of(const Gain& gain) const {
     for (std::size_t j = 0; j < i; ++j) {
       other += by_lamp[j] * covariance_.block<3, 3>(at(j), at(i));
     }
-    const Eigen::Matrix4d half = other * by_lamp[i].transpose();
+    const Covariance half = other * by_lamp[i].transpose();
     sum += half + half.transpose();
   }
   return sum;
 }
+
+template Matrix4 CommonErrors::covariance_of(const Gain& gain) const;
+template BodyCovariance CommonErrors::covariance_of(const BodyGain& gain) const;
 
 Matrix2 CommonErrors::covariance_of(const Effect& effect, std::size_t lamp) const {
   const Eigen::Index n = shared(), at = n + 3 * static_cast<Eigen::Index>(lamp);

@@ -15,6 +15,7 @@
 #include "../rig/lamp_map.h"
 #include "camera_mount.h"
 #include "correction.h"
+#include "fix.h"
 #include "frame_fix.h"
 #include "weighted_fix.h"
 
@@ -35,10 +36,10 @@ class CommonErrors {
  public:
   /// C from the adjustment; without one from the steps in a row: with e_lens from the boards
   ///   e_zenith = own + by_intrinsics e_lens,   e_offset = own + by_intrinsics e_lens + by_zenith
-  ///   e_zenith (by_zenith is -1 where it is not stated; the lens counts where by_intrinsics of the
-  /// zenith is),
-  /// and of the lamps the survey's sd_m. `lamps` are the map's, in the order of their ids. The
-  /// lamps of an adjustment are those of the map where they have the same place, to 1 um.
+  ///   e_zenith (by_zenith is -1 where it is not stated; the lens counts where the first of these
+  /// that is applied states by_intrinsics, and where none is applied),
+  /// and of the lamps the survey's sd_m. `lamps` are the map's, in the order in which indices name
+  /// them. The lamps of an adjustment are those of the map where they have the same place, to 1 um.
   CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
 
   /// Whether anything at all is known of them.
@@ -71,29 +72,36 @@ class CommonErrors {
   Effect effect_on(const Sighting& sighting, const LevelPose& pose, const Lens& lens,
                    const Eigen::Matrix3d& level_from_base) const;
 
-  /// G: what the errors do to a fix, (X, Y, Z, yaw), by the shared ones and by each lamp's own.
-  using ByShared = Eigen::Matrix<double, 4, Eigen::Dynamic, Eigen::ColMajor, 4, 20>;
-  using ByLamp = Eigen::Matrix<double, 4, 3>;
-  struct Gain {
+  /// G: what the errors do to the states of a fix, by the shared ones and by each lamp's own.
+  template <int States>
+  struct GainOf {
+    using ByShared = Eigen::Matrix<double, States, Eigen::Dynamic, Eigen::ColMajor, States, 20>;
+    using ByLamp = Eigen::Matrix<double, States, 3>;
+
     ByShared by_shared;
     /// Of the lamps of the fix: which of the map they are. The first `size` hold something.
     std::array<ByLamp, kMaxSightings> by_lamp;
     std::array<std::size_t, kMaxSightings> lamps;
     std::size_t size = 0;
 
-    explicit Gain(Eigen::Index shared) : by_shared(ByShared::Zero(4, shared)) {}
+    explicit GainOf(Eigen::Index shared) : by_shared(ByShared::Zero(States, shared)) {}
     void add(std::size_t lamp, const ByLamp& effect) {
       by_lamp[size] = effect;
       lamps[size++] = lamp;
     }
   };
+  /// Of (X, Y, Z, yaw), and of all states of a body (BodyIndex).
+  using Gain = GainOf<4>;
+  using BodyGain = GainOf<kBodyStates>;
   /// Of a fix of least squares (fix_weighted) with the covariance of `camera`, from sightings of
   /// these lamps of the map; of a single one, of fix_one_lamp().
   Gain gain_of(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
                const PoseEstimate& camera, const Lens& lens,
                const Eigen::Matrix3d& level_from_base) const;
-  /// G C G'.
-  Matrix4 covariance_of(const Gain& gain) const;
+  /// G C G', of one or the other.
+  template <int States>
+  Eigen::Matrix<double, States, States, Eigen::DontAlign> covariance_of(
+      const GainOf<States>& gain) const;
   /// Of one sighting's z.
   Matrix2 covariance_of(const Effect& effect, std::size_t lamp) const;
 

@@ -21,7 +21,8 @@ constexpr std::array<Entry, 13> kStatuses{{
     {FixStatus::too_many_lamps, "too_many_lamps", "more lamps in one frame than are supported"},
     {FixStatus::duplicate_lamp, "duplicate_lamp", "one lamp stands twice in the frame"},
     {FixStatus::not_finite, "not_finite",
-     "a pixel or a sensor reading is not finite, or a sigma not within 0.0001 and 1000 px"},
+     "a pixel or a sensor reading is not finite, a sigma not within 0.0001 and 1000 px, a sensor's "
+     "standard deviation negative, or that of a known height not positive"},
     {FixStatus::outside_lens, "outside_lens",
      "no ray through this lens reaches the pixel: is the calibration this camera's?"},
     {FixStatus::lamp_below_camera, "lamp_below_camera",

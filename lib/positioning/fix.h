@@ -18,7 +18,7 @@ enum class FixStatus {
   too_few_lamps,      // fewer than two lamps of the map
   too_many_lamps,     // more than Positioner::max_lamps
   duplicate_lamp,     // one id twice in a frame
-  not_finite,         // a pixel or a sensor reading is not, or a sigma is out of range
+  not_finite,         // a pixel or a sensor reading is not, or a sigma or sd is out of range
   outside_lens,       // a pixel that no ray through the lens reaches
   lamp_below_camera,  // a lamp would have to hang at or below the camera's height
   degenerate,         // the lamps are seen too close together, or do not fit any pose
@@ -52,9 +52,12 @@ struct BodyEstimate {
   Eigen::Vector2d velocity_m_per_s{0, 0};
   double yaw_rate_rad_per_s = 0;
   Inclination inclination{0, 0};
-  /// Of (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) in metres, radians and seconds: of pixels and
-  /// of what was known before, weighed together. Zero for what was given as exact.
+  /// Of (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) in metres, radians and seconds: all that is
+  /// known of their errors, as in Fix::estimate. Zero for what was given as exact.
   BodyCovariance covariance = BodyCovariance::Zero();
+  /// The part that is of this frame alone: of pixels and of what was known before, weighed
+  /// together.
+  BodyCovariance noise_covariance = BodyCovariance::Zero();
 };
 
 /// The answer to one frame. Everything below `status` holds only when that is `ok`.

@@ -42,8 +42,10 @@ FloorSummary::Row row_of(const FloorLimits::Source& source, const FloorLimits& l
 }  // namespace
 
 FixSpread spread_of(const Matrix4& covariance) {
-  return {std::sqrt(covariance(0, 0) + covariance(1, 1)), std::sqrt(covariance(2, 2)),
-          std::sqrt(covariance(3, 3))};
+  // Of a part that is nothing rounding may leave less than that.
+  const auto root = [](double variance) { return variance < 0 ? 0 : std::sqrt(variance); };
+  return {root(covariance(0, 0) + covariance(1, 1)), root(covariance(2, 2)),
+          root(covariance(3, 3))};
 }
 
 const FloorSummary::Row& FloorSummary::largest() const {

@@ -11,6 +11,7 @@
 namespace vlp {
 
 /// Standard deviations of a fix: horizontal is the root of the sum of the variances of x and y.
+/// Variances below zero, which rounding makes of none, are none.
 struct FixSpread {
   double horizontal_m;
   double height_m;

@@ -94,23 +94,25 @@ bool needs_body(const Sensors& sensors) {
          (sensors.motion && moves(*sensors.motion));
 }
 
-/// The velocity turned from the level frame into the world, and the covariance with it.
-BodyEstimate in_world(const BodyFix& fix) {
+/// The velocity turned from the level frame into the world, and the covariances with it: that of
+/// the fix's own noise, and the common part that comes on top.
+BodyEstimate in_world(const BodyFix& fix, const BodyCovariance& common) {
   const Eigen::Rotation2Dd world_from_level(fix.state.pose.yaw_rad);
   const BodyMotion& motion = fix.state.motion;
   BodyEstimate estimate{world_from_level * motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
-                        motion.inclination, fix.covariance};
+                        motion.inclination, fix.covariance + common, fix.covariance};
   const Eigen::Matrix2d turn = world_from_level.toRotationMatrix();
   const Eigen::Vector2d by_yaw(-estimate.velocity_m_per_s.y(), estimate.velocity_m_per_s.x());
-  BodyCovariance& covariance = estimate.covariance;
-  covariance.middleRows<2>(kBodyVelocity) =
-      (turn.lazyProduct(covariance.middleRows<2>(kBodyVelocity)) +
-       by_yaw.lazyProduct(covariance.row(kBodyYaw)))
-          .eval();
-  covariance.middleCols<2>(kBodyVelocity) =
-      (covariance.middleCols<2>(kBodyVelocity).lazyProduct(turn.transpose()) +
-       covariance.col(kBodyYaw).lazyProduct(by_yaw.transpose()))
-          .eval();
+  for (BodyCovariance* covariance : {&estimate.covariance, &estimate.noise_covariance}) {
+    covariance->middleRows<2>(kBodyVelocity) =
+        (turn.lazyProduct(covariance->middleRows<2>(kBodyVelocity)) +
+         by_yaw.lazyProduct(covariance->row(kBodyYaw)))
+            .eval();
+    covariance->middleCols<2>(kBodyVelocity) =
+        (covariance->middleCols<2>(kBodyVelocity).lazyProduct(turn.transpose()) +
+         covariance->col(kBodyYaw).lazyProduct(by_yaw.transpose()))
+            .eval();
+  }
   return estimate;
 }
 
@@ -153,8 +155,8 @@ class Positioner::Impl {
                           ConsistentFix& solution) const;
   Matrix4 common_covariance(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
                             const PoseEstimate& camera) const;
-  Matrix4 common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
-                            const BodyFix& fix) const;
+  BodyCovariance common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
+                                   const BodyFix& fix) const;
   FixStatus sight_from_body(std::span<const Detection> detections, double time_s, BodyFrame& frame,
                             int& unknown_lamps) const;
   /// Nothing when fewer than two lamps of the map are seen.
@@ -177,8 +179,9 @@ class Positioner::Impl {
   Eigen::Vector3d origin_m_;
   Eigen::Matrix3d base_from_camera_;
   CommonErrors common_;
-  Eigen::Matrix3d body_from_camera_;
   std::optional<CameraMount> mount_;
+  /// The base is the camera's level frame.
+  Eigen::Matrix3d body_from_base_, body_from_camera_;
   double max_residual_share_;
   double unstated_sigma_px_;
   /// Nothing when the calibration lacks the row time or the read-out.
@@ -193,9 +196,10 @@ Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
       base_from_camera_(level_from_camera(calibration, options.correction)),
       common_(lamps_, calibration, options.correction),
       mount_(options.mount),
+      body_from_base_(rotation_about_z(mount_ ? mount_->yaw_in_robot_rad : 0)),
+      body_from_camera_(body_from_base_ * base_from_camera_),
       max_residual_share_(options.max_residual_share),
       unstated_sigma_px_(options.unstated_sigma_px) {
-  body_from_camera_ = rotation_about_z(mount_ ? mount_->yaw_in_robot_rad : 0) * base_from_camera_;
   const Camera& camera = calibration.camera;
   if (camera.row_time_s && camera.readout) {
     const int rows = camera.imager_px[*camera.readout == Readout::rows ? 1 : 0];
@@ -285,23 +289,24 @@ Matrix4 Positioner::Impl::common_covariance(const SightedFrame& frame,
 }
 
 /// The gain of the pixels, in standard deviations, is that of the body's least squares.
-Matrix4 Positioner::Impl::common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
-                                            const BodyFix& fix) const {
+BodyCovariance Positioner::Impl::common_covariance(const BodyFrame& frame,
+                                                   const Eigen::Vector3d& arm_m,
+                                                   const BodyFix& fix) const {
   const PosedBody body(fix.state);
-  const Eigen::Matrix3d body_from_base = body_from_camera_ * base_from_camera_.transpose();
-  CommonErrors::Gain whole(common_.shared());
+  CommonErrors::BodyGain whole(common_.shared());
   for (std::size_t i = 0; i < frame.size; ++i) {
     const BodySighting& seen = frame.sightings[i];
     const auto d_q = body.d_lamp_in_body(seen.lamp_m, seen.time_s);
     const Eigen::Matrix<double, 2, 3> d_pixel =
         d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
     const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state = d_pixel.lazyProduct(d_q);
-    const Eigen::Matrix<double, 4, 2> gain =
-        fix.covariance.topRows<4>().lazyProduct(d_pixel_d_state.transpose());
-    const Eigen::Matrix<double, 2, 3> d_pixel_d_ray = seen.whitened_pixel_from_ray * body_from_base;
-    const Eigen::Matrix<double, 4, 3> by_ray = gain * d_pixel_d_ray;
+    const Eigen::Matrix<double, kBodyStates, 2> gain =
+        fix.covariance.lazyProduct(d_pixel_d_state.transpose());
+    const Eigen::Matrix<double, 2, 3> d_pixel_d_ray =
+        seen.whitened_pixel_from_ray * body_from_base_;
+    const Eigen::Matrix<double, kBodyStates, 3> by_ray = gain * d_pixel_d_ray;
     whole.by_shared.noalias() +=
-        by_ray.lazyProduct(common_.effect_on_ray(body_from_base.transpose() * seen.ray, lens_));
+        by_ray.lazyProduct(common_.effect_on_ray(body_from_base_.transpose() * seen.ray, lens_));
     whole.add(index_of(frame.ids[i]), gain * d_pixel_d_state.leftCols<3>());
   }
   return common_.covariance_of(whole);
@@ -373,16 +378,16 @@ std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> dete
   const auto [status, solution] = fix_body_frame(frame, arm_m, prior, max_residual_share_);
   if (status != FixStatus::ok) return refused(status, fix.unknown_lamps);
   fix.status = status;
-  fix.noise_covariance = solution.covariance.topLeftCorner<4, 4>();
-  fix.estimate = {solution.state.pose, fix.noise_covariance};
-  if (common_.stated()) fix.estimate.covariance += common_covariance(frame, arm_m, solution);
+  fix.body = in_world(solution, common_.stated() ? common_covariance(frame, arm_m, solution)
+                                                 : BodyCovariance(BodyCovariance::Zero()));
+  fix.noise_covariance = fix.body->noise_covariance.topLeftCorner<4, 4>();
+  fix.estimate = {solution.state.pose, fix.body->covariance.topLeftCorner<4, 4>()};
   fix.estimate.pose.position_m += origin_m_;
   fix.residual_px = solution.residual_px;
   fix.redundancy = solution.redundancy;
   fix.lamps = static_cast<int>(frame.now);
   fix.sightings = static_cast<int>(frame.size);
   name_rejected(frame, fix);
-  fix.body = in_world(solution);
   fix.time_s = sensors.time_s;
   return fix;
 }

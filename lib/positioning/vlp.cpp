@@ -110,6 +110,7 @@ BodyEstimate told_body(const Sensors& sensors, double yaw_rad) {
     body.covariance(kBodyYawRate, kBodyYawRate) =
         sensors.motion->yaw_rate_sd_rad_per_s * sensors.motion->yaw_rate_sd_rad_per_s;
   }
+  body.noise_covariance = body.covariance;
   return body;
 }
 
@@ -124,7 +125,7 @@ void fill(const Fix& from, const Sensors& sensors, vlp_fix& fix) {
   fix.pitch_rad = body.inclination.pitch_rad;
   fix.yaw_rad = pose.yaw_rad;
   fill_covariance(covariance, body.covariance, fix.covariance);
-  fill_covariance(from.noise_covariance, body.covariance, fix.noise_covariance);
+  fill_covariance(from.noise_covariance, body.noise_covariance, fix.noise_covariance);
   std::copy_n(body.velocity_m_per_s.data(), 2, fix.velocity_m_per_s);
   fix.yaw_rate_rad_per_s = body.yaw_rate_rad_per_s;
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(fix.velocity_covariance) =

@@ -25,7 +25,7 @@ enum {
   VLP_TOO_FEW_LAMPS = 1,     /* fewer than two lamps of the map */
   VLP_TOO_MANY_LAMPS = 2,    /* more than VLP_MAX_LAMPS */
   VLP_DUPLICATE_LAMP = 3,    /* one id twice in a frame */
-  VLP_NOT_FINITE = 4,        /* a pixel or a reading is not, or a sigma is out of range */
+  VLP_NOT_FINITE = 4,        /* a pixel or a reading is not, or a sigma or sd is out of range */
   VLP_OUTSIDE_LENS = 5,      /* a pixel that no ray through the lens reaches */
   VLP_LAMP_BELOW_CAMERA = 6, /* a lamp would have to hang at or below the camera's height */
   VLP_DEGENERATE = 7,        /* the lamps are seen too close together, or do not fit any pose */
@@ -87,7 +87,8 @@ typedef struct vlp_sensors {
   double velocity_m_per_s[2];
   double yaw_rate_rad_per_s;
   double velocity_sd_m_per_s, yaw_rate_sd_rad_per_s;
-  /* Of the robot's centre or, without a mount, of the camera. */
+  /* Of the robot's centre or, without a mount, of the camera; its standard deviation is positive.
+   */
   int32_t has_height;
   double z_m, z_sd_m;
 } vlp_sensors;
@@ -111,7 +112,7 @@ typedef struct vlp_fix {
   /* In the world; estimated where vlp_sensors let it move, else zero or as given. */
   double velocity_m_per_s[2];
   double yaw_rate_rad_per_s;
-  /* Of (vx, vy, yaw rate), by rows. */
+  /* Of (vx, vy, yaw rate), by rows: all that is known of their error. */
   double velocity_covariance[9];
   /* Root of the mean squared distance of the lamps' pixels from where the fix sees them. */
   double residual_px;

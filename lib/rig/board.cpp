@@ -20,6 +20,7 @@ constexpr std::array kFamilies{"tag36h11",         "tag25h9",         "tag16h5",
 constexpr std::array kCorners{"bottom-left", "bottom-right", "top-left", "top-right"};
 
 constexpr int kMostTags = 1000;
+constexpr int kLargestId = 1'000'000;  // families have fewer
 constexpr double kLeastTag_m = 1e-4, kLargestTag_m = 2;
 
 IdOrder read_id_order(const YamlValue& value) {
@@ -43,7 +44,8 @@ std::string read_family(const YamlValue& value) {
 }
 
 /// Kalibr's target of kind aprilgrid, as its documentation describes it: tag36h11 with a border of
-/// two bits and squares at the corners, ids from 0 along the rows, from the bottom left.
+/// two bits and squares at the corners, ids from codeOffset, or 0, along the rows, from the bottom
+/// left.
 Board read_kalibr_target(YamlMap& map) {
   const YamlValue kind = map.required("target_type");
   if (kind.text() != "aprilgrid") {
@@ -55,6 +57,9 @@ Board read_kalibr_target(YamlMap& map) {
   board.rows = map.required("tagRows").integer_within(1, kMostTags);
   board.tag_size_m = map.required("tagSize").number_within(kLeastTag_m, kLargestTag_m, "m");
   board.tag_spacing = map.required("tagSpacing").number_within(0.01, 10, "(gap / tag)");
+  if (const auto first = map.optional("codeOffset")) {
+    board.first_id = first->integer_within(0, kLargestId);
+  }
   return board;
 }
 
@@ -66,7 +71,6 @@ std::string name_of(const IdOrder& order) {
 }
 
 Board read_board(YamlMap& map) {
-  constexpr int largest_id = 1'000'000;  // families have fewer
   Board board;
   board.family = read_family(map.required("family"));
   board.cols = map.required("cols").integer_within(1, kMostTags);
@@ -75,7 +79,7 @@ Board read_board(YamlMap& map) {
   board.tag_spacing = map.required("tag_spacing").number_within(0.01, 10, "(gap / tag)");
   board.border_bits = map.required("border_bits").integer_within(1, 2);
   board.corner_squares = map.required("corner_squares").boolean();
-  board.first_id = map.required("first_id").integer_within(0, largest_id);
+  board.first_id = map.required("first_id").integer_within(0, kLargestId);
   board.id_order = read_id_order(map.required("id_order"));
   return board;
 }

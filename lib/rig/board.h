@@ -40,8 +40,8 @@ struct Board {
 };
 
 /// Reads `vlp-board/1`, of which every field above is a key of the same name, or the YAML file that
-/// Kalibr describes its AprilGrid by (target_type, tagCols, tagRows, tagSize in m, tagSpacing).
-/// Throws InputError.
+/// Kalibr describes its AprilGrid by (target_type, tagCols, tagRows, tagSize in m, tagSpacing,
+/// codeOffset). Throws InputError.
 Board read_board(const std::filesystem::path& file);
 
 /// Writes what read_board() reads, whole or not at all. Throws InputError.

@@ -5,7 +5,9 @@
 #include <benchmark/benchmark.h>
 
 #include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
 
 #include "detection/lamp_detector.h"
 #include "detection/lights/background.h"
@@ -50,6 +52,19 @@ void detect(benchmark::State& state) {
   detect_in(state, captures().frame, detector_camera(true_calibration(captures().scene)));
 }
 
+/// The image and the rig of tests/python/module_test.py, which times the same in Python.
+void detect_sample(benchmark::State& state) {
+  const std::string rendered = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/";
+  const cv::Mat image = cv::imread(rendered + "sample/0000.png", cv::IMREAD_UNCHANGED);
+  const LampDetector detector(
+      read_lamp_map(rendered + "lamps.yaml"),
+      detector_camera(read_calibration(rendered + "true_calibration.yaml")));
+  cv::setNumThreads(1);
+  std::size_t lamps = 0;
+  for (auto _ : state) lamps = detector.detect(image).size();
+  state.counters["lamps"] = static_cast<double>(lamps);
+}
+
 void opencv_components(benchmark::State& state) {
   const double threshold = background_of(captures().frame).threshold;
   cv::Mat binary, labels, statistics, centroids;
@@ -71,6 +86,7 @@ void detect_in_33_mpx_by_columns(benchmark::State& state) {
 }
 
 BENCHMARK(detect)->Unit(benchmark::kMicrosecond);
+BENCHMARK(detect_sample)->Unit(benchmark::kMicrosecond);
 BENCHMARK(opencv_components)->Unit(benchmark::kMicrosecond);
 BENCHMARK(detect_in_33_mpx)->Unit(benchmark::kMicrosecond);
 BENCHMARK(detect_in_33_mpx_by_columns)->Unit(benchmark::kMicrosecond);

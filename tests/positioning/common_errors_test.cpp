@@ -6,8 +6,11 @@
 
 #include <gtest/gtest.h>
 
+#include <tuple>
+
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
+#include "rig/calibration_error.h"
 #include "support/near.h"
 
 namespace vlp {
@@ -17,51 +20,77 @@ class CommonToFixes : public testing::Test {
  protected:
   StatedRig rig;
 
-  static Eigen::Vector4d state_of(const Fix& fix) {
-    Eigen::Vector4d state;
-    state << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
-    return state;
+  /// Of a body that is not estimated, X, Y, Z and yaw, and otherwise none.
+  using States = Eigen::Vector<double, kBodyStates>;
+  static States states_of(const Fix& fix) {
+    States states = States::Zero();
+    states.head<4>() << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
+    if (const auto& body = fix.body) {
+      states.tail<5>() << body->velocity_m_per_s, body->yaw_rate_rad_per_s,
+          body->inclination.roll_rad, body->inclination.pitch_rad;
+    }
+    return states;
+  }
+
+  void expect_common(const Fix& fix, const Eigen::MatrixXd& by_parameters,
+                     const MatrixX& covariance) const {
+    const Eigen::MatrixXd expected = by_parameters * covariance * by_parameters.transpose();
+    const Eigen::Matrix4d of_pose = expected.topLeftCorner<4, 4>();
+    EXPECT_THAT(fix.estimate.covariance - fix.noise_covariance,
+                IsNear(of_pose, 1e-4 * of_pose.cwiseAbs().maxCoeff()));
+    if (!fix.body) return;
+    EXPECT_EQ(fix.estimate.covariance, Matrix4(fix.body->covariance.topLeftCorner<4, 4>()));
+    EXPECT_EQ(fix.noise_covariance, Matrix4(fix.body->noise_covariance.topLeftCorner<4, 4>()));
+    // Each state in its own standard deviation; of those that are given there is none.
+    const Eigen::VectorXd sd = expected.diagonal().cwiseSqrt();
+    const Eigen::VectorXd inverse_sd =
+        (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Ones(kBodyStates));
+    const Eigen::MatrixXd off =
+        fix.body->covariance - fix.body->noise_covariance - BodyCovariance(expected);
+    EXPECT_THAT(inverse_sd.asDiagonal() * off * inverse_sd.asDiagonal(),
+                IsNear(Eigen::MatrixXd::Zero(kBodyStates, kBodyStates), 1e-3));
   }
 };
 
 /// G by differences of whole fixes: nothing is shared with the formula.
-class OfFixes : public CommonToFixes, public testing::WithParamInterface<Sensors> {};
+class OfFixes : public CommonToFixes,
+                public testing::WithParamInterface<std::tuple<RotationModel, Sensors>> {};
 
 TEST_P(OfFixes, IsThatOfThoseMadeWithEachParameterALittleOff) {
+  const Sensors& known = std::get<Sensors>(GetParam());
+  rig.calibration.rotation_center->model = std::get<RotationModel>(GetParam());
   rig.adjust(1);
   rig.calibration.camera.row_time_s = 3e-5;
   rig.calibration.camera.readout = Readout::rows;
   const Adjustment adjustment = *rig.calibration.adjustment;
+  // A mount's yaw turns the body against the camera.
+  PositionerOptions options;
+  if (known.motion) options.mount = CameraMount{{0, 0, 0}, 0.5};
   const auto detections = seen_from(rig, 0.1);
   const auto fix_with = [&](Eigen::Index parameter, double by) {
-    SyntheticRig other = rig;
-    other.calibration.adjustment.reset();
-    RotationCenter& center = *other.calibration.rotation_center;
+    LampMap map = rig.map;
+    Calibration other = rig.calibration;
     if (parameter < 12) {
-      other.calibration.camera.intrinsics[static_cast<std::size_t>(parameter)] += by;
+      other = with_lens_error(other, by * Eigen::VectorXd::Unit(12, parameter));
     } else if (parameter < 14) {
-      Eigen::Vector3d zenith = center.zenith_in_camera / center.zenith_in_camera.z();
-      zenith[parameter - 12] += by;
-      center.zenith_in_camera = zenith.normalized();
+      other = with_zenith_error(other, by * Eigen::Vector2d::Unit(parameter - 12));
     } else if (parameter >= 16) {
-      other.map.lamps[static_cast<std::size_t>(parameter - 16) / 3]
-          .position_m[(parameter - 16) % 3] += by;
+      map.lamps[static_cast<std::size_t>(parameter - 16) / 3].position_m[(parameter - 16) % 3] +=
+          by;
     }
-    return state_of(Positioner(other.map, other.calibration).locate(detections, GetParam()));
+    other.adjustment.reset();
+    return states_of(Positioner(map, other, options).locate(detections, known));
   };
-  Eigen::MatrixXd by_parameters(4, 40);
+  Eigen::MatrixXd by_parameters(kBodyStates, 40);
   for (Eigen::Index i = 0; i < 40; ++i) {
     const double step = i < 4 ? 1e-3 : 1e-6;
     by_parameters.col(i) = (fix_with(i, step) - fix_with(i, -step)) / (2 * step);
   }
-  const Eigen::Matrix4d expected =
-      by_parameters * adjustment.covariance * by_parameters.transpose();
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections, GetParam());
+  const Fix fix = Positioner(rig.map, rig.calibration, options).locate(detections, known);
   ASSERT_TRUE(fix.ok());
-  EXPECT_THAT(fix.estimate.covariance - fix.noise_covariance,
-              IsNear(expected, 1e-4 * expected.cwiseAbs().maxCoeff()));
+  expect_common(fix, by_parameters, adjustment.covariance);
   rig.calibration.adjustment.reset();
-  const Fix noise = Positioner(rig.map, rig.calibration).locate(detections, GetParam());
+  const Fix noise = Positioner(rig.map, rig.calibration, options).locate(detections, known);
   EXPECT_EQ(noise.estimate.covariance, noise.noise_covariance);
   EXPECT_THAT(fix.noise_covariance, IsNear(noise.noise_covariance, 1e-15));
 }
@@ -73,16 +102,62 @@ Sensors sensors(double inclination_sigma_rad, const std::optional<KnownMotion>& 
   return sensors;
 }
 
-std::string name_of_body(const testing::TestParamInfo<Sensors>& body) {
-  std::string name = body.param.motion ? "Driving" : "Standing";
-  if (body.param.inclination_sigma_rad > 0) name += "AndLeaning";
-  return name;
+std::string name_of_body(const testing::TestParamInfo<OfFixes::ParamType>& body) {
+  const Sensors& known = std::get<Sensors>(body.param);
+  std::string name = known.motion ? "Driving" : "Standing";
+  if (known.inclination_sigma_rad > 0) name += "AndLeaning";
+  const bool shifted = std::get<RotationModel>(body.param) == RotationModel::shift;
+  return name + (shifted ? "Shifted" : "Tilted");
 }
 
-INSTANTIATE_TEST_SUITE_P(Bodies, OfFixes,
-                         testing::Values(sensors(0, {}), sensors(0, KnownMotion::up_to(1, 1)),
-                                         sensors(0.1, {}), sensors(0.1, KnownMotion::up_to(1, 1))),
-                         name_of_body);
+INSTANTIATE_TEST_SUITE_P(
+    Bodies, OfFixes,
+    testing::Combine(testing::Values(RotationModel::tilt, RotationModel::shift),
+                     testing::Values(sensors(0, {}), sensors(0, KnownMotion::up_to(1, 1)),
+                                     sensors(0.1, {}), sensors(0.1, KnownMotion::up_to(1, 1)))),
+    name_of_body);
+
+/// As vlp-intrinsics leaves a calibration: nothing was made with the lens yet that leans on it.
+TEST_F(CommonToFixes, OfALensAloneAreThoseOfFixesMadeWithItALittleOff) {
+  rig.calibrate_in_a_row();
+  rig.calibration.rotation_center.reset();
+  rig.calibration.dispersion.reset();
+  for (Lamp& lamp : rig.map.lamps) lamp.sd_m.reset();
+  const MatrixX covariance = *rig.calibration.intrinsics_report->covariance;
+  const auto detections = seen_from(rig, 0.1);
+  const auto fix_with = [&](Eigen::Index parameter, double by) {
+    const Calibration other =
+        with_lens_error(rig.calibration, by * Eigen::VectorXd::Unit(12, parameter));
+    return states_of(Positioner(rig.map, other).locate(detections));
+  };
+  Eigen::MatrixXd by_parameters(kBodyStates, 12);
+  for (Eigen::Index i = 0; i < 12; ++i) {
+    const double step = i < 4 ? 1e-3 : 1e-6;
+    by_parameters.col(i) = (fix_with(i, step) - fix_with(i, -step)) / (2 * step);
+  }
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
+  ASSERT_TRUE(fix.ok());
+  EXPECT_GT(fix.estimate.covariance(0, 0), 2 * fix.noise_covariance(0, 0));
+  expect_common(fix, by_parameters, covariance);
+}
+
+/// What was calibrated with the lens and does not say how it leans on it hides its errors.
+TEST_F(CommonToFixes, OfALensCountOnce) {
+  const auto stated = [&](Correction correction) {
+    return CommonErrors(rig.map.lamps, rig.calibration, correction).stated(CommonPart::lens);
+  };
+  rig.calibrate_in_a_row();
+  for (const Correction correction :
+       {Correction::none, Correction::rotation, Correction::dispersion, Correction::all}) {
+    EXPECT_TRUE(stated(correction));
+  }
+  rig.calibration.rotation_center->by_intrinsics.reset();
+  EXPECT_FALSE(stated(Correction::rotation) || stated(Correction::all));
+  EXPECT_TRUE(stated(Correction::dispersion));
+  rig.calibration.dispersion->by_intrinsics.reset();
+  EXPECT_FALSE(stated(Correction::dispersion));
+  EXPECT_TRUE(stated(Correction::none));
+}
 
 TEST_F(CommonToFixes, OfASurveyIsItsStandardDeviationThroughTheFix) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;

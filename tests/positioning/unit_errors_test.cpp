@@ -177,6 +177,13 @@ TEST(UnitErrors, AreWhatFixesWithDrawnErrorsShow) {
   EXPECT_NEAR(judged.share(), 0.95, 0.02);
 }
 
+TEST(FixSpread, OfNoneIsNoneWhateverRoundingLeaves) {
+  const FixSpread spread = spread_of(Matrix4(-1e-22 * Matrix4::Identity()));
+  EXPECT_EQ(spread.horizontal_m, 0);
+  EXPECT_EQ(spread.height_m, 0);
+  EXPECT_EQ(spread.yaw_rad, 0);
+}
+
 TEST(UnitErrors, SayWhatIsNotStated) {
   StatedRig rig;
   const auto stated = [&](CommonPart part) {

@@ -135,6 +135,12 @@ TEST_F(CInterface, LocatesABodyThatDrivesAndLeans) {
   EXPECT_EQ(covariance(4, 5), fix.body->covariance(kBodyPitch, kBodyYaw));
   EXPECT_EQ(covariance(4, 4), fix.body->covariance(kBodyPitch, kBodyPitch));
   EXPECT_EQ(c.velocity_covariance[1], fix.body->covariance(kBodyVelocity, kBodyVelocity + 1));
+  // The surveyed lamp's error is common to all fixes, and leans them as well as it moves them.
+  const Covariance6 noise(c.noise_covariance);
+  EXPECT_EQ(noise(0, 3), fix.body->noise_covariance(0, kBodyRoll));
+  EXPECT_EQ(noise(4, 4), fix.body->noise_covariance(kBodyPitch, kBodyPitch));
+  EXPECT_LT(noise(4, 4), covariance(4, 4));
+  EXPECT_LT(fix.body->noise_covariance(kBodyVelocity, kBodyVelocity), c.velocity_covariance[0]);
 }
 
 TEST_F(CInterface, LocatesByOneLampAndEveryKnownFigure) {
@@ -175,6 +181,13 @@ TEST_F(CInterface, KnowsAHeight) {
   const vlp_fix fix = located(open().get(), &sensors);
   expect_same(fix, rig.positioner().locate(seen, same));
   EXPECT_LE(std::sqrt(fix.noise_covariance[14]), 1e-4);
+}
+
+TEST_F(CInterface, RefusesAHeightWithoutAStandardDeviationAndSaysSo) {
+  vlp_sensors sensors = {};
+  sensors.has_height = 1;
+  EXPECT_EQ(located(open().get(), &sensors).status, VLP_NOT_FINITE);
+  EXPECT_THAT(vlp_explanation(VLP_NOT_FINITE), HasSubstr("that of a known height not positive"));
 }
 
 TEST_F(CInterface, StampsAndCountsWithoutAFix) {

@@ -3,7 +3,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Python module: says what the files say, locates as it should, refuses what is none."""
 
+import ast
 import pathlib
+import re
 import subprocess
 import sys
 import time
@@ -77,6 +79,13 @@ class Module(unittest.TestCase):
         fix = self.positioner.locate([1], [[400.0, 300]])
         self.assertFalse(fix.ok)
         self.assertEqual(fix.status, "too_few_lamps")
+        for figure in ("position_m", "yaw_rad", "covariance", "noise_covariance", "residual_px"):
+            self.assertTrue(np.isnan(getattr(fix, figure)).all(), figure)
+        self.assertIsNone(fix.lean_rad)
+        no_sd = vlp.Sensors(height_m=(0, 0))
+        fix = self.positioner.locate([1, 2], [[400.0, 300], [500, 300]], sensors=no_sd)
+        self.assertEqual(fix.status, "not_finite")
+        self.assertIn("that of a known height not positive", fix.explanation)
         fixes = self.positioner.locate_frames([0, 1, 1], [1, 1, 2], [[400.0, 300]] * 3)
         self.assertEqual(vlp.STATUSES[fixes["status"][0]], "too_few_lamps")
         self.assertTrue(np.isnan(fixes["position_m"]).all())
@@ -89,7 +98,10 @@ class Module(unittest.TestCase):
             self.positioner.locate([1, 2], [1.0, 2])
         with self.assertRaisesRegex(ValueError, "one for each"):
             self.positioner.locate([1, 2, 3], [[1.0, 2], [3, 4]])
-        for lamps in ([1.7, 2], ["1", "2"], [True, False], [1, 1 + 2**32], [[1], [2, 3]], None):
+        wraps_to_minus_1 = np.array([1, 2**64 - 1], np.uint64)
+        of_no_numbers = np.zeros(0, [("id", int), ("name", "U3")])
+        for lamps in ([1.7, 2], ["1", "2"], [True, False], [1, 1 + 2**32], [[1], [2, 3]], None,
+                      wraps_to_minus_1, of_no_numbers):
             with self.assertRaisesRegex(ValueError, "lamps should be integers"):
                 self.positioner.locate(lamps, [[1.0, 2], [3, 4]])
         with self.assertRaisesRegex(ValueError, "frames should be integers"):
@@ -104,11 +116,14 @@ class Module(unittest.TestCase):
         with self.assertRaises(ValueError):
             vlp.Lens("LENSMODEL_NONE", [1, 1, 0, 0])
 
-    def test_detects_as_the_table_says(self):
-        detector = vlp.LampDetector(
+    def detector(self):
+        return vlp.LampDetector(
             vlp.LampMap(RENDERED / "lamps.yaml"),
             vlp.Calibration(RENDERED / "true_calibration.yaml"),
         )
+
+    def test_detects_as_the_table_says(self):
+        detector = self.detector()
         true = vlp.read_detections(RENDERED / "sample/true_detections.csv")
         image = true["images"][0]
         lamps, pixels, sigma_px = detector.detect(np.array(PIL.Image.open(RENDERED / "sample" / image)))
@@ -116,6 +131,20 @@ class Module(unittest.TestCase):
         for lamp, pixel, sigma in zip(lamps, pixels, sigma_px):
             row = (true["frames"] == 0) & (true["lamps"] == lamp)
             self.assertLess(np.linalg.norm(true["pixels"][row][0] - pixel), 6 * sigma + 0.05)
+
+    def test_detects_in_any_array(self):
+        detector = self.detector()
+        image = np.array(PIL.Image.open(RENDERED / "sample/0000.png"))
+        found = detector.detect(image)
+        wide = np.zeros((image.shape[0], 2 * image.shape[1]), image.dtype)
+        wide[:, ::2] = image  # whose rows do not follow each other
+        for given in (np.asfortranarray(image), wide[:, ::2]):
+            for one, other in zip(found, detector.detect(given)):
+                np.testing.assert_array_equal(one, other)
+        begin = time.process_time()
+        for _ in range(100):
+            detector.detect(image)
+        print(f"{10 * (time.process_time() - begin):.3f} ms of processor time a frame")
 
     def test_locates_many_frames_in_no_time(self):
         copies = 100000 // len(self.seen["images"]) + 1
@@ -129,6 +158,48 @@ class Module(unittest.TestCase):
         print(f"{len(fixes['status'])} fixes in {took:.2f} s of processor time")
         self.assertTrue((fixes["status"] == 0).all())
         self.assertLess(took, 5)  # 1 s on a machine of its own
+
+    def test_stubs_are_of_the_module(self):
+        stubs = ast.parse((SOURCE / "apps/python/vlp-stubs/__init__.pyi").read_text()).body
+        functions = [node for node in stubs if isinstance(node, ast.FunctionDef)]
+        classes = [node for node in stubs if isinstance(node, ast.ClassDef)]
+        tables = {
+            node.name: [field.target.id for field in node.body if isinstance(field, ast.AnnAssign)]
+            for node in classes
+            if [base.id for base in node.bases] == ["TypedDict"]
+        }
+        classes = [node for node in classes if node.name not in tables]
+
+        def parameters(function):
+            arguments = function.args.args + function.args.kwonlyargs
+            return [argument.arg for argument in arguments if argument.arg != "self"]
+
+        def documented(function):  # pybind11's "locate(self: vlp.Positioner, lamps: object) -> ..."
+            names = re.findall(r"(?:\(|, )(\w+): ", function.__doc__.split("\n")[0])
+            return [name for name in names if name != "self"]
+
+        variables = {node.target.id for node in stubs if isinstance(node, ast.AnnAssign)}
+        self.assertEqual(
+            {node.name for node in functions + classes} | variables,
+            {name for name in dir(vlp) if not name.startswith("_")} | {"__version__"},
+        )
+        for function in functions:
+            self.assertEqual(parameters(function), documented(getattr(vlp, function.name)))
+        for node in classes:
+            of_module = getattr(vlp, node.name)
+            methods = [method for method in node.body if isinstance(method, ast.FunctionDef)]
+            self.assertEqual(
+                {method.name for method in methods if not method.name.startswith("_")},
+                {name for name in vars(of_module) if not name.startswith("_")},
+            )
+            for method in methods:
+                called = not method.decorator_list and method.name != "__len__"
+                if called:
+                    names = documented(getattr(of_module, method.name))
+                    self.assertEqual(parameters(method), names, (node.name, method.name))
+        self.assertEqual(tables["Fixes"], list(self.located()))
+        self.assertEqual(tables["DetectionsTable"], list(self.seen))
+        self.assertEqual(tables["TruthTable"], list(self.truth))
 
     def test_example_runs(self):
         example = [sys.executable, SOURCE / "apps/python/example.py", EXAMPLE]

@@ -62,6 +62,21 @@ TEST(Board, IsReadFromKalibrsDescriptionOfItsTarget) {
   expect_same(read_board(folder.file("target.yaml", kKalibrTarget)), board);
 }
 
+/// As Kalibr's own downloads end.
+TEST(Board, TakesKalibrsOffsetForTheFirstId) {
+  const TemporaryFolder folder;
+  const auto with = [&](const std::string& offset) {
+    return folder.file("target.yaml", kKalibrTarget + ("codeOffset: " + offset) +
+                                          " #code offset for the first tag (default: 0)\n");
+  };
+  Board board{"tag36h11", 5, 4, 0.02, 0.2, 2, true, 0, {false, BoardCorner::bottom_left}};
+  expect_same(read_board(with("0")), board);
+  board.first_id = 100;
+  expect_same(read_board(with("100")), board);
+  EXPECT_THAT(refusal(read_board, with("-1")), HasSubstr("target.yaml:6: codeOffset: should be"));
+  EXPECT_THAT(refusal(read_board, with("0.5")), HasSubstr("target.yaml:6: codeOffset: should be"));
+}
+
 TEST(Board, RefusesKalibrsOtherTargetsAndKeys) {
   const TemporaryFolder folder;
   const auto refusal_of = [&](const std::string& from, const std::string& to) {

@@ -108,7 +108,7 @@ void SpotSearch::locate(double max_residual_share) {
 double SpotSearch::height_noise_m(const std::vector<Fix>& fixes) const {
   std::vector<double> of_two, of_more;
   for (const Fix& fix : fixes) {
-    const double of_1px_m = std::sqrt(fix.estimate.covariance(2, 2));
+    const double of_1px_m = std::sqrt(fix.noise_covariance(2, 2));
     const double n = fix.lamps;
     if (fix.lamps > 2) {
       of_more.push_back(of_1px_m * fix.residual_px * std::sqrt(n / (2 * n - 4)));

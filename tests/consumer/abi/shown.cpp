@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Every type that the installed headers define and every function that the library shows, so that
+/// the debug information of this one file tells its whole ABI; see abi_test.sh.
+#include <vlp/vlp.h>
+
+#include <vlp/positioning/positioner.h>
+#include <vlp/rig/input_error.h>
+#include <optional>
+#include <vector>
+
+using namespace vlp;
+using Seen = std::span<const Detection>;
+using FromName = std::optional<LensModel>(std::string_view);
+
+struct Types {
+  LampMap map;
+  Lamp lamp;
+  Calibration calibration;
+  Camera camera;
+  IntrinsicsReport report;
+  RotationCenter rotation_center;
+  Dispersion dispersion;
+  Adjustment adjustment;
+  Adjustment::Place place;
+  HistoryEntry entry;
+  HistoryEntry::Input input;
+  Detection detection;
+  EarlierFrame earlier;
+  Sensors sensors;
+  KnownMotion motion;
+  HeightAndYaw height_and_yaw;
+  KnownHeight height;
+  CameraMount mount;
+  PositionerOptions options;
+  Correction correction;
+  Positioner* positioner;
+  InputError* error;
+  Fix fix;
+  FixStatus status;
+  BodyEstimate body;
+  BodyIndex index;
+  PoseEstimate estimate;
+  Pose pose;
+  Inclination inclination;
+  vlp_options c_options;
+  vlp_detection c_detection;
+  vlp_sensors c_sensors;
+  vlp_fix c_fix;
+};
+
+struct Functions {
+  decltype(&rotation_about_z) rotation = &rotation_about_z;
+  decltype(&level_from_inclination) from_inclination = &level_from_inclination;
+  decltype(&level_from_zenith) from_zenith = &level_from_zenith;
+  decltype(&level_from_world) from_world = &level_from_world;
+  std::string_view (*name_of_lens)(LensModel) = &name_of;
+  FromName* lens_from_name = &lens_model_from_name;
+  decltype(&lens_model_names) lens_names = &lens_model_names;
+  decltype(&parameter_count) parameters = &parameter_count;
+  decltype(&read_lamp_map) read_map = &read_lamp_map;
+  decltype(&write_lamp_map) write_map = &write_lamp_map;
+  decltype(&parameter_names) names = &parameter_names;
+  decltype(&read_calibration) read = &read_calibration;
+  decltype(&write_calibration) write = &write_calibration;
+  decltype(&level_from_camera) from_camera = &level_from_camera;
+  std::string_view (*name_of_status)(FixStatus) = &name_of;
+  decltype(&explanation_of) explanation = &explanation_of;
+  Fix (Positioner::*locate)(Seen, const Sensors&) const noexcept = &Positioner::locate;
+  Fix (Positioner::*locate_together)(
+      Seen, const Sensors&, std::span<const EarlierFrame>) const noexcept = &Positioner::locate;
+  int (Positioner::*elsewhere)() const noexcept = &Positioner::lamps_elsewhere;
+  decltype(&vlp_version) c_version = &vlp_version;
+  decltype(&vlp_open) c_open = &vlp_open;
+  decltype(&vlp_close) c_close = &vlp_close;
+  decltype(&vlp_locate) c_locate = &vlp_locate;
+  decltype(&vlp_explanation) c_explanation = &vlp_explanation;
+  decltype(&vlp_last_error) c_last_error = &vlp_last_error;
+};
+
+Types* types;
+Functions functions;
