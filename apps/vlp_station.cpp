@@ -63,9 +63,13 @@ const CLI::Validator kUtc(
         const auto at = [&](std::size_t begin) {
           return static_cast<unsigned>(std::stoul(text.substr(begin, 2)));
         };
-        constexpr std::size_t month = 5, day = 8;
+        constexpr std::size_t month = 5, day = 8, hour = 11, minute = 14, second = 17;
         const std::chrono::year year(std::stoi(text.substr(0, 4)));
-        good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok();
+        const auto below = [&](std::size_t begin, unsigned end) {
+          return text.size() < begin + 2 || at(begin) < end;
+        };
+        good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok() &&
+               below(hour, 24) && below(minute, 60) && below(second, 60);
       }
       return good ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
     },

@@ -75,18 +75,19 @@ class Files {
   std::string digests_;
 };
 
-Camera read_type(const YamlValue& value, Files& files) {
-  const Camera type = read_calibration(files(value)).camera;
-  if (!type.row_time_s || !type.readout) {
+/// A calibration whose camera tells lamps.
+Calibration read_shutter(const YamlValue& value, Files& files) {
+  Calibration calibration = read_calibration(files(value));
+  if (!calibration.camera.row_time_s || !calibration.camera.readout) {
     throw value.error("its camera should have row_time_s and readout: lamps are told by them");
   }
-  return type;
+  return calibration;
 }
 
 GoldenUnit read_golden(YamlMap map, Files& files) {
   GoldenUnit golden{map.required("camera_id").text(), {}, {}};
   const YamlValue calibration = map.required("calibration");
-  golden.calibration = read_calibration(files(calibration));
+  golden.calibration = read_shutter(calibration, files);
   if (!golden.calibration.rotation_center) {
     throw calibration.error("should be of a whole calibration: it has no rotation_center");
   }
@@ -116,7 +117,7 @@ StationConfig read_station(const fs::path& file) {
   Files files(file);
   StationConfig config;
   config.station = document.required("station").text();
-  config.type = read_type(document.required("camera_type"), files);
+  config.type = read_shutter(document.required("camera_type"), files).camera;
   config.board = read_board(files(document.required("board")));
   config.lamps = read_lamp_map(files(document.required("lamps")));
   if (const auto place = document.optional("dispersion_station_m")) {

@@ -74,7 +74,8 @@ struct StationConfig {
 std::vector<MetricKind> unit_metrics();
 
 /// Throws InputError with file, line and key: unknown or missing keys, figures that no station can
-/// mean, a gate of a figure that there is not, a type without row time or read-out.
+/// mean, a gate of a figure that there is not, a type or a golden unit without row time or
+/// read-out.
 StationConfig read_station(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "support/datasets.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
 
@@ -60,6 +61,16 @@ TEST_F(StationYaml, RefusesWhatNoStationCanMean) {
 TEST_F(StationYaml, RefusesATypeWithoutRowTime) {
   change("camera_type.yaml", "  row_time_s: 3.0e-05\n", "");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("camera_type"), HasSubstr("row_time_s")));
+}
+
+TEST_F(StationYaml, RefusesAGoldenUnitWithoutRowTime) {
+  folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
+  change("station.yaml", "records: records.db",
+         "records: records.db\n"
+         "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
+  EXPECT_TRUE(read_station(folder / "station.yaml").golden);
+  change("golden.yaml", "  row_time_s: 0.00003\n", "");
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("golden.calibration"), HasSubstr("row_time_s")));
 }
 
 TEST_F(StationYaml, RefusesAnUnknownDatabase) {
