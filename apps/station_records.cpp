@@ -14,8 +14,10 @@
 
 #include "app.h"
 #include "captures/printable.h"
+#include "rig/file.h"
 #include "rig/input_error.h"
 #include "station/capability.h"
+#include "station/certificate.h"
 #include "station/control_chart.h"
 #include "station/database_name.h"
 #include "station/export_runs.h"
@@ -70,9 +72,7 @@ struct Known {
       away = error.what();
     }
   }
-  std::vector<RunRecord> waiting() {
-    return spool ? spool->waiting() : std::vector<RunRecord>();
-  }
+  std::vector<RunRecord> waiting() { return spool ? spool->waiting() : std::vector<RunRecord>(); }
   /// For what cannot do without them.
   Records& all() {
     if (!records) throw std::runtime_error(away);
@@ -150,6 +150,13 @@ std::vector<TrendPoint> judged(Records& records, const std::string& figure, RunF
   std::erase_if(points,
                 [](const TrendPoint& point) { return point.verdict == name_of(Verdict::invalid); });
   return last_of(std::move(points), last);
+}
+
+/// The folder into which files of a run go.
+std::filesystem::path results_of(const StationRecordsOptions& options) {
+  if (!options.output.empty()) return options.output;
+  if (!options.station.empty()) return read_station(options.station).results;
+  throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
 }
 
 MetricKind figure_of(const StationRecordsOptions& options) {
@@ -276,17 +283,23 @@ void show_run(const StationRecordsOptions& options) {
 }
 
 void restore_run(const StationRecordsOptions& options) {
-  if (options.station.empty() && options.output.empty()) {
-    throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
-  }
+  const std::filesystem::path results = results_of(options);
   Known known(options);
   const RunRecord record = run_of(known, options);
   const std::string contradiction = contradiction_of(record);
   if (!contradiction.empty()) throw InputError(record.run, contradiction);
-  const std::filesystem::path results = options.output.empty()
-                                            ? read_station(options.station).results
-                                            : std::filesystem::path(options.output);
   say(fmt::format("{}\n", publish_run(record, {}, results).string()));
+}
+
+void write_certificate(const StationRecordsOptions& options) {
+  const std::filesystem::path results = results_of(options);
+  Known known(options);
+  const RunRecord record = run_of(known, options);
+  check_certifiable(record);
+  const std::filesystem::path folder = publish_run(record, {}, results);
+  const std::filesystem::path file = folder / "certificate.html";
+  write_file(file, certificate(record, read_calibration(folder / calibration_name(record))));
+  say(fmt::format("{}\n", file.string()));
 }
 
 void export_runs(const StationRecordsOptions& options) {

@@ -55,6 +55,11 @@ nlohmann::ordered_json json_of(const RunRecord& run) {
                             {"gate", number_or_null(figure.limit)},
                             {"at_least", figure.asked == Direction::at_least},
                             {"met", figure.met()}};
+    if (!figure.guard) continue;
+    figures[figure.name]["uncertainty"] = figure.guard->standard_uncertainty;
+    figures[figure.name]["guard_k"] = figure.guard->k;
+    figures[figure.name]["conformance_probability"] =
+        number_or_null(figure.conformance_probability());
   }
   nlohmann::ordered_json images = nlohmann::ordered_json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {

@@ -227,13 +227,16 @@ void put_figures(soci::session& sql, const RunRecord& record, Watch& watch) {
     const double value = figure.value.value_or(0), gate = figure.limit.value_or(0);
     soci::indicator has_value = figure.value ? soci::i_ok : soci::i_null;
     soci::indicator has_gate = figure.limit ? soci::i_ok : soci::i_null;
+    const auto [uncertainty, guard_k] = figure.guard.value_or(GuardBand{});
+    soci::indicator has_guard = figure.guard ? soci::i_ok : soci::i_null;
     const int at_least = figure.asked == Direction::at_least ? 1 : 0, met = figure.met() ? 1 : 0;
     ++place;
-    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit) VALUES "
-           "(:run, :place, :name, :value, :gate, :at_least, :met, :unit)",
+    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit, uncertainty, "
+           "guard_k) VALUES (:run, :place, :name, :value, :gate, :at_least, :met, :unit, "
+           ":uncertainty, :guard_k)",
         soci::use(record.run), soci::use(place), soci::use(figure.name),
         soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least), soci::use(met),
-        soci::use(figure.unit);
+        soci::use(figure.unit), soci::use(uncertainty, has_guard), soci::use(guard_k, has_guard);
     watch.heard();
   }
 }
@@ -396,19 +399,24 @@ std::optional<RunRecord> Records::find(const std::string& run) {
     if (!found) return found;
     CheckedMetric figure;
     double value = 0, gate = 0;
+    GuardBand guard{};
     int at_least = 0;
-    soci::indicator has_value = soci::i_null, has_gate = soci::i_null;
+    soci::indicator has_value = soci::i_null, has_gate = soci::i_null, has_u = soci::i_null,
+                    has_k = soci::i_null;
     soci::statement figures =
         (sql.prepare
-             << "SELECT name, value, gate, at_least, unit FROM figures WHERE run = :run ORDER "
-                "BY place",
+             << "SELECT name, value, gate, at_least, unit, uncertainty, guard_k FROM figures "
+                "WHERE run = :run ORDER BY place",
          soci::into(figure.name), soci::into(value, has_value), soci::into(gate, has_gate),
-         soci::into(at_least), soci::into(figure.unit), soci::use(run));
+         soci::into(at_least), soci::into(figure.unit),
+         soci::into(guard.standard_uncertainty, has_u), soci::into(guard.k, has_k), soci::use(run));
     figures.execute();
     while (figures.fetch()) {
       figure.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
       figure.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
       figure.asked = at_least != 0 ? Direction::at_least : Direction::at_most;
+      const bool guarded = has_u == soci::i_ok && has_k == soci::i_ok;
+      figure.guard = guarded ? std::optional(guard) : std::nullopt;
       found->figures.push_back(figure);
     }
     RunRecord::Image image;

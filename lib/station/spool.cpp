@@ -34,6 +34,11 @@ std::optional<double> number_if_any(const Json& json) {
   return json.is_null() ? std::nullopt : std::optional(json.get<double>());
 }
 
+std::optional<GuardBand> guard_if_any(const Json& figure) {
+  if (!figure.contains("guard_k")) return std::nullopt;
+  return GuardBand{figure.at("uncertainty").get<double>(), figure.at("guard_k").get<double>()};
+}
+
 SpooledRun run_from(const Json& json) {
   if (json.at("format").get<std::string>() != kRunFormat)
     throw std::runtime_error("another format");
@@ -48,7 +53,8 @@ SpooledRun run_from(const Json& json) {
     run.figures.push_back(
         {figure.at("name").get<std::string>(), figure.at("unit").get<std::string>(),
          number_if_any(figure.at("value")), number_if_any(figure.at("gate")),
-         figure.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most});
+         figure.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
+         guard_if_any(figure)});
   }
   for (const Json& image : json.at("images")) {
     run.images.push_back({image.at("step").get<std::string>(), image.at("image").get<std::string>(),
@@ -104,6 +110,9 @@ std::string text_of_run(const SpooledRun& spooled) {
                                {"value", number_or_null(figure.value)},
                                {"gate", number_or_null(figure.limit)},
                                {"at_least", figure.asked == Direction::at_least}});
+    if (!figure.guard) continue;
+    json["figures"].back()["uncertainty"] = figure.guard->standard_uncertainty;
+    json["figures"].back()["guard_k"] = figure.guard->k;
   }
   json["images"] = Json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {

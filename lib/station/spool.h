@@ -86,8 +86,9 @@ class Spool {
   std::size_t not_asked_ = 0;
 };
 
-/// All of a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(), "figures"
-/// and "images". Bytes that are no text stand as printable() has them.
+/// All of a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(), "figures",
+/// with "uncertainty" and "guard_k" where there is a guard band, and "images". Bytes that are no
+/// text stand as printable() has them.
 std::string text_of_run(const SpooledRun& spooled);
 /// A text of run_fields() that is not there is empty: the program that wrote it did not know it.
 /// Throws InputError with the file, also when it is no run.

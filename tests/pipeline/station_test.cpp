@@ -37,7 +37,14 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
                     HasSubstr("Fixes at a known station minus")));
   // A unit calibrated again keeps its history, and gives the same calibration.
   take_again();
-  EXPECT_EQ(run_program(batch("0002") + " --threads 1").exit_code, 0);
+  change(
+      "station.yaml", "# The images of a unit",
+      "guard_bands: {k: 2, standard_uncertainties: {check_mean_mm: 0.01}}\n# The images of a unit");
+  const auto guarded = run_program(batch("0002") + " --threads 1");
+  EXPECT_EQ(guarded.exit_code, 0);
+  EXPECT_THAT(guarded.output, ContainsRegex("check_mean_mm +[0-9.e-]+ +<= 0.98 mm +met, p 1.000"));
+  EXPECT_THAT(this->result("0002", "report.html"),
+              AllOf(HasSubstr("less a guard band of 0.02 mm"), HasSubstr("conforms with p")));
   EXPECT_EQ(comparable_calibration("0002"), comparable_calibration("0001"));
 
   EXPECT_THAT(records("list").output,
@@ -48,6 +55,12 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   EXPECT_EQ(records("restore " + files.filename().string()).output, files.string() + "\n");
   EXPECT_EQ(this->result("0001", "calibration.yaml"), calibration);
   EXPECT_THAT(this->result("0001", "report.html"), HasSubstr("<strong>PASS"));
+  const auto certified = records("certificate " + files.filename().string());
+  EXPECT_EQ(certified.output, (files / "certificate.html").string() + "\n") << certified.errors;
+  EXPECT_THAT(this->result("0001", "certificate.html"),
+              AllOf(HasSubstr("Calibration certificate: camera 0001"),
+                    ContainsRegex("focal length x</th><td>[0-9.]+ \u00b1 0[.][0-9]+\u00a0px"),
+                    HasSubstr("lamp map")));
   EXPECT_THAT(records("list --camera-id 0002").output, HasSubstr("1 runs, 1 passed"));
   EXPECT_THAT(
       records("show --camera-id 0001").output,
@@ -257,6 +270,9 @@ TEST_F(Station, LosesNoVerdictWhenItsFilesCannotBeWritten) {
   ASSERT_NE(at, std::string::npos);
   EXPECT_EQ(records("restore " + listed.substr(at + 1, 33)).exit_code, 0);
   EXPECT_THAT(this->result("0001", "report.html"), HasSubstr("<strong>INVALID"));
+  const auto certified = records("certificate " + listed.substr(at + 1, 33));
+  EXPECT_EQ(certified.exit_code, 2);
+  EXPECT_THAT(certified.errors, HasSubstr("was not judged (boards"));
 }
 
 /// Records away: units get their verdicts all the same, and nothing is lost.
@@ -307,7 +323,9 @@ TEST_F(Station, WatchesATrend) {
       sql.append("', '").append(of).append("', '").append(camera).append("', '', '");
       sql.append("2").append(run).append("-01-01T00:00:00Z', '");  // a year each
       sql.append(verdict).append("', '', '', '', '', '';\n");
-      sql.append("INSERT INTO figures VALUES ('").append(run).append("', 1, 'rms_px', ");
+      sql.append(
+          "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit) VALUES (");
+      sql.append("'").append(run).append("', 1, 'rms_px', ");
       sql.append(std::to_string(values[i])).append(", NULL, 0, 1, 'px');\n");
     }
     const auto client = folder.file("client.py",

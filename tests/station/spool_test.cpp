@@ -52,7 +52,7 @@ RunRecord numbered_run(int number) {
   run.libraries = "none";
   run.config_sha256 = std::string(64, 'a');
   run.calibration = "format: vlp-calibration/1\n";
-  run.figures = check_all({{"rms_px", 1}, {"tilt_deg", 2}},
+  run.figures = check_all({{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
                           {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, unit_metrics());
   for (std::size_t i = 0; i < kImagesOfARun; ++i) {
     run.images.push_back({"boards", std::to_string(1000 + i) + ".png",
@@ -95,6 +95,10 @@ TEST(SpooledRun, IsReadAsItWasWritten) {
     EXPECT_EQ(read.figures[i].value, run.figures[i].value);  // to the last bit
     EXPECT_EQ(read.figures[i].limit, run.figures[i].limit);
     EXPECT_EQ(read.figures[i].asked, run.figures[i].asked);
+    ASSERT_EQ(read.figures[i].guard.has_value(), i == 0);
+    if (!read.figures[i].guard) continue;
+    EXPECT_EQ(read.figures[i].guard->standard_uncertainty, 0.01);
+    EXPECT_EQ(read.figures[i].guard->k, 1.645);
   }
   ASSERT_THAT(read.images, SizeIs(run.images.size()));
   EXPECT_EQ(read.images[1].refused, "too dark");
