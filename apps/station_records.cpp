@@ -14,8 +14,10 @@
 
 #include "app.h"
 #include "captures/printable.h"
+#include "rig/file.h"
 #include "rig/input_error.h"
 #include "station/capability.h"
+#include "station/certificate.h"
 #include "station/control_chart.h"
 #include "station/database_name.h"
 #include "station/export_runs.h"
@@ -70,10 +72,7 @@ struct Known {
       away = error.what();
     }
   }
-  const std::vector<RunRecord>& waiting() {
-    static const std::vector<RunRecord> none;
-    return spool ? spool->waiting() : none;
-  }
+  std::vector<RunRecord> waiting() { return spool ? spool->waiting() : std::vector<RunRecord>(); }
   /// For what cannot do without them.
   Records& all() {
     if (!records) throw std::runtime_error(away);
@@ -114,11 +113,7 @@ std::vector<RunSummary> runs_of(Known& known, const RunFilter& filter) {
   std::stable_sort(runs.begin(), runs.end(), [](const RunSummary& a, const RunSummary& b) {
     return std::tie(a.ended_utc, a.run) < std::tie(b.ended_utc, b.run);
   });
-  const auto last = static_cast<std::size_t>(filter.last);
-  if (last > 0 && runs.size() > last) {
-    runs.erase(runs.begin(), runs.end() - static_cast<std::ptrdiff_t>(last));
-  }
-  return runs;
+  return last_of(std::move(runs), filter.last);
 }
 
 /// The run that is named, or the last that the filter lets through.
@@ -150,14 +145,18 @@ RunFilter comparable(const StationRecordsOptions& options) {
 /// The values of runs that were judged, unless one verdict is asked for.
 std::vector<TrendPoint> judged(Records& records, const std::string& figure, RunFilter filter) {
   if (!filter.verdict.empty()) return records.trend(figure, filter);
-  const auto last = static_cast<std::size_t>(std::exchange(filter.last, 0));
+  const int last = std::exchange(filter.last, 0);
   auto points = records.trend(figure, filter);
   std::erase_if(points,
                 [](const TrendPoint& point) { return point.verdict == name_of(Verdict::invalid); });
-  if (last > 0 && points.size() > last) {
-    points.erase(points.begin(), points.end() - static_cast<std::ptrdiff_t>(last));
-  }
-  return points;
+  return last_of(std::move(points), last);
+}
+
+/// The folder into which files of a run go.
+std::filesystem::path results_of(const StationRecordsOptions& options) {
+  if (!options.output.empty()) return options.output;
+  if (!options.station.empty()) return read_station(options.station).results;
+  throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
 }
 
 MetricKind figure_of(const StationRecordsOptions& options) {
@@ -202,6 +201,38 @@ void check_one_station(const std::vector<TrendPoint>& points,
         fmt::format("there are runs of {} and of {}: say of which with "
                     "--of-station, or of all with --of-station any",
                     points.front().station, point.station));
+  }
+}
+
+/// The values of a study's units: of those that are named, or of those with two runs or more.
+/// Throws std::invalid_argument for units of which there is none.
+std::vector<StudyValue> study_values(const std::vector<TrendPoint>& points,
+                                     const std::vector<std::string>& units) {
+  std::map<std::string, std::size_t> runs;
+  for (const TrendPoint& point : points) ++runs[point.camera];
+  std::string unknown;
+  for (const std::string& unit : units) {
+    if (!runs.contains(unit)) unknown.append(unknown.empty() ? "" : ", ").append(unit);
+  }
+  if (!unknown.empty()) {
+    throw std::invalid_argument("no judged run that has the figure is of: " + unknown);
+  }
+  std::vector<StudyValue> values;
+  for (const TrendPoint& point : points) {
+    const bool named = std::count(units.begin(), units.end(), point.camera) > 0;
+    if (named || (units.empty() && runs[point.camera] > 1)) {
+      values.push_back({point.camera, point.station, point.value});
+    }
+  }
+  return values;
+}
+
+/// The study, or why these values are none, as Undetermined.
+MeasurementStudy study_of(const std::vector<StudyValue>& values) {
+  try {
+    return measurement_study(values);
+  } catch (const std::invalid_argument& error) {
+    throw Undetermined(error.what());
   }
 }
 
@@ -252,17 +283,23 @@ void show_run(const StationRecordsOptions& options) {
 }
 
 void restore_run(const StationRecordsOptions& options) {
-  if (options.station.empty() && options.output.empty()) {
-    throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
-  }
+  const std::filesystem::path results = results_of(options);
   Known known(options);
   const RunRecord record = run_of(known, options);
   const std::string contradiction = contradiction_of(record);
   if (!contradiction.empty()) throw InputError(record.run, contradiction);
-  const std::filesystem::path results = options.output.empty()
-                                            ? read_station(options.station).results
-                                            : std::filesystem::path(options.output);
   say(fmt::format("{}\n", publish_run(record, {}, results).string()));
+}
+
+void write_certificate(const StationRecordsOptions& options) {
+  const std::filesystem::path results = results_of(options);
+  Known known(options);
+  const RunRecord record = run_of(known, options);
+  check_certifiable(record);
+  const std::filesystem::path folder = publish_run(record, {}, results);
+  const std::filesystem::path file = folder / "certificate.html";
+  write_file(file, certificate(record, read_calibration(folder / calibration_name(record))));
+  say(fmt::format("{}\n", file.string()));
 }
 
 void export_runs(const StationRecordsOptions& options) {
@@ -289,9 +326,7 @@ void show_trend(const StationRecordsOptions& options) {
     throw Undetermined(
         fmt::format("{} of the runs have {}: a trend needs two", points.size(), options.figure));
   }
-  std::vector<double> values;
-  values.reserve(points.size());
-  for (const TrendPoint& point : points) values.push_back(point.value);
+  const std::vector<double> values = values_of(points);
   const auto alarms = chart_alarms(values, options.rules);
   const ControlChart chart = control_chart(values);
   const auto gate = gate_of(options.figure, options, records, points);
@@ -321,11 +356,8 @@ void show_capability(const StationRecordsOptions& options) {
   for (const MetricKind& kind : kinds) {
     const auto points = judged(records, kind.name, filter);
     check_one_station(points, options);
-    std::vector<double> values;
-    values.reserve(points.size());
-    for (const TrendPoint& point : points) values.push_back(point.value);
     const auto gate = gate_of(kind.name, options, records, points);
-    const auto found = capability(values, limits_of(kind, gate));
+    const auto found = capability(values_of(points), limits_of(kind, gate));
     if (!found) continue;
     const auto index = [](const CapabilityIndex& of) {
       return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
@@ -352,17 +384,8 @@ void show_study(const StationRecordsOptions& options) {
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
   const auto points = judged(records, options.figure, asked(filter));
-  std::map<std::string, std::size_t> runs;
-  for (const TrendPoint& point : points) ++runs[point.camera];
-  std::vector<StudyValue> values;
-  for (const TrendPoint& point : points) {
-    const bool named = std::count(options.units.begin(), options.units.end(), point.camera) > 0;
-    if (named || (options.units.empty() && runs[point.camera] > 1)) {
-      values.push_back({point.camera, point.station, point.value});
-    }
-  }
-  const MeasurementStudy study = measurement_study(values);
-  const ToleranceLimits limits = limits_of(kind, gate_of(options.figure, options, records, points));
+  const MeasurementStudy study = study_of(study_values(points, options.units));
+  const auto gate = gate_of(options.figure, options, records, points);
   say(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}\n\n", options.figure,
                   study.units, study.stations, study.repeats, study.mean, kind.unit));
   fmt::print("{:<18}{:>5}{:>14}{:>14}\n", "", "dof", "squares", "mean square");
@@ -393,8 +416,10 @@ void show_study(const StationRecordsOptions& options) {
   if (const auto categories = study.distinct_categories()) {
     fmt::print("distinct categories (ndc){:>21}\n", *categories);
   }
-  if (const auto share = study.percent_of_tolerance(limits)) {
+  if (const auto share = study.percent_of_tolerance(limits_of(kind, gate))) {
     fmt::print("measuring / tolerance (P/T){:>19.1f} %\n", *share);
+  } else if (gate) {
+    fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n", words_of(kind.asked), *gate);
   }
   if (study.stations == 1) {
     fmt::print("\nOne station: nothing is known of what stations differ by.\n");

@@ -27,6 +27,8 @@ void list_runs(const StationRecordsOptions& options);
 void show_run(const StationRecordsOptions& options);
 /// vlp-station restore: the files of a run, written from its record where they are missing.
 void restore_run(const StationRecordsOptions& options);
+/// vlp-station certificate: a page for who gets the unit, beside the files of its run.
+void write_certificate(const StationRecordsOptions& options);
 /// vlp-station export: CSV, a line for each run, or JSON with all there is.
 void export_runs(const StationRecordsOptions& options);
 /// vlp-station trend: a figure over the runs, with a control chart's limits and rules, also as a

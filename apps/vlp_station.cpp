@@ -63,9 +63,13 @@ const CLI::Validator kUtc(
         const auto at = [&](std::size_t begin) {
           return static_cast<unsigned>(std::stoul(text.substr(begin, 2)));
         };
-        constexpr std::size_t month = 5, day = 8;
+        constexpr std::size_t month = 5, day = 8, hour = 11, minute = 14, second = 17;
         const std::chrono::year year(std::stoi(text.substr(0, 4)));
-        good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok();
+        const auto below = [&](std::size_t begin, unsigned end) {
+          return text.size() < begin + 2 || at(begin) < end;
+        };
+        good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok() &&
+               below(hour, 24) && below(minute, 60) && below(second, 60);
       }
       return good ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
     },
@@ -108,10 +112,9 @@ int main(int argc, char** argv) {
       "end: do it again), as its images arrive or from full folders (--batch);\n"
       "'verify' measures a reference camera; 'list', 'show', 'export', 'trend', 'capability' and "
       "'study'\n"
-      "tell of the records, 'restore' writes a run's files again. Runs wait in the station's "
-      "'spool' "
-      "while\n"
-      "the records cannot be reached.\n"
+      "tell of the records, 'restore' writes a run's files again, 'certificate' a page for who "
+      "gets the\n"
+      "unit. Runs wait in the station's 'spool' while the records cannot be reached.\n"
       "vlp-station COMMAND --help tells more.\n\n"
       "Example, from the project's folder:\n"
       "  mkdir -p out && cp -rT datasets/station out/station\n"
@@ -137,6 +140,14 @@ int main(int argc, char** argv) {
   restore->add_option("run", records.run, "Name of the run")->required();
   restore->add_option("-o,--output", records.output,
                       "The folder of results (default: the station's); in it CAMERA/RUN/");
+  auto* certified = vlp::add_records(
+      app, "certificate",
+      "Write the certificate of a run, certificate.html: values with expanded uncertainty, "
+      "conformity, traceability",
+      records);
+  certified->add_option("run", records.run, "Name of the run")->required();
+  certified->add_option("-o,--output", records.output,
+                        "The folder of results (default: the station's); in it CAMERA/RUN/");
   auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
   exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
   constexpr const char* which = "Which: rms_px, check_mean_mm, ...";
@@ -174,6 +185,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("list")) vlp::list_runs(records);
     if (app.got_subcommand("show")) vlp::show_run(records);
     if (app.got_subcommand("restore")) vlp::restore_run(records);
+    if (app.got_subcommand("certificate")) vlp::write_certificate(records);
     if (app.got_subcommand("export")) vlp::export_runs(records);
     if (app.got_subcommand("trend")) vlp::show_trend(records);
     if (app.got_subcommand("capability")) vlp::show_capability(records);

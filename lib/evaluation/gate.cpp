@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -45,10 +46,21 @@ CheckedMetric checked(const MetricKind& kind, const std::vector<Metric>& metrics
 
 }  // namespace
 
+double CheckedMetric::acceptance_limit() const {
+  const double width = guard ? guard->width() : 0;
+  return asked == Direction::at_least ? limit.value() + width : limit.value() - width;
+}
+
 bool CheckedMetric::met() const {
   if (!limit) return true;
   if (!value) return false;
-  return asked == Direction::at_least ? *value >= *limit : *value <= *limit;
+  return asked == Direction::at_least ? *value >= acceptance_limit() : *value <= acceptance_limit();
+}
+
+std::optional<double> CheckedMetric::conformance_probability() const {
+  if (!limit || !value || !guard) return std::nullopt;
+  const double room = asked == Direction::at_least ? *value - *limit : *limit - *value;
+  return std::erfc(-room / guard->standard_uncertainty / std::numbers::sqrt2) / 2;
 }
 
 std::string gate_descriptions(const std::vector<MetricKind>& known) {
@@ -143,6 +155,7 @@ std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
   for (const Gate& gate : gates) {
     results.push_back(checked(metric_kind(gate.metric).value(), metrics));
     results.back().limit = gate.limit;
+    results.back().guard = gate.guard;
   }
   return results;
 }
@@ -154,7 +167,9 @@ std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
   for (const MetricKind& kind : known) {
     CheckedMetric result = checked(kind, metrics);
     for (const Gate& gate : gates) {
-      if (gate.metric == kind.name) result.limit = gate.limit;
+      if (gate.metric != kind.name) continue;
+      result.limit = gate.limit;
+      result.guard = gate.guard;
     }
     if (result.value || result.limit) results.push_back(std::move(result));
   }
@@ -164,7 +179,13 @@ std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
 std::string words_of(const CheckedMetric& gate) {
   return gate.name + " is " + (gate.value ? with_unit(*gate.value, gate.unit) : "not known") +
          ", " + words_of(gate.asked) + " " + with_unit(gate.limit.value(), gate.unit) +
-         " is asked for";
+         words_of_guard(gate) + " is asked for";
+}
+
+std::string words_of_guard(const CheckedMetric& gate) {
+  if (!gate.guard) return "";
+  return std::string(gate.asked == Direction::at_least ? " and" : " less") + " a guard band of " +
+         with_unit(gate.guard->width(), gate.unit);
 }
 
 std::string words_of_missed(const std::vector<CheckedMetric>& gates) {

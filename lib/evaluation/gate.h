@@ -13,10 +13,23 @@ namespace vlp {
 
 class YamlValue;
 
+/// By how much more than its limit asks a metric has to be good, because it is measured with an
+/// uncertainty (guarded acceptance, JCGM 106:2012, section 8.3.2): it is accepted up to limit - k
+/// u, or from limit + k u on. Metrics that are at the limit in truth are accepted with the
+/// probability 1 - Phi(k): 0.05 with k = 1.645 (ISO 14253-1), 0.023 with 2.
+struct GuardBand {
+  /// u, in the metric's unit.
+  double standard_uncertainty;
+  double k;
+
+  double width() const { return k * standard_uncertainty; }
+};
+
 /// What a metric has to be at most, or at least, whichever its kind says.
 struct Gate {
   std::string metric;
   double limit;
+  std::optional<GuardBand> guard = {};
 };
 
 /// A metric, as it was measured, and its gate.
@@ -28,9 +41,16 @@ struct CheckedMetric {
   /// Nothing when it is no gate.
   std::optional<double> limit;
   Direction asked;
+  std::optional<GuardBand> guard = {};
 
+  /// The limit, its guard band taken off. Precondition: it is a gate.
+  double acceptance_limit() const;
   /// A gate without a value is not met.
   bool met() const;
+  /// Of the metric being within its limit in truth, when nothing but its value is known of it:
+  /// Phi((limit - value) / u), or Phi((value - limit) / u) (JCGM 106:2012, section 7). Nothing
+  /// without a value, a limit or a guard band.
+  std::optional<double> conformance_probability() const;
 };
 
 /// The metrics, with what each needs, a line for each, for people.
@@ -67,8 +87,12 @@ std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
                                      const std::vector<Metric>& metrics,
                                      const std::vector<MetricKind>& known);
 
-/// For example "mean_mm is 1.25 mm, at most 1 mm is asked for". Precondition: it is a gate.
+/// For example "mean_mm is 1.25 mm, at most 1 mm is asked for", or "at most 1 mm less a guard band
+/// of 0.04 mm". Precondition: it is a gate.
 std::string words_of(const CheckedMetric& gate);
+
+/// " less a guard band of 0.04 mm", or " and ..."; empty without one.
+std::string words_of_guard(const CheckedMetric& gate);
 
 /// words_of() of those that are not met, with "; " between them.
 std::string words_of_missed(const std::vector<CheckedMetric>& gates);

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "report/report_style.h"
+
 namespace vlp {
 namespace {
 
@@ -58,6 +60,19 @@ std::string html_text(std::string_view text) {
 std::string html_element(std::string_view name, std::string_view text) {
   const std::string tag(name);
   return "<" + tag + ">" + html_text(text) + "</" + tag + ">\n";
+}
+
+std::string html_page(const std::string& title, const std::string& content) {
+  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n" +
+         html_element("title", title) + "<style>" + std::string(kReportStyle) +
+         "</style>\n</head>\n<body>\n<header>\n" + html_element("h1", title) +
+         "</header>\n<main>\n" + content + "</main>\n</body>\n</html>\n";
+}
+
+std::string html_section(const std::string& heading, const std::string& body) {
+  if (body.empty()) return "";
+  return "<section>\n" + html_element("h2", heading) + body + "</section>\n";
 }
 
 std::string html_table(const HtmlTable& table) {

@@ -18,6 +18,12 @@ std::string html_text(std::string_view text);
 /// `<name>text</name>`, the text being escaped.
 std::string html_element(std::string_view name, std::string_view text);
 
+/// A whole page that needs nothing else, with the report's style: `content` is HTML.
+std::string html_page(const std::string& title, const std::string& content);
+
+/// With a heading; empty without a body, which is HTML.
+std::string html_section(const std::string& heading, const std::string& body);
+
 /// A table that scrolls on its own when it is too wide. Each row begins with its own header. The
 /// cells are escaped; an empty caption or header is left out. Marked rows stand out.
 struct HtmlTable {

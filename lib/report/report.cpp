@@ -8,19 +8,12 @@
 #include "captures/csv_writer.h"
 #include "report/calibration_sections.h"
 #include "report/html.h"
-#include "report/report_style.h"
 
 namespace vlp {
 namespace {
 
 /// No-break: a unit stays with its number.
 const std::string kSpace = "\u00a0";
-
-/// Nothing when the body is empty.
-std::string section(const std::string& heading, const std::string& body) {
-  if (body.empty()) return "";
-  return "<section>\n" + html_element("h2", heading) + body + "</section>\n";
-}
 
 std::string with_unit(const std::string& text, const std::string& unit) {
   return text.empty() || unit.empty() ? text : text + kSpace + unit;
@@ -35,8 +28,10 @@ std::vector<std::string> row_of(const CheckedMetric& gate, bool may_be_out_of_re
   const std::string result = gate.met()     ? "met"
                              : out_of_reach ? "not\u00a0reached"
                                             : "NOT\u00a0MET";
+  const auto sure = gate.conformance_probability();
   return {gate.name, quantity(gate.value, gate.unit),
-          words_of(gate.asked) + kSpace + quantity(gate.limit, gate.unit), result};
+          words_of(gate.asked) + kSpace + quantity(gate.limit, gate.unit) + words_of_guard(gate),
+          result + (sure ? ", conforms with p\u00a0=\u00a0" + significant(*sure, 3) : "")};
 }
 
 std::string gates_table(const Report& report) {
@@ -133,20 +128,18 @@ std::string report_html(const Report& report) {
     if (calibration->dispersion) dispersion = dispersion_table(*calibration->dispersion);
   }
   const auto pictures = [&](ReportPart part) { return pictures_of(report, part); };
-  return "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n" +
-         html_element("title", report.title) + "<style>" + std::string(kReportStyle) +
-         "</style>\n</head>\n<body>\n<header>\n" + html_element("h1", report.title) +
-         "</header>\n<main>\n" + verdict(report) + section("Figures", figures_of(report)) +
-         section("Camera", camera + pictures(ReportPart::camera)) +
-         section("Rotation centre", rotation + pictures(ReportPart::rotation)) +
-         section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
-         section("Fixes on the floor", pictures(ReportPart::floor)) +
-         section("Distribution of the errors", pictures(ReportPart::distribution)) +
-         section("Moving tracks", pictures(ReportPart::tracks)) +
-         section("More pictures", pictures(ReportPart::other)) +
-         section("Images that were not used", refused_of(report)) +
-         section("History", history_of(report)) + "</main>\n</body>\n</html>\n";
+  return html_page(
+      report.title,
+      verdict(report) + html_section("Figures", figures_of(report)) +
+          html_section("Camera", camera + pictures(ReportPart::camera)) +
+          html_section("Rotation centre", rotation + pictures(ReportPart::rotation)) +
+          html_section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
+          html_section("Fixes on the floor", pictures(ReportPart::floor)) +
+          html_section("Distribution of the errors", pictures(ReportPart::distribution)) +
+          html_section("Moving tracks", pictures(ReportPart::tracks)) +
+          html_section("More pictures", pictures(ReportPart::other)) +
+          html_section("Images that were not used", refused_of(report)) +
+          html_section("History", history_of(report)));
 }
 
 }  // namespace vlp

@@ -483,7 +483,7 @@ class SessionRun {
     }
     const std::vector<Gate> gates = gates_of("evaluate");
     std::string limits;
-    for (const auto& [metric, limit] : gates_) limits += fmt::format("{} {}\n", metric, limit);
+    for (const Gate& gate : gates_) limits += fmt::format("{} {}\n", gate.metric, gate.limit);
     step("evaluate", inputs, picture_setting() + limits, [&] {
       const auto check = session_.check();
       if (check) truth = truth_file(*check);

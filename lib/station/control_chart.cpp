@@ -135,11 +135,10 @@ std::vector<ChartAlarm> chart_alarms(std::span<const double> values,
                                      const std::vector<std::string>& rules) {
   check_rules(rules);
   const ControlChart chart = control_chart(values);
+  if (chart.sigma <= 0) return {};
   std::vector<double> sigmas;
   sigmas.reserve(values.size());
-  for (const double value : values) {
-    sigmas.push_back(chart.sigma > 0 ? (value - chart.mean) / chart.sigma : 0);
-  }
+  for (const double value : values) sigmas.push_back((value - chart.mean) / chart.sigma);
   const Ewma average = ewma(sigmas, 0, 1, kEwmaWeight);
   std::vector<ChartAlarm> alarms;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -163,9 +162,7 @@ std::vector<ChartAlarm> chart_alarms(std::span<const double> values,
 void draw_trend(const std::filesystem::path& picture, const std::string& title,
                 std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
                 std::optional<double> gate) {
-  std::vector<double> values;
-  values.reserve(points.size());
-  for (const TrendPoint& point : points) values.push_back(point.value);
+  const std::vector<double> values = values_of(points);
   const ControlChart chart = control_chart(values);
   std::vector<bool> alarm(points.size());
   for (const ChartAlarm& each : alarms) alarm[each.index] = true;

@@ -3,9 +3,12 @@
 #include "station/database_name.h"
 
 #include <libpq-fe.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <memory>
 
@@ -18,20 +21,25 @@ constexpr const char* kScheme = "://";
 constexpr const char* kPatience = "connect_timeout";
 constexpr int kPatience_s = 10, kPatienceWithFile_s = 5;
 
-/// What libpq makes of a connection string; empty when it cannot.
-std::map<std::string, std::string> parts_of(const std::string& where) {
-  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
-      PQconninfoParse(where.c_str(), nullptr), PQconninfoFree);
-  std::map<std::string, std::string> parts;
-  const PQconninfoOption* option = options.get();
-  for (; option != nullptr && option->keyword != nullptr; ++option) {
-    if (option->val != nullptr) parts[option->keyword] = option->val;
+using Parts = std::map<std::string, std::string>;
+
+/// Those that have a value. It frees the options.
+Parts parts_of(PQconninfoOption* options) {
+  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> owned(options, PQconninfoFree);
+  Parts parts;
+  for (; options != nullptr && options->keyword != nullptr; ++options) {
+    if (options->val != nullptr) parts[options->keyword] = options->val;
   }
   return parts;
 }
 
+/// What libpq makes of a connection string; empty when it cannot.
+Parts parts_of(const std::string& where) {
+  return parts_of(PQconninfoParse(where.c_str(), nullptr));
+}
+
 /// Whether a part of the password may stand where the host or the database is looked for.
-bool may_be_misread(const std::string& where, const std::map<std::string, std::string>& parts) {
+bool may_be_misread(const std::string& where, const Parts& parts) {
   const std::string said = where.substr(0, where.find('?'));
   const auto begin = said.find(kScheme) + std::string(kScheme).size();
   const auto slash = std::min(said.find('/', begin), said.size());
@@ -48,6 +56,18 @@ bool may_be_misread(const std::string& where, const std::map<std::string, std::s
 bool is_of_keywords(const std::string& where) {
   return where.find("password=") != std::string::npos || where.find("host=") != std::string::npos ||
          where.find("dbname=") != std::string::npos;
+}
+
+std::string name_of_machine() {
+  constexpr std::size_t longest = 256;
+  std::array<char, longest> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+/// Whether libpq reaches a host through a socket or a loop, without a network.
+bool is_here(const std::string& host) {
+  return host.empty() || host.front() == '/' || host.front() == '@' || host == "localhost" ||
+         host == "::1" || host.starts_with("127.");
 }
 
 }  // namespace
@@ -68,6 +88,24 @@ std::string name_of_database(const std::string& where) {
   }
   const std::string port = parts.contains("port") ? ":" + parts["port"] : "";
   return "postgresql://" + parts["host"] + port + "/" + parts["dbname"];
+}
+
+std::string identity_of_database(const std::string& where) {
+  const std::string name = name_of_database(where);
+  if (!is_server(where)) {
+    return name_of_machine() + ":" + std::filesystem::absolute(name).lexically_normal().string();
+  }
+  Parts parts = parts_of(where);
+  parts.merge(parts_of(PQconndefaults()));  // what is said stays
+  const auto stated = [&](const char* key, const char* before) {
+    return parts[key].empty() ? "" : before + parts[key];
+  };
+  constexpr const char* usual_port = "5432";
+  const std::string &host = parts["host"], &address = parts["hostaddr"];
+  return (is_here(address.empty() ? host : address) ? name_of_machine() + ":" : "") +
+         "postgresql://" + host + (parts["port"] == usual_port ? "" : stated("port", ":")) + "/" +
+         (parts["dbname"].empty() ? parts["user"] : parts["dbname"]) + stated("hostaddr", " at ") +
+         stated("service", " of the service ");
 }
 
 std::string connection_of(const std::string& where) {

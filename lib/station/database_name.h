@@ -14,6 +14,14 @@ bool is_server(const std::string& where);
 /// could be misread as another: a '@', ':', '/' or '?' in user or password is %40, %3A, %2F or %3F.
 std::string name_of_database(const std::string& where);
 
+/// What tells databases apart, also for programs on other machines that share a folder: a file by
+/// its machine and its whole path, MACHINE:/var/lib/vlp/records.db; a server by host, address
+/// (hostaddr), port and database, or service, as libpq takes them, the environment's and its own
+/// defaults included, and by its machine, too, when it is reached without a network. It has no
+/// password, and the user's name only where that is the database's for want of another. Throws as
+/// name_of_database().
+std::string identity_of_database(const std::string& where);
+
 /// What SOCI's PostgreSQL takes for a connection string. SOCI 4.0 reads one without a parameter as
 /// the name of a database, and takes blanks and quotes for its own. It says how long to wait for
 /// the server, patience_s(). Precondition: is_server().

@@ -9,6 +9,7 @@
 #include "captures/csv_writer.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "station/json_number.h"
 #include "station/station_config.h"
 
 namespace vlp {
@@ -46,18 +47,19 @@ void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& 
   csv.save();
 }
 
-nlohmann::json optional_number(const std::optional<double>& value) {
-  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
-}
-
 nlohmann::ordered_json json_of(const RunRecord& run) {
   nlohmann::ordered_json figures = nlohmann::ordered_json::object();
   for (const CheckedMetric& figure : run.figures) {
-    figures[figure.name] = {{"value", optional_number(figure.value)},
+    figures[figure.name] = {{"value", number_or_null(figure.value)},
                             {"unit", figure.unit},
-                            {"gate", optional_number(figure.limit)},
+                            {"gate", number_or_null(figure.limit)},
                             {"at_least", figure.asked == Direction::at_least},
                             {"met", figure.met()}};
+    if (!figure.guard) continue;
+    figures[figure.name]["uncertainty"] = figure.guard->standard_uncertainty;
+    figures[figure.name]["guard_k"] = figure.guard->k;
+    figures[figure.name]["conformance_probability"] =
+        number_or_null(figure.conformance_probability());
   }
   nlohmann::ordered_json images = nlohmann::ordered_json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "calibration/levelling/map_doubt.h"
+#include "detection/identity/lamp_rule.h"
 #include "positioning/positioner.h"
 
 namespace vlp {
@@ -21,75 +22,105 @@ namespace {
 /// contradict.
 constexpr double kWorst_px = 20;
 
-/// How badly a map fits: the mean over the captures of three lamps or more.
-double misfit_px(std::span<const Frame> frames, const LampMap& map,
-                 const Calibration& calibration) {
+/// Fewer captures tell nothing of lamps.
+constexpr std::size_t kLeastFrames = 3;
+
+/// How badly a map fits each capture; nothing for one of fewer than three lamps, of which no
+/// residual tells.
+using Misfits = std::vector<std::optional<double>>;
+
+Misfits misfits_px(std::span<const Frame> frames, const LampMap& map,
+                   const Calibration& calibration) {
   const Positioner positioner(map, calibration);
-  double sum_px = 0;
-  int count = 0;
-  for (const Frame& frame : frames) {
-    const Fix fix = positioner.locate(frame.detections);
-    const auto known = static_cast<int>(frame.detections.size()) - fix.unknown_lamps;
+  Misfits misfits(frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Fix fix = positioner.locate(frames[i].detections);
+    const auto known = static_cast<int>(frames[i].detections.size()) - fix.unknown_lamps;
     if (known < 3) continue;
     const bool bad = !fix.ok() || fix.rejected_lamps > 0;
-    sum_px += bad ? kWorst_px : std::min(kWorst_px, fix.residual_px);
-    ++count;
+    misfits[i] = bad ? kWorst_px : std::min(kWorst_px, fix.residual_px);
+  }
+  return misfits;
+}
+
+double mean_misfit_px(const Misfits& misfits) {
+  double sum_px = 0;
+  int count = 0;
+  for (const auto& misfit_px : misfits) {
+    sum_px += misfit_px.value_or(0);
+    count += misfit_px ? 1 : 0;
   }
   return count > 0 ? sum_px / count : kWorst_px;
 }
 
+bool sees(const Frame& frame, int lamp) {
+  return std::any_of(frame.detections.begin(), frame.detections.end(),
+                     [&](const Detection& detection) { return detection.lamp == lamp; });
+}
+
+/// How much smaller a misfit without a lamp is that is held against the lamp.
+constexpr double kFarBetter = 0.3;
+
 struct Mend {
-  double misfit_px;
   int lamp;
+  Misfits misfits;
 };
 
-/// The lamp without which the map fits best. Precondition: four lamps or more; with fewer than
-/// three no residual tells.
+/// The lamp without which the map fits best. Precondition: four lamps or more.
 Mend best_without(std::span<const Frame> frames, const LampMap& map,
                   const Calibration& calibration) {
-  Mend best{kWorst_px, 0};
+  Mend best{0, Misfits(frames.size())};
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     LampMap without = map;
     without.lamps.erase(without.lamps.begin() + static_cast<std::ptrdiff_t>(i));
-    const double misfit = misfit_px(frames, without, calibration);
-    if (misfit < best.misfit_px) best = {misfit, map.lamps[i].id};
+    Misfits misfits = misfits_px(frames, without, calibration);
+    if (mean_misfit_px(misfits) < mean_misfit_px(best.misfits)) {
+      best = {map.lamps[i].id, std::move(misfits)};
+    }
   }
   return best;
 }
 
-std::vector<std::string> unseen(std::span<const Frame> frames, const LampMap& map) {
-  std::set<int> seen;
-  for (const Frame& frame : frames) {
-    for (const Detection& detection : frame.detections) seen.insert(detection.lamp);
+/// Whether more than a tenth of the captures that see the lamp, two or more, do not fit and do far
+/// better without it.
+bool many_contradict(std::span<const Frame> frames, const Misfits& now, const Mend& mend,
+                     double fits_px) {
+  constexpr int least = 2, few = 10;
+  int told = 0, contradict = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!now[i] || !mend.misfits[i] || !sees(frames[i], mend.lamp)) continue;
+    ++told;
+    const bool better = *mend.misfits[i] < kFarBetter * *now[i];
+    contradict += better && *now[i] >= fits_px ? 1 : 0;
   }
-  std::vector<std::string> faults;
-  for (const Lamp& lamp : map.lamps) {
-    if (seen.contains(lamp.id)) continue;
-    faults.push_back(
-        fmt::format("lamp {} is never seen: is it lit, and not overexposed?", lamp.id));
-  }
-  return faults;
+  return contradict >= least && few * contradict > told;
 }
 
 }  // namespace
 
 std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
                                      const Calibration& calibration, double fits_px) {
-  constexpr std::size_t least_frames = 3, least_lamps = 4;
-  constexpr double far_better = 0.3;
-  if (frames.size() < least_frames) return {};
-  std::vector<std::string> faults = unseen(frames, map);
+  constexpr std::size_t least_lamps = 4;
+  if (frames.size() < kLeastFrames) return {};
   std::string doubt = doubt_of_map(frames, map, calibration);
-  if (!doubt.empty()) {
-    faults.insert(faults.begin(), std::move(doubt));
-    return faults;
-  }
-  const double now_px = misfit_px(frames, map, calibration);
-  if (now_px < fits_px || map.lamps.size() < least_lamps) return faults;
+  if (!doubt.empty()) return {std::move(doubt)};
+  const Misfits now = misfits_px(frames, map, calibration);
+  if (mean_misfit_px(now) < fits_px || map.lamps.size() < least_lamps) return {};
   const Mend mend = best_without(frames, map, calibration);
-  if (mend.misfit_px < far_better * now_px) {
-    faults.insert(faults.begin(),
-                  fmt::format("lamp {} is loose: it does not hang where the map says", mend.lamp));
+  if (mean_misfit_px(mend.misfits) >= kFarBetter * mean_misfit_px(now)) return {};
+  if (!many_contradict(frames, now, mend, fits_px)) return {};
+  return {fmt::format("lamp {} is loose: it does not hang where the map says", mend.lamp)};
+}
+
+std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampMap& map) {
+  std::vector<std::string> faults;
+  if (frames.size() < kLeastFrames) return faults;
+  for (const Lamp& lamp : map.lamps) {
+    const bool seen = std::any_of(frames.begin(), frames.end(),
+                                  [&](const Frame& frame) { return sees(frame, lamp.id); });
+    if (seen) continue;
+    faults.push_back(
+        fmt::format("lamp {} is never seen: is it lit, and not overexposed?", lamp.id));
   }
   return faults;
 }
@@ -166,10 +197,10 @@ std::optional<double> row_time_that_fits(std::span<const double> frequencies_hz,
       found_s = row_time_s / ratio;
     }
   }
-  if (static_cast<double>(best) < most * static_cast<double>(frequencies_hz.size())) {
-    return std::nullopt;
-  }
-  return found_s;
+  const bool most_fit =
+      static_cast<double>(best) >= most * static_cast<double>(frequencies_hz.size());
+  const bool another = found_s && std::abs(row_time_s / *found_s - 1) > kMostOffUnclear;
+  return most_fit && another ? found_s : std::nullopt;
 }
 
 }  // namespace vlp

@@ -139,9 +139,8 @@ std::optional<double> MeasurementStudy::percent_of_tolerance(const ToleranceLimi
   if (limits.lower && limits.upper) {
     return percent * 6 * measuring / (*limits.upper - *limits.lower);
   }
-  if (!limits.lower && !limits.upper) return std::nullopt;
-  const double room = std::abs(limits.upper.value_or(limits.lower.value_or(0)) - mean);
-  return percent * 3 * measuring / room;
+  const double room = limits.upper ? *limits.upper - mean : limits.lower ? mean - *limits.lower : 0;
+  return room > 0 ? std::optional(percent * 3 * measuring / room) : std::nullopt;
 }
 
 }  // namespace vlp

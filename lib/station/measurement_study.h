@@ -48,7 +48,8 @@ struct MeasurementStudy {
   /// ndc: 1.41 PV / GRR, whole, and at least 1. Five are asked for. Nothing when GRR is 0.
   std::optional<int> distinct_categories() const;
   /// P/T in percent: 600 GRR / (U - L), or with one limit, of the room between mean and limit, 300
-  /// GRR / |limit - mean|. Nothing without a limit.
+  /// GRR / (U - mean) or 300 GRR / (mean - L). Nothing without a limit, and when there is no such
+  /// room: the mean is at the one limit or beyond it.
   std::optional<double> percent_of_tolerance(const ToleranceLimits& limits) const;
 };
 

@@ -18,15 +18,18 @@ void check_results(const fs::path& results, const std::string& camera) {
   check_room(results / camera, room_bytes);
 }
 
+const char* calibration_name(const RunRecord& record) {
+  if (record.passed()) return "calibration.yaml";
+  return record.invalid() ? "invalid-calibration.yaml" : "failed-calibration.yaml";
+}
+
 fs::path publish_run(const RunRecord& record, const std::vector<ReportPicture>& pictures,
                      const fs::path& results) {
   const fs::path folder = results / record.camera / record.run;
   make_folder(folder);
   fs::path calibration;
   if (!record.calibration.empty()) {
-    calibration = folder / (record.passed()    ? "calibration.yaml"
-                            : record.invalid() ? "invalid-calibration.yaml"
-                                               : "failed-calibration.yaml");
+    calibration = folder / calibration_name(record);
     if (!fs::exists(calibration)) {
       write_file(calibration, record.calibration);
     } else if (read_text_file(calibration, 2 * record.calibration.size()) != record.calibration) {

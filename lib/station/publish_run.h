@@ -15,6 +15,9 @@ namespace vlp {
 /// takes a file, and has room. Throws InputError.
 void check_results(const std::filesystem::path& results, const std::string& camera);
 
+/// The name of a run's calibration among its files, by its verdict.
+const char* calibration_name(const RunRecord& record);
+
 /// Writes of RESULTS/CAMERA/RUN/ what is not there: calibration.yaml when the unit passed,
 /// failed-calibration.yaml or invalid-calibration.yaml when it did not and came so far;
 /// report.html, last, which without `pictures` has none. The folder. It can be done at any time,

@@ -16,13 +16,14 @@ namespace {
 
 /// Version 2: a figure has its unit. Version 3: images are found by their digest; a verdict can be
 /// INVALID.
-constexpr int kSchema = 3;
+constexpr int kSchema = 4;
 
-constexpr const char* kFigures =  // gate: no limit is no gate
+constexpr const char* kFigures =  // gate: no limit is no gate; guard_k: none is no guard band
     "CREATE TABLE IF NOT EXISTS figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
     "place INTEGER NOT NULL, name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, "
     "gate DOUBLE PRECISION, at_least INTEGER NOT NULL, met INTEGER NOT NULL, "
-    "unit VARCHAR(16) NOT NULL DEFAULT '', PRIMARY KEY (run, name))";
+    "unit VARCHAR(16) NOT NULL DEFAULT '', uncertainty DOUBLE PRECISION, "
+    "guard_k DOUBLE PRECISION, PRIMARY KEY (run, name))";
 
 constexpr const char* kImages =
     "CREATE TABLE IF NOT EXISTS images (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
@@ -65,8 +66,14 @@ void from_1_to_2(soci::session& sql) {
 /// An older program, which counts what is INVALID as failed, is refused from here on.
 void from_2_to_3(soci::session& sql) { sql << kImagesByDigest; }
 
+/// Nor can an older program tell what gates with guard bands say.
+void from_3_to_4(soci::session& sql) {
+  sql << "ALTER TABLE figures ADD COLUMN uncertainty DOUBLE PRECISION";
+  sql << "ALTER TABLE figures ADD COLUMN guard_k DOUBLE PRECISION";
+}
+
 /// From each version to the next; the first is of version 1.
-constexpr std::array kMigrations{from_1_to_2, from_2_to_3};
+constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4};
 static_assert(kMigrations.size() + 1 == kSchema);
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }

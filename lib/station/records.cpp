@@ -11,10 +11,12 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <initializer_list>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "rig/input_error.h"
 #include "station/database_name.h"
@@ -225,13 +227,16 @@ void put_figures(soci::session& sql, const RunRecord& record, Watch& watch) {
     const double value = figure.value.value_or(0), gate = figure.limit.value_or(0);
     soci::indicator has_value = figure.value ? soci::i_ok : soci::i_null;
     soci::indicator has_gate = figure.limit ? soci::i_ok : soci::i_null;
+    const auto [uncertainty, guard_k] = figure.guard.value_or(GuardBand{});
+    soci::indicator has_guard = figure.guard ? soci::i_ok : soci::i_null;
     const int at_least = figure.asked == Direction::at_least ? 1 : 0, met = figure.met() ? 1 : 0;
     ++place;
-    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit) VALUES "
-           "(:run, :place, :name, :value, :gate, :at_least, :met, :unit)",
+    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit, uncertainty, "
+           "guard_k) VALUES (:run, :place, :name, :value, :gate, :at_least, :met, :unit, "
+           ":uncertainty, :guard_k)",
         soci::use(record.run), soci::use(place), soci::use(figure.name),
         soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least), soci::use(met),
-        soci::use(figure.unit);
+        soci::use(figure.unit), soci::use(uncertainty, has_guard), soci::use(guard_k, has_guard);
     watch.heard();
   }
 }
@@ -264,16 +269,35 @@ void bind(soci::statement& statement, const RunFilter& filter) {
   }
 }
 
+/// The rows that a query gives, each into the parts of `row`; `figure` is bound after the filter,
+/// unless it is empty.
 template <typename Row>
-std::vector<Row> last_of(std::vector<Row> rows, int last) {
-  const auto kept = static_cast<std::size_t>(last);
-  if (last > 0 && rows.size() > kept) {
-    rows.erase(rows.begin(), rows.end() - static_cast<std::ptrdiff_t>(kept));
-  }
-  return rows;
+std::vector<Row> rows_of(soci::session& sql, const std::string& query, const RunFilter& filter,
+                         const std::string& figure, std::initializer_list<std::string Row::*> texts,
+                         double Row::*value = nullptr) {
+  Row row;
+  std::vector<Row> rows;
+  soci::statement statement(sql);
+  for (std::string Row::*text : texts) statement.exchange(soci::into(row.*text));
+  if (value != nullptr) statement.exchange(soci::into(row.*value));
+  bind(statement, filter);
+  if (!figure.empty()) statement.exchange(soci::use(figure));
+  statement.alloc();
+  statement.prepare(query);
+  statement.define_and_bind();
+  statement.execute();
+  while (statement.fetch()) rows.push_back(row);
+  return last_of(std::move(rows), filter.last);
 }
 
 }  // namespace
+
+std::vector<double> values_of(std::span<const TrendPoint> points) {
+  std::vector<double> values;
+  values.reserve(points.size());
+  for (const TrendPoint& point : points) values.push_back(point.value);
+  return values;
+}
 
 Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
   database_->name = name_of_database(where);
@@ -338,59 +362,32 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
 }
 
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
+  using Line = RunSummary;
+  const std::string query =
+      "SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
+      condition(filter) + " ORDER BY ended_utc, run";
   return database_->run(
       [&](Watch&) {
-        RunSummary row;
-        std::vector<RunSummary> rows;
-        soci::statement statement(database_->sql);
-        statement.exchange(soci::into(row.run));
-        statement.exchange(soci::into(row.kind));
-        statement.exchange(soci::into(row.station));
-        statement.exchange(soci::into(row.camera));
-        statement.exchange(soci::into(row.ended_utc));
-        statement.exchange(soci::into(row.verdict));
-        statement.exchange(soci::into(row.causes));
-        bind(statement, filter);
-        statement.alloc();
-        statement.prepare(
-            "SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
-            condition(filter) + " ORDER BY ended_utc, run");
-        statement.define_and_bind();
-        statement.execute();
-        while (statement.fetch()) rows.push_back(row);
-        return last_of(std::move(rows), filter.last);
+        return rows_of<Line>(database_->sql, query, filter, "",
+                             {&Line::run, &Line::kind, &Line::station, &Line::camera,
+                              &Line::ended_utc, &Line::verdict, &Line::causes});
       },
       kManyRows);
 }
 
 std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilter& filter) {
+  using Point = TrendPoint;
+  const std::string query =
+      "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
+      "FROM runs JOIN figures ON figures.run = runs.run " +
+      condition(filter) +
+      " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, runs.run";
   return database_->run(
       [&](Watch&) {
-        TrendPoint row;
-        std::vector<TrendPoint> rows;
-        soci::statement statement(database_->sql);
-        statement.exchange(soci::into(row.run));
-        statement.exchange(soci::into(row.station));
-        statement.exchange(soci::into(row.camera));
-        statement.exchange(soci::into(row.verdict));
-        statement.exchange(soci::into(row.ended_utc));
-        statement.exchange(soci::into(row.value));
-        bind(statement, filter);
-        statement.exchange(soci::use(figure));
-        statement.alloc();
-        statement.prepare(
-            "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, "
-            "figures.value FROM runs "
-            "JOIN "
-            "figures ON "
-            "figures.run = runs.run " +
-            condition(filter) +
-            " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, "
-            "runs.run");
-        statement.define_and_bind();
-        statement.execute();
-        while (statement.fetch()) rows.push_back(row);
-        return last_of(std::move(rows), filter.last);
+        return rows_of<Point>(
+            database_->sql, query, filter, figure,
+            {&Point::run, &Point::station, &Point::camera, &Point::verdict, &Point::ended_utc},
+            &Point::value);
       },
       kManyRows);
 }
@@ -402,19 +399,24 @@ std::optional<RunRecord> Records::find(const std::string& run) {
     if (!found) return found;
     CheckedMetric figure;
     double value = 0, gate = 0;
+    GuardBand guard{};
     int at_least = 0;
-    soci::indicator has_value = soci::i_null, has_gate = soci::i_null;
+    soci::indicator has_value = soci::i_null, has_gate = soci::i_null, has_u = soci::i_null,
+                    has_k = soci::i_null;
     soci::statement figures =
         (sql.prepare
-             << "SELECT name, value, gate, at_least, unit FROM figures WHERE run = :run ORDER "
-                "BY place",
+             << "SELECT name, value, gate, at_least, unit, uncertainty, guard_k FROM figures "
+                "WHERE run = :run ORDER BY place",
          soci::into(figure.name), soci::into(value, has_value), soci::into(gate, has_gate),
-         soci::into(at_least), soci::into(figure.unit), soci::use(run));
+         soci::into(at_least), soci::into(figure.unit),
+         soci::into(guard.standard_uncertainty, has_u), soci::into(guard.k, has_k), soci::use(run));
     figures.execute();
     while (figures.fetch()) {
       figure.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
       figure.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
       figure.asked = at_least != 0 ? Direction::at_least : Direction::at_most;
+      const bool guarded = has_u == soci::i_ok && has_k == soci::i_ok;
+      figure.guard = guarded ? std::optional(guard) : std::nullopt;
       found->figures.push_back(figure);
     }
     RunRecord::Image image;

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +33,18 @@ struct TrendPoint {
   std::string run, station, camera, verdict, ended_utc;
   double value;
 };
+
+std::vector<double> values_of(std::span<const TrendPoint> points);
+
+/// The last so many of what is in order; all of it for 0.
+template <typename Row>
+std::vector<Row> last_of(std::vector<Row> rows, int last) {
+  const auto kept = static_cast<std::size_t>(last);
+  if (last > 0 && rows.size() > kept) {
+    rows.erase(rows.begin(), rows.end() - static_cast<std::ptrdiff_t>(kept));
+  }
+  return rows;
+}
 
 /// Records that give no answer, or are locked: a later try may do.
 class RecordsAway : public InputError {

@@ -14,6 +14,7 @@
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "station/database_name.h"
+#include "station/json_number.h"
 #include "station/station_folders.h"
 
 namespace vlp {
@@ -29,11 +30,13 @@ constexpr std::size_t kMostRunBytes = 64 << 20;
 /// Of a run of hundreds of images, several times over.
 constexpr std::uintmax_t kRoom_bytes = 1'000'000;
 
-Json number_or_null(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
 std::optional<double> number_if_any(const Json& json) {
   return json.is_null() ? std::nullopt : std::optional(json.get<double>());
+}
+
+std::optional<GuardBand> guard_if_any(const Json& figure) {
+  if (!figure.contains("guard_k")) return std::nullopt;
+  return GuardBand{figure.at("uncertainty").get<double>(), figure.at("guard_k").get<double>()};
 }
 
 SpooledRun run_from(const Json& json) {
@@ -50,7 +53,8 @@ SpooledRun run_from(const Json& json) {
     run.figures.push_back(
         {figure.at("name").get<std::string>(), figure.at("unit").get<std::string>(),
          number_if_any(figure.at("value")), number_if_any(figure.at("gate")),
-         figure.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most});
+         figure.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
+         guard_if_any(figure)});
   }
   for (const Json& image : json.at("images")) {
     run.images.push_back({image.at("step").get<std::string>(), image.at("image").get<std::string>(),
@@ -62,12 +66,6 @@ SpooledRun run_from(const Json& json) {
 
 fs::path file_of_run(const fs::path& folder, const std::string& run) {
   return folder / (run + kRunEnding);
-}
-
-/// What the file of a run says of the records that it is for, wherever the program was started.
-std::string name_of_records(const std::string& where) {
-  const std::string name = name_of_database(where);  // refuses what is none
-  return printable(is_server(where) ? name : fs::absolute(name).lexically_normal().string());
 }
 
 std::vector<fs::path> entries_of(const fs::path& folder, std::error_code& error) {
@@ -91,18 +89,10 @@ void remove_left_over(const fs::path& folder) {
   }
 }
 
-/// "camera 0001: run RUN" as Records::owner_of() has it.
-std::string owner_among(const std::vector<RunRecord>& runs, const std::string& sha256,
-                        const std::string& other_than_camera) {
-  for (const RunRecord& run : runs) {
-    const bool uses =
-        run.camera != other_than_camera &&
-        std::any_of(run.images.begin(), run.images.end(), [&](const RunRecord::Image& image) {
-          return image.sha256 == sha256 && image.refused.empty();
-        });
-    if (uses) return "camera " + run.camera + ": run " + run.run;
-  }
-  return "";
+bool uses(const RunRecord& run, const std::string& sha256) {
+  return std::any_of(run.images.begin(), run.images.end(), [&](const RunRecord::Image& image) {
+    return image.sha256 == sha256 && image.refused.empty();
+  });
 }
 
 }  // namespace
@@ -120,6 +110,9 @@ std::string text_of_run(const SpooledRun& spooled) {
                                {"value", number_or_null(figure.value)},
                                {"gate", number_or_null(figure.limit)},
                                {"at_least", figure.asked == Direction::at_least}});
+    if (!figure.guard) continue;
+    json["figures"].back()["uncertainty"] = figure.guard->standard_uncertainty;
+    json["figures"].back()["guard_k"] = figure.guard->k;
   }
   json["images"] = Json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {
@@ -142,7 +135,9 @@ SpooledRun read_run(const fs::path& file) {
 }
 
 Spool::Spool(fs::path folder, std::string records)
-    : folder_(std::move(folder)), where_(std::move(records)), name_(name_of_records(where_)) {}
+    : folder_(std::move(folder)),
+      where_(std::move(records)),
+      name_(printable(identity_of_database(where_))) {}
 
 Spool::~Spool() = default;
 
@@ -199,7 +194,9 @@ void Spool::prepare() {
 void Spool::keep(const RunRecord& run) {
   try {
     make_folder(folder_);
-    write_file(file_of_run(folder_, run.run), text_of_run({run, name_}));
+    const fs::path file = file_of_run(folder_, run.run);
+    known_.erase(file);  // another, maybe, of the same name
+    write_file(file, text_of_run({run, name_}));
   } catch (const InputError& error) {
     const std::string refused = ask([&](Records& records) { records.keep(run); });
     if (refused.empty()) return;
@@ -223,9 +220,7 @@ void Spool::deliver() {
     SpooledRun spooled;
     try {
       spooled = read_run(file);
-    } catch (const InputError& error) {
-      // Another program may have brought it there.
-      if (fs::exists(file, gone)) problem_ = error.what();
+    } catch (const InputError&) {  // state() tells of it
       continue;
     }
     if (spooled.records != name_) continue;
@@ -243,17 +238,26 @@ void Spool::deliver() {
 std::string Spool::state() {
   read();
   const std::string& why = away_.empty() ? problem_ : away_;
-  const std::size_t waiting = known_files_.size() - others_.size();
+  std::size_t waiting = 0;
+  std::string other_records;
+  for (const auto& [file, spooled] : known_) {
+    if (spooled.records == name_) {
+      ++waiting;
+    } else {
+      other_records = spooled.records;
+    }
+  }
   std::vector<std::string> said;
   if (waiting > 0) {
     said.push_back(fmt::format("kept here, {} waiting{}{}", waiting, why.empty() ? "" : ": ", why));
   } else if (!why.empty()) {
     said.push_back("runs are kept here: " + why);
   }
-  if (!others_.empty()) {
-    said.push_back(
-        fmt::format("{} here for other records, such as {}", others_.size(), other_records_));
+  if (known_.size() > waiting) {
+    said.push_back(fmt::format("{} here for other records, such as {}", known_.size() - waiting,
+                               other_records));
   }
+  if (!unread_.empty()) said.push_back(unread_);
   if (not_asked_ > 0) {
     said.push_back(fmt::format("{} images were not looked up in the records", not_asked_));
   }
@@ -275,32 +279,36 @@ std::vector<fs::path> Spool::files() {
 }
 
 void Spool::read() {
-  auto files = this->files();
-  if (files == known_files_) return;
-  known_.clear();
-  others_.clear();
+  const auto files = this->files();
+  std::erase_if(known_, [&](const auto& known) {
+    return !std::binary_search(files.begin(), files.end(), known.first);
+  });
+  unread_.clear();
   for (const fs::path& file : files) {
+    if (known_.contains(file)) continue;
     try {
-      auto [run, records] = read_run(file);
-      if (records != name_) other_records_ = records;
-      (records == name_ ? known_ : others_).push_back(std::move(run));
-    } catch (const InputError&) {  // state() tells of it
+      known_.emplace(file, read_run(file));
+    } catch (const InputError& error) {
+      // Another program may have brought it to the records.
+      std::error_code gone;
+      if (fs::exists(file, gone)) unread_ = error.what();
     }
   }
-  known_files_ = std::move(files);
 }
 
-const std::vector<RunRecord>& Spool::waiting() {
+std::vector<RunRecord> Spool::waiting() {
   read();
-  return known_;
+  std::vector<RunRecord> runs;
+  for (const auto& [file, spooled] : known_) {
+    if (spooled.records == name_) runs.push_back(spooled.run);
+  }
+  return runs;
 }
 
 std::optional<RunRecord> Spool::find(const std::string& run) {
   read();
-  for (const auto* runs : {&known_, &others_}) {
-    for (const RunRecord& waiting : *runs) {
-      if (waiting.run == run) return waiting;
-    }
+  for (const auto& [file, spooled] : known_) {
+    if (spooled.run.run == run) return spooled.run;
   }
   std::optional<RunRecord> found;
   if (may_ask()) ask([&](Records& records) { found = records.find(run); });
@@ -309,9 +317,11 @@ std::optional<RunRecord> Spool::find(const std::string& run) {
 
 std::string Spool::owner_of(const std::string& sha256, const std::string& other_than_camera) {
   read();
-  for (const auto* runs : {&known_, &others_}) {
-    const std::string owner = owner_among(*runs, sha256, other_than_camera);
-    if (!owner.empty()) return owner;
+  for (const auto& [file, spooled] : known_) {
+    const RunRecord& run = spooled.run;
+    if (run.camera != other_than_camera && uses(run, sha256)) {
+      return "camera " + run.camera + ": run " + run.run;
+    }
   }
   std::string owner;
   const auto look = [&](Records& records) { owner = records.owner_of(sha256, other_than_camera); };

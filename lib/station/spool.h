@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,13 +15,19 @@
 
 namespace vlp {
 
+/// A run and the records that it is for, as identity_of_database() has them.
+struct SpooledRun {
+  RunRecord run;
+  std::string records;
+};
+
 /// A station's runs on their way to its records, which need not be there: each waits, whole, as a
 /// file of the spool, RUN.json (`vlp-run/1`), until the records have it that it is for; it goes
-/// into no others, so that stations with other records may share a folder. Nothing is lost,
-/// whatever is killed and when: a file appears as a whole and goes when the run is committed.
-/// Nothing is twice: records keep a run by its name, once. Any number of programs may use a spool
-/// at once. Records that did not answer are left alone for a minute, so that a unit waits for them
-/// once.
+/// into no others (identity_of_database), so that stations with other records may share a folder.
+/// Nothing is lost, whatever is killed and when: a file appears as a whole and goes when the run is
+/// committed. Nothing is twice: records keep a run by its name, once. Any number of programs may
+/// use a spool at once. Records that did not answer are left alone for a minute, so that a unit
+/// waits for them once.
 class Spool {
  public:
   /// The folder is made when it is needed. `records` is as Records takes it; nothing is reached for
@@ -42,14 +49,15 @@ class Spool {
   /// seconds, so that a backlog keeps nobody waiting, nor after records that are away. A run that
   /// the records refuse holds up no other.
   void deliver();
-  /// "kept here, 3 waiting: WHY", or why the records are away; how many are here for other records,
-  /// and how many digests owner_of() has looked for here only. Empty when there is nothing to tell.
+  /// "kept here, 3 waiting: WHY", or why the records are away; how many are here for other records;
+  /// a file that cannot be read; how many digests owner_of() has looked for here only. Empty when
+  /// there is nothing to tell.
   std::string state();
   /// Why the records are away, since they were asked last; empty when they are not.
   const std::string& away() const { return away_; }
 
   /// Those that wait for these records, from the first to the last; without files that are no runs.
-  const std::vector<RunRecord>& waiting();
+  std::vector<RunRecord> waiting();
   /// A run that waits, for whichever records, or that the records have; nothing, too, when these do
   /// not answer, see away().
   std::optional<RunRecord> find(const std::string& run);
@@ -69,25 +77,18 @@ class Spool {
   /// `name_` is what files of runs for these records say.
   std::string where_, name_;
   std::unique_ptr<Records> records_;
-  /// Why the records are away; why they did not take a run, or a file could not be read.
-  std::string away_, problem_;
+  /// Why the records are away; why they did not take a run; a file that read() could not read, or
+  /// that is no run.
+  std::string away_, problem_, unread_;
   std::chrono::steady_clock::time_point ask_again_;
-  /// What read() has found, for these records and for others, and in which files.
-  std::vector<std::filesystem::path> known_files_;
-  std::vector<RunRecord> known_, others_;
-  std::string other_records_;
+  /// What read() has found, for these records and for others.
+  std::map<std::filesystem::path, SpooledRun> known_;
   std::size_t not_asked_ = 0;
 };
 
-/// A run and the records that it is for: a server as name_of_database() has it, or the whole path
-/// of a file.
-struct SpooledRun {
-  RunRecord run;
-  std::string records;
-};
-
-/// All of a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(), "figures"
-/// and "images". Bytes that are no text stand as printable() has them.
+/// All of a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(), "figures",
+/// with "uncertainty" and "guard_k" where there is a guard band, and "images". Bytes that are no
+/// text stand as printable() has them.
 std::string text_of_run(const SpooledRun& spooled);
 /// A text of run_fields() that is not there is empty: the program that wrote it did not know it.
 /// Throws InputError with the file, also when it is no run.

@@ -75,18 +75,45 @@ class Files {
   std::string digests_;
 };
 
-Camera read_type(const YamlValue& value, Files& files) {
-  const Camera type = read_calibration(files(value)).camera;
-  if (!type.row_time_s || !type.readout) {
+/// A calibration whose camera tells lamps.
+Calibration read_shutter(const YamlValue& value, Files& files) {
+  Calibration calibration = read_calibration(files(value));
+  if (!calibration.camera.row_time_s || !calibration.camera.readout) {
     throw value.error("its camera should have row_time_s and readout: lamps are told by them");
   }
-  return type;
+  return calibration;
+}
+
+/// Puts guard bands on gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
+void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
+  constexpr double most_k = 10, most_u = 1e6;
+  const YamlValue factor = map.required("k");
+  const double k = factor.number_within(0, most_k, "(factor)");
+  const YamlValue stated = map.required("standard_uncertainties");
+  YamlMap uncertainties = stated.map();
+  int found = 0;
+  for (Gate& gate : gates) {
+    const auto value = uncertainties.optional(gate.metric.c_str());
+    if (!value) continue;
+    ++found;
+    const double u = value->number_within(0, most_u, "(in the gate's unit)");
+    if (!(u > 0)) throw value->error("should be above 0");
+    gate.guard = GuardBand{u, k};
+    const MetricKind kind = metric_kind(gate.metric).value();
+    const double accepted =
+        CheckedMetric{gate.metric, "", {}, gate.limit, kind.asked, gate.guard}.acceptance_limit();
+    if (accepted >= 0 && accepted <= kind.largest) continue;
+    throw value->error("leaves nothing within the gate: k times this is more than there is");
+  }
+  uncertainties.finish();  // what is no gate of the station
+  if (found == 0) throw stated.error("names no gate");
+  map.finish();
 }
 
 GoldenUnit read_golden(YamlMap map, Files& files) {
   GoldenUnit golden{map.required("camera_id").text(), {}, {}};
   const YamlValue calibration = map.required("calibration");
-  golden.calibration = read_calibration(files(calibration));
+  golden.calibration = read_shutter(calibration, files);
   if (!golden.calibration.rotation_center) {
     throw calibration.error("should be of a whole calibration: it has no rotation_center");
   }
@@ -116,7 +143,7 @@ StationConfig read_station(const fs::path& file) {
   Files files(file);
   StationConfig config;
   config.station = document.required("station").text();
-  config.type = read_type(document.required("camera_type"), files);
+  config.type = read_shutter(document.required("camera_type"), files).camera;
   config.board = read_board(files(document.required("board")));
   config.lamps = read_lamp_map(files(document.required("lamps")));
   if (const auto place = document.optional("dispersion_station_m")) {
@@ -125,6 +152,9 @@ StationConfig read_station(const fs::path& file) {
   if (const auto enough = document.optional("enough")) config.enough = read_enough(enough->map());
   if (const auto refuse = document.optional("refuse")) config.refuse = read_refusal(refuse->map());
   config.gates = read_gates(document.required("gates"), unit_metrics());
+  if (const auto guard = document.optional("guard_bands")) {
+    read_guard_bands(guard->map(), config.gates);
+  }
   if (const auto golden = document.optional("golden")) {
     config.golden = read_golden(golden->map(), files);
   }

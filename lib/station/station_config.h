@@ -57,6 +57,7 @@ struct StationConfig {
   std::optional<Eigen::Vector2d> dispersion_station_m;
   StationEnough enough;
   StationRefusal refuse;
+  /// With guard bands where `guard_bands` states standard uncertainties.
   std::vector<Gate> gates;
   std::optional<GoldenUnit> golden;
   /// Folders: where the images of a unit arrive, as CAPTURES/CAMERA/STEP/, and where results go.
@@ -74,7 +75,8 @@ struct StationConfig {
 std::vector<MetricKind> unit_metrics();
 
 /// Throws InputError with file, line and key: unknown or missing keys, figures that no station can
-/// mean, a gate of a figure that there is not, a type without row time or read-out.
+/// mean, a gate of a figure that there is not, a guard band of what is no gate or that leaves
+/// nothing within it, a type or a golden unit without row time or read-out.
 StationConfig read_station(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -39,8 +39,11 @@ std::string outcome_of(const UnitImage& image) {
 ScreenLine gate_line(const CheckedMetric& figure) {
   const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
   const std::string limit = fmt::format(
-      "{} {:.4g}", figure.asked == Direction::at_least ? ">=" : "<=", figure.limit.value_or(0));
-  const char* outcome = figure.met() ? "met" : "NOT MET";
+      "{} {:.4g}", figure.asked == Direction::at_least ? ">=" : "<=", figure.acceptance_limit());
+  std::string outcome = figure.met() ? "met" : "NOT MET";
+  if (const auto sure = figure.conformance_probability()) {
+    outcome += fmt::format(", p {:.3f}", *sure);
+  }
   return {
       fmt::format("{:<24}{:>12}{:>14} {:<4} {}", figure.name, value, limit, figure.unit, outcome),
       figure.met() ? Tone::plain : Tone::bad};

@@ -72,9 +72,10 @@ bool Unit::hopeless() const {
   const UnitStep& state = this->step(*step);
   if (state.refused_in_a_row >= config_.refuse.in_a_row) return true;
   const bool stuck = state.enough && state.result && !state.result->ok();
-  const auto known = calibration_before(*step);
-  return stuck && *step != StationStep::boards &&
-         !lamp_faults(frames_of(state), config_.lamps, *known).empty();
+  if (!stuck || *step == StationStep::boards) return false;
+  const auto frames = frames_of(state);
+  return !lamp_faults(frames, config_.lamps, *calibration_before(*step)).empty() ||
+         !unseen_lamps(frames, config_.lamps).empty();
 }
 
 }  // namespace vlp

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -144,6 +145,8 @@ std::vector<std::string> station_faults_of(const Unit& unit) {
     for (Frame& frame : frames_of(unit.step(each))) frames.push_back(std::move(frame));
   }
   auto faults = lamp_faults(frames, unit.config().lamps, *known);
+  auto unseen = unseen_lamps(frames, unit.config().lamps);
+  std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
   const UnitStep& check = unit.step(StationStep::check);
   if (!faults.empty() || !check.result || !check.result->ok()) return faults;
   return place_faults(frames_of(check), unit.config().lamps, *known, captures_in(check.folder));

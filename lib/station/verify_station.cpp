@@ -4,6 +4,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "captures/in_parallel.h"
 #include "detection/image_file.h"
 #include "rig/input_error.h"
@@ -72,7 +75,12 @@ class Verification {
     }
     // Whatever the gates are of: this camera is known.
     constexpr double fits_px = 0.25;
-    const auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration, fits_px);
+    auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration, fits_px);
+    if (!causes_.empty()) {
+      // Where all gates are met it is for them to say whether all lamps have to be seen.
+      auto unseen = unseen_lamps(frames_, config_.lamps);
+      std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
+    }
     std::vector<Cause> first;
     first.reserve(faults.size() + places_.size());
     for (const std::string& fault : faults) first.push_back({fault, true});

@@ -69,7 +69,8 @@ def changes_of(rows, before_rows):
         "only_before": len(before) - len(both),
         "in_both": len(both),
         "same_inputs": len(same_inputs),
-        "other_inputs": [name_of(row) for row, old in both if row["inputs"] != old["inputs"]],
+        "other_inputs": len(both) - len(same_inputs),
+        "with_other_inputs": [name_of(row) for row, old in both if row["inputs"] != old["inputs"]],
         "newly_failed": [],
         "newly_good": [],
     }
@@ -82,7 +83,7 @@ def changes_of(rows, before_rows):
             changes["newly_good"].append(name_of(row))
         elif good and row["inputs"] == old["inputs"] and row["mean_mm"] and old["mean_mm"]:
             pairs.append((row, old, float(row["mean_mm"]) - float(old["mean_mm"])))
-    changes["lost_with_other_inputs"] = sorted(set(changes["newly_failed"]) & set(changes["other_inputs"]))
+    changes["lost_with_other_inputs"] = sorted(set(changes["newly_failed"]) & set(changes["with_other_inputs"]))
     changes |= {
         "pairs": len(pairs),
         "better": sum(change < -SAME_MM for _, _, change in pairs),

@@ -3,7 +3,7 @@
 """When and in which room a session was taken: as ARCHIVE/archive.csv says (columns camera, session, date, room;
 others are not read), or else by a date in the session's name, as in 2026-03-14 or 20260314-b."""
 import re
-from datetime import datetime
+from datetime import datetime, timezone
 
 from files import read_table
 
@@ -19,8 +19,14 @@ def date_in(name):
     return ""
 
 
+def in_utc(text):
+    """What is without an offset is taken for UTC."""
+    date = datetime.fromisoformat(text)
+    return date.astimezone(timezone.utc).replace(tzinfo=None) if date.tzinfo else date
+
+
 def table_of(archive):
-    """Of (camera, session): (date, room). Throws ValueError with file and line."""
+    """Of (camera, session): (date in UTC, room). Throws ValueError with file and line."""
     file, stated = archive / "archive.csv", {}
     if not file.is_file():
         return stated
@@ -29,7 +35,7 @@ def table_of(archive):
             raise ValueError(f"{file}:{line}: should name a camera and a session")
         date = (row.get("date") or "").strip()
         try:
-            date = date and datetime.fromisoformat(date).replace(tzinfo=None).isoformat()
+            date = date and in_utc(date).isoformat()
         except ValueError:
             raise ValueError(f"{file}:{line}: date: should be as 2026-03-14 or 2026-03-14T09:30, not {date}") from None
         stated[row["camera"], row["session"]] = (date.removesuffix("T00:00:00"), (row.get("room") or "").strip())
@@ -49,5 +55,5 @@ def dates_of(archive, sessions):
 
 
 def days_of(date):
-    """Since 1970, whatever the time zone; None without a date."""
+    """Since 1970; None without a date."""
     return (datetime.fromisoformat(date) - datetime(1970, 1, 1)).total_seconds() / 86400 if date else None

@@ -46,13 +46,20 @@ def words(value):
     return "none" if value is None else f"{value:.6g}"
 
 
+def changed_inputs(old_row, row):
+    """The files and folders that differ; rows of an earlier version do not tell."""
+    parts, old_parts = row.get("parts"), old_row.get("parts")
+    if parts is None or old_parts is None:
+        return "the same" if row["inputs"] == old_row["inputs"] else "others, not known which"
+    changed = sorted(part for part in {*parts, *old_parts} if parts.get(part) != old_parts.get(part))
+    return ", ".join(changed) or "the same"
+
+
 def lines_of(before, now):
     """(row.json, session.json) of each."""
     (old_row, old), (row, new) = before, now
     yield f"verdict     {old_row['verdict']} -> {row['verdict']}" + (f": {row['reason']}" if row["reason"] else "")
-    parts, old_parts = row.get("parts", {}), old_row.get("parts", {})
-    changed = sorted(part for part in {*parts, *old_parts} if parts.get(part) != old_parts.get(part))
-    yield f"inputs      {', '.join(changed) if changed else 'the same'}"
+    yield f"inputs      {changed_inputs(old_row, row)}"
     same = " (the same)" if old["version"] == new["version"] else ""
     yield f"version     {old['version'] or 'none'} -> {new['version'] or 'none'}{same}"
     figures, old_figures = figures_of(new), figures_of(old)

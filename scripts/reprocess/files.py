@@ -88,12 +88,9 @@ def entry_digest(entry):
 
 
 def input_digests(session):
-    """Of each file and folder that the stages read, by name."""
+    """Of all that the stages read, and of each file and folder of it, by name."""
     lines = {}
     for name, entry in input_files(session):
         lines.setdefault(name.split("/")[0], []).append(f"{entry_digest(entry)}  {name}\n")
-    return {name: digest("".join(of_it)) for name, of_it in lines.items()}
-
-
-def input_digest(session):
-    return digest(json_text(input_digests(session)))
+    texts = {name: "".join(of_it) for name, of_it in lines.items()}
+    return digest("".join(texts.values())), {name: digest(text) for name, text in texts.items()}

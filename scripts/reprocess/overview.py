@@ -73,13 +73,13 @@ def changed_inputs(previous, rows, changes):
     html = "<h2>Of other inputs than before</h2>\n"
     by_name, listed = {name_of(row): row for row in rows}, []
     lost = changes["lost_with_other_inputs"]
-    for name in [*lost, *(name for name in changes["other_inputs"] if name not in set(lost))][:MOST_LOOKED_INTO]:
+    for name in [*lost, *(name for name in changes["with_other_inputs"] if name not in set(lost))][:MOST_LOOKED_INTO]:
         now, before = parts_of(Path("."), name), parts_of(previous, name)
         files = sorted(part for part in {*now, *before} if now.get(part) != before.get(part))
         what = "lost its result" if name in lost else by_name[name]["verdict"]
         listed.append((name, ", ".join(files) if before else "not known", what))
     html += table(["session", "what of it is another", "now"], listed)
-    more = len(changes["other_inputs"]) - len(listed)
+    more = changes["other_inputs"] - len(listed)
     return html + (f"<p>and {more} more, in changes.json</p>\n" if more else "")
 
 

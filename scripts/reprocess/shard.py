@@ -32,14 +32,19 @@ def key_of(inputs, run):
     return digest(json_text([inputs, run["toolbox"], run["camera"], run["session_gates_digest"]]))
 
 
+def row_in(place):
+    """The row of a result; None when it cannot be read."""
+    try:
+        return json.loads((place / "row.json").read_text())
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return None
+
+
 def current(name, key):
     """The session as it stands, when it is of this key; what crashed is tried again."""
     for place in (Path("sessions") / name, Path("failed") / name):
-        try:
-            row = json.loads((place / "row.json").read_text())
-        except (FileNotFoundError, NotADirectoryError, ValueError):
-            continue
-        if row["key"] == key and row["verdict"] != "crashed":
+        row = row_in(place)
+        if row and row["key"] == key and row["verdict"] != "crashed":
             return row
     return None
 
@@ -70,25 +75,32 @@ def same_file(source, target):
         shutil.copyfile(source, target)
 
 
-def put_aside(place, name, keep):
-    """The former result goes to former/, by its key, of which so many stay; with none, and of a crash, it is gone."""
+def discard(result, name):
+    """At once, so that no part of it is ever taken for a result."""
     old = STATE / "old" / name
     shutil.rmtree(old, ignore_errors=True)
     old.parent.mkdir(parents=True, exist_ok=True)
-    place.rename(old)
-    former = Path("former") / name
-    row = json.loads((old / "row.json").read_text()) if keep > 0 else None
-    if row and row["verdict"] != "crashed":
-        former.mkdir(parents=True, exist_ok=True)
-        kept = former / row["key"][:12]
-        shutil.rmtree(kept, ignore_errors=True)
-        old.rename(kept)
-    else:
-        shutil.rmtree(old)
-    if former.is_dir():
-        by_age = sorted(former.iterdir(), key=lambda result: (result / "row.json").stat().st_mtime_ns)
-        for result in by_age[: max(0, len(by_age) - keep)]:
-            shutil.rmtree(result)
+    result.rename(old)
+    shutil.rmtree(old)
+
+
+def put_aside(place, name, keep):
+    """The former result goes to former/, by its key; with none to keep, of a crash, and without a row it is gone."""
+    row = row_in(place) if keep > 0 else None
+    if not row or row["verdict"] == "crashed":
+        return discard(place, name)
+    kept = Path("former") / name / row["key"][:12]
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    if kept.exists():
+        discard(kept, name)
+    place.rename(kept)
+
+
+def keep_the_last(name, keep):
+    """Of the former results."""
+    rows = sorted((Path("former") / name).glob("*/row.json"), key=lambda row: row.stat().st_mtime_ns)
+    for row in rows[: max(0, len(rows) - keep)]:
+        discard(row.parent, name)
 
 
 def publish(row, work, keep=0):
@@ -108,6 +120,7 @@ def publish(row, work, keep=0):
         if former.exists():
             put_aside(former, name, keep)
     ready.rename(place)
+    keep_the_last(name, keep)
     return sum(file.stat().st_size for file in place.iterdir())
 
 
@@ -130,8 +143,7 @@ def reprocess(run, shard, names, lock, keep):
     work = (STATE / "work" / shard).absolute()
     rows, made = [], 0
     for name in names:
-        parts = input_digests(Path(run["archive"]) / name)
-        inputs = digest(json_text(parts))
+        inputs, parts = input_digests(Path(run["archive"]) / name)
         key = key_of(inputs, run)
         row = current(name, key)
         if row is None:

@@ -43,8 +43,7 @@ def main():
         print(f"{len(changes['newly_failed'])} newly without a result: {changes.get('verdict', 'nothing to compare')}")
         if changes["other_inputs"]:
             lost = len(changes["lost_with_other_inputs"])
-            others = len(changes["other_inputs"])
-            print(f"inputs      {others} of other inputs than before, {lost} lost their result with them")
+            print(f"inputs      {changes['other_inputs']} of other inputs than before, {lost} lost their result with them")
     print(f"overview    {results / 'overview.html'}")
     for gate in said["gates"]:
         if not gate["passed"]:

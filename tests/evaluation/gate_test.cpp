@@ -10,6 +10,7 @@
 
 #include "evaluation/evaluation_files.h"
 #include "evaluation/evaluation_metrics.h"
+#include "support/random.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
 
@@ -56,6 +57,59 @@ TEST(Gates, AreMetUpToTheLimitOrFromItOn) {
   EXPECT_EQ(cause_of(coverage[0]),
             "the board was not shown all over the image (" + words_of(coverage[0]) + ")");
   EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].met());
+}
+
+TEST(Gates, WithAGuardBandAskForMore) {
+  const auto of = [](const char* metric, double limit, double value) {
+    return check_all({{metric, limit, GuardBand{0.01, 1.5}}}, {{metric, value}},
+                     {*metric_kind(metric)})[0];
+  };
+  EXPECT_TRUE(of("rms_px", 0.3, 0.2849).met());
+  const CheckedMetric within = of("rms_px", 0.3, 0.286);
+  EXPECT_FALSE(within.met());
+  EXPECT_EQ(words_of(within),
+            "rms_px is 0.286 px, at most 0.3 px less a guard band of 0.015 px is asked for");
+  EXPECT_FALSE(check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0].met());
+  EXPECT_TRUE(of("coverage", 0.7, 0.7151).met());
+  const CheckedMetric below = of("coverage", 0.7, 0.714);
+  EXPECT_FALSE(below.met());
+  EXPECT_EQ(words_of(below),
+            "coverage is 0.714, at least 0.7 and a guard band of 0.015 is asked for");
+  // The normal distribution's tables.
+  EXPECT_NEAR(*of("rms_px", 0.3, 0.286).conformance_probability(), 0.91924, 5e-6);
+  EXPECT_NEAR(*of("coverage", 0.7, 0.714).conformance_probability(), 0.91924, 5e-6);
+  EXPECT_NEAR(*of("rms_px", 0.3, 0.32).conformance_probability(), 0.02275, 5e-6);
+  EXPECT_EQ(of("rms_px", 0.3, 0.3).conformance_probability(), 0.5);
+  EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.1}})[0].conformance_probability());
+}
+
+/// Of units of any quality that are measured with an uncertainty: how many are passed and should
+/// not have been, and the other way round, against what their probabilities say.
+TEST(Gates, WithAGuardBandStateTheirErrors) {
+  constexpr double limit = 1, u = 0.05, k = 1.645;
+  CheckedMetric unit = check_gates({{"rms_px", limit, GuardBand{u, k}}}, {})[0];
+  Random random(11);
+  constexpr int units = 300'000;
+  double passed_falsely = 0, stated_passed = 0, failed_falsely = 0, stated_failed = 0;
+  int passed_at_limit = 0;
+  for (int i = 0; i < units; ++i) {
+    const double truth = random.uniform(limit - 5 * u, limit + 5 * u);
+    unit.value = truth + u * random.normal();
+    const double conforms = unit.conformance_probability().value();
+    if (unit.met()) {
+      passed_falsely += truth > limit ? 1 : 0;
+      stated_passed += 1 - conforms;
+    } else {
+      failed_falsely += truth <= limit ? 1 : 0;
+      stated_failed += conforms;
+    }
+    unit.value = limit + u * random.normal();
+    passed_at_limit += unit.met() ? 1 : 0;
+  }
+  // 630 units pass falsely: their number has a standard error of 4 %.
+  EXPECT_NEAR(passed_falsely / stated_passed, 1, 0.1);
+  EXPECT_NEAR(failed_falsely / stated_failed, 1, 0.1);
+  EXPECT_NEAR(double(passed_at_limit) / units, 0.05, 0.005);
 }
 
 TEST(Gates, OfAllMetricsHaveThoseWithoutAGateAndWithoutAValue) {

@@ -37,7 +37,14 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
                     HasSubstr("Fixes at a known station minus")));
   // A unit calibrated again keeps its history, and gives the same calibration.
   take_again();
-  EXPECT_EQ(run_program(batch("0002") + " --threads 1").exit_code, 0);
+  change(
+      "station.yaml", "# The images of a unit",
+      "guard_bands: {k: 2, standard_uncertainties: {check_mean_mm: 0.01}}\n# The images of a unit");
+  const auto guarded = run_program(batch("0002") + " --threads 1");
+  EXPECT_EQ(guarded.exit_code, 0);
+  EXPECT_THAT(guarded.output, ContainsRegex("check_mean_mm +[0-9.e-]+ +<= 0.98 mm +met, p 1.000"));
+  EXPECT_THAT(this->result("0002", "report.html"),
+              AllOf(HasSubstr("less a guard band of 0.02 mm"), HasSubstr("conforms with p")));
   EXPECT_EQ(comparable_calibration("0002"), comparable_calibration("0001"));
 
   EXPECT_THAT(records("list").output,
@@ -48,6 +55,12 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   EXPECT_EQ(records("restore " + files.filename().string()).output, files.string() + "\n");
   EXPECT_EQ(this->result("0001", "calibration.yaml"), calibration);
   EXPECT_THAT(this->result("0001", "report.html"), HasSubstr("<strong>PASS"));
+  const auto certified = records("certificate " + files.filename().string());
+  EXPECT_EQ(certified.output, (files / "certificate.html").string() + "\n") << certified.errors;
+  EXPECT_THAT(this->result("0001", "certificate.html"),
+              AllOf(HasSubstr("Calibration certificate: camera 0001"),
+                    ContainsRegex("focal length x</th><td>[0-9.]+ \u00b1 0[.][0-9]+\u00a0px"),
+                    HasSubstr("lamp map")));
   EXPECT_THAT(records("list --camera-id 0002").output, HasSubstr("1 runs, 1 passed"));
   EXPECT_THAT(
       records("show --camera-id 0001").output,
@@ -64,6 +77,10 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   change("station.yaml", "# The images of a unit",
          "golden: {camera_id: \"0001\", calibration: golden.yaml, gates: {check_mean_mm: 0.5, "
          "check_lamps: 0.95, world_mm: 1, center_px: 1}}\n# The images of a unit");
+  // A lamp that is out of the golden unit's view is for a gate to ask for (check_lamps_seen).
+  change("lamps.yaml", "  - {id: 1,",
+         "  - {id: 7, position_m: [3, 3, 1.6], diameter_m: 0.18, frequency_hz: 6000, duty: 0.5}\n"
+         "  - {id: 1,");
   const std::string verify = "verify --batch " + (folder / "unit").string();
   const auto steady = records(verify);
   EXPECT_EQ(steady.exit_code, 0) << steady.output << steady.errors;
@@ -212,8 +229,7 @@ TEST_F(Station, JudgesNoUnitForWhatIsNotItsFault) {
 
 /// One unit's images, as another's.
 TEST_F(Station, TakesNoImagesOfAnotherUnit) {
-  change("scene.yaml", "count: 16", "count: 4");
-  render("boards");
+  render_four_boards();
   EXPECT_EQ(run_program(batch("0001")).exit_code, 3);
   EXPECT_EQ(run_program(batch("0001")).exit_code, 3);  // its own, again
   const auto result = run_program(batch("0002"));
@@ -233,8 +249,7 @@ TEST_F(Station, NoticesAtOnceThatResultsCannotBeWritten) {
 
 /// Whatever cannot be written, the verdict is on the screen, in the record, and can be restored.
 TEST_F(Station, LosesNoVerdictWhenItsFilesCannotBeWritten) {
-  change("scene.yaml", "count: 16", "count: 4");
-  render("boards");
+  render_four_boards();
   fs::create_directories(captures("0001"));
   fs::copy(folder / "unit/boards", captures("0001") / "boards");
   // While it waits for images, a file takes the place of the folder.
@@ -255,13 +270,15 @@ TEST_F(Station, LosesNoVerdictWhenItsFilesCannotBeWritten) {
   ASSERT_NE(at, std::string::npos);
   EXPECT_EQ(records("restore " + listed.substr(at + 1, 33)).exit_code, 0);
   EXPECT_THAT(this->result("0001", "report.html"), HasSubstr("<strong>INVALID"));
+  const auto certified = records("certificate " + listed.substr(at + 1, 33));
+  EXPECT_EQ(certified.exit_code, 2);
+  EXPECT_THAT(certified.errors, HasSubstr("was not judged (boards"));
 }
 
 /// Records away: units get their verdicts all the same, and nothing is lost.
 TEST_F(Station, KeepsRunsHereWhileTheRecordsAreAway) {
   change("station.yaml", "records: records.db", "records: share/records.db");
-  change("scene.yaml", "count: 16", "count: 4");
-  render("boards");
+  render_four_boards();
   const auto first = run_program(batch("0001"));
   EXPECT_EQ(first.exit_code, 3);
   EXPECT_THAT(first.errors, HasSubstr("runs are kept here: "));
@@ -294,8 +311,7 @@ TEST_F(Station, KeepsRunsHereWhileTheRecordsAreAway) {
 
 /// A station that is watched: exit code 1 for an alarm, of what can be compared.
 TEST_F(Station, WatchesATrend) {
-  change("scene.yaml", "count: 16", "count: 4");
-  render("boards");
+  render_four_boards();
   ASSERT_EQ(run_program(batch()).exit_code, 3);  // makes the tables
   const auto add = [&](int first, const std::string& of, const std::string& kind,
                        const std::string& verdict, const std::vector<double>& values,
@@ -307,7 +323,9 @@ TEST_F(Station, WatchesATrend) {
       sql.append("', '").append(of).append("', '").append(camera).append("', '', '");
       sql.append("2").append(run).append("-01-01T00:00:00Z', '");  // a year each
       sql.append(verdict).append("', '', '', '', '', '';\n");
-      sql.append("INSERT INTO figures VALUES ('").append(run).append("', 1, 'rms_px', ");
+      sql.append(
+          "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit) VALUES (");
+      sql.append("'").append(run).append("', 1, 'rms_px', ");
       sql.append(std::to_string(values[i])).append(", NULL, 0, 1, 'px');\n");
     }
     const auto client = folder.file("client.py",
@@ -347,7 +365,11 @@ TEST_F(Station, WatchesATrend) {
   EXPECT_THAT(records("trend rms_px --until 2200-01-01").output,
               HasSubstr("10 runs, 2100-01-01T00:00:00Z to 2109-01-01T00:00:00Z"));
   EXPECT_THAT(records("list --since 2400-01-01 --until 2460-01-01").output, HasSubstr("2 runs"));
-  EXPECT_EQ(records("list --since 21.11.2026").exit_code, 2);
+  for (const char* no_time : {"21.11.2026", "2026-02-30", "2026-11-21T24:00", "2026-11-21T10:60",
+                              "2026-11-21T10:59:60", "2026-11-21T10:99:00Z"}) {
+    EXPECT_EQ(records(std::string("list --since ") + no_time).exit_code, 2) << no_time;
+  }
+  EXPECT_EQ(records("list --since 2026-11-21T23:59:59Z").exit_code, 0);
 
   // Failed units count in the capability; those that were not judged do not.
   EXPECT_THAT(records("capability rms_px").output, ContainsRegex("rms_px +13 .*<= 0.3 +-"));
@@ -365,14 +387,19 @@ TEST_F(Station, WatchesATrend) {
                     ContainsRegex("\\(EV\\) +0.12649"), ContainsRegex("\\(AV\\) +0.031623"),
                     ContainsRegex("\\(GRR\\) +0.13038"), ContainsRegex("\\(PV\\) +0.70427"),
                     ContainsRegex("ndc\\) +7\n")));
-  EXPECT_THAT(records("study rms_px --units m1").errors, HasSubstr("two units or more"));
+  EXPECT_THAT(study.output, HasSubstr("no P/T: the mean is not within the gate, at most 0.3\n"));
+  const auto too_few = records("study rms_px --units m1");
+  EXPECT_EQ(too_few.exit_code, 3);
+  EXPECT_THAT(too_few.errors, HasSubstr("two units or more"));
+  const auto unknown = records("study rms_px --units m1 m2 m3 m4");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.errors, HasSubstr("no judged run that has the figure is of: m3, m4"));
 }
 
 /// What is at full scale hides edges and stripes.
 TEST_F(Station, NamesOverexposure) {
-  change("scene.yaml", "count: 16", "count: 4");
   change("scene.yaml", "white_e_per_s: 2.4e+6", "white_e_per_s: 2.4e+8");
-  render("boards");
+  render_four_boards();
   const auto boards = run_program(batch("0001"));
   EXPECT_EQ(boards.exit_code, 3);
   EXPECT_THAT(boards.output, HasSubstr("images refused: 4 overexposed"));

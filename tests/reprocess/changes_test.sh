@@ -70,7 +70,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   grep -q "$lost</td><td>lamps.yaml</td><td>lost its result" "$page" || fail "no inputs that changed"
   grep -q '^camera-00001,session-01,look,.*,6,,.*,2026-03-14,' "$looked/summary.csv" || fail "$(cat "$looked/summary.csv")"
   grep -q '^camera-00001,session-01,2026-03-14,hall,' "$looked/fleet.csv" || fail "$(cat "$looked/fleet.csv")"
-  [ "$(grep -c '^hall,[0-9a-f]*,[1-6],camera-00001,session-01,2026-03-14,' "$looked/lamps.csv")" = 6 ] || fail "six lamps"
+  [ "$(grep -c '^hall,[0-9a-f]\{12\},[1-6],camera-00001,session-01,2026-03-14,' "$looked/lamps.csv")" = 6 ] || fail "six lamps"
 
   # It is mended, and what it was before is kept and told.
   mv "$scratch/looked-lamps.yaml" "$archive/$lost/lamps.yaml"

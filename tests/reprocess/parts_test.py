@@ -2,6 +2,7 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 """The parts of scripts/reprocess, whose folder is the argument."""
+import hashlib
 import json
 import os
 import random
@@ -48,7 +49,8 @@ class Changes(unittest.TestCase):
         self.assertEqual(found["newly_failed"], ["c0001/s1", "c0002/s1"])
         self.assertEqual(found["lost_with_other_inputs"], [])
         self.assertEqual(found["newly_good"], ["c0002/s0"])
-        self.assertEqual([found[key] for key in ("other_inputs", "only_now", "only_before")], [["c0003/s0"], 1, 1])
+        self.assertEqual([found[key] for key in ("other_inputs", "only_now", "only_before")], [1, 1, 1])
+        self.assertEqual(found["with_other_inputs"], ["c0003/s0"])
         self.assertEqual([change for _, _, change in pairs], [1, -0.5, 0])
         self.assertIn("cannot tell", found["verdict"])
 
@@ -95,7 +97,7 @@ class Changes(unittest.TestCase):
         before = [row(i, "pass", 1, "old") for i in range(3)]
         now = [row(0, "no result", None, "new"), row(1, "look", 1, "new"), row(2, "no result", None, "old")]
         found, pairs = changes.changes_of(now, before)
-        self.assertEqual(found["other_inputs"], ["c0000/s0", "c0000/s1"])
+        self.assertEqual((found["other_inputs"], found["with_other_inputs"]), (2, ["c0000/s0", "c0000/s1"]))
         self.assertEqual(found["newly_failed"], ["c0000/s0", "c0001/s0"])
         self.assertEqual(found["lost_with_other_inputs"], ["c0000/s0"])
         self.assertEqual(pairs, [])
@@ -259,6 +261,64 @@ class Shard(unittest.TestCase):
             self.assertEqual(publish("6key", 1, "crashed"), ["5key5key5key"])
             self.assertEqual(publish("7key", 1), ["5key5key5key"])  # a crash does not push it out
             self.assertEqual(publish("8key", 1), ["7key7key7key"])
+            self.assertEqual(publish("8key", 1), ["8key8key8key"])  # the same again
+
+    def test_a_former_result_outlasts_a_kill_at_any_moment(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            work = Path("work")
+            (work / "c/s").mkdir(parents=True)
+
+            def publish(key):
+                (work / "c/s/session.json").unlink(missing_ok=True)
+                (work / "c/s/session.json").write_text(key)
+                shard.publish({"camera": "c", "session": "s", "verdict": "pass", "key": key}, work, 1)
+
+            def killed_after(moves):
+                """The process ends after so many renamings."""
+                rename, left = Path.rename, [moves]
+
+                def once_more(path, target):
+                    if left[0] == 0:
+                        raise KeyboardInterrupt
+                    left[0] -= 1
+                    return rename(path, target)
+
+                return unittest.mock.patch.object(Path, "rename", once_more)
+
+            publish("first")
+            for moves in range(5):
+                key = f"key {moves}"
+                there = {file.read_text() for file in Path("sessions").rglob("session.json")}
+                try:
+                    with killed_after(moves):
+                        publish(key)
+                except KeyboardInterrupt:
+                    kept = {file.read_text() for top in ("sessions", "former") for file in Path(top).rglob("session.json")}
+                    self.assertLessEqual(there, kept, moves)
+                    for former in Path("former/c/s").glob("*"):
+                        self.assertTrue((former / "row.json").exists(), moves)
+                    if shard.current("c/s", key) is None:
+                        publish(key)
+                kept = {file.read_text() for file in Path("former").rglob("session.json")}
+                self.assertLessEqual(there, kept, moves)
+                self.assertEqual(Path("sessions/c/s/session.json").read_text(), key)
+            publish("last")
+            self.assertEqual([file.read_text() for file in Path("former").rglob("session.json")], [key])
+
+    def test_a_former_result_whose_row_cannot_be_read_is_replaced(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            work, place = Path("work"), Path("sessions/c/s")
+            for unreadable in ("", "{"):
+                (work / "c/s").mkdir(parents=True, exist_ok=True)
+                place.mkdir(parents=True, exist_ok=True)
+                (place / "row.json").write_text(unreadable)
+                shard.publish({"camera": "c", "session": "s", "verdict": "pass", "key": "k"}, work, 1)
+                self.assertEqual(json.loads((place / "row.json").read_text())["key"], "k")
+                self.assertFalse(Path("former/c/s").exists())
 
 
 class Diff(unittest.TestCase):
@@ -281,6 +341,12 @@ class Diff(unittest.TestCase):
         self.assertIn("  + check: the residuals; they show", said)
         self.assertEqual(len(said.splitlines()), 7)
 
+    def test_of_a_row_without_parts_says_only_whether_inputs_are_the_same(self):
+        now = {"inputs": "a", "parts": {"lamps.yaml": "c", "check": "b"}}
+        self.assertEqual(diff.changed_inputs({"inputs": "a"}, now), "the same")
+        self.assertEqual(diff.changed_inputs({"inputs": "b"}, now), "others, not known which")
+        self.assertEqual(diff.changed_inputs({"inputs": "b", "parts": {"check": "b"}}, now), "lamps.yaml")
+
 
 class Dates(unittest.TestCase):
     def test_are_those_of_the_table_or_of_the_name(self):
@@ -295,6 +361,9 @@ class Dates(unittest.TestCase):
             lines = dates.dates_of(Path(folder), ["a/1", "a/20260101", "b/1"])
             expected = [("a", "1", "2026-03-14T09:30:00", "hall"), ("a", "20260101", "2026-01-01", "attic")]
             self.assertEqual([tuple(line.values()) for line in lines], expected)
+            file.write_text("camera,session,date\na,1,2026-03-14T09:30+02:00\na,2,2026-03-14T23:30-05:00\n")
+            lines = dates.dates_of(Path(folder), ["a/1", "a/2"])
+            self.assertEqual([line["date"] for line in lines], ["2026-03-14T07:30:00", "2026-03-15T04:30:00"])
             file.write_text("camera,session,date\na,1,14.3.2026\n")
             self.assertRaisesRegex(ValueError, "archive.csv:2: date: should be as", dates.table_of, Path(folder))
 
@@ -443,17 +512,28 @@ class Files(unittest.TestCase):
             session = Path(folder)
             (session / "boards").mkdir()
             (session / "boards/0.png").write_text("one")
-            first = files.input_digest(session)
+            first = files.input_digests(session)[0]
             (session / "notes.txt").write_text("not read")
             (session / "results").mkdir()
             (session / "results/boards").write_text("not read")
             os.utime(session / "boards/0.png", (1, 1))
-            self.assertEqual(files.input_digest(session), first)
+            self.assertEqual(files.input_digests(session)[0], first)
             (session / "boards/0.png").rename(session / "boards/1.png")
-            second = files.input_digest(session)
+            second = files.input_digests(session)[0]
             (session / "boards/1.png").write_text("two")
-            self.assertEqual(len({first, second, files.input_digest(session)}), 3)
-            self.assertEqual(list(files.input_digests(session)), ["boards"])
+            self.assertEqual(len({first, second, files.input_digests(session)[0]}), 3)
+            self.assertEqual(list(files.input_digests(session)[1]), ["boards"])
+
+    def test_digest_of_all_inputs_is_that_of_earlier_versions(self):
+        with tempfile.TemporaryDirectory() as folder:
+            session, lines = Path(folder), ""
+            for name in ("board.yaml", "boards/0.png", "boards/1.png", "lamps.yaml"):
+                (session / name).parent.mkdir(exist_ok=True)
+                (session / name).write_text(name)
+                lines += f"{hashlib.sha256(name.encode()).hexdigest()}  {name}\n"
+            inputs, parts = files.input_digests(session)
+            self.assertEqual(inputs, hashlib.sha256(lines.encode()).hexdigest())
+            self.assertEqual(list(parts), ["board.yaml", "boards", "lamps.yaml"])
 
 
 if __name__ == "__main__":

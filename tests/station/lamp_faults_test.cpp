@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <span>
+
 #include "captures/detections_table.h"
 #include "positioning/positioner.h"
 #include "rig/calibration.h"
@@ -55,8 +57,10 @@ TEST_F(LampFaults, NameOneThatIsNeverSeen) {
   for (Frame& frame : frames) {
     std::erase_if(frame.detections, [&](const Detection& lamp) { return lamp.lamp == id; });
   }
-  EXPECT_THAT(lamp_faults(frames, map, calibration),
+  EXPECT_THAT(unseen_lamps(frames, map),
               ElementsAre(HasSubstr("lamp " + std::to_string(id) + " is never seen")));
+  EXPECT_THAT(lamp_faults(frames, map, calibration), IsEmpty()) << "it does not contradict the map";
+  EXPECT_THAT(unseen_lamps(std::span(frames).first(2), map), IsEmpty()) << "too few to tell";
 }
 
 /// Of a camera that is known.
@@ -68,6 +72,31 @@ TEST_F(LampFaults, NameOneThatMovedAFewMillimetres) {
     moved.lamps[i].position_m += Eigen::Vector3d(0.004, 0, 0);
     EXPECT_THAT(lamp_faults(frames, moved, calibration, fits_px),
                 ElementsAre(HasSubstr("lamp " + std::to_string(map.lamps[i].id) + " is loose")));
+  }
+}
+
+/// A light that is taken for a lamp is rejected, and its capture counts as one that does not fit at
+/// all: no reason to call the lamp loose unless many say so.
+TEST_F(LampFaults, HoldNoSingleReflectionAgainstALamp) {
+  constexpr double fits_px = 0.25;
+  const int id = map.lamps[2].id;
+  std::vector<Detection*> seen;
+  for (Frame& frame : frames) {
+    for (Detection& lamp : frame.detections) {
+      if (lamp.lamp == id && frame.detections.size() > 3) seen.push_back(&lamp);
+    }
+  }
+  ASSERT_GT(seen.size(), 20u);
+  const std::size_t tenth = seen.size() / 10;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const auto faults = lamp_faults(frames, map, calibration, fits_px);
+    if (i > tenth) {
+      EXPECT_THAT(faults, ElementsAre(HasSubstr("lamp " + std::to_string(id) + " is loose"))) << i;
+      break;
+    }
+    EXPECT_THAT(faults, IsEmpty()) << i << " of " << seen.size();
+    constexpr double middle_px = 400, far_px = 80;
+    seen[i]->pixel.x() += seen[i]->pixel.x() < middle_px ? far_px : -far_px;
   }
 }
 
@@ -124,6 +153,12 @@ TEST(RowTime, IsThatWithWhichTheLightsAreTheLamps) {
     const auto found_s = row_time_that_fits(seen_hz, map, row_time_s);
     ASSERT_TRUE(found_s) << ratio;
     EXPECT_NEAR(*found_s / (row_time_s * ratio), 1, 0.003);
+  }
+  // With the row time that was said the lights are lamps, too: it is not that.
+  for (const double ratio : {1., 0.99, 1.02}) {
+    std::vector<double> seen_hz;
+    for (const Lamp& lamp : map.lamps) seen_hz.push_back(*lamp.frequency_hz * ratio);
+    EXPECT_FALSE(row_time_that_fits(seen_hz, map, row_time_s)) << ratio;
   }
   // Lights of another kind.
   EXPECT_FALSE(row_time_that_fits(std::vector<double>{510, 700, 905, 1033, 1111, 1401, 1777}, map,

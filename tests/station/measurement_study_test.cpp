@@ -10,21 +10,12 @@
 #include <vector>
 
 #include "support/random.h"
+#include "support/refused.h"
 
 namespace vlp {
 namespace {
 
 using testing::HasSubstr;
-
-template <typename Action>
-std::string study_refusal(const Action& action) {
-  try {
-    action();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
-}
 
 /// Values by unit, then station, then repeat.
 std::vector<StudyValue> crossed(std::size_t stations, std::size_t repeats,
@@ -131,6 +122,11 @@ TEST(MeasurementStudy, OfOneStationKnowsItsRepeatability) {
   EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({0, 20}), 100 * 6 * sd / 20);
   EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({std::nullopt, 11}), 100 * 3 * sd / 6);
   EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({1, std::nullopt}), 100 * 3 * sd / 4);
+  // The mean, 5, is at the one limit or beyond it.
+  EXPECT_FALSE(study.percent_of_tolerance({std::nullopt, 5}));
+  EXPECT_FALSE(study.percent_of_tolerance({std::nullopt, 1}));
+  EXPECT_FALSE(study.percent_of_tolerance({5, std::nullopt}));
+  EXPECT_FALSE(study.percent_of_tolerance({11, std::nullopt}));
 }
 
 TEST(MeasurementStudy, FindsWhatWasPutIn) {
@@ -159,18 +155,19 @@ TEST(MeasurementStudy, FindsWhatWasPutIn) {
 }
 
 TEST(MeasurementStudy, SaysWhatIsMissing) {
-  EXPECT_THAT(study_refusal([] { measurement_study({}); }), HasSubstr("two units"));
-  EXPECT_THAT(study_refusal([] {
+  EXPECT_THAT(refusal_of<std::invalid_argument>([] { measurement_study({}); }),
+              HasSubstr("two units"));
+  EXPECT_THAT(refusal_of<std::invalid_argument>([] {
                 measurement_study(crossed(1, 1, {1, 2}));
               }),
               HasSubstr("two or more"));
   auto values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
   values.pop_back();
-  EXPECT_THAT(study_refusal([&] { measurement_study(values); }),
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { measurement_study(values); }),
               HasSubstr("unit 101 has 1 runs on 1, 100 has 2 on 0"));
   values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
   values.erase(values.begin(), values.begin() + 2);
-  EXPECT_THAT(study_refusal([&] { measurement_study(values); }),
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { measurement_study(values); }),
               HasSubstr("unit 100 has 0 runs on 0, 100 has 2 on 1"));
 }
 

@@ -44,7 +44,7 @@ RunRecord sample(const std::string& run, const std::string& camera, double rms_p
   record.libraries = "none";
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\ncamera: {id: \"it's\"}\n";
-  record.figures = check_all({{"rms_px", 1}, {"tilt_deg", 2}},
+  record.figures = check_all({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
                              {{"rms_px", rms_px}, {"coverage", 0.75}}, unit_metrics());
   record.images = {{"boards", "0000.png", std::string(64, 'b'), ""},
                    {"check", "0000.png", std::string(64, 'c'), "too dark"}};
@@ -113,6 +113,10 @@ void check_records(const std::string& where) {
   EXPECT_EQ(found->figures[0].value, 1.5);
   EXPECT_FALSE(found->figures[0].met());
   EXPECT_EQ(found->figures[0].unit, "px");
+  ASSERT_TRUE(found->figures[0].guard);
+  EXPECT_EQ(found->figures[0].guard->standard_uncertainty, 0.1 + 0.2);  // to the last bit
+  EXPECT_EQ(found->figures[0].guard->k, 1.5);
+  EXPECT_FALSE(found->figures[1].guard);
   EXPECT_FALSE(found->figures[1].limit);
   EXPECT_EQ(found->figures[1].asked, Direction::at_least);
   EXPECT_FALSE(found->figures[2].value);
@@ -229,10 +233,12 @@ void check_migration(const std::string& where) {
   EXPECT_EQ(found->figures[2].unit, "deg");
   EXPECT_EQ(found->figures[3].unit, "mm");
   EXPECT_EQ(found->figures[4].unit, "%");
+  EXPECT_FALSE(found->figures[0].guard);
   EXPECT_THAT(found->images, SizeIs(1));
   records.keep(sample(run_of(5), "b", 0.1));
   EXPECT_THAT(records.list({}), SizeIs(2));
   EXPECT_EQ(records.find(run_of(5))->figures[0].unit, "px");
+  EXPECT_TRUE(records.find(run_of(5))->figures[0].guard);
 }
 
 /// Of a database that holds kVersion1, which another program is about to bring up to date.
@@ -270,7 +276,7 @@ void check_later_version(const std::string& where) {
   answer_of(where, "UPDATE vlp_schema SET version = 99;\n");
   const std::string before = state_of(where);
   EXPECT_THAT(refusal_of([&] { Records records(where); }),
-              HasSubstr(": holds records of version 99, this program knows those up to 3: use the "
+              HasSubstr(": holds records of version 99, this program knows those up to 4: use the "
                         "newer vlp-station that wrote them"));
   EXPECT_EQ(state_of(where), before);
 }
@@ -442,7 +448,12 @@ TEST(ExportRuns, WritesJson) {
                   "program", "libraries", "config_sha256", "calibration", "figures", "images"));
   const auto& figures = runs[0]["figures"];
   EXPECT_THAT(keys_of(figures), ElementsAre("rms_px", "coverage", "tilt_deg"));
-  EXPECT_THAT(keys_of(figures["rms_px"]), ElementsAre("value", "unit", "gate", "at_least", "met"));
+  EXPECT_THAT(keys_of(figures["tilt_deg"]),
+              ElementsAre("value", "unit", "gate", "at_least", "met"));
+  EXPECT_THAT(keys_of(figures["rms_px"]),
+              ElementsAre("value", "unit", "gate", "at_least", "met", "uncertainty", "guard_k",
+                          "conformance_probability"));
+  EXPECT_NEAR(figures["rms_px"]["conformance_probability"].get<double>(), 0.99379, 5e-6);
   EXPECT_EQ(figures["rms_px"]["value"], 0.25);
   EXPECT_EQ(figures["rms_px"]["unit"], "px");
   EXPECT_TRUE(figures["tilt_deg"]["value"].is_null());

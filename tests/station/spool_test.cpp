@@ -4,6 +4,7 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sched.h>
 #include <sys/mount.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -17,6 +18,7 @@
 #include <thread>
 
 #include "rig/child_process.h"
+#include "station/database_name.h"
 #include "station/station_config.h"
 #include "support/postgres_server.h"
 #include "support/random.h"
@@ -30,6 +32,7 @@ namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
@@ -49,7 +52,7 @@ RunRecord numbered_run(int number) {
   run.libraries = "none";
   run.config_sha256 = std::string(64, 'a');
   run.calibration = "format: vlp-calibration/1\n";
-  run.figures = check_all({{"rms_px", 1}, {"tilt_deg", 2}},
+  run.figures = check_all({{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
                           {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, unit_metrics());
   for (std::size_t i = 0; i < kImagesOfARun; ++i) {
     run.images.push_back({"boards", std::to_string(1000 + i) + ".png",
@@ -92,6 +95,10 @@ TEST(SpooledRun, IsReadAsItWasWritten) {
     EXPECT_EQ(read.figures[i].value, run.figures[i].value);  // to the last bit
     EXPECT_EQ(read.figures[i].limit, run.figures[i].limit);
     EXPECT_EQ(read.figures[i].asked, run.figures[i].asked);
+    ASSERT_EQ(read.figures[i].guard.has_value(), i == 0);
+    if (!read.figures[i].guard) continue;
+    EXPECT_EQ(read.figures[i].guard->standard_uncertainty, 0.01);
+    EXPECT_EQ(read.figures[i].guard->k, 1.645);
   }
   ASSERT_THAT(read.images, SizeIs(run.images.size()));
   EXPECT_EQ(read.images[1].refused, "too dark");
@@ -155,8 +162,29 @@ TEST(Spool, IsNotHeldUpByWhatIsNoRun) {
   folder.file("spool/0.json", "{}\n");
   folder.file("spool/.1.json.tmp-1-0", "{");
   spool.deliver();
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("0.json")));
   EXPECT_THAT(whole_runs(where), SizeIs(1));
+  EXPECT_THAT(spool.state(), AllOf(HasSubstr("0.json: is no run"), Not(HasSubstr("waiting"))));
+  fs::remove(where);  // away
+  Spool other(folder / "spool", where);
+  other.keep(numbered_run(2));
+  other.deliver();
+  EXPECT_THAT(other.state(), AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("records.db"),
+                                   HasSubstr("; "), HasSubstr("0.json: is no run")));
+}
+
+TEST(Spool, ReadsAFileAgainThatCouldNotBeRead) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "away/records.db").string();
+  Spool spool(folder / "spool", where);
+  const std::string text = text_of_run({numbered_run(1), identity_of_database(where)});
+  fs::create_directory(folder / "spool");
+  folder.file("spool/1.json", text.substr(0, text.size() / 2));
+  EXPECT_THAT(spool.waiting(), IsEmpty());
+  EXPECT_THAT(spool.state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
+  folder.file("spool/1.json", text);
+  EXPECT_THAT(spool.waiting(), SizeIs(1));
+  EXPECT_EQ(spool.owner_of("digest-1-7", "b"), "camera camera-1: run " + numbered_run(1).run);
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), Not(HasSubstr("1.json"))));
 }
 
 TEST(Spool, ThatCannotBeWrittenPassesRunsOn) {
@@ -192,6 +220,41 @@ TEST(Spool, BringsRunsToTheRecordsTheyAreFor) {
   Spool(folder / "spool", (folder / "spool/../a.db").string()).deliver();
   EXPECT_EQ(whole_runs(a), std::set<std::string>{numbered_run(1).run});
   EXPECT_EQ(of_b.state(), "");
+}
+
+/// Does `action` on a machine of another name; whether there can be one here.
+template <typename Action>
+bool on_another_machine(const Action& action) {
+  constexpr int not_permitted = 3;
+  const std::string name = "another";
+  const pid_t child = start_child([&] {
+    // The name of this process alone, or none.
+    if (::unshare(CLONE_NEWUTS) != 0) ::_exit(not_permitted);
+    if (::sethostname(name.data(), name.size()) != 0) ::_exit(not_permitted);
+    action();
+  });
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  const bool permitted = WEXITSTATUS(status) != not_permitted;
+  EXPECT_TRUE(!permitted || status == 0);
+  return permitted;
+}
+
+/// Two machines that share the folder, and have records of their own at the same path.
+TEST(Spool, BringsRunsToNoRecordsOfAnotherMachine) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  { const Records made(where); }
+  const bool permitted =
+      on_another_machine([&] { Spool(folder / "spool", where).keep(numbered_run(1)); });
+  if (!permitted) GTEST_SKIP() << "a process cannot have a machine's name of its own here";
+  Spool here(folder / "spool", where);
+  here.prepare();
+  EXPECT_THAT(whole_runs(where), IsEmpty());
+  EXPECT_EQ(here.state(), "1 here for other records, such as another:" + where);
+  on_another_machine([&] { Spool(folder / "spool", where).deliver(); });
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+  EXPECT_EQ(here.state(), "");
 }
 
 TEST(Spool, LosesNoSecondVerdictOfARun) {
@@ -374,6 +437,10 @@ TEST(Spool, OutlastsItsServer) {
   const auto spool = [&] { return Spool(folder / "spool", where); };
   kill_while_keeping(folder, where, 5);
   const std::size_t before = whole_runs(where).size();
+  const auto deliver_to = [&](std::size_t count) {
+    Spool(spool()).deliver();
+    EXPECT_THAT(whole_runs(where), SizeIs(before + count));
+  };
 
   // Stopped before the record; new units begin.
   Spool running = spool();
@@ -389,8 +456,7 @@ TEST(Spool, OutlastsItsServer) {
   begun.deliver();
   EXPECT_THAT(begun.state(), StartsWith("kept here, 2 waiting: "));
   server.start();
-  Spool(spool()).deliver();
-  EXPECT_THAT(whole_runs(where), SizeIs(before + 2));
+  deliver_to(2);
 
   // Frozen, with a connection and without: nobody waits for it without a word, nor twice.
   Spool connected = spool();
@@ -408,8 +474,7 @@ TEST(Spool, OutlastsItsServer) {
   EXPECT_LT(seconds_of([&] { fresh.prepare(); }), 8);
   EXPECT_THAT(fresh.state(), StartsWith("kept here, 1 waiting: "));
   server.thaw();
-  Spool(spool()).deliver();
-  EXPECT_THAT(whole_runs(where), SizeIs(before + 3));
+  deliver_to(3);
   // Once, too, while several wait.
   Spool several = spool();
   several.prepare();
@@ -419,8 +484,7 @@ TEST(Spool, OutlastsItsServer) {
   EXPECT_THAT(several.state(),
               AllOf(StartsWith("kept here, 6 waiting: "), HasSubstr("has not answered for 2 s")));
   server.thaw();
-  Spool(spool()).deliver();
-  EXPECT_THAT(whole_runs(where), SizeIs(before + 9));
+  deliver_to(9);
 
   // Killed in the middle of many.
   for (int i = 0; i < 200; ++i) fresh.keep(numbered_run(1'000'000 + i));

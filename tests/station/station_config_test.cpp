@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "support/datasets.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
 
@@ -60,6 +61,45 @@ TEST_F(StationYaml, RefusesWhatNoStationCanMean) {
 TEST_F(StationYaml, RefusesATypeWithoutRowTime) {
   change("camera_type.yaml", "  row_time_s: 3.0e-05\n", "");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("camera_type"), HasSubstr("row_time_s")));
+}
+
+TEST_F(StationYaml, HasGuardBandsWhereUncertaintiesAreStated) {
+  change("station.yaml", "\nrecords: records.db",
+         "\nguard_bands: {k: 1.645, standard_uncertainties: {check_mean_mm: 0.02}}"
+         "\nrecords: records.db");
+  for (const Gate& gate : read_station(folder / "station.yaml").gates) {
+    ASSERT_EQ(gate.guard.has_value(), gate.metric == "check_mean_mm") << gate.metric;
+    if (!gate.guard) continue;
+    EXPECT_EQ(gate.guard->standard_uncertainty, 0.02);
+    EXPECT_EQ(gate.guard->k, 1.645);
+  }
+  const auto refused = [&](const std::string& from, const std::string& to) {
+    const std::string before = TemporaryFolder::content_of(folder / "station.yaml");
+    change("station.yaml", from, to);
+    const std::string why = refusal();
+    folder.file("station.yaml", before);
+    return why;
+  };
+  EXPECT_THAT(refused("k: 1.645, standard", "standard"), HasSubstr("guard_bands: key 'k'"));
+  EXPECT_THAT(refused("{check_mean_mm: 0.02}", "{check_offset_mm: 0.02}"),
+              HasSubstr("check_offset_mm"));
+  EXPECT_THAT(refused("{check_mean_mm: 0.02}", "{}"), HasSubstr("names no gate"));
+  EXPECT_THAT(refused("check_mean_mm: 0.02", "check_mean_mm: 0"), HasSubstr("above 0"));
+  EXPECT_THAT(refused("check_mean_mm: 0.02", "check_mean_mm: 0.62"),
+              AllOf(HasSubstr("standard_uncertainties.check_mean_mm"),
+                    HasSubstr("leaves nothing within the gate")));
+  EXPECT_THAT(refused("check_mean_mm: 0.02", "check_lamps: 0.04"),
+              HasSubstr("leaves nothing within the gate"));
+}
+
+TEST_F(StationYaml, RefusesAGoldenUnitWithoutRowTime) {
+  folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
+  change("station.yaml", "records: records.db",
+         "records: records.db\n"
+         "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
+  EXPECT_TRUE(read_station(folder / "station.yaml").golden);
+  change("golden.yaml", "  row_time_s: 0.00003\n", "");
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("golden.calibration"), HasSubstr("row_time_s")));
 }
 
 TEST_F(StationYaml, RefusesAnUnknownDatabase) {

@@ -11,11 +11,11 @@
 namespace vlp {
 
 /// The message with which `read` is refused; empty when it is not.
-template <typename Read>
+template <typename Error = InputError, typename Read>
 std::string refusal_of(const Read& read) {
   try {
     read();
-  } catch (const InputError& error) {
+  } catch (const Error& error) {
     return error.what();
   }
   return "";

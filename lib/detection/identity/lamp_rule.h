@@ -13,6 +13,10 @@ namespace vlp {
 /// it may be taken for another.
 inline constexpr double kLampDrift = 0.015;
 
+/// How far a light may be from a lamp's frequency, as a share of it, when its stripes are few or
+/// unclear; those that are not may be farther.
+inline constexpr double kMostOffUnclear = 0.025;
+
 /// How much nearer in duty a light has to be to one lamp than to another: saturation and blur
 /// change the duty that is seen by up to about half of it.
 inline constexpr double kDutyMargin = 0.15;

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/database_name.h"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+#include <string>
+
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+/// What libpq takes where a connection string says nothing.
+struct IdentityOfDatabase : testing::Test {
+  IdentityOfDatabase() {
+    for (const char* name : {"PGHOST", "PGHOSTADDR", "PGPORT", "PGDATABASE", "PGSERVICE"}) {
+      ::unsetenv(name);
+    }
+    ::setenv("PGUSER", "operator", 1);
+    std::array<char, 256> name{};
+    EXPECT_EQ(::gethostname(name.data(), name.size() - 1), 0);
+    here = std::string(name.data()) + ":";
+  }
+  ~IdentityOfDatabase() override { ::unsetenv("PGUSER"); }
+  std::string here;
+};
+
+TEST_F(IdentityOfDatabase, OfAFileHasMachineAndWholePath) {
+  EXPECT_EQ(identity_of_database("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
+  EXPECT_EQ(identity_of_database("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
+}
+
+TEST_F(IdentityOfDatabase, TellsServersApart) {
+  const auto of = [](const std::string& where) { return identity_of_database(where); };
+  EXPECT_EQ(of("postgresql://u@db/vlp"), "postgresql://db/vlp");
+  EXPECT_EQ(of("postgres://other:secret@db:5432/vlp?connect_timeout=2"), of("postgresql://db/vlp"));
+  EXPECT_NE(of("postgresql://db:5433/vlp"), of("postgresql://db/vlp"));
+  EXPECT_NE(of("postgresql:///vlp?hostaddr=10.0.0.1"), of("postgresql:///vlp?hostaddr=10.0.0.2"));
+  EXPECT_NE(of("postgresql:///vlp?service=a"), of("postgresql:///vlp?service=b"));
+  // Without a name the database is that of the user.
+  EXPECT_EQ(of("postgresql://a@db"), "postgresql://db/a");
+  EXPECT_NE(of("postgresql://a@db"), of("postgresql://b@db"));
+  EXPECT_EQ(of("postgresql://db"), "postgresql://db/operator");
+  ::setenv("PGDATABASE", "vlp", 1);
+  EXPECT_EQ(of("postgresql://db"), of("postgresql://db/vlp"));
+}
+
+/// Two machines that share a folder have each a server of their own.
+TEST_F(IdentityOfDatabase, OfAServerWithoutANetworkHasTheMachine) {
+  for (const char* where :
+       {"postgresql:///vlp", "postgresql://localhost/vlp", "postgresql://127.0.0.1:5544/vlp",
+        "postgresql:///vlp?host=/run/postgresql", "postgresql://db/vlp?hostaddr=127.0.0.1"}) {
+    EXPECT_THAT(identity_of_database(where), StartsWith(here + "postgresql://")) << where;
+  }
+  EXPECT_THAT(identity_of_database("postgresql:///vlp?hostaddr=10.0.0.1"), Not(StartsWith(here)));
+}
+
+TEST_F(IdentityOfDatabase, HasNoPassword) {
+  for (const char* where : {"postgresql://u:secret@db", "postgresql://u@db/vlp?password=secret"}) {
+    EXPECT_THAT(identity_of_database(where), Not(HasSubstr("secret")));
+  }
+  EXPECT_THAT(refusal_of([] { identity_of_database("postgresql://u:a@secret@/db"); }),
+              testing::AllOf(HasSubstr("is not of the form"), Not(HasSubstr("secret"))));
+}
+
+}  // namespace
+}  // namespace vlp
