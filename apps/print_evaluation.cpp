@@ -100,10 +100,9 @@ void print_ratios(const Evaluation& evaluation) {
     fmt::print(" (errors within 1.96 sd; those of one calibration go together)\n");
   }
   if (const auto& limit = evaluation.limit) {
-    fmt::print(
-        "limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
-        limit->horizontal,
-        limit->beaten() ? "beaten: the stated noise is too large" : "1: the best there can be");
+    fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
+               limit->horizontal,
+               limit->beaten() ? "beaten: see the warning" : "1: the best of one level image");
   }
 }
 

@@ -189,7 +189,8 @@ std::string zsh_option(const CLI::Option& option) {
   for (const std::string& name : names) list.append(list.empty() ? "" : ",").append(name);
   spec.append(names.size() > 1 ? "{" + list + "}" : list).append("'[" + text + "]");
   const Value value = value_of(option);
-  for (int i = 0; i < (value == Value::none ? 0 : std::max(1, option.get_type_size())); ++i) {
+  const int values = value == Value::none ? 0 : std::max(1, option.get_items_expected_min());
+  for (int i = 0; i < values; ++i) {
     spec.append(":value:");
     if (value == Value::choice) spec.append("(" + in_words(choices_of(option)) + ")");
     if (value == Value::file) spec.append("_files");
@@ -262,7 +263,7 @@ std::string bash_completion(const CLI::App& app) {
       text.append("      ;;\n");
     }
     text.append("    *)\n").append(bash_options(app, "      "));
-    text.append("      words='" + in_words(names) + "'\n      ;;\n  esac\n");
+    text.append("      [ \"$value\" ] || words='" + in_words(names) + "'\n      ;;\n  esac\n");
   } else {
     text.append(bash_options(app, "  "));
   }

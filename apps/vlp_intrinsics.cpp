@@ -7,7 +7,9 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app.h"
@@ -71,6 +73,26 @@ void write_exports(const Options& options, const Camera& camera) {
 
 bool chooses_lens(const Options& options) { return options.lens == kChosenLens; }
 
+/// Every file that is written, and the option that names it: none may be an input, nor two one.
+void check_outputs(const Options& options, const std::vector<std::string>& inputs) {
+  const std::vector<std::pair<std::string, std::string>> outputs{
+      {"--output", options.output},
+      {"--output's .cameramodel", beside(options.output, ".cameramodel")},
+      {"--output's .corners.vnl", beside(options.output, ".corners.vnl")},
+      {"--ros", options.ros},
+      {"--kalibr", options.kalibr},
+      {"--opencv", options.opencv},
+      {"--plot", options.plot}};
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const auto& [option, file] = outputs[i];
+    check_output(file, inputs);
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!same_file(file, outputs[k].second)) continue;
+      throw std::invalid_argument(fmt::format("{} and {} name one file", outputs[k].first, option));
+    }
+  }
+}
+
 /// Throws std::invalid_argument for a format that has no lens model like the camera's, before
 /// anything is written.
 void check_exports(const Options& options, Camera camera) {
@@ -92,14 +114,7 @@ void run(const CLI::App& app, const Options& options) {
   const auto images = image_files(options.images);
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
-  for (const std::string& output : {options.output, beside(options.output, ".cameramodel"),
-                                    beside(options.output, ".corners.vnl")}) {
-    check_output(output, inputs);
-  }
-  check_further_output("--ros", options.ros, options.output, inputs);
-  check_further_output("--kalibr", options.kalibr, options.output, inputs);
-  check_further_output("--opencv", options.opencv, options.output, inputs);
-  check_further_output("--plot", options.plot, options.output, inputs);
+  check_outputs(options, inputs);
   const Board board = read_board(options.board);
   const SeenBoards seen = boards_in(images, board, options);
   tell(seen);
@@ -109,6 +124,7 @@ void run(const CLI::App& app, const Options& options) {
                                      history_entry(app, inputs));
   tell(lens);
   require(lens);
+  check_exports(options, lens.calibration.camera);  // of a lens that was chosen
   write_calibration(options.output, lens.calibration);
   if (has_mrcal(lens.calibration.camera.lens_model)) {
     write_cameramodel(beside(options.output, ".cameramodel"), lens.solution);

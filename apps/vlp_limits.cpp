@@ -19,6 +19,7 @@
 #include "positioning/floor_summary.h"
 #include "report/plots/floor_plot.h"
 #include "rig/input_error.h"
+#include "session/locate_step.h"
 
 namespace vlp {
 namespace {
@@ -46,7 +47,7 @@ void write_map(const std::string& file, const FloorLimits& limits) {
     std::vector<std::string> row{at(position_m.x()), at(position_m.y()), at(position_m.z()),
                                  at(yaw_rad), std::to_string(place.lamps)};
     if (!place.parts.empty()) {
-      const Eigen::Vector4d sd = place.total().diagonal().cwiseSqrt();
+      const Eigen::Vector4d sd = place.total().diagonal().cwiseMax(0).cwiseSqrt();
       for (const double one : sd) row.push_back(at(one));
       for (const Matrix4& part : place.parts) row.push_back(at(spread_of(part).horizontal_m));
       row.push_back(at(spread_of(place.total()).horizontal_m));
@@ -123,6 +124,9 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
   if (!unstated.empty()) {
     spdlog::warn("{}: the errors are not stated, and count as none", unstated);
   }
+  if (const int elsewhere = unit.common().lamps_elsewhere(); elsewhere > 0) {
+    spdlog::warn(words_of_lamps_elsewhere(elsewhere));
+  }
   return unit;
 }
 
@@ -141,7 +145,7 @@ FloorLimits limits_of(const Options& options, const LampMap& lamps, const FloorG
 void run(const Options& options) {
   check_output(options.map, {options.lamps, options.calibration});
   check_output(options.picture, {options.lamps, options.calibration});
-  if (!options.map.empty() && options.map == options.picture) {
+  if (same_file(options.map, options.picture)) {
     throw std::invalid_argument("--map and --picture name one file");
   }
   const LampMap lamps = read_lamp_map(options.lamps);
@@ -170,8 +174,8 @@ int main(int argc, char** argv) {
       "The theoretical limit of positioning over a floor, and the error budget: what pixel noise,\n"
       "image centre, tilt and lamp map each do to a fix; or, with --stated, what a calibration "
       "and\n"
-      "its lamp map say of their own errors, and so what to improve first. Nothing better can be\n"
-      "reached with that pixel noise, whatever the method.\n\n"
+      "its lamp map say of their own errors, and so what to improve first. With that pixel noise\n"
+      "no method reaches better from one image of a level camera.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-limits --lamps datasets/example/lamps.yaml \\\n"
       "    --calibration datasets/example/calibration.yaml --height-m 0 \\\n"

@@ -33,8 +33,9 @@ std::string caution_of_limit(const Evaluation& evaluation) {
   if (!limit || !limit->beaten()) return "";
   constexpr int digits = 3;
   return "the errors are " + significant(limit->horizontal, digits) +
-         " times the theoretical limit, which nothing beats: the stated noise of a lamp's pixel is "
-         "too large";
+         " times the theoretical limit: either the noise of a lamp's pixel is stated too large, or "
+         "the fixes use more than one image of a level camera shows of lamps that are whole in it "
+         "(other frames, a known height, lamps partly in view, a camera that leans)";
 }
 
 std::vector<std::string> cautions_of_few(const Evaluation& evaluation) {

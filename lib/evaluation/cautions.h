@@ -14,8 +14,8 @@ namespace vlp {
 /// capture has a fix, when such a gate asks, and without gates, as nothing passes then.
 std::string unasked_missing(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
-/// That the theoretical limit is beaten, which no method does: the noise it is of is stated too
-/// large; empty when it is not. Without a full stop.
+/// That the theoretical limit is beaten: the noise it is of is stated too large, or the fixes use
+/// more than what it is of, one image of a level camera; empty when it is not. Without a full stop.
 std::string caution_of_limit(const Evaluation& evaluation);
 
 /// What so few stations or captures (or, of a comparison, pairs' ones) mean for the intervals and

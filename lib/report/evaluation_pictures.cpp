@@ -64,7 +64,7 @@ std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, co
       "Where the uncertainty comes from", {"noise", "lens", "zenith", "offset", "lamp map"}, {}};
   const auto horizontal = [](const Eigen::Vector4d& sd) { return sd.head<2>().squaredNorm(); };
   for (const FixRow& row : fixes) {
-    if (!row.fix || !row.fix->sd || !row.fix->noise_sd) continue;
+    if (!row.fix || !row.fix->sd || !row.fix->noise_sd || row.fix->inclination) continue;
     auto seen = unit.lamps_seen_from(row.fix->pose);
     std::erase_if(seen, [&](std::size_t lamp) {
       const auto& left_out = row.rejected;

@@ -19,8 +19,10 @@ std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
                                                const Evaluation& evaluation, const LampMap& lamps);
 
 /// What the stated uncertainty of fixes comes from, horizontally: of each its noise, and the part
-/// of calibration and map, divided as a fix from all lamps in view there, without those that were
-/// left out, would be (UnitErrors). Nothing when no fix states such a part. Throws InputError, see
+/// of calibration and map, divided as a level camera's fix from all lamps in view there, without
+/// those that were left out, would be (UnitErrors). Fixes whose lean was estimated, of which that
+/// is not true, are left out. Precondition, which the fixes do not tell: they are of the camera,
+/// not of a robot's centre. Nothing when no fix states such a part. Throws InputError, see
 /// svg_of().
 std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, const LampMap& lamps,
                                             const Calibration& calibration);

@@ -53,7 +53,8 @@ constexpr std::array<Kind, 8> kKinds = {
      {"budget", ReportPart::distribution,
       "What the uncertainty of the fixes comes from, as they state it: noise, which averages out, "
       "below, and what calibration and lamp map leave, which does not, above it. The largest part "
-      "is to be improved first.",
+      "is to be improved first. It is divided as for a level camera whose fixes are its own place: "
+      "fixes with an estimated lean are left out, and of a robot's centre it does not hold.",
       "Stacked horizontal variances of the fixes by their sources."},
      {"track", ReportPart::tracks,
       "Above: the commanded line and the fixes on the floor. Below: how far they are to the left "

@@ -185,11 +185,7 @@ void warn_of_noise(LocateResult& result, const std::vector<Frame>& frames) {
 
 void warn_of_map(LocateResult& result, const LocateInput& input) {
   const int elsewhere = Positioner(input.lamps, input.calibration, input.how).lamps_elsewhere();
-  if (elsewhere == 0) return;
-  result.warnings.push_back(fmt::format(
-      "{} lamps are elsewhere than in the adjustment of the calibration, and sd does not "
-      "know how well they are: give the map that vlp-adjust --refine-map wrote with it",
-      elsewhere));
+  if (elsewhere > 0) result.warnings.push_back(words_of_lamps_elsewhere(elsewhere));
 }
 
 void warn_of_image(LocateResult& result, const LocateInput& input) {
@@ -349,6 +345,13 @@ void tell_of_lamps_left_out(LocateResult& result, const LocateInput& input) {
 }
 
 }  // namespace
+
+std::string words_of_lamps_elsewhere(int lamps) {
+  return fmt::format(
+      "{} lamps are elsewhere than in the adjustment of the calibration, and sd does not "
+      "know how well they are: give the map that vlp-adjust --refine-map wrote with it",
+      lamps);
+}
 
 LocateResult locate_frames(const LocateInput& input) {
   check_row_time(input);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "captures/captures_table.h"
@@ -56,5 +57,8 @@ struct LocateResult : StepResult {
 /// explain, of detections outside the image or where the lens is not known (region_px), of images
 /// that `captures` lacks, of lamps left out. undetermined: no frame has a fix.
 LocateResult locate_frames(const LocateInput& input);
+
+/// The warning of Positioner::lamps_elsewhere(), of one or more.
+std::string words_of_lamps_elsewhere(int lamps);
 
 }  // namespace vlp

@@ -47,6 +47,10 @@ sed -n '/^```c$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/robot
 # shellcheck disable=SC2086 # several words each
 cc -std=c99 -Wall -Wextra -Wpedantic -Werror $flags "$scratch/robot.c" $libs -o "$scratch/robot-in-c"
 grep '^x ' <<<"$("$scratch/robot-in-c")"
+sed -n '/^```c++$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/ros_node.cpp"
+# shellcheck disable=SC2086 # several words each
+c++ -std=c++17 -Wall -Wextra -Werror -fsyntax-only $flags $eigen -I"$scratch/installed/include" \
+  -I"$source_dir/tests/consumer/ros" "$scratch/ros_node.cpp"
 same=$source_dir/tests/consumer/same_fix/same_fix
 first=''
 same_fix() {  # COMPILER OPTIONS...

@@ -4,6 +4,7 @@
 /// page and what the shells complete say the same.
 #include <gmock/gmock.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <regex>
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/reference.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -172,6 +174,36 @@ TEST(Completion, KnowsChoicesCommandsAndFiles) {
               testing::ElementsAre((folder / "lamps.yaml").string()));
   EXPECT_THAT(completed("vlp-locate", begin), testing::SizeIs(1));
   EXPECT_THAT(completed("vlp-locate", "--sigma-px " + begin), testing::ElementsAre(""));
+}
+
+/// No program with commands has an option with choices beside them: here is one.
+TEST(Completion, PrefersAnOptionsChoicesToCommands) {
+  CLI::App app("Tests.", "vlp-odd");
+  std::string kind;
+  double size = 0;
+  app.add_option("--kind", kind)->check(CLI::IsMember({"red", "blue"}));
+  app.add_option("--size", size);
+  app.add_subcommand("run", "Runs.");
+  const TemporaryFolder folder;
+  const std::string script = folder.file("odd.bash", bash_completion(app)).string();
+  const auto offered = [&](const std::string& words) {
+    return lines_of(run_program("bash -c 'source " + script + "; COMP_WORDS=(vlp-odd " + words +
+                                "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _vlp_odd; "
+                                "printf \"%s\\n\" \"${COMPREPLY[@]}\"'")
+                        .output);
+  };
+  EXPECT_THAT(offered("--kind \"\""), testing::UnorderedElementsAre("red", "blue"));
+  EXPECT_THAT(offered("--size \"\""), testing::ElementsAre(""));
+  EXPECT_THAT(offered("\"\""), testing::ElementsAre("run"));
+}
+
+/// An option of four numbers takes four words, not one.
+TEST(Completion, LeavesZshAllValuesOfAnOption) {
+  const auto zsh = run_program("vlp-limits --reference zsh").output;
+  const auto begin = zsh.find("--floor-m");
+  const std::string floor = zsh.substr(begin, zsh.find('\n', begin) - begin);
+  EXPECT_THAT(floor, HasSubstr(":value::value::value::value:'"));
+  EXPECT_THAT(floor, testing::Not(HasSubstr(":value::value::value::value::value:")));
 }
 
 INSTANTIATE_TEST_SUITE_P(

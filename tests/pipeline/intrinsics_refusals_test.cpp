@@ -46,6 +46,22 @@ TEST_F(IntrinsicsRefusals, RefusesOneViewAndViewsAllAlike) {
   EXPECT_FALSE(fs::exists(folder / "camera.yaml"));
 }
 
+TEST_F(IntrinsicsRefusals, WritesNoTwoOfItsFilesToOne) {
+  const std::string images = copies({"0.png"}), board = kRig + "/board.yaml";
+  const auto refusal_of = [&](const std::string& ros, const std::string& kalibr) {
+    const auto result = calibrate(images, board,
+                                  "--lens LENSMODEL_OPENCV4 --ros " + (folder / ros).string() +
+                                      " --kalibr " + (folder / kalibr).string());
+    EXPECT_EQ(result.exit_code, 2);
+    return result.errors;
+  };
+  EXPECT_THAT(refusal_of("a.yaml", "./a.yaml"), HasSubstr("--ros and --kalibr name one file"));
+  EXPECT_THAT(refusal_of("images/../camera.yaml", "a.yaml"),
+              HasSubstr("--output and --ros name one file"));
+  EXPECT_THAT(refusal_of("a.yaml", "camera.cameramodel"),
+              HasSubstr("--output's .cameramodel and --kalibr name one file"));
+}
+
 TEST_F(IntrinsicsRefusals, SaysWhyThereAreNoTags) {
   const std::string board = kRig + "/board.yaml";
   const auto lamps = calibrate(kRig + "/sample", board);

@@ -73,6 +73,15 @@ TEST_P(RenderedRig, GivesItsLensWhateverTheThreads) {
   EXPECT_THAT(gated.output, HasSubstr("held out      6 views"));
   EXPECT_EQ(read_calibration(folder / "camera.yaml").intrinsics_report->views, 30);
 
+  // A format may lack the lens that is chosen: nothing is written then.
+  fs::remove(folder / "camera.yaml");
+  const auto chosen =
+      calibrate(rig + "/boards/000?.png", board,
+                "--lens auto --kalibr " + (folder / "kalibr.yaml").string() + " --cache " + cache);
+  EXPECT_EQ(chosen.exit_code, 2) << chosen.output;
+  EXPECT_THAT(chosen.errors, HasSubstr("Kalibr has no lens model like LENSMODEL_"));
+  EXPECT_FALSE(fs::exists(folder / "camera.yaml"));
+
   // mrcal's own uncertainty of the model, where mrcal for Python is installed.
   if (run_program("/usr/bin/python3 -c 'import mrcal'").exit_code != 0) return;
   const auto oracle =

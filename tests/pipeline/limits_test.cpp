@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "captures/csv_reader.h"
+#include "positioning/stated_rig.h"
 #include "rig/stage.h"
 #include "support/program.h"
 #include "support/synthetic_rig.h"
@@ -90,6 +91,33 @@ TEST_F(StatedLimits, SayWhatToImproveFirst) {
   }
 }
 
+TEST_F(StatedLimits, OfACameraFromTheBoardsAloneAreThoseOfItsLens) {
+  calibration.rotation_center.reset();
+  calibration.intrinsics_report = IntrinsicsReport{10, 1000, 0, 0.1, {}, {}};
+  calibration.intrinsics_report->covariance = MatrixX(1e-6 * MatrixX::Identity(12, 12));
+  for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();
+  const auto result = run("--stated");
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("\nlens  "));
+  EXPECT_THAT(result.output, HasSubstr("improve     lens first"));
+  EXPECT_THAT(result.errors, HasSubstr("zenith, lamp map: the errors are not stated"));
+}
+
+TEST_F(StatedLimits, TellOfLampsThatTheMapHasElsewhere) {
+  StatedRig rig;
+  rig.adjust(1);
+  lamps = rig.map;
+  calibration.adjustment = rig.calibration.adjustment;
+  calibration.adjustment->sets = {"turn"};
+  EXPECT_THAT(run("--stated").errors, testing::Not(HasSubstr("elsewhere")));
+  lamps.lamps[2].position_m.x() += 0.01;
+  lamps.lamps[2].sd_m = 0.002;
+  const auto result = run("--stated");
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.errors,
+              HasSubstr("1 lamps are elsewhere than in the adjustment of the calibration"));
+}
+
 TEST_F(StatedLimits, WantErrorsThatAreStatedOnce) {
   EXPECT_EQ(run("--stated --tilt-deg 1").exit_code, 2);
   calibration.rotation_center->covariance.reset();
@@ -112,6 +140,15 @@ TEST(Limits, WritesNothingWhenItsPictureCannotBe) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("should end in .png or .svg"));
   EXPECT_FALSE(std::filesystem::exists(map));
+}
+
+TEST(Limits, WritesNoTwoResultsToOneFile) {
+  const TemporaryFolder folder;
+  const auto result = run_program("cd '" + (folder / "").string() + "' && " + kLimits +
+                                  "--map a.svg --picture ./a.svg");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("--map and --picture name one file"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.svg"));
 }
 
 TEST(Limits, NoticesWhenItsResultsAreLost) {

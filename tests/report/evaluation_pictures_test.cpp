@@ -81,6 +81,20 @@ TEST(EvaluationPictures, ShowsWhereTheStatedUncertaintyComesFrom) {
   EXPECT_THAT(picture->alt, HasSubstr("noise 9 %, lens 0 %, zenith "));
 }
 
+/// Of a camera that leans nobody knows how its uncertainty divides.
+TEST(EvaluationPictures, LeavesFixesWithALeanOutOfTheBudget) {
+  const StatedRoom room;
+  auto fixes = room.fixes();
+  fixes[1].fix->sd = Eigen::Vector4d(1e-2, 1e-2, 2e-2, 2e-3);
+  fixes[1].fix->inclination = Inclination{0.1, 0};
+  const auto picture = budget_picture(fixes, room.lamps, room.calibration);
+  ASSERT_TRUE(picture);
+  EXPECT_THAT(picture->image, HasSubstr("noise, 9 %"));
+  EXPECT_THAT(picture->caption, HasSubstr("as for a level camera"));
+  fixes[0].fix->inclination = Inclination{0, 0};
+  EXPECT_FALSE(budget_picture(fixes, room.lamps, room.calibration));
+}
+
 TEST(EvaluationPictures, ShowsNoBudgetOfWhatIsNotStated) {
   StatedRoom room;
   EXPECT_FALSE(budget_picture(room.fixes(), {}, room.calibration));

@@ -34,7 +34,8 @@ std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
 /// Errors in units of the theoretical limit.
 struct LimitRatio {
   /// sqrt(mean |error|^2 / mean (limit)^2), horizontal: 1 is the best that any unbiased method
-  /// reaches with this noise.
+  /// reaches with this noise from one image of a level camera, without what else may be known:
+  /// other frames, a height, lamps that are partly in view.
   double horizontal;
   /// Root of the mean squared limit of those fixes, x and y together.
   double limit_m;
