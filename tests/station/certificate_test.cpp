@@ -34,7 +34,7 @@ Calibration measured() {
   return calibration;
 }
 
-RunRecord passed() {
+RunRecord certified_run() {
   RunRecord record;
   record.run = "20261121T134501Z-0001";
   record.kind = "unit";
@@ -95,8 +95,8 @@ TEST(CertifiedValues, HaveTheUncertaintiesOfTheCalibration) {
 }
 
 TEST(Certificate, HasWhatARecordHas) {
-  const std::string page = certificate(passed(), measured());
-  EXPECT_EQ(certificate(passed(), measured()), page);
+  const std::string page = certificate(certified_run(), measured());
+  EXPECT_EQ(certificate(certified_run(), measured()), page);
   EXPECT_THAT(
       page, AllOf(HasSubstr("Calibration certificate: camera &lt;0001&gt;"), HasSubstr("conforms"),
                   HasSubstr("20261121T134501Z-0001"), HasSubstr("2026-11-21T13:50:01Z"),
@@ -112,7 +112,7 @@ TEST(Certificate, HasWhatARecordHas) {
 }
 
 TEST(Certificate, SaysThatAUnitDoesNotConform) {
-  RunRecord record = passed();
+  RunRecord record = certified_run();
   record.figures[0].value = 0.4;
   record.judge({{"the lens is poor", true}});
   EXPECT_THAT(certificate(record, measured()),
@@ -124,17 +124,17 @@ TEST(Certificate, IsRefusedWhereThereCanBeNone) {
   const auto refusal = [](const RunRecord& record) {
     return refusal_of([&] { certificate(record, measured()); });
   };
-  RunRecord golden = passed();
+  RunRecord golden = certified_run();
   golden.kind = "golden";
   EXPECT_THAT(refusal(golden), HasSubstr("is of the golden unit"));
-  RunRecord invalid = passed();
+  RunRecord invalid = certified_run();
   invalid.judge({{"lamp 5 is loose", false}});
   EXPECT_THAT(refusal(invalid),
               AllOf(HasSubstr("20261121T134501Z-0001"), HasSubstr("not judged (lamp 5 is loose)")));
-  RunRecord changed = passed();
+  RunRecord changed = certified_run();
   changed.figures[0].value = 0.4;
   EXPECT_THAT(refusal(changed), HasSubstr("it was changed by hand: it has no certificate"));
-  RunRecord without = passed();
+  RunRecord without = certified_run();
   without.calibration.clear();
   EXPECT_THAT(refusal(without), HasSubstr("came to no calibration"));
 }

@@ -453,15 +453,17 @@ MatrixX stated_lens_covariance(const Camera& camera, double sd_px) {
   constexpr int across = 16;
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(std::ssize(camera.intrinsics));
   int rays = 0;
-  for (int i = 0; i < across * across; ++i) {
-    const Eigen::Vector2d share((i % across + 0.5) / across, (i / across + 0.5) / across);
-    const auto ray = lens.unproject(
-        {share.x() * camera.imager_px[0] - 0.5, share.y() * camera.imager_px[1] - 0.5});
-    if (!ray) continue;
-    const auto seen = lens.project_with_jacobians(ray->direction);
-    if (!seen) continue;
-    squares += seen->d_pixel_d_parameters.colwise().squaredNorm().transpose() / 2;
-    ++rays;
+  for (int row = 0; row < across; ++row) {
+    for (int column = 0; column < across; ++column) {
+      const Eigen::Vector2d share((column + 0.5) / across, (row + 0.5) / across);
+      const auto ray = lens.unproject(
+          {share.x() * camera.imager_px[0] - 0.5, share.y() * camera.imager_px[1] - 0.5});
+      if (!ray) continue;
+      const auto seen = lens.project_with_jacobians(ray->direction);
+      if (!seen) continue;
+      squares += seen->d_pixel_d_parameters.colwise().squaredNorm().transpose() / 2;
+      ++rays;
+    }
   }
   // A lens that shows no ray of the image stays as it is.
   const Eigen::ArrayXd variances = sd_px * sd_px * rays / squares.array();
