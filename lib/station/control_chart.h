@@ -52,8 +52,8 @@ struct ChartAlarm {
 };
 
 /// Alarms in the order of the values, by rules of these names; "western-electric" and "nelson" are
-/// all of them, "ewma" is the average with weight 0.3. Values that are all equal have none. Throws std::invalid_argument for another
-/// name.
+/// all of them, "ewma" is the average with weight 0.3. Values that are all equal have none. Throws
+/// std::invalid_argument for another name.
 std::vector<ChartAlarm> chart_alarms(std::span<const double> values,
                                      const std::vector<std::string>& rules);
 

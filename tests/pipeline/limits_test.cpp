@@ -93,6 +93,7 @@ TEST_F(StatedLimits, SayWhatToImproveFirst) {
 
 TEST_F(StatedLimits, OfACameraFromTheBoardsAloneAreThoseOfItsLens) {
   calibration.rotation_center.reset();
+  calibration.history.clear();  // it names the centre
   calibration.intrinsics_report = IntrinsicsReport{10, 1000, 0, 0.1, {}, {}};
   calibration.intrinsics_report->covariance = MatrixX(1e-6 * MatrixX::Identity(12, 12));
   for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();

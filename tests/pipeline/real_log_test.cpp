@@ -155,8 +155,8 @@ double path_over_fixes(const std::vector<Eigen::Vector2d>& driven,
 
 /// The path is 5 to 6 % longer than fixes with the lens that is given with the log. With a lens
 /// that the log itself tells it is within 2 %, the pixels are square, which nobody told it, the
-/// residuals are little more than the rounding to whole pixels (0.29 px), and the distances are
-/// what the fixes state.
+/// residuals are little more than the rounding to whole pixels (0.41 px, of both axes), and the
+/// distances are what the fixes state.
 TEST_F(RealLog, IsOfAnotherLensThanIsGivenWithIt) {
   ASSERT_EQ(level().exit_code, 0);
   const auto adjusted = [&](const std::string& options) {
@@ -186,7 +186,7 @@ TEST_F(RealLog, IsOfAnotherLensThanIsGivenWithIt) {
   EXPECT_NEAR(scale(), 1, 0.02);
   EXPECT_LT(after.mean_distance_m, 0.4 * before.mean_distance_m);
   EXPECT_LT(after.mean_distance_m, 0.013);
-  EXPECT_LT(after.median_residual_px, 0.45);
+  EXPECT_LT(after.median_residual_px, 0.5);  // 0.65 before; of both axes
   const auto& lens = read_calibration(folder / "adjusted.yaml").camera.intrinsics;
   EXPECT_NEAR(lens[1] / lens[0], 1, 0.002);  // 1.0102 as it is given
   // Distances are across the path, along one axis: the mean of |e| is 0.80 standard deviations.
