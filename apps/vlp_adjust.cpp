@@ -65,7 +65,7 @@ void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& pa
   }
 }
 
-void print_summary(const AdjustmentResult& found, const Calibration& before) {
+void print_summary(const AdjustmentResult& found, const Calibration& before, bool lens_stated) {
   const RotationCenter& center = found.center;
   const double focal_px = std::sqrt(found.camera.intrinsics[0] * found.camera.intrinsics[1]);
   fmt::print("captures    {} used, {} left out\n", found.captures, found.captures_left_out);
@@ -96,10 +96,10 @@ void print_summary(const AdjustmentResult& found, const Calibration& before) {
         "{:.3f}\n",
         lens[0], lens[1], sd[0], sd[1], lens[2], lens[3], sd[2], sd[3]);
   } else {
-    const bool stated = before.intrinsics_report && before.intrinsics_report->covariance;
-    fmt::print("lens        {}\n", stated ? "as it was: the captures tell nothing of it"
-                                          : "taken as exact: the calibration has no covariance of "
-                                            "it (see --lens-sd-px)");
+    fmt::print("lens        {}\n", lens_stated
+                                       ? "as it was: the captures tell nothing of it"
+                                       : "taken as exact: the calibration has no covariance of "
+                                         "it (see --lens-sd-px)");
   }
   fmt::print("residual    {:.4f} px per axis\n", found.residual_px);
   for (const auto& place : found.places) {
@@ -156,7 +156,9 @@ void run(const CLI::App& app, const Options& options) {
   require(result);
   if (input.refine_map) write_lamp_map(options.refined_map, result.found.refined);
   write_calibration(images.output, result.calibration);
-  print_summary(result.found, input.calibration);
+  const auto& report = input.calibration.intrinsics_report;
+  const bool lens_stated = input.lens_sd_px || (report && report->covariance);
+  print_summary(result.found, input.calibration, lens_stated);
 }
 
 }  // namespace
@@ -205,7 +207,7 @@ int main(int argc, char** argv) {
                  "Of a lens whose calibration states no covariance: by how much each of its "
                  "parameters may be off, as the shift of the image that it makes, rms; such a lens "
                  "is then estimated (default: it is exact)")
-      ->check(vlp::finite_positive());
+      ->check(CLI::Range(1e-3, 1e3));
   vlp::add_detect_options(app, options.images);
   return vlp::run_app(app, argc, argv, [&] {
     if (options.sets.empty() && options.turns.empty()) {
