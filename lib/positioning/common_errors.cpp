@@ -345,4 +345,30 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
   return {};
 }
 
+namespace {
+
+/// Whether they lack what a calibration states of its lens.
+bool lack_lens(const CommonErrors& errors, const Calibration& calibration) {
+  const auto& report = calibration.intrinsics_report;
+  return report && report->covariance && !errors.stated(CommonPart::lens);
+}
+
+}  // namespace
+
+std::optional<Matrix2> whole_zenith_covariance(const Calibration& calibration) {
+  const CommonErrors errors({}, calibration, Correction::all);
+  if (!errors.stated(CommonPart::zenith) || lack_lens(errors, calibration)) return std::nullopt;
+  const Eigen::Index zenith = std::ssize(calibration.camera.intrinsics);
+  return Matrix2(errors.joint().block<2, 2>(zenith, zenith));
+}
+
+std::optional<Matrix2> whole_offset_covariance(const Calibration& calibration) {
+  const CommonErrors errors({}, calibration, Correction::all);
+  if (!errors.stated(CommonPart::offset) || lack_lens(errors, calibration)) return std::nullopt;
+  const Eigen::Index offset = errors.joint().rows() - 2;
+  const Eigen::Vector2d focal_px = focal_px_of(calibration.camera);
+  return Matrix2(focal_px.asDiagonal() * errors.joint().block<2, 2>(offset, offset) *
+                 focal_px.asDiagonal());
+}
+
 }  // namespace vlp

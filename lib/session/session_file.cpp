@@ -9,6 +9,7 @@
 #include "calibration/passed_on.h"
 #include "calibration/rotation/rotation_fit.h"
 #include "geometry/angles.h"
+#include "positioning/common_errors.h"
 #include "rig/calibration_error.h"
 #include "session/step_file.h"
 

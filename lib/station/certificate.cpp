@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "captures/csv_writer.h"
+#include "positioning/common_errors.h"
 #include "report/calibration_sections.h"
 #include "report/html.h"
 #include "rig/calibration_error.h"

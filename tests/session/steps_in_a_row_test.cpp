@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "calibration/adjustment/survey.h"
+#include "positioning/common_errors.h"
 #include "rig/calibration_error.h"
 #include "session/dispersion_step.h"
 #include "session/rotation_step.h"
