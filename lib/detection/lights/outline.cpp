@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "detection/lights/profile.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
@@ -55,46 +56,154 @@ std::vector<EdgePoint> outline(const cv::Mat& image, const Blob& blob, double da
   return points;
 }
 
+/// The ellipse in a box, of a light's rim.
+class RimInBox {
+ public:
+  RimInBox(const RimBox& box)
+      : center((box.low + box.high) / 2), half((box.high - box.low) / 2), box_(box) {}
+
+  /// Across the rim, outwards. Precondition: the point is near it.
+  Eigen::Vector2d normal_at(const Eigen::Vector2d& point) const {
+    return (point - center).cwiseQuotient(half.cwiseAbs2()).normalized();
+  }
+  /// Of the curvature where the normal is that.
+  double radius_px(const Eigen::Vector2d& normal) const {
+    return std::pow(half.prod(), 2) / std::pow(half.cwiseProduct(normal).norm(), 3);
+  }
+  double chord_px(double row) const {
+    const double up = (row - center.y()) / half.y();
+    return 2 * half.x() * std::sqrt(std::max(0.0, 1 - up * up));
+  }
+  /// From the image of the disc's centre to the rim's first or last column.
+  double half_width_px(bool begins) const {
+    return begins ? box_.middle.x() - box_.low.x() : box_.high.x() - box_.middle.x();
+  }
+  /// Of (u / w)^2, inwards, w that half width, u pixels from the image of the disc's centre.
+  double bend_slope(double column, bool begins) const {
+    const double u = (column - box_.middle.x()) * (begins ? 1 : -1);
+    return 2 * u / std::pow(half_width_px(begins), 2);
+  }
+
+  Eigen::Vector2d center, half;
+
+ private:
+  RimBox box_;
+};
+
+/// The standard deviation of the blur across the rim, from how steeply its levels rise. No more
+/// than optics blur: what rises slower is the lamp itself.
+double blur_px(const std::vector<EdgePoint>& points, const RimInBox& rim) {
+  constexpr double quarters = 1.349;  // of a normal distribution, in standard deviations
+  constexpr double most = 1.5;
+  std::vector<double> blurs;
+  blurs.reserve(points.size());
+  for (const EdgePoint& point : points) {
+    blurs.push_back(point.rise_px * std::abs(rim.normal_at(point.pixel).x()) / quarters);
+  }
+  return std::min(upper_median(std::move(blurs)), most);
+}
+
+/// The light next to the edge in a row: a line through a few pixels further in, because lamps
+/// darken towards their rim, and the lens towards the image's.
+struct InnerLevel {
+  EdgePoint point;
+  Eigen::Vector2d normal;
+  /// The pixel from which a profile inwards counts, and the first and the middle one of the line.
+  int origin, first;
+  double middle;
+  /// At the middle, above the dark; how much more with each pixel inwards.
+  double level, slope;
+
+  int direction() const { return point.begins ? 1 : -1; }
+  double cosine() const { return std::abs(normal.x()); }
+  double along_row(double i) const { return origin + direction() * i; }
+};
+
+constexpr int kBefore = 8, kSamples = 8;
+
 template <typename Level>
-std::vector<EdgePoint> refine(const cv::Mat& image, const std::vector<EdgePoint>& points,
-                              const Eigen::Vector2d& low, const Eigen::Vector2d& high,
-                              double dark) {
+Profile<Level> profile_of(const cv::Mat& image, const InnerLevel& inner) {
+  return {image.ptr<Level>(static_cast<int>(inner.point.pixel.y())), image.cols, inner.origin,
+          inner.direction()};
+}
+
+template <typename Level>
+std::vector<InnerLevel> inner_levels(const cv::Mat& image, const std::vector<EdgePoint>& points,
+                                     const RimInBox& rim, double dark) {
   constexpr double flattest = 0.35, depth_px = 3, most_bent = 0.35;
-  constexpr int before = 8, samples = 8;
-  const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
-  std::vector<EdgePoint> result;
+  constexpr double square = kSamples * (kSamples * kSamples - 1) / 12.0;
+  std::vector<InnerLevel> result;
   result.reserve(points.size());
   for (const EdgePoint& point : points) {
     // The cosine of the angle between the row and the outline's normal.
-    const Eigen::Vector2d normal =
-        (point.pixel - center).cwiseQuotient(half.cwiseAbs2()).normalized();
-    const double cosine = std::abs(normal.x());
-    if (cosine < flattest) continue;
-    const int direction = point.begins ? 1 : -1;
-    const int origin = static_cast<int>(std::lround(point.pixel.x())) - direction * before;
-    const Profile<Level> profile{image.ptr<Level>(static_cast<int>(point.pixel.y())), image.cols,
-                                 origin, direction};
-    const double up = (point.pixel.y() - center.y()) / half.y();
-    const double chord_px = 2 * half.x() * std::sqrt(std::max(0.0, 1 - up * up));
-    if (2 * depth_px / cosine + samples > chord_px) continue;
-    const int first = before + static_cast<int>(std::lround(depth_px / cosine));
-    if (!profile.has(0) || !profile.has(first + samples)) continue;
-    // The light next to the edge, by a line through what is further in: lamps darken towards their
-    // rim, and the lens towards the image's.
+    InnerLevel inner{};
+    inner.point = point;
+    inner.normal = rim.normal_at(point.pixel);
+    const double depth = depth_px / inner.cosine();
+    if (inner.cosine() < flattest) continue;
+    if (2 * depth + kSamples > rim.chord_px(point.pixel.y())) continue;
+    inner.origin = static_cast<int>(std::lround(point.pixel.x())) - inner.direction() * kBefore;
+    inner.first = kBefore + static_cast<int>(std::lround(depth));
+    inner.middle = inner.first + (kSamples - 1) / 2.0;
+    const auto profile = profile_of<Level>(image, inner);
+    if (!profile.has(0) || !profile.has(inner.first + kSamples)) continue;
     double sum = 0, moment = 0;
-    for (int i = 0; i < samples; ++i) {
-      sum += profile(first + i);
-      moment += (i - (samples - 1) / 2.0) * profile(first + i);
+    for (int i = inner.first; i < inner.first + kSamples; ++i) {
+      sum += profile(i);
+      moment += (i - inner.middle) * profile(i);
     }
-    constexpr double square = samples * (samples * samples - 1) / 12.0;
-    const double back = first + (samples - 1) / 2.0 - before;
-    const double inner = sum / samples - dark, level = inner - moment / square * back;
+    inner.level = sum / kSamples - dark;
+    inner.slope = moment / square;
     // What hides the light further in bends the line too much.
-    if (std::abs(level - inner) > most_bent * inner) continue;
-    const auto at = profile.crossing(dark + level / 2, 0, first);
-    if (level <= 0 || !at) continue;
-    EdgePoint better = point;
-    better.pixel.x() = origin + direction * *at;
+    const double change = std::abs(inner.slope) * (inner.middle - kBefore);
+    if (change < most_bent * inner.level) result.push_back(inner);
+  }
+  return result;
+}
+
+/// How a light's levels bend: q of 1 + q (u / w)^2, u pixels along a row from the image of the
+/// disc's centre, w from there to the rim, the median by their slopes. Of a light that is
+/// darker at its rim it is negative.
+double bend_of(const std::vector<InnerLevel>& levels, const RimInBox& rim) {
+  std::vector<double> bends;
+  bends.reserve(levels.size());
+  for (const InnerLevel& inner : levels) {
+    const double of_one = rim.bend_slope(inner.along_row(inner.middle), inner.point.begins);
+    if (of_one < 0) bends.push_back(inner.slope / (inner.level * of_one));
+  }
+  return bends.empty() ? 0 : std::clamp(upper_median(std::move(bends)), -1.0, 1.0);
+}
+
+template <typename Level>
+std::vector<EdgePoint> refine(const cv::Mat& image, const std::vector<EdgePoint>& points,
+                              const RimBox& box, double dark) {
+  constexpr double spread = (kSamples * kSamples - 1) / 12.0;  // of the pixels of a line, squared
+  if (points.empty()) return {};
+  const RimInBox rim(box);
+  const double blur_square = std::pow(blur_px(points, rim), 2);
+  const auto levels = inner_levels<Level>(image, points, rim, dark);
+  const double bend = bend_of(levels, rim);
+  std::vector<EdgePoint> result;
+  result.reserve(levels.size());
+  for (const InnerLevel& inner : levels) {
+    const double back = inner.middle - kBefore, half_px = rim.half_width_px(inner.point.begins);
+    const double level = inner.level * (1 + bend * (back * back - spread) / (half_px * half_px)) -
+                         inner.slope * back;
+    // The lamp's own at its rim: the lens darkens what is blurred already.
+    const double slope =
+        bend * inner.level * rim.bend_slope(inner.along_row(kBefore), inner.point.begins);
+    if (level <= 0) continue;
+    const auto profile = profile_of<Level>(image, inner);
+    const auto at = profile.crossing(dark + level / 2, 0, inner.first);
+    if (!at) continue;
+    // Blurred, the half of a level lies further out where the light grows inwards, and further in
+    // behind a bent rim: for a standard deviation s of the blur across it and a radius r of the
+    // rim by s^2 slope / level and s^2 / (2 r), to first order.
+    const double cosine = inner.cosine();
+    const double further_in =
+        blur_square / cosine * (slope / (level * cosine) - 0.5 / rim.radius_px(inner.normal));
+    EdgePoint better = inner.point;
+    better.pixel.x() = inner.along_row(*at + further_in);
     better.level = level;
     result.push_back(better);
   }
@@ -104,10 +213,9 @@ std::vector<EdgePoint> refine(const cv::Mat& image, const std::vector<EdgePoint>
 }  // namespace
 
 std::vector<EdgePoint> refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
-                               const Eigen::Vector2d& low, const Eigen::Vector2d& high,
-                               const Background& background) {
-  return image.depth() == CV_8U ? refine<std::uint8_t>(image, points, low, high, background.level)
-                                : refine<std::uint16_t>(image, points, low, high, background.level);
+                               const RimBox& box, const Background& background) {
+  return image.depth() == CV_8U ? refine<std::uint8_t>(image, points, box, background.level)
+                                : refine<std::uint16_t>(image, points, box, background.level);
 }
 
 std::vector<EdgePoint> outermost(std::vector<EdgePoint> points) {

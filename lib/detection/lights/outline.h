@@ -24,12 +24,20 @@ struct EdgePoint {
   bool begins;
 };
 
-/// The points again, now that the light is known to be an ellipse in the box from `low` to `high`
-/// (column, row): the level is taken at the same depth below the outline everywhere, where a row
-/// cuts it at a flat angle further in. Points where it cuts flatter than 20 degrees are left out.
+/// A light that is known to be a disc: the box around its rim's image, and the image of its centre,
+/// (column, row) each.
+struct RimBox {
+  Eigen::Vector2d low, high, middle;
+};
+
+/// The points again, now that the light is known to be a disc whose image is close to an ellipse:
+/// the level is taken at the same depth below the outline everywhere, where a row cuts it at a flat
+/// angle further in, and extrapolated to it as that of a disc which darkens with the square of the
+/// distance from its centre. A blur of standard deviation s moves the half of the level by
+/// s^2 level' / level - s^2 / (2 r), level' inwards and r the rim's radius, which is undone. Points
+/// where a row cuts flatter than 20 degrees are left out.
 std::vector<EdgePoint> refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
-                               const Eigen::Vector2d& low, const Eigen::Vector2d& high,
-                               const Background& background);
+                               const RimBox& box, const Background& background);
 
 /// Of each row the first begin and the last end: the outline of a light that something in the way
 /// splits.

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "detection/lights/outline.h"
@@ -15,12 +15,13 @@ constexpr double kDark = 0.04;  // of white
 /// Cosine between the row and the normal, from which on the first outline is good.
 constexpr double kSteep = 0.75;
 
-/// A disc on a dark image of 200 x 160 pixels. Its edge passes half its level exactly.
+/// A disc on a dark image of 200 x 160 pixels, blurred, seen by pixels that are lit all over.
 struct DrawnDisc {
   Eigen::Vector2d center{101.3, 79.6};
   double radius_px = 38.4, blur_px = 0.8;
   double level = 0.7;                  // of white, above the dark
   double change = 0;                   // of the level, from the centre to the right rim
+  double fall = 0;                     // of the level, with the square of the radius, at the rim
   std::vector<int> dark_columns = {};  // of a bar before it
 
   Eigen::Vector2d low() const { return center - Eigen::Vector2d(radius_px, radius_px); }
@@ -31,14 +32,26 @@ struct DrawnDisc {
     return std::abs(pixel.x() - center.x()) / radius_px;
   }
   cv::Mat image(int depth) const {
+    constexpr int finer = 8;
+    constexpr double pixels_own = 1 / 12.0;  // of their area, squared
+    cv::Mat1d sharp(160 * finer, 200 * finer);
+    for (int row = 0; row < sharp.rows; ++row) {
+      for (int column = 0; column < sharp.cols; ++column) {
+        const Eigen::Vector2d place(column, row);
+        const double inside_px = -off((place.array() + 0.5) / finer - 0.5);
+        const double lost = fall * std::pow(1 - inside_px / radius_px, 2);
+        sharp(row, column) = std::clamp(0.5 + finer * inside_px, 0.0, 1.0) * (1 - lost);
+      }
+    }
+    const double sigma = finer * std::sqrt(blur_px * blur_px - pixels_own);
+    cv::GaussianBlur(sharp, sharp, {}, sigma);
+    cv::Mat1d light;
+    cv::resize(sharp, light, {200, 160}, 0, 0, cv::INTER_AREA);
     const double white = depth == CV_8U ? 255 : 65535;
-    cv::Mat1d light(160, 200);
     for (int row = 0; row < light.rows; ++row) {
       for (int column = 0; column < light.cols; ++column) {
-        const double share =
-            std::erfc(off(Eigen::Vector2d(column, row)) / (blur_px * std::numbers::sqrt2)) / 2;
         const double here = level * (1 + change * (column - center.x()) / radius_px);
-        light(row, column) = white * (kDark + here * share);
+        light(row, column) = white * (kDark + here * light(row, column));
       }
     }
     for (const int column : dark_columns) light.col(column) = white * kDark;
@@ -59,7 +72,8 @@ inline std::vector<EdgePoint> outline_in(const cv::Mat& image) {
 }
 
 inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {
-  return refined(image, outline_in(image), disc.low(), disc.high(), background_of(image));
+  return refined(image, outline_in(image), {disc.low(), disc.high(), disc.center},
+                 background_of(image));
 }
 
 /// Where rows cut the outline more steeply than that.

@@ -49,6 +49,20 @@ TEST(RefinedOutline, IsRefinedOnTheCircleHoweverTheDiscsBrightnessChanges) {
   }
 }
 
+TEST(RefinedOutline, IsNotDrawnInByBlurNorByADarkRim) {
+  for (const double radius_px : {12.0, 24.0}) {
+    for (const double fall : {0.0, 0.3}) {
+      const DrawnDisc disc{.radius_px = radius_px, .blur_px = 1, .fall = fall};
+      double sum_px = 0;
+      const auto points = refined_in(disc.image(CV_16U), disc);
+      for (const EdgePoint& point : points) sum_px += disc.off(point.pixel);
+      const double mean_px = sum_px / double(points.size());
+      const double drawn_in_px = disc.blur_px * disc.blur_px / (2 * radius_px);  // were it left
+      EXPECT_NEAR(mean_px, 0, 0.5 * drawn_in_px) << radius_px << ", " << fall;
+    }
+  }
+}
+
 TEST(RefinedOutline, IsRefinedWithoutItsFlatParts) {
   const DrawnDisc disc;
   const cv::Mat image = disc.image(CV_16U);
