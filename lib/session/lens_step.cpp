@@ -88,7 +88,9 @@ Sorted sorted(const LensInput& input, LensResult& result) {
 
 IntrinsicsReport report_of(const LensResult& result, const IntrinsicsInput& input) {
   const IntrinsicsSolution& solution = result.solution;
-  const MatrixX covariance = ProjectionUncertainty(solution).intrinsics_covariance();
+  const ProjectionUncertainty uncertainty(solution);
+  const Eigen::VectorXd& pull = uncertainty.intrinsics_pull();
+  const MatrixX covariance = uncertainty.intrinsics_covariance() + pull * pull.transpose();
   std::optional<std::array<double, 2>> board_warp_m;
   if (solution.solved_for.warp) {
     const Eigen::Vector2d warp_m =

@@ -60,6 +60,8 @@ bool solve(BoardProblem& problem, const SolveFor& what);
 struct Linearization {
   /// Of the points, u and v in turn, in their order; 0 for those with a negative weight.
   Eigen::VectorXd residuals_px;
+  /// Of the regularization; none of the models that mrcal does not have.
+  Eigen::VectorXd regularization;
   /// A column for each row of the Jacobian: of the points first, then of the regularization.
   Eigen::SparseMatrix<double> jacobian_transposed;
   /// State / packed state.

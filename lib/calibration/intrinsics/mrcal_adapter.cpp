@@ -149,8 +149,9 @@ Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& w
       problem.imager_px.data(), the.selections, &the.constants, problem.spacing_m, problem.cols,
       problem.rows, false);
   if (!done) throw std::runtime_error("mrcal_optimizer_callback failed");
-  result.residuals_px =
-      residuals.head(mrcal_num_measurements_boards(the.frames, problem.cols, problem.rows));
+  const int of_boards = mrcal_num_measurements_boards(the.frames, problem.cols, problem.rows);
+  result.residuals_px = residuals.head(of_boards);
+  result.regularization = residuals.tail(residuals.size() - of_boards);
   result.jacobian_transposed = Eigen::Map<const Eigen::SparseMatrix<double>>(
       the.states, the.measurements, starts.back(), starts.data(), rows.data(), values.data());
   result.scale.setOnes(the.states);

@@ -24,10 +24,28 @@ double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& re
   return std::sqrt(squares / count - (sum / count) * (sum / count));
 }
 
+/// Of the whole state, packed.
+Eigen::VectorXd pull_of(const Linearization& at, double sigma_px) {
+  constexpr double least_px = 0.01;  // without noise all of it would be in the way
+  const Eigen::Index corners = at.residuals_px.size(), pulls = at.regularization.size();
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(at.jacobian_transposed.rows());
+  if (pulls == 0) return none;
+  const Eigen::SparseMatrix<double> by_corners = at.jacobian_transposed.leftCols(corners);
+  const Eigen::SparseMatrix<double> by_pulls = at.jacobian_transposed.rightCols(pulls);
+  const double share = std::min(1.0, std::pow(std::max(sigma_px, least_px), 2));
+  const Eigen::SparseMatrix<double> normal =
+      by_corners * by_corners.transpose() + share * (by_pulls * by_pulls.transpose());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) return none;
+  return (1 - share) * factor.solve(by_pulls * at.regularization);
+}
+
 }  // namespace
 
 ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
-    : lens_(solution.lens()), determined_(false) {
+    : lens_(solution.lens()),
+      determined_(false),
+      intrinsics_pull_(Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
   const BoardProblem& problem = solution.problem;
   const Linearization at = linearized(problem, solution.solved_for);
   const Eigen::SparseMatrix<double>& jt = at.jacobian_transposed;
@@ -48,6 +66,7 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
       (jt.leftCols(at.residuals_px.size()).transpose() * factor.solve(wanted)).eval();
   const double sigma_px = standard_deviation(problem, at.residuals_px);
   covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
+  intrinsics_pull_ = wanted.leftCols(intrinsics).transpose() * pull_of(at, sigma_px);
   determined_ = covariance_.allFinite();
 }
 

@@ -9,13 +9,12 @@
 namespace vlp {
 
 /// How far the noise of the corners moves the projection of a point at infinity, as mrcal reports
-/// it
-/// ("Projection uncertainty" in its documentation): the state's covariance is
+/// it ("Projection uncertainty" in its documentation): the state's covariance is
 ///   s^2 N^-1 (Jo' Jo) N^-1,  N = J' J,
 /// with J the Jacobian at the solution, Jo its rows of the corners (without those of the
-/// regularization) and s the standard deviation of the residuals. A pixel depends on the intrinsics
-/// and, because the camera's own orientation is what the boards make it, on the mean over all
-/// boards of the changes of their rotations.
+/// regularization, Jr) and s the standard deviation of the residuals. A pixel depends on the
+/// intrinsics and, because the camera's own orientation is what the boards make it, on the mean
+/// over all boards of the changes of their rotations.
 class ProjectionUncertainty {
  public:
   /// Precondition: solution.ok().
@@ -34,6 +33,13 @@ class ProjectionUncertainty {
   /// Of the intrinsics alone.
   Eigen::MatrixXd intrinsics_covariance() const;
 
+  /// How much further off zero the intrinsics would be, to first order, were the distortion's
+  /// coefficients drawn to zero no harder than the corners call for: mrcal's regularization is made
+  /// for a noise of a pixel. With its residuals r
+  ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r.
+  /// Zero where there is none. A standard deviation of the intrinsics that no noise explains.
+  const Eigen::VectorXd& intrinsics_pull() const { return intrinsics_pull_; }
+
   /// Of the focal length along x. Infinite when nothing is determined.
   double focal_sd_px() const;
 
@@ -42,6 +48,7 @@ class ProjectionUncertainty {
   bool determined_;
   /// Of the intrinsics and of the mean rotation, in rad, in the camera.
   Eigen::MatrixXd covariance_;
+  Eigen::VectorXd intrinsics_pull_;
 };
 
 }  // namespace vlp

@@ -24,6 +24,33 @@ TEST(ProjectionUncertainty, IsLargeForViewsFromTheFront) {
             5 * ProjectionUncertainty(tilted).worst_px(place));
 }
 
+TEST(ProjectionUncertainty, KnowsHowFarTheRegularizationDrawsALens) {
+  // 110 degrees: the coefficients are far from zero, and the corners known to a fiftieth of the
+  // noise for which mrcal regularizes.
+  const std::array wide{416.7,  416.9,  398.2,     302.1,   0.733348, 0.0897113,
+                        0.0001, 0.0002, 0.0009234, 1.06639, 0.246743, 0.00924612};
+  const SyntheticViews views{synthetic_board(false), Lens(LensModel::opencv8, wide)};
+  Random random(3);
+  const auto solution = solve_intrinsics(views.input(30, random, 0.02));
+  ASSERT_TRUE(solution.ok());
+  const ProjectionUncertainty uncertainty(solution);
+  const Eigen::VectorXd& pull = uncertainty.intrinsics_pull();
+  const double focal_off_px = solution.problem.intrinsics[0] - wide[0];
+  const double noise_px = std::sqrt(uncertainty.intrinsics_covariance()(0, 0));
+  EXPECT_GT(std::abs(focal_off_px), 5 * noise_px);
+  EXPECT_NEAR(focal_off_px, -pull[0], 0.4 * std::abs(focal_off_px));
+}
+
+TEST(ProjectionUncertainty, IsWithoutAPullWhereNothingDraws) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  Random random(3);
+  IntrinsicsInput input = views.input(12, random, 0.1);
+  input.lens_model = LensModel::fisheye;
+  const auto solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok());
+  EXPECT_EQ(ProjectionUncertainty(solution).intrinsics_pull(), Eigen::VectorXd::Zero(8));
+}
+
 TEST(CalibrationReport, HalvesAgreeAsTheUncertaintySays) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(5);
