@@ -96,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Samples,
 
 INSTANTIATE_TEST_SUITE_P(Scenes, SamplesOfDiscs,
                          testing::Values(Sample{"paper-rig", 0.038},
-                                         Sample{"paper-rig-faulty", 0.28}, Sample{"clutter", 0.02},
+                                         Sample{"paper-rig-faulty", 0.28}, Sample{"clutter", 0.03},
                                          Sample{"wide", 0.048}),
                          [](const auto& instance) { return test_name(instance.param.scene); });
 
