@@ -37,11 +37,12 @@ done
 trap 'cmake "${before[@]}" "$project/build" >/dev/null' EXIT
 installed=(-DCMAKE_INSTALL_PREFIX=/usr
            -DCMAKE_INSTALL_LIBDIR="lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)")
-# The preset is for a build that is not there yet; it would set what else was chosen for one that is.
+# The preset is for a build that is not there yet; it would set what else was chosen for one that is. What the
+# tests need is not there then either.
 if [ -e build/CMakeCache.txt ]; then
   cmake "${installed[@]}" build
 else
-  cmake --preset release "${installed[@]}"
+  cmake --preset release "${installed[@]}" -DBUILD_TESTING=OFF
 fi
 targets=("${@/#/vlp_package_}")
 [ $# -gt 0 ] || targets=(vlp_packages)

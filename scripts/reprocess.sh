@@ -32,7 +32,11 @@
 # session; 2 bad input; 3 not all could be done.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
-bin=${VLP_PROGRAMS_DIR:-$(cd "$scripts/../.." && pwd)/build/bin}
+bin=${VLP_PROGRAMS_DIR:-}
+if [ -z "$bin" ]; then  # those of the build that this belongs to, or else those that are installed
+  bin=$(cd "$scripts/../.." && pwd)/build/bin
+  [ -x "$bin/vlp-calibrate" ] || bin=$(dirname "$(command -v vlp-calibrate || echo "$bin/vlp-calibrate")")
+fi
 python=${VLP_PYTHON:-/usr/bin/python3}  # the one that Debian's snakemake is for
 
 refuse() {
@@ -72,7 +76,7 @@ done
 [ ${#folders[@]} = 2 ] || usage "ARCHIVE and RESULTS are missing, or something more is there"
 results=${folders[1]}
 snakemake=$("$python" -c 'from importlib.metadata import version; print(version("snakemake"))' 2>/dev/null) ||
-  refuse "snakemake is missing; run scripts/setup.sh --batch"
+  refuse "snakemake is missing; scripts/setup.sh --batch or apt install snakemake installs it"
 if [[ $profile == "$scripts/profiles/"* && $snakemake != 7.* ]]; then
   refuse "$profile is for Snakemake 7, this is $snakemake: give --profile a folder of your own, see reprocess/README.md"
 fi

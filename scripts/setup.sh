@@ -29,6 +29,7 @@ tests=(
   debootstrap lintian  # of tests/bare_root.sh and tests/packages.sh
   groff zsh  # manual pages and completions are checked by them
   abigail-tools  # the library's ABI is
+  python3-jsonschema  # documents of JSON are held against datasets/schemas
 )
 # Snakemake, and a Slurm on one machine for the tests of its profile.
 batch=(snakemake slurmctld slurmd slurm-client munge procps)

@@ -68,6 +68,29 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$release" '
     vlp-evaluate /packages/fixes.csv --truth truth.csv --gate mean_mm=1 --report /packages/report.html
     grep -q "<strong>PASS</strong>" /packages/report.html
     echo "a first report $((SECONDS - begin)) s after the first command"
+    # What README.md begins with, of what is in the package alone.
+    mkdir /packages/first
+    sed -n "/^    mkdir -p out && cp/p; s/^    \(vlp-.*\)/\1/p" ../../README.md >/packages/first/commands
+    (cd /packages/first && bash -euo pipefail commands >>/packages/install.log && test -s out/chain-results/report.html)
+    echo "a whole calibration and its report $((SECONDS - begin)) s after the first command"
+    archive=/packages/archive
+    vlp-simulate --quiet ../archive/scene.yaml --archive 2 -o $archive
+    apt-get install -qq --no-install-recommends snakemake >>/packages/install.log 2>&1
+    /usr/share/vlp-tools/reprocess.sh $archive $archive-results --row-time-s 3e-5 --readout rows
+    test -s $archive-results/overview.html
+    (  # the scripts of the workflow that apps/README.md tells of
+      mkdir /packages/ci
+      vlp-simulate --quiet ../archive/scene.yaml -o /packages/ci/session
+      sed -n "/^format: vlp-gates/,/^\`\`\`/{/^\`\`\`/!p}" ../../apps/README.md >/packages/ci/gates.yaml
+      awk "/^      - run: [|]\$/ {inside = 1; next} !/^          / {inside = 0} inside" ../../apps/README.md \
+        >/packages/ci/scripts
+      cd /packages/ci
+      ln -s .. packages
+      vlp-calibrate --quiet session --row-time-s 3e-5 --readout rows -o before
+      cp before/check-fixes.csv accepted-fixes.csv
+      bash -euo pipefail scripts >>/packages/install.log
+      test -s evaluation.xml
+    )
     for program in /usr/bin/vlp-*; do
       "$program" --version
       test -s "/usr/share/man/man1/${program##*/}.1.gz"
@@ -77,7 +100,7 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$release" '
     apt-get install -qq --no-install-recommends g++ pkg-config >>/packages/install.log 2>&1
     sed -n "/^\`\`\`c\$/,/^\`\`\`\$/{/^\`\`\`/!p}" ../../lib/README.md >/packages/robot.c
     cc -std=c99 /packages/robot.c -lvlp_positioning -o /packages/robot
-    /packages/robot | grep "^x "
+    grep -F "\`$(/packages/robot)\`" ../../lib/README.md  # as it says there
     c++ -std=c++20 -x c++ ../../tests/consumer/same_fix/same_fix.cpp -o /packages/robot \
       $(pkg-config --cflags --libs vlp-positioning)
     fixes=$(/packages/robot)

@@ -46,7 +46,7 @@ eigen=$(pkg-config --cflags eigen3)
 sed -n '/^```c$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/robot.c"
 # shellcheck disable=SC2086 # several words each
 cc -std=c99 -Wall -Wextra -Wpedantic -Werror $flags "$scratch/robot.c" $libs -o "$scratch/robot-in-c"
-grep '^x ' <<<"$("$scratch/robot-in-c")"
+grep -F "\`$("$scratch/robot-in-c")\`" "$source_dir/lib/README.md"  # as it says there
 sed -n '/^```c++$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/ros_node.cpp"
 # shellcheck disable=SC2086 # several words each
 c++ -std=c++17 -Wall -Wextra -Werror -fsyntax-only $flags $eigen -I"$scratch/installed/include" \

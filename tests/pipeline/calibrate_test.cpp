@@ -13,6 +13,7 @@
 
 #include "captures/truth_table.h"
 #include "support/program.h"
+#include "support/schema.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -45,6 +46,19 @@ class Calibrate : public testing::Test {
   }
   std::string result(const std::string& name) const {
     return TemporaryFolder::content_of(folder / ("results/" + name));
+  }
+  void expect_documents_as_their_schemas_say() const {
+    EXPECT_EQ(problems_by_schema("session", {folder / "results/session.json"}), "");
+    const auto evaluation = folder / "results/evaluation.json";
+    if (fs::exists(evaluation)) {
+      EXPECT_EQ(problems_by_schema("evaluation", {evaluation}), "");
+    }
+    std::vector<fs::path> steps;
+    for (const auto& file : fs::directory_iterator(folder / "results/steps")) {
+      if (file.path().extension() == ".json") steps.push_back(file.path());
+    }
+    EXPECT_FALSE(steps.empty());
+    EXPECT_EQ(problems_by_schema("step", steps), "");
   }
   const TemporaryFolder folder;
 };
@@ -128,6 +142,7 @@ TEST_F(SmallSession, EndsWithTheVerdictOfTheGatesEachTime) {
   }
   EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
   EXPECT_THAT(result("gates.xml"), HasSubstr("<failure message=\"tilt_deg is "));
+  expect_documents_as_their_schemas_say();
   // Another limit measures nothing again.
   folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  tilt_deg: 90\n");
   const auto met = calibrate();
@@ -214,6 +229,7 @@ TEST_F(SmallSession, EndsWhereAStageCannotGoOn) {
   EXPECT_THAT(run.errors, HasSubstr("vlp-calibrate: error: rotation: "));
   EXPECT_THAT(result("session.json"), HasSubstr("\"verdict\": \"no result\""));
   EXPECT_THAT(result("session.json"), HasSubstr("\"failure\": \"undetermined\""));
+  expect_documents_as_their_schemas_say();
   EXPECT_TRUE(fs::exists(folder / "results/lens.yaml"));
   EXPECT_FALSE(fs::exists(folder / "results/report.html")) << "of the captures before";
   EXPECT_FALSE(fs::exists(folder / "results/calibration.yaml"));
@@ -397,6 +413,7 @@ TEST_F(SmallSession, TellsOfImagesThatAreDamaged) {
   EXPECT_EQ(skipped,
             (std::map<std::string, std::string>{{"rotation", "0003.png"}, {"check", "0001.png"}}));
   EXPECT_THAT(result("session.json"), Not(HasSubstr(path("")))) << "of no use elsewhere";
+  expect_documents_as_their_schemas_say();
 }
 
 TEST_F(SmallSession, StatesHowWellTheCalibrationIsKnown) {

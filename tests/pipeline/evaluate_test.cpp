@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "support/program.h"
+#include "support/schema.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -80,6 +81,7 @@ TEST_F(Evaluate, EndsWithOneAndAllIsWrittenWhenAGateIsNotMet) {
   EXPECT_THAT(result.output,
               AllOf(HasSubstr("NOT MET gate p90_mm"), HasSubstr("met    gate mean_mm")));
   EXPECT_THAT(content("evaluation.json"), HasSubstr("\"passed\": false"));
+  EXPECT_EQ(problems_by_schema("evaluation", {folder / "evaluation.json"}), "");
   EXPECT_THAT(content("junit.xml"), HasSubstr("tests=\"3\" failures=\"2\""));
   EXPECT_EQ(with_truth("--gate mean_mm=2.5 --gate p90_mm=4.5").exit_code, 0);
 }
@@ -119,6 +121,7 @@ TEST_F(Evaluate, HoldsFixesAgainstAPathAndALine) {
   EXPECT_THAT(line.output, AllOf(HasSubstr("mean            1.800 mm"),
                                  HasSubstr("line fit    mean"), HasSubstr("hides     jitter of")));
   EXPECT_THAT(content("line.json"), HasSubstr("\"jitter_mm\""));
+  EXPECT_EQ(problems_by_schema("evaluation", {folder / "line.json"}), "");
 }
 
 TEST_F(Evaluate, SaysWhichOfTwoRunsIsBetter) {
@@ -133,10 +136,11 @@ TEST_F(Evaluate, SaysWhichOfTwoRunsIsBetter) {
   folder.file("other.csv", bad);
   folder.file("truth.csv", truth);
   EXPECT_THAT(
-      with_truth("--compare other.csv --gate worse_mm=0").output,
+      with_truth("--compare other.csv --gate worse_mm=0 --json better.json").output,
       AllOf(HasSubstr("compared    better by more than 0.0025 mm: mean error differs by -0.150 mm"),
             HasSubstr("20 in both: 20 with a smaller error")));
-  EXPECT_THAT(with_truth("--compare fixes.csv").output, HasSubstr("the same within 0.001 mm"));
+  EXPECT_THAT(with_truth("--compare fixes.csv --json same.json").output,
+              HasSubstr("the same within 0.001 mm"));
   // All off by 0.17 um more, and surely so: nobody's loss.
   std::string hardly = good;
   for (auto at = hardly.find(".0001,"); at != std::string::npos; at = hardly.find(".0001,", at)) {
@@ -151,8 +155,25 @@ TEST_F(Evaluate, SaysWhichOfTwoRunsIsBetter) {
   folder.file("other.csv", good);
   EXPECT_EQ(with_truth("--compare other.csv --gate worse_mm=0").exit_code, 1);
   folder.file("other.csv", kFixes + "x,ok,0,0,0,0,,,,,3,0\n");
+  EXPECT_EQ(problems_by_schema("evaluation", {folder / "better.json", folder / "same.json"}), "");
   EXPECT_EQ(with_truth("--compare other.csv").exit_code, 2);
   EXPECT_EQ(evaluate("--line 0 0 9 0 --compare other.csv").exit_code, 2);
+}
+
+TEST_F(Evaluate, ADocumentThatIsAnotherIsNotAsTheSchemaSays) {
+  with_truth("--json evaluation.json");
+  const std::string whole = content("evaluation.json");
+  const auto problems_with = [&](const std::string& what, const std::string& other) {
+    std::string text = whole;
+    EXPECT_NE(text.find(what), std::string::npos) << what;
+    text.replace(text.find(what), what.size(), other);
+    return problems_by_schema("evaluation", {folder.file("other.json", text)});
+  };
+  EXPECT_EQ(problems_with("\"captures\": 6", "\"captures\": 6"), "");
+  EXPECT_THAT(problems_with("\"captures\": 6", "\"captures\": 6.5"), HasSubstr("$.captures: 6.5"));
+  EXPECT_THAT(problems_with("\"captures\": 6,", ""), HasSubstr("'captures' is a required"));
+  EXPECT_THAT(problems_with("\"captures\"", "\"caught\": 0, \"captures\""), HasSubstr("'caught'"));
+  EXPECT_THAT(problems_with("vlp-evaluation/1", "vlp-evaluation/2"), HasSubstr("$.format"));
 }
 
 TEST_F(Evaluate, ComparesWithTheLimitOfTheExample) {
@@ -170,6 +191,7 @@ TEST_F(Evaluate, SaysThatALimitIsBeatenAndWhatThatMeans) {
   EXPECT_THAT(result.output, HasSubstr("(beaten: see the warning)"));
   EXPECT_THAT(result.errors, HasSubstr("is stated too large, or the fixes use more than one"));
   EXPECT_THAT(content("e.json"), HasSubstr("\"beaten\": true"));
+  EXPECT_EQ(problems_by_schema("evaluation", {folder / "e.json"}), "");
 }
 
 TEST_F(Evaluate, EndsWithThreeWithoutAFix) {

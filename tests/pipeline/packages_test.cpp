@@ -56,7 +56,9 @@ TEST_F(Packages, AreOfTheBuildThatIsThere) {
 }
 
 TEST_F(Packages, AreOfTheReleasePresetWhereThereIsNoBuild) {
-  EXPECT_THAT(calls(), testing::StartsWith("cmake --preset release -DCMAKE_INSTALL_PREFIX=/usr "));
+  const std::string called = calls();
+  EXPECT_THAT(called, testing::StartsWith("cmake --preset release -DCMAKE_INSTALL_PREFIX=/usr "));
+  EXPECT_THAT(called.substr(0, called.find('\n')), HasSubstr(" -DBUILD_TESTING=OFF"));
 }
 
 }  // namespace

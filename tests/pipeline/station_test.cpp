@@ -5,6 +5,7 @@
 #include <regex>
 
 #include "small_station.h"
+#include "support/schema.h"
 
 namespace vlp {
 namespace {
@@ -69,6 +70,7 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   const auto exported = folder / "runs.json", picture = folder / "trend.svg";
   EXPECT_EQ(records("export -o " + exported.string()).exit_code, 0);
   EXPECT_THAT(TemporaryFolder::content_of(exported), HasSubstr("vlp-calibration/1"));
+  EXPECT_EQ(problems_by_schema("runs", {exported}), "");
   EXPECT_THAT(records("trend rms_px -o " + picture.string()).output, HasSubstr("limits"));
   EXPECT_THAT(TemporaryFolder::content_of(picture), HasSubstr("<svg"));
 

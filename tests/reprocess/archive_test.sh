@@ -32,6 +32,9 @@ while IFS=, read -r camera session _ damage _; do
     done
   fi
 done <"$archive/archive.csv"
+as_its_schema_says row "$baseline"/*/*/*/row.json
+as_its_schema_says changes "$baseline/changes.json"
+as_its_schema_says plan "$baseline"/.state/{run,compare}.json
 # What reprocessing gives is what vlp-calibrate gives, byte for byte, and its report is of the same.
 name=camera-00001/session-01 alone=$scratch/alone
 "$bin/vlp-calibrate" "$archive/$name" -o "$alone" --camera-id camera-00001 "${options[@]}" >"$said"

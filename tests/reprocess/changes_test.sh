@@ -19,6 +19,8 @@ grep -q '^changed     0 better, 1 worse, 6 the same, 0 newly without' "$said" ||
 grep -q 'gate worse_share: is 0.1429, at most 0.1 is asked for' "$scratch/errors" || fail "$(cat "$scratch/errors")"
 [ "$(wc -l <"$scratch/errors")" = 1 ] || fail "the other gates are met"
 grep -q '>FAIL<' "$results/overview.html" || fail "the overview says nothing"
+as_its_schema_says changes "$results/changes.json"
+as_its_schema_says plan "$results"/.state/{run,compare}.json
 printf 'format: vlp-archive-gates/1\ngates: {no_result: 3}\n' >"$scratch/gates.yaml"
 reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gates.yaml" >/dev/null
 
@@ -63,6 +65,8 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
     '1 newly without a result' '^inputs      2 of other inputs than before, 1 lost their result'; do
     grep -q "$words" "$said" || fail "no '$words' in $(cat "$said")"
   done
+  as_its_schema_says row "$looked"/*/*/*/row.json
+  as_its_schema_says changes "$looked/changes.json"
   page=$looked/overview.html
   head -n 20 "$page" | grep -q '<h2>Passed, but look here</h2>' || fail "the overview does not begin with it"
   grep -q 'taken as zero' "$page" || fail "the warning is not in the overview"

@@ -56,4 +56,7 @@ bytes_of() {  # RESULTS [SESSION...]
 expect_baseline() {  # RESULTS [SESSION...]
   diff <(bytes_of "$baseline" "${@:2}") <(bytes_of "$@") || fail "$1 is not as an undisturbed run leaves it"
 }
+as_its_schema_says() {  # NAME FILE...
+  "$source_dir/tests/support/schema_check.py" "$@" || fail "another document than its schema says"
+}
 state_of_archive() { find "$archive" -printf '%P %s %T@\n' | sort | sha256sum; }

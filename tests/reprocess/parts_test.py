@@ -14,6 +14,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, sys.argv.pop(1))
+sys.path.append(str(Path(__file__).parents[1] / "support"))
 try:
     import yaml  # noqa: F401
 except ImportError:
@@ -26,6 +27,7 @@ import files
 import fleet
 import outcome
 import plan
+import schema_check
 import shard
 import summary
 import made_up_fleet
@@ -412,6 +414,14 @@ class OverTime(unittest.TestCase):
             self.assertEqual(fleet.kind_of(first["figure"]), "center")
             dates_of_both = [made_up.date(made_up.day(7, session)) for session in (5, 6)]
             self.assertEqual([first["before"]["date"], first["since"]["date"]], dates_of_both)
+
+    def test_is_as_the_schema_says(self):
+        made_up = Fleet(0, drifts=self.DRIFTS, moved=self.MOVED, broken={7: (6, {"center": (0.4, -0.3)})})
+        document = {"format": "vlp-archive-changes/1", "changes": None, "gates": [], "passed": True}
+        document |= {"counts": changes.counts_of([]), "fleet": fleet.fleet_of(*fleet_rows(made_up))}
+        alarms = [one["kind"] for alarm in document["fleet"]["cameras"] for one in alarm["changes"]]
+        self.assertEqual((set(alarms), len(document["fleet"]["lamps"])), ({"step", "drift"}, 2))
+        self.assertEqual(schema_check.problems_of(schema_check.validator_of("changes"), document), [])
 
     def test_tells_a_drift_from_a_step(self):
         for seed in range(5):

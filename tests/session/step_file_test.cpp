@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "support/schema.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -48,6 +49,19 @@ TEST(StepFile, GivesBackWhatWasKept) {
   EXPECT_LT((offset.sd_m - Eigen::Vector2d(1e-4, 2e-4)).norm(), 1e-15);
   EXPECT_EQ(result.failure, StepFailure::wrong_map);
   EXPECT_EQ(message_of(result), "lamps.yaml: look swapped");
+}
+
+TEST(StepFile, IsAsItsSchemaSays) {
+  const TemporaryFolder folder;
+  std::vector<std::filesystem::path> files;
+  for (int failure = 0; !name_of(static_cast<StepFailure>(failure)).empty(); ++failure) {
+    StepResult result = sample();
+    result.failure = static_cast<StepFailure>(failure);
+    files.push_back(folder / (std::to_string(failure) + ".json"));
+    write_step(files.back(), {"key", "outputs", result});
+  }
+  EXPECT_EQ(files.size(), 6U);
+  EXPECT_EQ(problems_by_schema("step", files), "");
 }
 
 TEST(StepFile, IsNothingWhenItIsCutOrOfAnotherVersion) {

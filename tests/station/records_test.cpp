@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include "station/records.h"
+#include "station/spool.h"
 
 #include <gmock/gmock.h>
 #include <sys/wait.h>
@@ -17,6 +18,7 @@
 #include "station/station_config.h"
 #include "support/postgres_server.h"
 #include "support/refused.h"
+#include "support/schema.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -464,6 +466,22 @@ TEST(ExportRuns, WritesJson) {
     EXPECT_THAT(runs[1][field.name].get<std::string>(),
                 StartsWith(std::string("the '") + field.name + "' of "));
   }
+}
+
+TEST(ExportRuns, AndTheSpoolAreAsTheirSchemasSay) {
+  const TemporaryFolder folder;
+  const auto file = folder / "runs.json";
+  RunRecord golden = sample(run_of(2), "b", 1.5);
+  golden.kind = "golden";
+  RunRecord invalid = sample(run_of(3), "c", 1.5);
+  invalid.verdict = name_of(Verdict::invalid);
+  write_runs(file, {sample(run_of(1), "a", 0.25), golden, invalid});
+  EXPECT_EQ(problems_by_schema("runs", {file}), "");
+  std::vector<std::filesystem::path> waiting;
+  for (const RunRecord& run : {sample(run_of(1), "a", 0.25), golden, invalid}) {
+    waiting.push_back(folder.file(run.camera + ".json", text_of_run({run, "records.db"})));
+  }
+  EXPECT_EQ(problems_by_schema("run", waiting), "");
 }
 
 }  // namespace
