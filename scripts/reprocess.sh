@@ -7,6 +7,7 @@
 #   scripts/reprocess.sh ARCHIVE RESULTS [--gates FILE] [--previous RESULTS] [--cores N]
 #                        [--profile slurm] [--session-gates FILE] [--row-time-s S]
 #                        [--readout rows|columns] [--shard-size N] [--keep N]
+#                        [--look files|folders] [--rebuild-catalogue]
 #   scripts/reprocess.sh --diff RESULTS CAMERA/SESSION [KEY | OTHER_RESULTS]
 #
 # ARCHIVE/CAMERA/SESSION/ is laid out as vlp-calibrate has it, and only read. RESULTS gets
@@ -25,6 +26,10 @@
 # --session-gates  gates (vlp-gates/1) for sessions that have no gates.yaml of their own
 # --shard-size N   sessions in a job at most (default 50)
 # --keep N         results that a session had before, of which so many stay in former/ (default 0)
+# --look           what tells that a session has changed: files (default), sees all that the file system shows;
+#                  folders, and tables and YAML files: some eight times as fast, for archives in which no image is
+#                  written over in place
+# --rebuild-catalogue  forgets what was seen of the archive: the contents of all files are looked at again
 # --diff           says what differs between a session's result and a former one, by its key's first letters
 #                  (default: the last one), or that of other results
 #
@@ -37,7 +42,7 @@ if [ -z "$bin" ]; then  # those of the build that this belongs to, or else those
   bin=$(cd "$scripts/../.." && pwd)/build/bin
   [ -x "$bin/vlp-calibrate" ] || bin=$(dirname "$(command -v vlp-calibrate || echo "$bin/vlp-calibrate")")
 fi
-python=${VLP_PYTHON:-/usr/bin/python3}  # the one that Debian's snakemake is for
+python=${VLP_PYTHON:-/usr/bin/python3}  # the one that Debian's snakemake is for; that of an environment
 
 refuse() {
   echo "reprocess.sh: error: $1" >&2
@@ -52,16 +57,18 @@ folders=() plan=() profile=''
 cores=$(nproc)
 while [ $# -gt 0 ]; do
   case $1 in
-    --gates | --session-gates | --previous | --shard-size | --keep | --cores | --profile | --row-time-s | --readout)
+    --gates | --session-gates | --previous | --shard-size | --keep | --look | --cores | --profile | --row-time-s | --readout)
       [ $# -gt 1 ] || usage "$1 wants a value"
       case $1 in
         --cores | --shard-size) [[ $2 =~ ^[1-9][0-9]*$ ]] || usage "$1: should be a number from 1" ;;
         --keep) [[ $2 =~ ^[0-9]+$ ]] || usage "$1: should be a number" ;;
+        --look) [[ $2 =~ ^(files|folders)$ ]] || usage "$1: should be files or folders" ;;
         --row-time-s) [[ $2 =~ ^[0-9.]+(e-?[0-9]+)?$ ]] || usage "$1: should be seconds" ;;
         --readout) [[ $2 =~ ^(rows|columns)$ ]] || usage "$1: should be rows or columns" ;;
       esac ;;&
-    --gates | --session-gates | --previous | --shard-size | --keep) plan+=("$1" "$2"); shift ;;
+    --gates | --session-gates | --previous | --shard-size | --keep | --look) plan+=("$1" "$2"); shift ;;
     --row-time-s | --readout) plan+=("--camera-option=$1" "--camera-option=$2"); shift ;;
+    --rebuild-catalogue) plan+=("$1") ;;
     --cores) cores=$2; shift ;;
     --profile)
       if [ -d "$scripts/profiles/$2" ]; then profile=$scripts/profiles/$2; else profile=$2; fi
@@ -77,8 +84,9 @@ done
 results=${folders[1]}
 snakemake=$("$python" -c 'from importlib.metadata import version; print(version("snakemake"))' 2>/dev/null) ||
   refuse "snakemake is missing; scripts/setup.sh --batch or apt install snakemake installs it"
-if [[ $profile == "$scripts/profiles/"* && $snakemake != 7.* ]]; then
-  refuse "$profile is for Snakemake 7, this is $snakemake: give --profile a folder of your own, see reprocess/README.md"
+if [[ $profile == "$scripts/profiles/slurm" && $snakemake != 7.* ]] &&
+  ! "$python" -c 'import snakemake_executor_plugin_slurm' 2>/dev/null; then
+  refuse "Snakemake $snakemake submits by snakemake-executor-plugin-slurm, which is missing beside it: install it by pip"
 fi
 if [ -n "$profile" ]; then
   how=(--profile "$profile")
@@ -109,7 +117,7 @@ if ! "$python" -m snakemake --snakefile "$scripts/Snakefile" --directory "$resul
   --rerun-incomplete --rerun-triggers mtime --keep-going --scheduler greedy "${how[@]}" \
   >"$log" 2>&1
 then
-  mapfile -t failed < <(grep -A 8 '^Error in rule' "$log" | sed -n 's/^ *log: \([^ ]*\).*/\1/p' | sort -u | head -n 5)
+  mapfile -t failed < <(grep -A 12 '^Error in rule' "$log" | sed -n 's/^ *log: \([^ ]*\).*/\1/p' | sort -u | head -n 5)
   [ ${#failed[@]} -gt 0 ] || tail -n 20 "$log" >&2
   for said in "${failed[@]}"; do
     words=$(tail -n 1 "$results/$said")

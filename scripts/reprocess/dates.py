@@ -4,12 +4,14 @@
 others are not read), or else by a date in the session's name, as in 2026-03-14 or 20260314-b."""
 import re
 from datetime import datetime, timezone
+from functools import lru_cache
 
 from files import read_table
 
 IN_A_NAME = re.compile(r"(?<!\d)(\d{4})-?(\d\d)-?(\d\d)(?!\d)")
 
 
+@lru_cache(maxsize=None)
 def date_in(name):
     for found in IN_A_NAME.finditer(name):
         try:
@@ -54,6 +56,7 @@ def dates_of(archive, sessions):
     return lines
 
 
+@lru_cache(maxsize=None)
 def days_of(date):
     """Since 1970; None without a date."""
     return (datetime.fromisoformat(date) - datetime(1970, 1, 1)).total_seconds() / 86400 if date else None

@@ -33,15 +33,18 @@ def write_if_other(file, text):
 
 def table(columns, rows):
     text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n", extrasaction="ignore")
-    writer.writeheader()
-    writer.writerows(rows)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([row.get(column, "") for column in columns] for row in rows)
     return text.getvalue()
 
 
 def read_table(file):
+    """Of each line that is not empty what its columns hold, by name; a short one lacks the last."""
     with open(file, newline="") as stream:
-        return list(csv.DictReader(stream))
+        lines = csv.reader(stream)
+        columns = next(lines, [])
+        return [dict(zip(columns, line)) for line in lines if line]
 
 
 def json_text(value):

@@ -108,13 +108,15 @@ def camera_series(rows):
     found = {}
     for camera, of_it in sorted(by_camera.items()):
         found[camera] = {}
+        of_it = in_order(of_it)
         with_arm = [row for row in of_it if row["lever_arm_x_mm"]]
         for name, unit in TWO.items():
             for axis in "xy":
                 figure = f"{name}_{axis}_{unit}"
                 some = with_arm if with_arm and name in WITH_LEVER_ARM else of_it
                 some = [row for row in some if row[figure] and float(row[f"sd_{figure}"] or 0) > 0]
-                some = in_order(some)
+                if not all(row["date"] for row in of_it):
+                    some = in_order(some)  # those without a date may be out
                 if len(some) > 1:
                     found[camera][figure] = (some, [(float(row[figure]), float(row[f"sd_{figure}"])) for row in some])
     return found

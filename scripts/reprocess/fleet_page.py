@@ -40,7 +40,8 @@ def cameras(fleet, fleet_rows):
             by = f"{change['change']:+.4g} ± {change['sd']:.2g}"
             rows.append((alarm["camera"], words_of(change["figure"]), by, how, chance(change["p"])))
     html += table(["camera", "figure", "change", "how and when", "chance in this fleet"], rows, "changes.json")
-    series = camera_series(fleet_rows)
+    pictured = {alarm["camera"] for alarm in fleet["cameras"][:MOST_PICTURES]}
+    series = camera_series([row for row in fleet_rows if row["camera"] in pictured])
     for alarm in fleet["cameras"][:MOST_PICTURES]:
         figures, first = series[alarm["camera"]], alarm["changes"][0]
         name, points = kind_of(first["figure"]), {}
@@ -66,7 +67,8 @@ def lamps(fleet, lamp_rows):
         rows.append((room_of(lamp), lamp["lamp"], by, *ends, chance(lamp["p"]), sure))
     columns = ["room", "lamp", "moved by", "after", "not later than", "chance in this fleet", ""]
     html += table(columns, rows, "changes.json")
-    rooms = {room.name: room for room in rooms_of(lamp_rows)}
+    pictured = {(lamp["room"], lamp["map"]) for lamp in fleet["lamps"][:MOST_PICTURES]}
+    rooms = {room.name: room for room in rooms_of([row for row in lamp_rows if (row["room"], row["map"]) in pictured])}
     for lamp in fleet["lamps"][:MOST_PICTURES]:
         room = rooms[lamp["room"], lamp["map"]]
         times, numbers = times_of(room.sessions), [one[0] for one in room.series[lamp["lamp"]]]

@@ -19,7 +19,7 @@ FLEET = ["camera", "session", "date", "room", "map", "tilt_deg"]
 FLEET += [column for name in TRACKED for column in (name, f"sd_{name}")] + [*RESIDUALS, "mean_mm"]
 LAMPS = ["room", "map", "lamp", "camera", "session", "date", "captures", "map_x_m", "map_y_m"]
 LAMPS += ["offset_x_mm", "offset_y_mm", "sd_offset_x_mm", "sd_offset_y_mm"]
-ALL = list(dict.fromkeys([*COLUMNS, *FLEET, "lamps"]))  # of a shard's rows
+ALL = list(dict.fromkeys([*COLUMNS, *FLEET, "lamps", "glance"]))  # of a shard's rows
 TOOK_TOO_LONG = (124, 137)  # exit codes of timeout
 # Files of vlp-calibrate that are kept, and their names there.
 KEPT = {

@@ -2,41 +2,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lists the sessions of an archive in shards, and says what they are reprocessed with.
 
-Writes into RESULTS/.state: run.json (toolbox and options), shards/N.list (a session a line, with the
-number, size and latest change of its files: a glance that tells which shards to look into), shards.txt
-(how many), again.txt (rows to make again), keep.txt (how many former results stay; no reason to run a shard again),
+Writes into RESULTS/.state: run.json (toolbox and options), catalogue.sqlite (catalogue.py), shards/N.list (a
+session a line, with the glance at its files), shards.txt (how many), to_do.txt (the shards that Snakemake has to know
+of), again.txt (rows to make again), keep.txt (how many former results stay; no reason to run a shard again),
 dates.csv (dates and rooms of sessions) and compare.json. What has not changed is not touched, so that Snakemake
 runs the rest.
 """
 import argparse
+import gc
+import os
 import re
 import shutil
+import sqlite3
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from catalogue import LOOKS, Catalogue
 from checks import check, fail
 from dates import dates_of
-from files import digest, input_files, json_text, table, write_if_other, write_whole
+from files import digest, json_text, table, write_if_other, write_whole
 from toolbox import toolbox
 
 
+def folders_in(folder):
+    with os.scandir(folder) as entries:
+        return sorted(entry.name for entry in entries if not entry.name.startswith(".") and entry.is_dir())
+
+
 def sessions_in(archive):
-    for camera in sorted(archive.iterdir()):
-        if camera.is_dir() and not camera.name.startswith("."):
-            for session in sorted(camera.iterdir()):
-                if session.is_dir() and not session.name.startswith("."):
-                    yield f"{camera.name}/{session.name}"
-
-
-def glance(session):
-    count = size = latest = 0
-    for _, entry in input_files(session):
-        count += 1
-        if entry.is_file():
-            status = entry.stat()
-            size, latest = size + status.st_size, max(latest, status.st_mtime_ns)
-    return f"{count} {size} {latest}"
+    return [f"{camera}/{session}" for camera in folders_in(archive) for session in folders_in(archive / camera)]
 
 
 def shard_ends(sessions, size, at_a_time):
@@ -49,37 +43,76 @@ def shard_ends(sessions, size, at_a_time):
     return [sessions * (i + 1) // count for i in range(count)]
 
 
-def write_shards(archive, state, size, at_a_time):
-    sessions = list(sessions_in(archive))
+def shards_of(sessions, catalogue, size, at_a_time):
+    """{number: sessions}. Where there are many, a session stays in its shard, so that new ones do not move the others
+    to other shards: they fill the last one, and go to further ones."""
+    if len(sessions) < 8 * at_a_time * size or catalogue.stated.get("shard_size") != str(size):
+        ends = shard_ends(len(sessions), size, at_a_time)
+        return {number: sessions[first:end] for number, (first, end) in enumerate(zip([0, *ends], ends))}
+    shards, new = {}, []
+    for name in sessions:
+        number = catalogue.shard_of(name)
+        if number is None:
+            new.append(name)
+        else:
+            shards.setdefault(number, []).append(name)
+    last = max(shards, default=0)
+    for name in new:
+        if len(shards.get(last, [])) >= size:
+            last += 1
+        shards.setdefault(last, []).append(name)
+    return {number: sorted(names) for number, names in sorted(shards.items())}
+
+
+def write_shards(archive, state, options):
+    sessions = sessions_in(archive)
     if not sessions:
         fail(f"{archive}: no sessions in it; ARCHIVE/CAMERA/SESSION/ is where captures are looked for")
+    well_named = re.compile(r"\w[\w .-]*/\w[\w .-]*", re.ASCII)
     for name in sessions:
-        if not re.fullmatch(r"\w[\w .-]*/\w[\w .-]*", name, re.ASCII):
+        if not well_named.fullmatch(name):
             fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks")
     dates = dates_of(archive, sessions)
     write_if_other(state / "dates.csv", table(["camera", "session", "date", "room"], dates))
-    with ThreadPoolExecutor(16) as threads:  # most of it is waiting for the file system
-        glances = list(threads.map(lambda name: glance(archive / name), sessions))
-    lines = [f"{name}\t{seen}\n" for name, seen in zip(sessions, glances)]
+    catalogue = Catalogue(state / "catalogue.sqlite", archive, options.rebuild_catalogue)
+    seen = dict(zip(sessions, catalogue.glances(sessions, options.look)))
+    shards = shards_of(sessions, catalogue, options.shard_size, options.at_a_time)
     wanted = set()
-    first = 0
-    for number, end in enumerate(shard_ends(len(sessions), size, at_a_time)):
+    for number, names in shards.items():
         file = state / "shards" / f"{number:06d}.list"
-        wanted.add(file)
-        write_if_other(file, "".join(lines[first:end]))
-        first = end
-    for file in set((state / "shards").glob("*.list")) - wanted:
-        file.unlink()
+        wanted.add(file.name)
+        write_if_other(file, "".join(f"{name}\t{seen[name]}\n" for name in names))
+    for file in (state / "shards").glob("*.list"):
+        if file.name not in wanted:
+            file.unlink()
     write_if_other(state / "shards.txt", f"{len(wanted)}\n")
+    catalogue.save(shards, options.shard_size)
     return len(sessions)
 
 
-def again(state, summary):
-    """The rows to make whatever Snakemake thinks: those that are missing beside a summary, and those
-    with crashes, which may have been for want of memory or disk."""
-    rows = [state / "rows" / f"{file.stem}.csv" for file in sorted((state / "shards").glob("*.list"))]
-    wanted = [file for file in rows if (",crashed," in file.read_text() if file.exists() else summary.exists())]
-    return [f".state/rows/{file.name}\n" for file in wanted]
+def changed_at(file):
+    """None without it."""
+    try:
+        return file.stat().st_mtime_ns
+    except FileNotFoundError:
+        return None
+
+
+def to_do(state, summary):
+    """The shards that Snakemake has to know of, and of them those to run whatever it thinks. Of the others the rows are
+    later than list and options, and in the summary. To run are those whose rows are missing beside a summary, and
+    those with crashes, which may have been for want of memory or disk."""
+    options, summed_up = changed_at(state / "run.json"), changed_at(summary)
+    known, again = [], []
+    for file in sorted((state / "shards").glob("*.list")):
+        rows = state / "rows" / f"{file.stem}.csv"
+        made = changed_at(rows)
+        if (made is None and summed_up is not None) or (made is not None and b",crashed," in rows.read_bytes()):
+            again.append(file.stem)
+        elif made is not None and summed_up is not None and max(changed_at(file), options) <= made <= summed_up:
+            continue
+        known.append(file.stem)
+    return known, again
 
 
 def main():
@@ -93,6 +126,8 @@ def main():
     parser.add_argument("--keep", type=int, default=0)
     parser.add_argument("--shard-size", type=int, default=50)
     parser.add_argument("--at-a-time", type=int, default=1)
+    parser.add_argument("--look", choices=LOOKS, default=LOOKS[0])
+    parser.add_argument("--rebuild-catalogue", action="store_true")
     parser.add_argument("--camera-option", action="append", default=[])
     options = parser.parse_args()
     archive, results = options.archive.resolve(), options.results.resolve()
@@ -109,10 +144,12 @@ def main():
         "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
         **toolbox(options.bin),
     }
-    count = write_shards(archive, state, options.shard_size, options.at_a_time)
-    write_whole(state / "again.txt", "".join(again(state, results / "summary.csv")))
+    count = write_shards(archive, state, options)
     write_if_other(state / "keep.txt", f"{options.keep}\n")
     write_if_other(state / "run.json", json_text(run))
+    known, again = to_do(state, results / "summary.csv")
+    write_whole(state / "to_do.txt", "".join(f"{shard}\n" for shard in known))
+    write_whole(state / "again.txt", "".join(f".state/rows/{shard}.csv\n" for shard in again))
     previous = options.previous.resolve() if options.previous else None
     compare = {
         "previous": str(previous) if previous else "",
@@ -125,7 +162,10 @@ def main():
 
 
 if __name__ == "__main__":
+    gc.disable()  # of an archive's many names and glances none go in circles
     try:
         main()
     except (OSError, UnicodeDecodeError, ValueError) as failure:
         fail(failure)
+    except sqlite3.Error as failure:
+        fail(f".state/catalogue.sqlite: {failure}")

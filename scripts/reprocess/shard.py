@@ -16,7 +16,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from files import digest, input_digests, json_text, table, write_whole
+from files import digest, input_digests, json_text, read_table, table, write_whole
 from outcome import ALL, KEPT, outcome_of
 
 STATE = Path(".state")
@@ -139,13 +139,26 @@ def tell_run(shard, row, cost, size):
         ran.write(f"{row['camera']}/{row['session']}\t{row['verdict']}\t{cost}\t{size}\n")
 
 
-def reprocess(run, shard, names, lock, keep):
+def rows_before(shard):
+    """Of each session: its row of the last time; none when that cannot be read."""
+    try:
+        return {f"{row['camera']}/{row['session']}": row for row in read_table(STATE / "rows" / f"{shard}.csv")}
+    except (FileNotFoundError, KeyError):
+        return {}
+
+
+def reprocess(run, shard, glances, lock, keep):
+    """glances: {CAMERA/SESSION: glance at its files}; while that is the same the digest of the inputs is."""
     work = (STATE / "work" / shard).absolute()
-    rows, made = [], 0
-    for name in names:
-        inputs, parts = input_digests(Path(run["archive"]) / name)
-        key = key_of(inputs, run)
-        row = current(name, key)
+    before, rows, made = rows_before(shard), [], 0
+    for name, glance in glances.items():
+        row, known = None, before.get(name)
+        if known and known.get("glance") == glance:
+            row = current(name, key_of(known["inputs"], run))
+        if row is None:
+            inputs, parts = input_digests(Path(run["archive"]) / name)
+            key = key_of(inputs, run)
+            row = current(name, key)
         if row is None:
             outcome, cost = calibrate(run, name, work, lock)
             row = outcome | {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
@@ -153,9 +166,9 @@ def reprocess(run, shard, names, lock, keep):
             tell_run(shard, row, cost, publish(row, work, keep))
             shutil.rmtree(work / name)
             made += 1
-        rows.append(row | {"cpu_s": stated_cost(name)})
+        rows.append(row | {"cpu_s": stated_cost(name), "glance": glance})
     shutil.rmtree(work, ignore_errors=True)
-    print(f"{len(names)} sessions, {made} reprocessed")
+    print(f"{len(rows)} sessions, {made} reprocessed")
     return rows
 
 
@@ -167,7 +180,7 @@ def main():
     with open(STATE / "locks" / shard, "w") as lock:
         # A job that the cluster gave up may still be at work.
         fcntl.flock(lock, fcntl.LOCK_EX)
-        rows = reprocess(run, shard, [line.split("\t")[0] for line in lines], lock, keep)
+        rows = reprocess(run, shard, dict(line.split("\t") for line in lines), lock, keep)
     write_whole(STATE / "rows" / f"{shard}.csv", table(ALL, rows))
 
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joins the rows of the shards, in RESULTS, to summary.csv (a row per session), fleet.csv (a row per session with
 a calibration: its figures over time) and lamps.csv (a row per session and lamp: where the others see it)."""
+import gc
 import json
 from pathlib import Path
 
@@ -23,6 +24,7 @@ def main():
     shards = sorted(file.stem for file in Path(".state/shards").glob("*.list"))
     stated = {(row["camera"], row["session"]): row for row in read_table(".state/dates.csv")}
     rows = [row for shard in shards for row in read_table(f".state/rows/{shard}.csv")]
+    rows.sort(key=lambda row: (row["camera"], row["session"]))
     for row in rows:
         known = stated.get((row["camera"], row["session"]), {"date": "", "room": ""})
         row |= {"date": known["date"], "room": known["room"]}
@@ -33,4 +35,5 @@ def main():
 
 
 if __name__ == "__main__":
+    gc.disable()  # of an archive's many rows none go in circles
     main()

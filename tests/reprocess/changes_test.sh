@@ -103,6 +103,7 @@ refused 'unknown option' "$archive" "$scratch/refused" --odd
 refused '--shard-size: should be a number' "$archive" "$scratch/refused" --shard-size 0
 refused '--readout: should be rows or columns' "$archive" "$scratch/refused" --readout diagonals
 refused 'neither of ours nor a folder' "$archive" "$scratch/refused" --profile odd
+refused '--look: should be files or folders' "$archive" "$scratch/refused" --look everywhere
 refused '--keep: should be a number' "$archive" "$scratch/refused" --keep all
 refused 'keeps no former result' --diff "$results" camera-00001/session-01
 refused 'holds no result of' --diff "$results" camera-00001/session-77

@@ -30,6 +30,13 @@ patiently() {  # SECONDS COMMAND...: until it succeeds
     sleep 0.05
   done
 }
+# Pythons with a Snakemake of their own, as scripts/reprocess/README.md makes them.
+other_snakemakes() {
+  local python
+  for python in "${VLP_SNAKEMAKES:-$source_dir/out/snakemake}"/*/bin/python; do
+    [ ! -x "$python" ] || echo "$python"
+  done
+}
 # Takes copies of some sessions, for a test to change, as its archive.
 take() {  # FOLDER SESSION...
   local session

@@ -8,6 +8,7 @@ import os
 import random
 import sys
 import tempfile
+import time
 import unittest
 import unittest.mock
 from pathlib import Path
@@ -20,6 +21,7 @@ try:
 except ImportError:
     print("yaml is missing: scripts/setup.sh --batch")
     sys.exit(77)
+import catalogue
 import changes
 import dates
 import diff
@@ -236,6 +238,41 @@ class Shard(unittest.TestCase):
             found = sorted(str(file.relative_to(former)) for file in former.rglob("*") if file.is_file())
             self.assertEqual(found, sorted([*outcome.KEPT.values(), "row.json"]))
 
+
+    def test_digests_of_what_looks_the_same_are_not_taken_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "archive": folder, "version": "1"}
+            for name, text in (("c/1", "one"), ("c/2", "two")):
+                (Path(name) / "boards").mkdir(parents=True)
+                (Path(name) / "boards/0.png").write_text(text)
+            made = []
+
+            def calibrate(run, name, work, lock):
+                (work / name).mkdir(parents=True)
+                made.append(name)
+                return {"camera": "c", "session": name[-1], "verdict": "pass"}, "0.5"
+
+            def reprocess(**glances):
+                digested, made[:] = [], []
+                digests = lambda session: digested.append(session.name) or files.input_digests(session)
+                glances = {f"c/{name[1:]}": glance for name, glance in glances.items()}
+                with unittest.mock.patch.multiple(shard, calibrate=calibrate, input_digests=digests):
+                    rows = shard.reprocess(run, "7", glances, None, 0)
+                files.write_whole(".state/rows/7.csv", files.table(outcome.ALL, rows))
+                self.assertEqual([row["glance"] for row in rows], list(glances.values()))
+                return digested, [name[-1] for name in made]
+
+            self.assertEqual(reprocess(s1="a", s2="b"), (["1", "2"], ["1", "2"]))
+            self.assertEqual(reprocess(s1="a", s2="b"), ([], []))
+            self.assertEqual(reprocess(s1="a", s2="c"), (["2"], []))  # touched
+            Path("c/2/boards/0.png").write_text("three")
+            self.assertEqual(reprocess(s1="a", s2="d"), (["2"], ["2"]))
+            (Path("sessions/c/1/row.json")).unlink()
+            self.assertEqual(reprocess(s1="a", s2="d"), (["1"], ["1"]))
+            run["toolbox"] = "u"
+            self.assertEqual(reprocess(s1="a", s2="d"), (["1", "2"], ["1", "2"]))
 
     def test_former_results_stay_by_their_keys_so_many(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -514,6 +551,176 @@ class Plan(unittest.TestCase):
         self.assertEqual(lengths(3, 50, 8), [1, 1, 1])
         self.assertEqual(lengths(10, 3, 1), [2, 3, 2, 3])
         self.assertEqual(lengths(810, 50, 2), [50] * 16 + [10])
+
+
+    def test_a_session_stays_in_its_shard_where_there_are_many(self):
+        sessions = [f"c/{i:03d}" for i in range(85)]
+        known = unittest.mock.Mock(stated={"shard_size": "10"}, shard_of=lambda name: numbers.get(name))
+        numbers = {}
+        first = plan.shards_of(sessions, known, 10, 1)
+        self.assertEqual([len(names) for names in first.values()], [10] * 8 + [5])
+        numbers = {name: number for number, names in first.items() for name in names}
+        del sessions[20:30]  # a whole shard
+        sessions += [f"b/{i:03d}" for i in range(17)]
+        then = plan.shards_of(sorted(sessions), known, 10, 1)
+        self.assertEqual([(number, len(names)) for number, names in then.items() if number not in (0, 1, 3, 4, 5, 6, 7)], [(8, 10), (9, 10), (10, 2)])
+        for number in (0, 1, 3, 4, 5, 6, 7):
+            self.assertEqual(then[number], first[number])
+        self.assertEqual(sorted(name for names in then.values() for name in names), sorted(sessions))
+        self.assertEqual(plan.shards_of(sorted(sessions), known, 5, 1)[0], sorted(sessions)[:5])  # another size
+
+    def test_only_shards_that_are_not_done_and_summed_up_are_to_do(self):
+        with tempfile.TemporaryDirectory() as folder:
+            state, summary_file = Path(folder) / ".state", Path(folder) / "summary.csv"
+
+            def write(name, at, text=""):
+                file = Path(folder) / name
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text(text)
+                os.utime(file, (at, at))
+
+            write(".state/run.json", 10)
+            for number, (listed, made) in enumerate([(5, 20), (25, 20), (5, 31), (5, 8), (5, 20), (5, None)]):
+                write(f".state/shards/{number}.list", listed)
+                if made:
+                    write(f".state/rows/{number}.csv", made, "c,s,crashed,\n" if number == 4 else "")
+            self.assertEqual(plan.to_do(state, summary_file), (list("012345"), ["4"]))
+            write("summary.csv", 30)
+            self.assertEqual(plan.to_do(state, summary_file), (list("12345"), ["4", "5"]))
+
+
+class Look(unittest.TestCase):
+    """What the plan notices of what happens to a session's files."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.archive = Path(folder.name) / "archive"
+        self.file = Path(folder.name) / "catalogue.sqlite"
+        self.session = self.archive / "c/s"
+        for name in ("boards/0.png", "boards/1.png", "check/truth.csv", "lamps.yaml", "notes.txt", "check/more/2.png"):
+            (self.session / name).parent.mkdir(parents=True, exist_ok=True)
+            (self.session / name).write_text("one")
+        (self.archive / "c/other").mkdir()
+        self.at_ns = 0  # that of the clock is later by so much than what is looked at
+
+    def glance(self, how="files", rebuild=False, archive=None):
+        """Of the session, as the plan finds it; it is kept for the next time."""
+        self.at_ns += 10_000_000_000
+        now = time.time_ns() + self.at_ns
+        with unittest.mock.patch.object(catalogue.time, "time_ns", return_value=now):
+            known = catalogue.Catalogue(self.file, archive or self.archive, rebuild)
+            glances = known.glances(["c/other", "c/s"], how)
+            known.save({0: ["c/other", "c/s"]}, 50)
+        return glances[1]
+
+    def written_over(self, name, text):
+        """In place, by another content of the same length, and its time is set back."""
+        before = os.stat(self.session / name)
+        time.sleep(0.02)  # file systems count in ticks
+        with open(self.session / name, "r+") as stream:
+            stream.write(text)
+        os.utime(self.session / name, ns=(before.st_atime_ns, before.st_mtime_ns))
+        after = os.stat(self.session / name)
+        self.assertEqual((before.st_size, before.st_ino, before.st_mtime_ns), (after.st_size, after.st_ino, after.st_mtime_ns))
+
+    def replaced(self, name):
+        before = os.stat(self.session / name)
+        (self.session / "new").write_text("two")
+        os.utime(self.session / "new", ns=(before.st_atime_ns, before.st_mtime_ns))
+        (self.session / "new").replace(self.session / name)
+
+    def test_the_same_is_the_same_both_ways(self):
+        first = self.glance()
+        for how in ("files", "folders", "folders", "files"):
+            self.assertEqual(self.glance(how), first)
+        (self.session / "notes.txt").write_text("three")  # not read
+        (self.session / "results").mkdir()
+        for how in ("folders", "files"):
+            self.assertEqual(self.glance(how), first)
+
+    def test_sees_each_change_of_each_file(self):
+        said = [self.glance()]
+        for change in (
+            lambda: self.written_over("boards/0.png", "two"),
+            lambda: self.written_over("check/more/2.png", "two"),
+            lambda: self.replaced("boards/1.png"),
+            lambda: (self.session / "boards/1.png").rename(self.session / "boards/3.png"),
+            lambda: (self.session / "boards/3.png").unlink(),
+            lambda: (self.session / "rotation").mkdir() or (self.session / "rotation/0.png").write_text("one"),
+            lambda: self.written_over("lamps.yaml", "two"),
+            lambda: os.utime(self.session / "lamps.yaml"),
+        ):
+            change()
+            said.append(self.glance())
+            self.assertEqual(self.glance(), said[-1])
+        self.assertEqual(len(set(said)), len(said))
+
+    def test_folders_show_all_but_images_that_are_written_over(self):
+        said = [self.glance("folders")]
+        for change in (
+            lambda: self.replaced("boards/1.png"),
+            lambda: self.replaced("check/more/2.png"),
+            lambda: (self.session / "boards/2.png").write_text("one"),
+            lambda: self.written_over("lamps.yaml", "two"),
+            lambda: self.written_over("check/truth.csv", "two"),
+            lambda: (self.session / "gates.yaml").write_text("one"),
+        ):
+            change()
+            said.append(self.glance("folders"))
+            self.assertEqual(self.glance("folders"), said[-1])
+        self.assertEqual(len(set(said)), len(said))
+        self.written_over("boards/0.png", "two")
+        self.assertEqual(self.glance("folders"), said[-1])  # as the page says
+        self.assertNotEqual(self.glance("files"), said[-1])
+
+    def test_what_is_as_new_as_the_look_is_looked_at_again(self):
+        for how in ("files", "folders"):
+            self.at_ns = -10_000_000_000
+            new = self.glance(how, rebuild=True)
+            self.at_ns = 0
+            settled = self.glance(how)
+            self.assertNotEqual(settled, new)
+            self.assertEqual(self.glance(how), settled)
+
+    def test_a_catalogue_that_is_rebuilt_damaged_or_anothers_knows_nothing(self):
+        said = [self.glance(), self.glance(rebuild=True)]
+        self.file.write_bytes(b"not a database, and longer than the head of one" * 50)
+        said.append(self.glance())
+        self.file.unlink()
+        said.append(self.glance())
+        whole = self.file.read_bytes()
+        self.file.write_bytes(whole[:5000] + bytes(len(whole) - 5000))
+        said.append(self.glance())
+        moved = self.archive.rename(self.archive.with_name("moved"))
+        said.append(self.glance(archive=moved))
+        self.assertEqual(len(set(said)), len(said))
+        self.assertEqual(self.glance(archive=moved), said[-1])
+
+    def test_looks_at_the_files_of_which_the_digest_is(self):
+        (self.session / "boards/nowhere.png").symlink_to("/nowhere")
+        (self.session / "rotation").symlink_to(self.session / "boards")
+        (self.session / "dispersion").write_text("a file")
+        opened = os.open(self.archive, os.O_RDONLY)
+        self.addCleanup(os.close, opened)
+        seen = catalogue.Seen("c/s", opened)
+        self.assertEqual(seen.files, [name for name, _ in files.input_files(self.session)])
+        self.assertEqual(seen.of_places, catalogue.look_at("c/s", seen.places, opened))
+
+    def test_only_sessions_that_changed_or_went_are_written(self):
+        self.glance()
+        later = unittest.mock.patch.object(catalogue.time, "time_ns", return_value=time.time_ns() + 10_000_000_000)
+        later.start()
+        self.addCleanup(later.stop)
+        known = catalogue.Catalogue(self.file, self.archive)
+        known.glances(["c/s"], "files")
+        known.save({3: ["c/s"]}, 50)
+        known = catalogue.Catalogue(self.file, self.archive)
+        self.assertEqual((known.shard_of("c/s"), known.shard_of("c/other")), (3, None))
+        before = self.file.stat().st_mtime_ns
+        known.glances(["c/s"], "files")
+        known.save({3: ["c/s"]}, 50)
+        self.assertEqual(self.file.stat().st_mtime_ns, before)
 
 
 class Files(unittest.TestCase):

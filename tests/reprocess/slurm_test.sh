@@ -77,6 +77,17 @@ expect_baseline "$results"
 done_on_n2() { scontrol show job --oneliner | grep 'JobState=COMPLETED.*BatchHost=n2'; }
 done_on_n2 >/dev/null || fail "no job ran on the second node: $(scontrol show job --oneliner)"
 
+submitted() { scontrol show job --oneliner | grep -c 'JobState=COMPLETED.*Comment=rule_shard_' || true; }
+jobs=0
+for python in $(other_snakemakes); do
+  results=$scratch/slurm-other
+  rm -rf "$results"
+  VLP_PYTHON=$python reprocess "$results" --profile slurm --shard-size 5
+  expect_baseline "$results"
+  jobs=$((jobs + 2))
+  [ "$(submitted)" = $jobs ] || fail "two shards, and not two jobs: $(scontrol show job --oneliner)"
+done
+
 results=$scratch/slurm-killed
 start_reprocess "$results" --profile slurm --shard-size 3
 runs+=($!)
