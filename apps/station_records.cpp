@@ -23,6 +23,7 @@
 #include "station/export_runs.h"
 #include "station/measurement_study.h"
 #include "station/publish_run.h"
+#include "station/retention.h"
 #include "station/spool.h"
 #include "station/station_config.h"
 #include "station/station_screen.h"
@@ -73,6 +74,11 @@ struct Known {
     }
   }
   std::vector<RunRecord> waiting() { return spool ? spool->waiting() : std::vector<RunRecord>(); }
+  /// Of all stations.
+  std::vector<std::string> with_open_hook() {
+    if (spool) return spool->with_open_hook("");
+    return records ? records->with_open_hook("") : std::vector<std::string>();
+  }
   /// For what cannot do without them.
   Records& all() {
     if (!records) throw std::runtime_error(away);
@@ -261,6 +267,14 @@ void list_runs(const StationRecordsOptions& options) {
     fmt::print(": yield {:.1f} % of {}", percent * double(passed) / double(judged), judged);
   }
   fmt::print("\n");
+  const auto open = known.with_open_hook();
+  const auto without = std::count_if(runs.begin(), runs.end(), [&](const RunSummary& run) {
+    return std::binary_search(open.begin(), open.end(), run.run);
+  });
+  if (without > 0) {
+    fmt::print("{} of them with a hook that has not ended well: 'vlp-station hook' runs it again\n",
+               without);
+  }
   known.all();  // these are not all there are when the records are away
 }
 
@@ -277,9 +291,13 @@ void show_run(const StationRecordsOptions& options) {
                                   [](const auto& image) { return image.refused.empty(); });
   fmt::print("\n");
   for (const RunField& field : run_fields()) {
-    if (field.label != nullptr) say(fmt::format("{:<11}{}\n", field.label, record.*field.text));
+    if (field.label == nullptr || (record.*field.text).empty()) continue;
+    say(fmt::format("{:<11}{}\n", field.label, record.*field.text));
   }
   fmt::print("images     {}, {} used\n", record.images.size(), used);
+  for (const RunEvent& event : record.events) {
+    say(fmt::format("{:<11} {} {}\n", event.what, event.utc(), event.text));
+  }
 }
 
 void restore_run(const StationRecordsOptions& options) {
@@ -300,6 +318,40 @@ void write_certificate(const StationRecordsOptions& options) {
   const std::filesystem::path file = folder / "certificate.html";
   write_file(file, certificate(record, read_calibration(folder / calibration_name(record))));
   say(fmt::format("{}\n", file.string()));
+}
+
+void clean_up(const StationRecordsOptions& options) {
+  const StationConfig config = read_station(options.station);
+  if (!config.keep.images_days && !config.keep.results_days) {
+    throw InputError(options.station, "keeps all for ever: add the key 'keep'");
+  }
+  Known known(options);
+  const Retained found = look_for_expired(config, known.all());
+  constexpr double megabyte = 1e6;
+  double all_mb = 0;
+  for (const auto& [folder, what, days, bytes, run] : found.expired) {
+    const double mb = double(bytes) / megabyte;
+    all_mb += mb;
+    if (options.remove) {
+      RunRecord told = run;
+      const bool told_before =
+          std::any_of(run.events.begin(), run.events.end(),
+                      [&](const RunEvent& event) { return event.what == what; });
+      if (!told_before) {
+        told.events.push_back(new_event(what, fmt::format("kept {} days, {:.1f} MB", days, mb)));
+        known.spool->keep(told);  // before: a killed program goes on the next time
+      }
+      delete_expired({folder, what, days, bytes, run});
+    }
+    say(fmt::format("{:>10.1f} MB  {} of {}, {} {}\n", mb, folder.string(), run.ended_utc,
+                    run.verdict, options.remove ? "(deleted)" : ""));
+  }
+  for (const auto& folder : found.without_record) {
+    spdlog::warn("{}: is of no run of the records: left", folder.string());
+  }
+  fmt::print("{} folders, {:.1f} MB{}\n", found.expired.size(), all_mb,
+             options.remove ? " deleted" : ": --delete deletes them");
+  known.spool->deliver();
 }
 
 void export_runs(const StationRecordsOptions& options) {

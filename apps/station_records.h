@@ -15,6 +15,8 @@ struct StationRecordsOptions {
   std::string station, records;
   RunFilter filter;
   std::string run, figure, output;
+  /// Of clean: delete, instead of telling what would be.
+  bool remove = false;
   /// Of a control chart.
   std::vector<std::string> rules{"western-electric"};
   /// Of a study: its units; those with two runs or more when there is none.
@@ -29,6 +31,9 @@ void show_run(const StationRecordsOptions& options);
 void restore_run(const StationRecordsOptions& options);
 /// vlp-station certificate: a page for who gets the unit, beside the files of its run.
 void write_certificate(const StationRecordsOptions& options);
+/// vlp-station clean: what of the station's runs is kept no longer, deleted when that is asked for,
+/// which the runs' events tell. Records stay.
+void clean_up(const StationRecordsOptions& options);
 /// vlp-station export: CSV, a line for each run, or JSON with all there is.
 void export_runs(const StationRecordsOptions& options);
 /// vlp-station trend: a figure over the runs, with a control chart's limits and rules, also as a

@@ -7,12 +7,15 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 
 #include "app.h"
 #include "captures/printable.h"
 #include "detection/image_file.h"
 #include "rig/input_error.h"
+#include "station/golden_due.h"
+#include "station/hook.h"
 #include "station/publish_run.h"
 #include "station/spool.h"
 #include "station/verify_station.h"
@@ -25,11 +28,40 @@ namespace fs = std::filesystem;
 
 const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 
-/// Keeps the run, says the verdict, writes its files; then the records, which may be away.
-void conclude(const RunRecord& record, const std::vector<ReportPicture>& pictures, Spool& spool,
+/// A verdict is a verdict without it.
+void note(const StationConfig& config, const RunRecord& record) {
+  try {
+    note_for_golden(config, record);
+  } catch (const InputError& error) {
+    spdlog::error("when the golden unit is due is not known: {}", error.what());
+  }
+}
+
+/// Runs the hook of a kept run and keeps what became of it. A verdict is a verdict without it.
+void call_hook(const Hook& hook, RunRecord& record, Spool& spool) {
+  record.events.push_back(run_hook(hook, record));
+  try {
+    spool.keep(record);
+  } catch (const InputError& error) {
+    spdlog::error("what became of the hook is not recorded: {}", error.what());
+  }
+  spool.deliver();
+}
+
+/// Keeps the run, says the verdict, writes its files; then the records, which may be away, and the
+/// hook.
+void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spool& spool,
               const StationConfig& config, Terminal& terminal,
               const std::function<void()>& mark_kept, const std::function<void()>& put_away) {
   auto lines = verdict_screen(record);
+  std::optional<HookLock> lock;
+  if (config.hook) {
+    lock.emplace(spool.folder(), record.run);
+    record.events.push_back(hook_wanted(*config.hook));
+  }
+  // Killed in between, a station that failed is known as such, one that passed is not.
+  const bool golden_failed = record.kind == "golden" && !record.passed();
+  if (golden_failed) note(config, record);
   try {
     spool.keep(record);
   } catch (const InputError&) {
@@ -39,6 +71,7 @@ void conclude(const RunRecord& record, const std::vector<ReportPicture>& picture
   }
   mark_kept();
   terminal.print(lines);
+  if (!golden_failed) note(config, record);
   std::string undone, mend;
   try {
     mend = fmt::format("'vlp-station restore {}' writes the files", record.run);
@@ -50,6 +83,10 @@ void conclude(const RunRecord& record, const std::vector<ReportPicture>& picture
     undone = error.what();
   }
   spool.deliver();
+  if (config.hook) {
+    call_hook(*config.hook, record, spool);
+    terminal.print(hook_lines(record));
+  }
   terminal.print(spool_lines(spool.state()));
   if (undone.empty()) return;
   throw std::runtime_error(
@@ -68,6 +105,7 @@ void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
   unit.refuse_images_of_others([&spool, camera = unit.camera_id()](const std::string& sha256) {
     return spool.owner_of(sha256, camera);
   });
+  unit.distrust(golden_state(config).problem);
 }
 
 /// Throws GateNotMet or Undetermined, by the verdict.
@@ -91,20 +129,31 @@ void add_folders(Unit& unit, const fs::path& folder) {
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }
 
-void run_batch(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
+/// The record of a unit that ends now. A golden unit that failed meanwhile spoils it.
+RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions& options) {
+  const GoldenState golden = golden_state(unit.config());
+  if (golden.failed) unit.distrust(golden.problem);
+  RunRecord record = record_of(unit, run, kProgram);
+  record.operator_name = options.operator_name;
+  record.shift = options.shift;
+  return record;
+}
+
+RunRecord run_batch(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
   const std::string run = new_run();
   Unit unit(config, options.camera_id, kProgram, options.threads);
   prepare(unit, spool, config);
+  if (!unit.distrusted().empty()) spdlog::warn("{}; no unit passes", unit.distrusted());
   add_folders(unit, options.batch);
   unit.advance(true);
-  const RunRecord record = record_of(unit, run, kProgram);
+  RunRecord record = record_now(unit, run, options);
   Terminal terminal;
   conclude(
       record, unit.pictures(), spool, config, terminal, [] {}, [] {});
-  throw_unless_passed(record);
+  return record;
 }
 
-void run_watched(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
+RunRecord run_watched(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
   StepSources sources(options.sources, config.type.imager_px);
   Unit unit(config, options.camera_id, kProgram, options.threads);
   prepare(unit, spool, config);
@@ -112,27 +161,34 @@ void run_watched(const StationRunOptions& options, const StationConfig& config, 
   Terminal terminal;
   if (const auto& finished = watched.finished()) {
     terminal.print(verdict_screen(*finished));
+    terminal.print(hook_lines(*finished));
     spdlog::info("run {} had its verdict before it was put away; the same command begins another",
                  finished->run);
-    return throw_unless_passed(*finished);
+    return *finished;
   }
   spdlog::info("run {}; images go to {}/STEP", watched.run(), watched.folder().string());
+  if (!unit.distrusted().empty() && !terminal.interactive()) {
+    spdlog::warn("{}; no unit passes", unit.distrusted());
+  }
   guide_unit(options, unit, watched, sources, spool, terminal);
   unit.advance(true);
-  const RunRecord record = record_of(unit, watched.run(), kProgram);
+  RunRecord record = record_now(unit, watched.run(), options);
   conclude(
       record, unit.pictures(), spool, config, terminal, [&] { watched.mark_kept(); },
       [&] { watched.put_away(); });
-  throw_unless_passed(record);
+  return record;
 }
 
 }  // namespace
 
 void run_unit(const StationRunOptions& options) {
   const StationConfig config = read_station(options.station);
+  if (const std::string why = serial_problem(config, options.camera_id); !why.empty()) {
+    throw std::invalid_argument("--camera-id: " + why);
+  }
   Spool spool(config.spool, config.records);
-  if (options.batch.empty()) return run_watched(options, config, spool);
-  run_batch(options, config, spool);
+  throw_unless_passed(options.batch.empty() ? run_watched(options, config, spool)
+                                            : run_batch(options, config, spool));
 }
 
 void run_verify(const StationRunOptions& options) {
@@ -142,8 +198,10 @@ void run_verify(const StationRunOptions& options) {
   prepare(spool, config, config.golden->camera_id);
   const fs::path arrived = config.captures / config.golden->camera_id;
   const bool batch = !options.batch.empty();
-  const auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
-                                                 new_run(), kProgram, options.threads);
+  auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
+                                           new_run(), kProgram, options.threads);
+  record.operator_name = options.operator_name;
+  record.shift = options.shift;
   Terminal terminal;
   conclude(
       record, pictures, spool, config, terminal, [] {},
@@ -151,6 +209,30 @@ void run_verify(const StationRunOptions& options) {
         if (!batch) put_away(arrived, run);
       });
   throw_unless_passed(record, "station " + record.station + " has moved");
+}
+
+void run_hooks(const StationRunOptions& options) {
+  const StationConfig config = read_station(options.station);
+  if (!config.hook) throw InputError(options.station, "has no hook: add the key 'hook'");
+  Spool spool(config.spool, config.records);
+  spool.deliver();
+  const auto runs = spool.with_open_hook(config.station);
+  int failed = 0;
+  for (const std::string& run : runs) {
+    const HookLock lock(spool.folder(), run);
+    auto record = spool.find(run);
+    // Another program may be at it, or have done it meanwhile.
+    if (!lock.held() || !record || !hook_is_open(*record)) continue;
+    call_hook(*config.hook, *record, spool);
+    const std::string problem = hook_problem(*record);
+    if (!problem.empty()) ++failed;
+    fmt::print("{}\n", printable(fmt::format("{} {} {}: {}", run, record->camera, record->verdict,
+                                             problem.empty() ? "done" : problem)));
+  }
+  if (const std::string state = spool.state(); !state.empty()) spdlog::warn("{}", printable(state));
+  if (failed > 0) {
+    throw std::runtime_error(fmt::format("the hook failed for {} of {} runs", failed, runs.size()));
+  }
 }
 
 }  // namespace vlp

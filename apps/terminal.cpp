@@ -37,6 +37,11 @@ const char* colour_of(Tone tone) {
   return "";
 }
 
+bool read_key(char& key, int wait_ms) {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  return ::poll(&input, 1, wait_ms) > 0 && ::read(STDIN_FILENO, &key, 1) == 1;
+}
+
 }  // namespace
 
 struct Terminal::Saved {
@@ -124,10 +129,42 @@ std::optional<char> Terminal::key(int wait_ms) const {
     std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
     return std::nullopt;
   }
-  pollfd input{STDIN_FILENO, POLLIN, 0};
-  char key = 0;
-  if (::poll(&input, 1, wait_ms) < 1 || ::read(STDIN_FILENO, &key, 1) != 1) return std::nullopt;
-  return key;
+  char first = 0, key = 0;
+  if (!read_key(first, wait_ms)) return std::nullopt;
+  constexpr int slower_than_a_scanner_ms = 30;
+  bool alone = true;
+  while (read_key(key, slower_than_a_scanner_ms)) alone = false;
+  return alone ? std::optional(first) : std::nullopt;
+}
+
+std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
+  constexpr char escape = 0x1b, backspace = 0x08, del = 0x7f, end = 0x04;
+  constexpr int look_every_ms = 100;
+  constexpr std::size_t longest = 200;
+  const std::string asked = prompt.back().text;
+  std::string typed;
+  for (;;) {
+    prompt.back().text = asked + typed;
+    draw(prompt);
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    char key = 0;
+    if (interrupted()) return std::nullopt;
+    if (::poll(&input, 1, look_every_ms) < 1) continue;
+    const bool ended = ::read(STDIN_FILENO, &key, 1) != 1 || key == end;
+    if (ended && typed.empty()) return std::nullopt;
+    if (ended || key == '\n' || key == '\r') break;
+    if (key == escape) {  // an arrow, or another key of several characters
+      while (saved_->keys && read_key(key, 0)) continue;
+    } else if (key == backspace || key == del) {
+      if (!typed.empty()) typed.pop_back();
+    } else if (static_cast<unsigned char>(key) >= ' ' && typed.size() < longest) {
+      typed += key;
+    }
+  }
+  if (interactive_) print(prompt);  // to stay
+  const auto first = typed.find_first_not_of(' ');
+  return first == std::string::npos ? ""
+                                    : typed.substr(first, typed.find_last_not_of(' ') + 1 - first);
 }
 
 bool interrupted() { return stop_asked; }

@@ -30,8 +30,12 @@ class Terminal {
   void print(const std::vector<ScreenLine>& lines);
   /// Whether the terminal has another size than when it was drawn.
   bool resized() const;
-  /// The key that was pressed, if one was, waiting so long at most.
+  /// The key that was pressed, if one was, waiting so long at most. Keys that come together are a
+  /// scanner's, and none.
   std::optional<char> key(int wait_ms) const;
+  /// The line that is typed, or comes from a scanner or a file: asked for by `prompt`, whose last
+  /// line it follows. Nothing at the end of the input, and when SIGINT or SIGTERM came.
+  std::optional<std::string> line(std::vector<ScreenLine> prompt);
 
  private:
   struct Saved;

@@ -12,20 +12,31 @@
 #include "station/watched_run.h"
 #include "station_records.h"
 #include "station_run.h"
+#include "station_shift.h"
 
 namespace vlp {
 namespace {
 
+void add_operator(CLI::App& command, StationRunOptions& options) {
+  command.add_option("--operator", options.operator_name,
+                     "Who measures, for the record (a shift asks when it is not said)");
+  command.add_option("--shift", options.shift, "In which shift, for the record");
+}
+
 void add_run(CLI::App& app, StationRunOptions& options) {
-  CLI::App* run = app.add_subcommand("run", "Take a unit to its verdict");
+  CLI::App* run = app.add_subcommand(
+      "run", "Take a unit to its verdict, or, without --camera-id, unit after unit");
   run->add_option("--station", options.station, "The station, station.yaml")->required();
-  run->add_option("--camera-id", options.camera_id, "The unit's camera")
-      ->required()
-      ->check([](const std::string& id) { return camera_id_problem(id); });
+  auto* camera =
+      run->add_option("--camera-id", options.camera_id,
+                      "The unit's camera (default: those that a scanner or the operator types, a "
+                      "line each, until q)")
+          ->check([](const std::string& id) { return camera_id_problem(id); });
   auto* batch =
       run->add_option("--batch", options.batch,
                       "A folder whose folders boards, rotation, dispersion and check are full: no "
-                      "questions asked (default: the images that arrive in the station's folder)");
+                      "questions asked (default: the images that arrive in the station's folder)")
+          ->needs(camera);
   run->add_option("--source", options.sources,
                   "A V4L2 camera or a video file whose frames are taken for the present step, or "
                   "STEP=SOURCE for one step; frames that are refused are not kept")
@@ -35,6 +46,7 @@ void add_run(CLI::App& app, StationRunOptions& options) {
                   "Give the verdict when no image came for so long, of a source none that could be "
                   "used")
       ->check(finite_positive());
+  add_operator(*run, options);
   run->add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
 }
@@ -46,8 +58,15 @@ void add_verify(CLI::App& app, StationRunOptions& options) {
   verify->add_option("--batch", options.batch,
                      "Its images: a folder with check and, maybe, dispersion and boards (default: "
                      "those that are in the station's folder, which are put away)");
+  add_operator(*verify, options);
   verify->add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
+}
+
+void add_hook(CLI::App& app, StationRunOptions& options) {
+  CLI::App* hook = app.add_subcommand(
+      "hook", "Run the hook again for runs whose hook failed or was not run to its end");
+  hook->add_option("--station", options.station, "The station, station.yaml")->required();
 }
 
 /// A UTC as records have it, 2026-11-21T13:45:01Z, or its beginning from the day on.
@@ -114,7 +133,9 @@ int main(int argc, char** argv) {
       "'study'\n"
       "tell of the records, 'restore' writes a run's files again, 'certificate' a page for who "
       "gets the\n"
-      "unit. Runs wait in the station's 'spool' while the records cannot be reached.\n"
+      "unit. Runs wait in the station's 'spool' while the records cannot be reached; 'hook' runs "
+      "the\n"
+      "station's hook again where it failed, 'clean' deletes what is kept no longer.\n"
       "vlp-station COMMAND --help tells more.\n\n"
       "Example, from the project's folder:\n"
       "  mkdir -p out && cp -rT datasets/station out/station\n"
@@ -130,6 +151,7 @@ int main(int argc, char** argv) {
   run.threads = vlp::all_cores();
   vlp::add_run(app, run);
   vlp::add_verify(app, run);
+  vlp::add_hook(app, run);
   vlp::add_records(app, "list", "A line for each run", records);
   auto* show =
       vlp::add_records(app, "show", "All of one run, the last unless it is named", records);
@@ -148,6 +170,10 @@ int main(int argc, char** argv) {
   certified->add_option("run", records.run, "Name of the run")->required();
   certified->add_option("-o,--output", records.output,
                         "The folder of results (default: the station's); in it CAMERA/RUN/");
+  CLI::App* clean = app.add_subcommand(
+      "clean", "What of the runs is kept no longer ('keep' in station.yaml); records stay");
+  clean->add_option("--station", records.station, "The station, station.yaml")->required();
+  clean->add_flag("--delete", records.remove, "Delete it (default: only tell)");
   auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
   exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
   constexpr const char* which = "Which: rms_px, check_mean_mm, ...";
@@ -180,12 +206,20 @@ int main(int argc, char** argv) {
   study->add_option("--units", records.units, "Its cameras (default: those with two runs or more)")
       ->option_text("ID ...");
   return vlp::run_app(app, argc, argv, [&] {
-    if (app.got_subcommand("run")) vlp::run_unit(run);
+    if (app.got_subcommand("run")) {
+      if (run.camera_id.empty()) {
+        vlp::run_shift(run);
+      } else {
+        vlp::run_unit(run);
+      }
+    }
     if (app.got_subcommand("verify")) vlp::run_verify(run);
+    if (app.got_subcommand("hook")) vlp::run_hooks(run);
     if (app.got_subcommand("list")) vlp::list_runs(records);
     if (app.got_subcommand("show")) vlp::show_run(records);
     if (app.got_subcommand("restore")) vlp::restore_run(records);
     if (app.got_subcommand("certificate")) vlp::write_certificate(records);
+    if (app.got_subcommand("clean")) vlp::clean_up(records);
     if (app.got_subcommand("export")) vlp::export_runs(records);
     if (app.got_subcommand("trend")) vlp::show_trend(records);
     if (app.got_subcommand("capability")) vlp::show_capability(records);

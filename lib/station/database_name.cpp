@@ -126,6 +126,13 @@ std::string connection_of(const std::string& where) {
       .append(std::to_string(kPatience_s));
 }
 
+bool answers(const std::string& where) {
+  const std::string connection = connection_of(where);
+  const std::array keywords{"dbname", "sslmode", kPatience, static_cast<const char*>(nullptr)};
+  const std::array values{connection.c_str(), "prefer", "2", static_cast<const char*>(nullptr)};
+  return PQpingParams(keywords.data(), values.data(), 1) == PQPING_OK;
+}
+
 int patience_s(const std::string& where) {
   if (!is_server(where)) return kPatienceWithFile_s;
   const auto parts = parts_of(where);

@@ -27,6 +27,10 @@ std::string identity_of_database(const std::string& where);
 /// the server, patience_s(). Precondition: is_server().
 std::string connection_of(const std::string& where);
 
+/// Whether a server answers at all, whoever asks for whatever: one that refuses a password, or has
+/// no TLS where it is asked for, does. Waits two seconds at most. Precondition: is_server().
+bool answers(const std::string& where);
+
 /// How long a database that does not answer is waited for, in seconds: a server as connect_timeout
 /// says, a day at most, 0 (also for less) for ever, ten without it; a file that another program
 /// writes, five.

@@ -71,18 +71,29 @@ nlohmann::ordered_json json_of(const RunRecord& run) {
   }
   json["figures"] = std::move(figures);
   json["images"] = std::move(images);
+  json["events"] = nlohmann::ordered_json::array();
+  for (const RunEvent& event : run.events) {
+    json["events"].push_back({{"event", event.event}, {"what", event.what}, {"text", event.text}});
+  }
   return json;
 }
 
+/// Bytes that are no UTF-8 are replaced.
+std::string text_of(const nlohmann::ordered_json& json) {
+  constexpr int indent = 1;
+  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
 }  // namespace
+
+std::string run_json(const RunRecord& run) { return text_of(json_of(run)); }
 
 void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
   if (file.extension() == ".csv") return write_csv(file, runs);
   if (file.extension() != ".json") throw InputError(file, "should end in .csv or .json");
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const RunRecord& run : runs) all.push_back(json_of(run));
-  constexpr int indent = 1;
-  write_file(file, all.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  write_file(file, text_of(all));
 }
 
 }  // namespace vlp

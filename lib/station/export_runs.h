@@ -3,15 +3,20 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "station/run_record.h"
 
 namespace vlp {
 
+/// All that is known of a run, as a JSON object: the texts of run_fields(), each figure with value,
+/// unit, gate and whether it is met, images, events.
+std::string run_json(const RunRecord& run);
+
 /// Writes runs, whole or not at all. To .csv: a line for each with run, kind, station, camera,
 /// begun_utc, ended_utc, verdict, causes, program, config_sha256 and each figure, empty where there
-/// is none. To .json: all that is known of each, calibration and images too. Throws InputError, for
+/// is none. To .json: a list of run_json(). Throws InputError, for
 /// another ending, too.
 void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs);
 

@@ -15,8 +15,8 @@ namespace vlp {
 namespace {
 
 /// Version 2: a figure has its unit. Version 3: images are found by their digest; a verdict can be
-/// INVALID.
-constexpr int kSchema = 4;
+/// INVALID. Version 4: guard bands. Version 5: events, operator and shift.
+constexpr int kSchema = 5;
 
 constexpr const char* kFigures =  // gate: no limit is no gate; guard_k: none is no guard band
     "CREATE TABLE IF NOT EXISTS figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
@@ -33,6 +33,13 @@ constexpr const char* kImages =
 constexpr const char* kImagesByDigest =
     "CREATE INDEX IF NOT EXISTS images_by_sha256 ON images (sha256)";
 
+constexpr const char* kEvents =
+    "CREATE TABLE IF NOT EXISTS events (event VARCHAR(64) PRIMARY KEY, "
+    "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
+    "text TEXT NOT NULL)";
+
+constexpr const char* kEventsByRun = "CREATE INDEX IF NOT EXISTS events_by_run ON events (run)";
+
 std::vector<std::string> tables() {
   std::string runs = "CREATE TABLE IF NOT EXISTS runs (run VARCHAR(64) PRIMARY KEY";
   for (const RunField& field : run_fields().subspan(1)) {
@@ -43,6 +50,8 @@ std::vector<std::string> tables() {
           runs,
           kFigures,
           kImages,
+          kEvents,
+          kEventsByRun,
           "CREATE INDEX IF NOT EXISTS runs_by_camera ON runs (camera)",
           kImagesByDigest};
 }
@@ -72,8 +81,16 @@ void from_3_to_4(soci::session& sql) {
   sql << "ALTER TABLE figures ADD COLUMN guard_k DOUBLE PRECISION";
 }
 
+/// An older program would bring runs here without their events, and take them from the spool.
+void from_4_to_5(soci::session& sql) {
+  sql << kEvents;
+  sql << kEventsByRun;
+  sql << "ALTER TABLE runs ADD COLUMN operator_name TEXT NOT NULL DEFAULT ''";
+  sql << "ALTER TABLE runs ADD COLUMN shift TEXT NOT NULL DEFAULT ''";
+}
+
 /// From each version to the next; the first is of version 1.
-constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4};
+constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4, from_4_to_5};
 static_assert(kMigrations.size() + 1 == kSchema);
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }

@@ -127,17 +127,29 @@ class Watch {
 }  // namespace
 
 struct Records::Database {
-  /// For messages.
-  std::string name;
+  /// `name` is for messages.
+  std::string where, name;
   int patience_s = 0;
   soci::session sql;
 
   /// Tables are there; from then on a connection that was lost is made again.
   bool ready = false;
 
+  /// Why there is no connection. A server that took its time is not asked whether it is there.
+  RecordsAway not_connected(std::string what, std::chrono::steady_clock::time_point begun) const {
+    const std::string soci = "Cannot establish connection to the database. ";
+    if (what.starts_with(soci)) what.erase(0, soci.size());
+    constexpr std::chrono::seconds soon(2);
+    const bool refused = std::chrono::steady_clock::now() - begun < soon && answers(where);
+    return {name, (refused ? "the server of the records answers, but refuses 'records' as it is: "
+                           : "the server of the records cannot be reached: ") +
+                      what};
+  }
+
   /// Errors name the database.
   template <typename Action>
   auto named(const Action& action) {
+    const auto begun = std::chrono::steady_clock::now();
     try {
       return action();
     } catch (const InputError&) {
@@ -146,8 +158,8 @@ struct Records::Database {
       std::string what = error.what();
       std::replace_if(
           what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
-      const bool away = name.starts_with("postgresql://") && !sql.is_connected();
-      if (away) throw RecordsAway(name, "the server of the records cannot be reached: " + what);
+      if (name.starts_with("postgresql://") && !sql.is_connected())
+        throw not_connected(what, begun);
       if (may_pass(error)) throw RecordsAway(name, "the records: " + what);
       throw InputError(name, "the records: " + what);
     } catch (const std::exception& error) {
@@ -251,6 +263,15 @@ void put_images(soci::session& sql, const RunRecord& record, Watch& watch) {
   }
 }
 
+void put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
+  for (const auto& [event, what, text] : record.events) {
+    sql << "INSERT INTO events (event, run, what, text) VALUES (:event, :run, :what, :text) "
+           "ON CONFLICT (event) DO NOTHING",
+        soci::use(event), soci::use(record.run), soci::use(what), soci::use(text);
+    watch.heard();
+  }
+}
+
 std::string condition(const RunFilter& filter) {
   std::string text = "WHERE 1 = 1";
   if (!filter.camera.empty()) text += " AND runs.camera = :camera";
@@ -300,6 +321,7 @@ std::vector<double> values_of(std::span<const TrendPoint> points) {
 }
 
 Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
+  database_->where = where;
   database_->name = name_of_database(where);
   database_->patience_s = patience_s(where);
   database_->named([&] { open(database_->sql, where); });
@@ -338,6 +360,7 @@ void Records::keep(const RunRecord& record) {
     } else if (const auto kept = texts_of(sql, record.run); !kept || !same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);
     }
+    put_events(sql, record, watch);
     transaction.commit();
   });
 }
@@ -359,6 +382,27 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
         soci::into(camera), soci::into(run), soci::use(sha256), soci::use(other_than_camera);
     return run.empty() ? std::string() : "camera " + camera + ": run " + run;
   });
+}
+
+std::vector<std::string> Records::with_open_hook(const std::string& station) {
+  return database_->run(
+      [&](Watch&) {
+        std::string run;
+        std::vector<std::string> runs;
+        const std::string wanted = kHookWanted, done = kHookDone;
+        soci::statement open =
+            (database_->sql.prepare
+                 << "SELECT DISTINCT events.run FROM events JOIN runs ON runs.run = events.run "
+                    "WHERE events.what = :wanted AND (:station = '' OR runs.station = :of) AND NOT "
+                    "EXISTS (SELECT 1 FROM events ended WHERE ended.run = events.run AND "
+                    "ended.what = :done) ORDER BY events.run",
+             soci::into(run), soci::use(wanted), soci::use(station), soci::use(station),
+             soci::use(done));
+        open.execute();
+        while (open.fetch()) runs.push_back(run);
+        return runs;
+      },
+      kManyRows);
 }
 
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
@@ -427,6 +471,12 @@ std::optional<RunRecord> Records::find(const std::string& run) {
          soci::into(image.refused), soci::use(run));
     images.execute();
     while (images.fetch()) found->images.push_back(image);
+    RunEvent event;
+    soci::statement events =
+        (sql.prepare << "SELECT event, what, text FROM events WHERE run = :run ORDER BY event",
+         soci::into(event.event), soci::into(event.what), soci::into(event.text), soci::use(run));
+    events.execute();
+    while (events.fetch()) found->events.push_back(event);
     return found;
   });
 }

@@ -46,7 +46,7 @@ std::vector<Row> last_of(std::vector<Row> rows, int last) {
   return rows;
 }
 
-/// Records that give no answer, or are locked: a later try may do.
+/// Records that give no answer, refuse the connection, or are locked: a later try may do.
 class RecordsAway : public InputError {
  public:
   using InputError::InputError;
@@ -57,10 +57,10 @@ class RecordsAway : public InputError {
 /// version brought up to date; of a later one they are refused. Any number of programs may use it
 /// at once: each run is written in one transaction, which waits for another's. What is kept is on
 /// the disk. A connection that was lost is made again. All throw InputError that names the
-/// database, but no password; it is RecordsAway when the server cannot be reached (also for a wrong
-/// password, which nothing tells from other refusals), the file cannot be opened, another program
-/// holds a lock, or no answer came for patience_s(), ten times as long where many runs are asked
-/// for, 360 times where tables are made or brought up to date.
+/// database, but no password; it is RecordsAway when the server cannot be reached, or answers but
+/// refuses the connection (a wrong password, no such database, no TLS), which it says, the file
+/// cannot be opened, another program holds a lock, or no answer came for patience_s(), ten times as
+/// long where many runs are asked for, 360 times where tables are made or brought up to date.
 class Records {
  public:
   explicit Records(const std::string& where);
@@ -68,8 +68,8 @@ class Records {
   Records(const Records&) = delete;
   Records& operator=(const Records&) = delete;
 
-  /// Keeps a run, whole or not at all. One that is kept already stays as it is; another of its name
-  /// is refused.
+  /// Keeps a run, whole or not at all. One that is kept already stays as it is, but gets the events
+  /// that it does not have; another of its name is refused.
   void keep(const RunRecord& record);
   /// All of one run; nothing when it is not kept.
   std::optional<RunRecord> find(const std::string& run);
@@ -78,6 +78,9 @@ class Records {
   /// "camera 0001: run RUN" of the first run of another camera that uses an image of this digest;
   /// empty when there is none.
   std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
+  /// The runs of this station, or of all when it is empty, whose hook is open (hook_is_open()),
+  /// from the first to the last.
+  std::vector<std::string> with_open_hook(const std::string& station);
   /// From the first to the last.
   std::vector<RunSummary> list(const RunFilter& filter);
   std::vector<TrendPoint> trend(const std::string& figure, const RunFilter& filter);

@@ -11,6 +11,7 @@
 #include <chrono>
 #include <ctime>
 #include <filesystem>
+#include <limits>
 #include <opencv2/core/utility.hpp>
 #include <random>
 #include <utility>
@@ -23,12 +24,15 @@
 namespace vlp {
 namespace {
 
-std::string utc(const char* format) {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+std::string utc_of(std::time_t time, const char* format) {
   std::tm parts{};
-  ::gmtime_r(&now, &parts);
+  ::gmtime_r(&time, &parts);
   char text[32];
   return {text, std::strftime(text, sizeof text, format, &parts)};
+}
+
+std::string utc(const char* format) {
+  return utc_of(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now()), format);
 }
 
 }  // namespace
@@ -59,6 +63,26 @@ std::string begun_utc(const std::string& run) {
   if (run.size() < length || run[8] != 'T' || run[15] != 'Z') return "";
   return run.substr(0, 4) + "-" + run.substr(4, 2) + "-" + run.substr(6, 5) + ":" +
          run.substr(11, 2) + ":" + run.substr(13, 3);
+}
+
+std::string RunEvent::utc() const { return begun_utc(event.substr(0, event.find('.')) + "Z"); }
+
+RunEvent new_event(const std::string& what, const std::string& text) {
+  std::random_device random;
+  using std::chrono::microseconds;
+  const auto now = std::chrono::time_point_cast<microseconds>(std::chrono::system_clock::now());
+  constexpr int of_a_second = 1'000'000;
+  const auto part = now.time_since_epoch().count() % of_a_second;
+  return {utc_of(std::chrono::system_clock::to_time_t(now), "%Y%m%dT%H%M%S") +
+              fmt::format(".{:06d}Z-{:08x}", part, random()),
+          what, text};
+}
+
+double seconds_since(const std::string& utc) {
+  std::tm parts{};
+  const char* end = ::strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  if (end == nullptr || *end != '\0') return std::numeric_limits<double>::quiet_NaN();
+  return std::difftime(std::time(nullptr), ::timegm(&parts));
 }
 
 std::string now_utc() { return utc("%Y-%m-%dT%H:%M:%SZ"); }
@@ -97,6 +121,8 @@ std::span<const RunField> run_fields() {
       RunField{"kind", &RunRecord::kind},
       RunField{"station", &RunRecord::station, "station"},
       RunField{"camera", &RunRecord::camera},
+      RunField{"operator_name", &RunRecord::operator_name, "operator"},
+      RunField{"shift", &RunRecord::shift, "shift"},
       RunField{"begun_utc", &RunRecord::begun_utc, "begun"},
       RunField{"ended_utc", &RunRecord::ended_utc, "ended"},
       RunField{"verdict", &RunRecord::verdict},
@@ -114,6 +140,8 @@ RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersi
                    .kind = "unit",
                    .station = unit.config().station,
                    .camera = unit.camera_id(),
+                   .operator_name = "",
+                   .shift = "",
                    .begun_utc = begun_utc(run),
                    .ended_utc = now_utc(),
                    .verdict = "",
@@ -123,7 +151,8 @@ RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersi
                    .config_sha256 = unit.config().sha256,
                    .calibration = calibration ? calibration_text(*calibration) : "",
                    .figures = unit.figures(),
-                   .images = {}};
+                   .images = {},
+                   .events = {}};
   record.judge(unit.causes());
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {

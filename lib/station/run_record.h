@@ -11,6 +11,25 @@
 
 namespace vlp {
 
+/// What became of a run after its verdict. Events are added to a run, never changed nor taken away.
+struct RunEvent {
+  /// Unique, in the order of time: 20261121T134501.123456Z-01234567.
+  std::string event;
+  /// One of those below.
+  std::string what;
+  /// For people.
+  std::string text;
+
+  /// As 2026-11-21T13:45:01Z.
+  std::string utc() const;
+};
+inline constexpr const char *kHookWanted = "hook wanted", *kHookDone = "hook done",
+                            *kHookFailed = "hook failed", *kImagesDeleted = "images deleted",
+                            *kResultsDeleted = "results deleted";
+
+/// One of now.
+RunEvent new_event(const std::string& what, const std::string& text);
+
 /// All that is kept of a run.
 struct RunRecord {
   /// Unique over all stations, see new_run().
@@ -18,6 +37,8 @@ struct RunRecord {
   /// "unit", or "golden" for the station's reference camera.
   std::string kind;
   std::string station, camera;
+  /// Who measured, and in which shift, where it was said.
+  std::string operator_name, shift;
   /// As 2026-11-21T13:45:01Z.
   std::string begun_utc, ended_utc;
   /// name_of() a Verdict, and why, one cause to a line, the root first.
@@ -34,6 +55,8 @@ struct RunRecord {
     std::string refused;
   };
   std::vector<Image> images;
+  /// From the first to the last.
+  std::vector<RunEvent> events;
 
   bool passed() const { return verdict == name_of(Verdict::pass); }
   bool invalid() const { return verdict == name_of(Verdict::invalid); }
@@ -67,6 +90,8 @@ std::string new_run();
 /// When it began, as 2026-11-21T13:45:01Z; empty for what is no name of a run.
 std::string begun_utc(const std::string& run);
 std::string now_utc();
+/// Since a UTC as 2026-11-21T13:45:01Z; below 0 for one to come, NaN for what is none.
+double seconds_since(const std::string& utc);
 
 /// The record of a unit that ends now.
 RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "station/database_name.h"
+#include "station/hook.h"
 #include "station/json_number.h"
 #include "station/station_folders.h"
 
@@ -61,11 +63,33 @@ SpooledRun run_from(const Json& json) {
                           image.at("sha256").get<std::string>(),
                           image.at("refused").get<std::string>()});
   }
+  for (const Json& event : json.value("events", Json::array())) {
+    run.events.push_back({event.at("event").get<std::string>(), event.at("what").get<std::string>(),
+                          event.at("text").get<std::string>()});
+  }
   return spooled;
 }
 
-fs::path file_of_run(const fs::path& folder, const std::string& run) {
-  return folder / (run + kRunEnding);
+/// With another event another file: programs that bring the one before to the records take away no
+/// other.
+fs::path file_of_run(const fs::path& folder, const RunRecord& run) {
+  const std::string last = run.events.empty() ? "" : "." + run.events.back().event;
+  return folder / (run.run + last + kRunEnding);
+}
+
+/// The run of several files, with the events of all.
+void add_run(std::vector<RunRecord>& runs, const RunRecord& run) {
+  if (runs.empty() || runs.back().run != run.run) {
+    runs.push_back(run);
+    return;
+  }
+  std::vector<RunEvent>& events = runs.back().events;
+  for (const RunEvent& event : run.events) {
+    const auto at =
+        std::lower_bound(events.begin(), events.end(), event,
+                         [](const RunEvent& a, const RunEvent& b) { return a.event < b.event; });
+    if (at == events.end() || at->event != event.event) events.insert(at, event);
+  }
 }
 
 std::vector<fs::path> entries_of(const fs::path& folder, std::error_code& error) {
@@ -120,6 +144,11 @@ std::string text_of_run(const SpooledRun& spooled) {
                               {"image", printable(name)},
                               {"sha256", sha256},
                               {"refused", printable(refused)}});
+  }
+  json["events"] = Json::array();
+  for (const RunEvent& event : run.events) {
+    json["events"].push_back(
+        {{"event", event.event}, {"what", event.what}, {"text", printable(event.text)}});
   }
   constexpr int indent = 1;
   return json.dump(indent) + "\n";
@@ -194,7 +223,7 @@ void Spool::prepare() {
 void Spool::keep(const RunRecord& run) {
   try {
     make_folder(folder_);
-    const fs::path file = file_of_run(folder_, run.run);
+    const fs::path file = file_of_run(folder_, run);
     known_.erase(file);  // another, maybe, of the same name
     write_file(file, text_of_run({run, name_}));
   } catch (const InputError& error) {
@@ -238,24 +267,26 @@ void Spool::deliver() {
 std::string Spool::state() {
   read();
   const std::string& why = away_.empty() ? problem_ : away_;
-  std::size_t waiting = 0;
+  std::set<std::string> waiting, others;
   std::string other_records;
   for (const auto& [file, spooled] : known_) {
     if (spooled.records == name_) {
-      ++waiting;
+      waiting.insert(spooled.run.run);
     } else {
+      others.insert(spooled.run.run);
       other_records = spooled.records;
     }
   }
   std::vector<std::string> said;
-  if (waiting > 0) {
-    said.push_back(fmt::format("kept here, {} waiting{}{}", waiting, why.empty() ? "" : ": ", why));
+  if (!waiting.empty()) {
+    said.push_back(
+        fmt::format("kept here, {} waiting{}{}", waiting.size(), why.empty() ? "" : ": ", why));
   } else if (!why.empty()) {
     said.push_back("runs are kept here: " + why);
   }
-  if (known_.size() > waiting) {
-    said.push_back(fmt::format("{} here for other records, such as {}", known_.size() - waiting,
-                               other_records));
+  if (!others.empty()) {
+    said.push_back(
+        fmt::format("{} here for other records, such as {}", others.size(), other_records));
   }
   if (!unread_.empty()) said.push_back(unread_);
   if (not_asked_ > 0) {
@@ -300,19 +331,37 @@ std::vector<RunRecord> Spool::waiting() {
   read();
   std::vector<RunRecord> runs;
   for (const auto& [file, spooled] : known_) {
-    if (spooled.records == name_) runs.push_back(spooled.run);
+    if (spooled.records == name_) add_run(runs, spooled.run);
   }
   return runs;
 }
 
 std::optional<RunRecord> Spool::find(const std::string& run) {
   read();
+  std::vector<RunRecord> here;
   for (const auto& [file, spooled] : known_) {
-    if (spooled.run.run == run) return spooled.run;
+    if (spooled.run.run == run) add_run(here, spooled.run);
   }
+  if (!here.empty()) return here.front();
   std::optional<RunRecord> found;
   if (may_ask()) ask([&](Records& records) { found = records.find(run); });
   return found;
+}
+
+std::vector<std::string> Spool::with_open_hook(const std::string& station) {
+  std::vector<std::string> kept;
+  if (may_ask()) ask([&](Records& records) { kept = records.with_open_hook(station); });
+  std::set<std::string> runs(kept.begin(), kept.end());
+  for (const RunRecord& run : waiting()) {
+    if (!station.empty() && run.station != station) continue;
+    // What waits is newer.
+    if (hook_is_open(run)) {
+      runs.insert(run.run);
+    } else {
+      runs.erase(run.run);
+    }
+  }
+  return {runs.begin(), runs.end()};
 }
 
 std::string Spool::owner_of(const std::string& sha256, const std::string& other_than_camera) {

@@ -22,12 +22,12 @@ struct SpooledRun {
 };
 
 /// A station's runs on their way to its records, which need not be there: each waits, whole, as a
-/// file of the spool, RUN.json (`vlp-run/1`), until the records have it that it is for; it goes
-/// into no others (identity_of_database), so that stations with other records may share a folder.
-/// Nothing is lost, whatever is killed and when: a file appears as a whole and goes when the run is
-/// committed. Nothing is twice: records keep a run by its name, once. Any number of programs may
-/// use a spool at once. Records that did not answer are left alone for a minute, so that a unit
-/// waits for them once.
+/// file of the spool, RUN.json, or RUN.EVENT.json with what became of it (`vlp-run/1`), until the
+/// records have it that it is for; it goes into no others (identity_of_database), so that stations
+/// with other records may share a folder. Nothing is lost, whatever is killed and when: a file
+/// appears as a whole and goes when the run is committed. Nothing is twice: records keep a run by
+/// its name, once. Any number of programs may use a spool at once. Records that did not answer are
+/// left alone for a minute, so that a unit waits for them once.
 class Spool {
  public:
   /// The folder is made when it is needed. `records` is as Records takes it; nothing is reached for
@@ -42,8 +42,8 @@ class Spool {
   /// open, of a later version or no database, are. This alone makes a database that is not there:
   /// elsewhere it may be on a share that is not mounted.
   void prepare();
-  /// Keeps a run in the folder; where that cannot be written, in the records. Throws InputError
-  /// when neither can be.
+  /// Keeps a run in the folder, again when it has another event; where that cannot be written, in
+  /// the records. Throws InputError when neither can be.
   void keep(const RunRecord& run);
   /// Brings what waits to the records, from the first to the last. It begins no other run after ten
   /// seconds, so that a backlog keeps nobody waiting, nor after records that are away. A run that
@@ -53,6 +53,7 @@ class Spool {
   /// a file that cannot be read; how many digests owner_of() has looked for here only. Empty when
   /// there is nothing to tell.
   std::string state();
+  const std::filesystem::path& folder() const { return folder_; }
   /// Why the records are away, since they were asked last; empty when they are not.
   const std::string& away() const { return away_; }
 
@@ -61,6 +62,8 @@ class Spool {
   /// A run that waits, for whichever records, or that the records have; nothing, too, when these do
   /// not answer, see away().
   std::optional<RunRecord> find(const std::string& run);
+  /// Records::with_open_hook() of those that wait and, when they answer, the records.
+  std::vector<std::string> with_open_hook(const std::string& station);
   /// Records::owner_of() of those that wait and, when they answer, the records.
   std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
 
@@ -87,8 +90,8 @@ class Spool {
 };
 
 /// All of a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(), "figures",
-/// with "uncertainty" and "guard_k" where there is a guard band, and "images". Bytes that are no
-/// text stand as printable() has them.
+/// with "uncertainty" and "guard_k" where there is a guard band, "images" and "events". Bytes that
+/// are no text stand as printable() has them.
 std::string text_of_run(const SpooledRun& spooled);
 /// A text of run_fields() that is not there is empty: the program that wrote it did not know it.
 /// Throws InputError with the file, also when it is no run.

@@ -3,11 +3,13 @@
 #include "station/station_config.h"
 
 #include <algorithm>
+#include <regex>
 
 #include "captures/digest.h"
 #include "geometry/angles.h"
 #include "rig/yaml_reader.h"
 #include "station/database_name.h"
+#include "station/watched_run.h"
 
 namespace vlp {
 namespace {
@@ -122,6 +124,58 @@ GoldenUnit read_golden(YamlMap map, Files& files) {
   return golden;
 }
 
+VerifyDue read_verify_due(YamlMap map) {
+  VerifyDue due;
+  constexpr double most_h = 10'000;
+  if (const auto hours = map.optional("hours")) due.hours = hours->number_within(0, most_h, "h");
+  if (const auto units = map.optional("units")) due.units = units->integer_within(1, 1'000'000);
+  if (!due.hours && !due.units) throw map.error("should have hours or units");
+  map.finish();
+  return due;
+}
+
+Retention read_retention(YamlMap map) {
+  Retention keep;
+  constexpr int most_days = 36'525;
+  const auto days = [&](const char* key, std::optional<int>& figure) {
+    if (const auto value = map.optional(key)) figure = value->integer_within(1, most_days);
+  };
+  days("images_days", keep.images_days);
+  days("results_days", keep.results_days);
+  map.finish();
+  return keep;
+}
+
+std::string read_pattern(const YamlValue& value) {
+  std::string pattern = value.text();
+  try {
+    const std::regex compiled(pattern);
+  } catch (const std::regex_error& error) {
+    throw value.error(std::string("is no regular expression: ") + error.what());
+  }
+  return pattern;
+}
+
+/// A program of which a folder is named is beside the station, another where PATH says.
+Hook read_hook(YamlMap map, const fs::path& file) {
+  Hook hook;
+  const YamlValue command = map.required("command");
+  for (const YamlValue& word : command.list()) hook.command.push_back(word.text());
+  if (hook.command.empty() || hook.command.front().empty()) {
+    throw command.error("should be a program and its arguments: [PROGRAM, ...]");
+  }
+  hook.folder = fs::absolute(file).parent_path();
+  std::string& program = hook.command.front();
+  if (program.find('/') != std::string::npos) program = (hook.folder / program).string();
+  constexpr double most_s = 3600;
+  if (const auto limit = map.optional("time_limit_s")) {
+    hook.time_limit_s = limit->number_within(0, most_s, "seconds");
+    if (!(hook.time_limit_s > 0)) throw limit->error("should be above 0");
+  }
+  map.finish();
+  return hook;
+}
+
 /// A database: a file beside the station, or a server.
 std::string records_of(const YamlValue& value, const fs::path& file) {
   const std::string where = value.text();
@@ -132,6 +186,13 @@ std::string records_of(const YamlValue& value, const fs::path& file) {
 }
 
 }  // namespace
+
+std::string serial_problem(const StationConfig& config, const std::string& serial) {
+  std::string problem = camera_id_problem(serial);
+  if (!problem.empty() || config.serial_pattern.empty()) return problem;
+  if (std::regex_match(serial, std::regex(config.serial_pattern))) return "";
+  return "'" + serial + "' is not of the form " + config.serial_pattern;
+}
 
 std::vector<MetricKind> unit_metrics() {
   return metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
@@ -158,11 +219,20 @@ StationConfig read_station(const fs::path& file) {
   if (const auto golden = document.optional("golden")) {
     config.golden = read_golden(golden->map(), files);
   }
+  if (const auto due = document.optional("verify_due")) {
+    if (!config.golden) throw due->error("needs a golden unit: add the key 'golden'");
+    config.verify_due = read_verify_due(due->map());
+  }
+  if (const auto pattern = document.optional("serial_pattern")) {
+    config.serial_pattern = read_pattern(*pattern);
+  }
   config.captures = path_of(document.required("captures"), file);
   config.results = path_of(document.required("results"), file);
   config.records = records_of(document.required("records"), file);
   const auto spool = document.optional("spool");
   config.spool = spool ? path_of(*spool, file) : file.parent_path() / "spool";
+  if (const auto keep = document.optional("keep")) config.keep = read_retention(keep->map());
+  if (const auto hook = document.optional("hook")) config.hook = read_hook(hook->map(), file);
   document.finish();
   const auto& lamps = config.lamps.lamps;
   if (std::none_of(lamps.begin(), lamps.end(), [](const Lamp& l) { return l.frequency_hz; })) {

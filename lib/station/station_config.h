@@ -45,6 +45,29 @@ struct GoldenUnit {
   std::vector<Gate> gates;
 };
 
+/// A command of the factory's own that is told of each verdict: labels, the factory's system,
+/// writing to the device.
+struct Hook {
+  /// Program and arguments, as they are, without a shell.
+  std::vector<std::string> command;
+  /// The folder in which it is run.
+  std::filesystem::path folder;
+  /// Killed when it takes longer, with all processes of its group.
+  double time_limit_s = 30;
+};
+
+/// When the golden unit is to be measured again, at the latest.
+struct VerifyDue {
+  std::optional<double> hours;
+  /// Units that were judged since.
+  std::optional<int> units;
+};
+
+/// How long what of a run is kept beside its record, which stays; without a figure for ever.
+struct Retention {
+  std::optional<int> images_days, results_days;
+};
+
 /// A station for one type of camera: `vlp-station/1`. Files that it names are beside it, unless
 /// their names begin with a slash.
 struct StationConfig {
@@ -60,6 +83,10 @@ struct StationConfig {
   /// With guard bands where `guard_bands` states standard uncertainties.
   std::vector<Gate> gates;
   std::optional<GoldenUnit> golden;
+  /// Only with a golden unit.
+  std::optional<VerifyDue> verify_due;
+  /// A regular expression of ECMAScript that the ids of units match as a whole; empty: any do.
+  std::string serial_pattern;
   /// Folders: where the images of a unit arrive, as CAPTURES/CAMERA/STEP/, and where results go.
   std::filesystem::path captures, results;
   /// A file of SQLite, or postgresql://...
@@ -69,7 +96,12 @@ struct StationConfig {
   /// The folder in which runs wait for the records, `spool` beside the station unless it says
   /// another.
   std::filesystem::path spool;
+  std::optional<Hook> hook;
+  Retention keep;
 };
+
+/// Why a text cannot be the id of a unit of the station, which names folders; empty when it can.
+std::string serial_problem(const StationConfig& config, const std::string& serial);
 
 /// The metrics of a unit, and those that its gates can be of.
 std::vector<MetricKind> unit_metrics();

@@ -10,6 +10,7 @@
 
 #include "captures/printable.h"
 #include "station/guidance.h"
+#include "station/hook.h"
 
 namespace vlp {
 namespace {
@@ -76,6 +77,9 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
     steps += fmt::format("[{}] {} {}   ", mark, name_of(step), count_of(unit, step));
   }
   lines.push_back({steps.substr(0, kColumns)});
+  if (!unit.distrusted().empty()) {
+    add_wrapped(lines, "Station", unit.distrusted() + "; no unit passes", Tone::bad);
+  }
   lines.push_back({""});
   if (!current) return lines;
   const UnitStep& state = unit.step(*current);
@@ -113,6 +117,14 @@ std::string last_image_line(const Unit& unit, StationStep step, const std::strin
 std::vector<ScreenLine> spool_lines(const std::string& state) {
   std::vector<ScreenLine> lines;
   if (!state.empty()) add_wrapped(lines, "Records", printable(state), Tone::bad);
+  return lines;
+}
+
+std::vector<ScreenLine> hook_lines(const RunRecord& record) {
+  std::vector<ScreenLine> lines;
+  const std::string problem = hook_problem(record);
+  if (problem.empty()) return lines;
+  add_wrapped(lines, "Hook", problem + "; 'vlp-station hook' runs it again", Tone::bad);
   return lines;
 }
 

@@ -26,6 +26,9 @@ std::vector<ScreenLine> station_screen(const Unit& unit);
 /// The same in one line, of the image that came last.
 std::string last_image_line(const Unit& unit, StationStep step, const std::string& image);
 
+/// hook_problem() with what to do; nothing when that is nothing.
+std::vector<ScreenLine> hook_lines(const RunRecord& record);
+
 /// What Spool::state() says of the records; nothing when that is nothing.
 std::vector<ScreenLine> spool_lines(const std::string& state);
 

@@ -55,6 +55,11 @@ class Unit {
   /// the run".
   void end_early(std::string why) { ended_ = std::move(why); }
 
+  /// No verdict of this unit counts, because of the station: `why`, for people, comes first of its
+  /// causes. Empty: it does.
+  void distrust(std::string why) { distrusted_ = std::move(why); }
+  const std::string& distrusted() const { return distrusted_; }
+
   const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
   /// The first step that is not done; nothing when all are.
   std::optional<StationStep> current() const;
@@ -80,6 +85,7 @@ class Unit {
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
   void look(StationStep step, const std::vector<std::filesystem::path>& files);
   void take(StationStep step, UnitImage image);
+  std::vector<Cause> causes_of_images() const;
   void count_refusals(StationStep step);
   std::pair<Superfluous, std::string> superfluity(StationStep step, const UnitImage& image) const;
   void drop(StationStep step, const std::string& name);
@@ -93,7 +99,7 @@ class Unit {
   std::string camera_id_;
   ProgramVersion program_;
   int threads_;
-  std::string ended_ = {};
+  std::string ended_ = {}, distrusted_ = {};
   std::function<std::string(const std::string&)> owner_ = {};
   std::unique_ptr<BoardDetector> boards_;
   std::array<UnitStep, 4> steps_;

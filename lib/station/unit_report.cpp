@@ -54,7 +54,10 @@ std::string unit_report(const RunRecord& record, const std::filesystem::path& ca
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
-  report.notes.push_back("Run " + record.run + ", ended " + record.ended_utc + "; " +
+  std::string who;
+  if (!record.operator_name.empty()) who += ", operator " + record.operator_name;
+  if (!record.shift.empty()) who += ", shift " + record.shift;
+  report.notes.push_back("Run " + record.run + ", ended " + record.ended_utc + who + "; " +
                          record.program + "; " + record.libraries + "; station configuration " +
                          record.config_sha256 + "; " + std::to_string(used) + " of " +
                          std::to_string(record.images.size()) + " images used.");

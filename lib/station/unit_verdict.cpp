@@ -175,6 +175,12 @@ std::vector<CheckedMetric> Unit::figures() const {
 }
 
 std::vector<Cause> Unit::causes() const {
+  auto causes = causes_of_images();
+  if (!distrusted_.empty()) causes.insert(causes.begin(), {distrusted_});
+  return causes;
+}
+
+std::vector<Cause> Unit::causes_of_images() const {
   std::vector<Cause> causes;
   const auto figures = this->figures();
   const UnitStep& boards = step(StationStep::boards);

@@ -92,6 +92,8 @@ class Verification {
                      .kind = "golden",
                      .station = config_.station,
                      .camera = golden_.camera_id,
+                     .operator_name = "",
+                     .shift = "",
                      .begun_utc = begun_utc(run),
                      .ended_utc = now_utc(),
                      .verdict = "",
@@ -101,7 +103,8 @@ class Verification {
                      .config_sha256 = config_.sha256,
                      .calibration = "",
                      .figures = figures,
-                     .images = images_};
+                     .images = images_,
+                     .events = {}};
     record.judge(causes_);
     return record;
   }

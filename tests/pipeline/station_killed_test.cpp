@@ -152,6 +152,25 @@ TEST_F(StationKilled, AfterItsVerdictItWaitsForTheRecords) {
   EXPECT_EQ(kept().size(), 1u);
 }
 
+/// A hook that was not run to its end is known as such, though its run ended.
+TEST_F(StationKilled, InItsHookItKnows) {
+  change("station.yaml", "records: records.db",
+         "records: records.db\nhook: {command: [sh, hook.sh]}");
+  folder.file("station/hook.sh", "echo $$ >pid.new; mv pid.new pid; exec sleep 100\n");
+  const std::string pid = (folder / "station/pid").string();
+  run_program("(exec " + run("b", "-q --idle-s 0.2") + ") & until [ -s " + pid +
+              " ]; do sleep 0.05; done; kill -9 $! $(cat " + pid + "); wait");
+  EXPECT_EQ(kept().size(), 1u);
+  EXPECT_THAT(records("list").output, HasSubstr("1 of them with a hook that has not ended well"));
+  EXPECT_THAT(records("show").output,
+              testing::AllOf(HasSubstr("hook wanted"), testing::Not(HasSubstr("hook failed"))));
+  folder.file("station/hook.sh", "echo label 7\n");
+  const auto again = records("hook");
+  EXPECT_EQ(again.exit_code, 0) << again.errors;
+  EXPECT_THAT(again.output, HasSubstr(" b INVALID: done"));
+  EXPECT_THAT(records("list").output, testing::Not(HasSubstr("hook")));
+}
+
 TEST_F(StationKilled, SurvivesAFullDisk) {
   change("scene.yaml", "count: 16", "count: 8");
   change("station.yaml", "board_views: 16", "board_views: 8");

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-station at a real terminal (tmux), images dropped one by one; the screens are kept in
 /// station_screens/ as text.
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <regex>
@@ -135,6 +136,39 @@ TEST_F(StationTerminal, ShowsColourAndStopsOnAKey) {
   EXPECT_THAT(tmux.screen_with("INVALID   camera"),
               HasSubstr("boards: the operator ended the run"));
   EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[31m"));
+}
+
+/// A shift: who measures, then unit after unit by a scanner, which types.
+TEST_F(StationTerminal, TakesAShift) {
+  if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
+  change("station.yaml", "records: records.db",
+         "records: records.db\nserial_pattern: 'SN-[0-9]{4}'");
+  const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH NO_COLOR=1 vlp-station run --station " +
+                      station.string() + " 2>/dev/null",
+                  "-x 80 -y 24");
+  tmux.screen_with("Operator");
+  tmux.type("Bo BSpace BSpace Ann Enter");
+  tmux.screen_with("Shift");
+  tmux.type("early Enter");
+  expect_screen(tmux.screen_with("Serial"), "shift.txt");
+  tmux.type("SN-12 Enter");
+  expect_screen(tmux.screen_with("Wrong"), "shift-wrong.txt");
+  tmux.type("SN-0001 Enter");
+  tmux.screen_with("q: verdict now");
+  // The next unit was scanned too early: no key of it counts.
+  tmux.type("-l qq");
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_THAT(tmux.screen(), Not(HasSubstr("INVALID")));
+  tmux.resize("-x 45 -y 12");
+  tmux.type("q");
+  tmux.screen_with("INVALID   camera SN-0001");
+  const std::string next = tmux.screen_with("Serial\n");
+  // What was there before is broken anew to the width.
+  expect_screen(next.substr(std::min(next.find("INVALID"), next.size())), "shift-next.txt");
+  tmux.type("q Enter");
+  EXPECT_THAT(tmux.screen_with("1 units"), HasSubstr("1 units: 0 passed, 0 failed, 1 invalid"));
+  EXPECT_THAT(records("show").output,
+              testing::AllOf(HasSubstr("operator   Ann\n"), HasSubstr("shift      early\n")));
 }
 
 /// The operator need not take the rest of the unit.

@@ -1,10 +1,13 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-station: units to their verdicts, from full folders; the records.
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <sstream>
 
 #include "small_station.h"
+#include "support/postgres_server.h"
 #include "support/schema.h"
 
 namespace vlp {
@@ -311,6 +314,183 @@ TEST_F(Station, KeepsRunsHereWhileTheRecordsAreAway) {
   EXPECT_TRUE(fs::is_empty(folder / "station/spool"));
 }
 
+/// Overdue, the golden unit comes before all units.
+TEST_F(Station, PassesNoUnitWhileItsGoldenUnitIsDue) {
+  render();
+  ASSERT_EQ(run_program(batch()).exit_code, 0);
+  folder.file("station/golden.yaml", result("0001", "calibration.yaml"));
+  change("station.yaml", "# The images of a unit",
+         "golden: {camera_id: \"0001\", calibration: golden.yaml, gates: {check_mean_mm: 0.5}}\n"
+         "verify_due: {hours: 24}\n# The images of a unit");
+  const auto due = run_program(batch());
+  EXPECT_EQ(due.exit_code, 3);
+  EXPECT_THAT(due.errors, HasSubstr("warning: the golden unit was not measured here yet: "
+                                    "'vlp-station verify' is due; no unit passes\n"));
+  EXPECT_THAT(due.output, AllOf(HasSubstr("Cause    the golden unit was not measured here yet"),
+                                HasSubstr("INVALID   camera 0001")));
+  const auto verified = records("verify --batch " + (folder / "unit").string());
+  EXPECT_EQ(verified.exit_code, 0) << verified.output << verified.errors;
+  EXPECT_EQ(run_program(batch()).exit_code, 0);
+}
+
+/// The images of a run go when they are old enough; its record, which tells of it, stays.
+TEST_F(Station, DeletesWhatIsKeptNoLonger) {
+  prepare("0001");
+  ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
+  EXPECT_EQ(records("clean").exit_code, 2);
+  change("station.yaml", "records: records.db", "records: records.db\nkeep: {images_days: 1}");
+  EXPECT_THAT(records("clean").output, HasSubstr("0 folders, 0.0 MB"));
+  // Years ago, as the records and the folder have it.
+  const std::string client =
+      "import os, sqlite3, sys\n"
+      "db = sqlite3.connect(sys.argv[1] + '/records.db', isolation_level=None)\n"
+      "run = db.execute('SELECT run FROM runs').fetchone()[0]\n"
+      "old = '20200101T000000Z' + run[16:]\n"
+      "db.execute('UPDATE runs SET run = ?, ended_utc = ?', (old, '2020-01-01T00:10:00Z'))\n"
+      "db.execute('UPDATE figures SET run = ?', (old,))\n"
+      "db.execute('UPDATE images SET run = ?', (old,))\n"
+      "os.rename(sys.argv[1] + '/captures/0001.' + run, sys.argv[1] + '/captures/0001.' + old)\n";
+  const auto aged = run_program("python3 " + folder.file("age.py", client).string() + " " +
+                                (folder / "station").string());
+  ASSERT_EQ(aged.exit_code, 0) << aged.errors;
+  const auto dry = records("clean");
+  EXPECT_THAT(dry.output, AllOf(HasSubstr("captures/0001.20200101T000000Z-"),
+                                HasSubstr("1 folders, 0.0 MB: --delete deletes them")));
+  EXPECT_FALSE(fs::is_empty(folder / "station/captures"));
+  EXPECT_THAT(records("clean --delete").output, HasSubstr("1 folders, 0.0 MB deleted"));
+  EXPECT_TRUE(fs::is_empty(folder / "station/captures"));
+  EXPECT_THAT(records("show").output, ContainsRegex("images deleted 20[0-9TZ:-]+ kept 1 days"));
+  EXPECT_THAT(records("clean").output, HasSubstr("0 folders"));
+  EXPECT_THAT(records("list").output, HasSubstr("1 runs"));
+}
+
+/// The recipe of apps/README.md, with SQLite and with PostgreSQL.
+TEST_F(Station, IsRestoredFromABackup) {
+  const std::string backup = (folder / "backup").string(), here = (folder / "station").string();
+  fs::create_directory(backup);
+  prepare("0001");
+  ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
+  const std::string shown = records("show").output;
+  if (run_program("command -v sqlite3").exit_code == 0) {
+    const auto made = run_program("cd " + here + " && sqlite3 records.db \".backup '" + backup +
+                                  "/records.db'\"");
+    ASSERT_EQ(made.exit_code, 0) << made.errors;
+    fs::remove(folder / "station/records.db");
+    EXPECT_EQ(records("show").exit_code, 2);
+    fs::copy_file(folder / "backup/records.db", folder / "station/records.db");
+    EXPECT_EQ(records("show").output, shown);
+  }
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  change("station.yaml", "records: records.db", "records: \"" + server.uri() + "\"");
+  ASSERT_EQ(run_program(run("0002", "--idle-s 0.1 --operator Ann")).exit_code, 3);
+  const std::string of_server = records("show").output;
+  const auto dumped = run_program("pg_dump --format=custom --file=" + backup + "/records.dump '" +
+                                  server.uri() + "'");
+  ASSERT_EQ(dumped.exit_code, 0) << dumped.errors;
+  std::string empty = server.uri();
+  empty.replace(empty.find("/postgres?"), 10, "/restored?");
+  ASSERT_EQ(run_program("psql -q '" + server.uri() + "' -c 'CREATE DATABASE restored'").exit_code,
+            0);
+  const auto restored =
+      run_program("pg_restore --no-owner --dbname='" + empty + "' " + backup + "/records.dump");
+  ASSERT_EQ(restored.exit_code, 0) << restored.errors;
+  change("station.yaml", server.uri(), empty);
+  EXPECT_EQ(records("show").output, of_server);
+  EXPECT_THAT(of_server, HasSubstr("operator   Ann\n"));
+  // And it goes on.
+  ASSERT_EQ(run_program(run("0003", "--idle-s 0.1")).exit_code, 3);
+  EXPECT_THAT(records("list").output, HasSubstr("2 runs"));
+}
+
+/// Unit after unit without a terminal: a line each. What becomes of one ends nothing.
+TEST_F(Station, TakesUnitAfterUnit) {
+  render();
+  change("station.yaml", "records: records.db",
+         "records: records.db\nserial_pattern: '[0-9]{4}'\nhook: {command: [\"false\"]}");
+  prepare("0001");
+  drop_all("0001");
+  const auto shift = run_program(
+      "printf 'Ann\\n\\nx1\\n0001\\n0002\\nq\\n0003\\n' | vlp-station run "
+      "--station " +
+      station.string() + " --idle-s 0.5");
+  EXPECT_EQ(shift.exit_code, 0) << shift.errors;
+  EXPECT_THAT(shift.output,
+              AllOf(HasSubstr("PASS   camera 0001   station-1\nHook     failed: exit code 1"),
+                    HasSubstr("INVALID   camera 0002"), Not(HasSubstr("camera 0003")),
+                    testing::EndsWith("2 units: 1 passed, 0 failed, 1 invalid\n")));
+  EXPECT_THAT(shift.errors, HasSubstr("error: 'x1' is not of the form [0-9]{4}\n"));
+  EXPECT_THAT(records("show").output,
+              AllOf(HasSubstr("operator   Ann\n"), Not(HasSubstr("\nshift  "))));
+  const auto said = run_program(run("0001", "--operator Bob --shift night -q --idle-s 0.1"));
+  EXPECT_EQ(said.exit_code, 3);
+  EXPECT_THAT(records("show").output,
+              AllOf(HasSubstr("operator   Bob\n"), HasSubstr("shift      night\n")));
+  EXPECT_THAT(run_program(run("x1", "")).errors, HasSubstr("--camera-id: 'x1' is not of the form"));
+  EXPECT_EQ(run_program("vlp-station run --station " + station.string()).output,
+            "0 units: 0 passed, 0 failed, 0 invalid\n");
+}
+
+/// From a tenth of the units to the last of them, of which VLP_STATION_UNITS may say another
+/// number.
+TEST_F(Station, DoesNotGrowInAShift) {
+  const char* said = std::getenv("VLP_STATION_UNITS");
+  const std::string units = said == nullptr ? "20" : said;
+  const auto shift = run_program(
+      "cd " + (folder / "station").string() +
+      "; mkfifo in; vlp-station run --station station.yaml --operator a --shift b --idle-s 0.01 "
+      "<in >out 2>&1 & cd " +
+      (folder / "station").string() + "; exec 3>in; i=0; while [ $i -lt " + units +
+      " ]; do i=$((i + 1)); echo u$i >&3; until ls captures 2>&- | grep -q \"^u$i[.]\"; do sleep "
+      "0.02; done; if [ $((10 * i)) = " +
+      units + " ] || [ $i = " + units +
+      " ]; then sleep 0.2; awk '/RssAnon/ {print $2}' /proc/$!/status; fi; done; exec 3>&-; wait "
+      "$!");
+  ASSERT_EQ(shift.exit_code, 0) << shift.errors;
+  std::istringstream figures(shift.output);
+  double early_kb = 0, late_kb = 0;
+  figures >> early_kb >> late_kb;
+  EXPECT_GT(early_kb, 1000);
+  EXPECT_LT(late_kb, 1.1 * early_kb);
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "station/out"),
+              HasSubstr(units + " units: 0 passed, 0 failed, " + units + " invalid"));
+}
+
+/// A hook gets each run; that it fails is recorded and said, and it can be run again.
+TEST_F(Station, TellsAHookOfEachVerdict) {
+  render_four_boards();
+  change("station.yaml", "records: records.db",
+         "records: records.db\nhook: {command: [sh, hook.sh], time_limit_s: 20}");
+  folder.file("station/hook.sh", "cat >seen.json; echo no labels; exit 3\n");
+  const auto first = run_program(batch());
+  EXPECT_EQ(first.exit_code, 3) << first.errors;
+  EXPECT_THAT(first.output,
+              HasSubstr("INVALID   camera 0001   station-1\nHook     failed: exit code 3: no "
+                        "labels; 'vlp-station hook' runs it again\n"));
+  const auto seen =
+      nlohmann::json::parse(TemporaryFolder::content_of(folder / "station/seen.json"));
+  EXPECT_EQ(seen["camera"], "0001");
+  EXPECT_EQ(seen["verdict"], "INVALID");
+  EXPECT_EQ(seen["images"].size(), 4U);
+  EXPECT_THAT(records("list").output, HasSubstr("1 of them with a hook that has not ended well"));
+  EXPECT_THAT(records("show").output,
+              AllOf(ContainsRegex("hook wanted 20[0-9TZ:-]+ sh hook.sh\n"),
+                    ContainsRegex("hook failed 20[0-9TZ:-]+ exit code 3: no labels\n")));
+  const auto again = records("hook");
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.errors, HasSubstr("the hook failed for 1 of 1 runs"));
+
+  folder.file("station/hook.sh", "cat >seen.json; echo label 7\n");
+  const auto mended = records("hook");
+  EXPECT_EQ(mended.exit_code, 0) << mended.errors;
+  EXPECT_THAT(mended.output, HasSubstr(" 0001 INVALID: done\n"));
+  EXPECT_THAT(records("list").output, Not(HasSubstr("hook")));
+  EXPECT_THAT(records("show").output, ContainsRegex("hook done +20[0-9TZ:-]+ label 7\n"));
+  EXPECT_EQ(records("hook").output, "");
+  EXPECT_TRUE(fs::is_empty(folder / "station/spool"));
+}
+
 /// A station that is watched: exit code 1 for an alarm, of what can be compared.
 TEST_F(Station, WatchesATrend) {
   render_four_boards();
@@ -322,7 +502,7 @@ TEST_F(Station, WatchesATrend) {
     for (std::size_t i = 0; i < values.size(); ++i) {
       const std::string run = std::to_string(first + static_cast<int>(i));
       sql.append("INSERT INTO runs SELECT '").append(run).append("', '").append(kind);
-      sql.append("', '").append(of).append("', '").append(camera).append("', '', '");
+      sql.append("', '").append(of).append("', '").append(camera).append("', '', '', '', '");
       sql.append("2").append(run).append("-01-01T00:00:00Z', '");  // a year each
       sql.append(verdict).append("', '', '', '', '', '';\n");
       sql.append(

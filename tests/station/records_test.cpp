@@ -76,6 +76,31 @@ void check_all_texts(Records& records) {
   }
 }
 
+/// Events come to a run that is kept, once each, and stay.
+void check_events(Records& records) {
+  RunRecord run = sample(run_of(8), "e", 0.5), other = sample(run_of(6), "e", 0.5);
+  run.events = {new_event(kHookWanted, "label 'x'")};
+  other.events = {new_event(kHookWanted, "label"), new_event(kHookDone, "")};
+  for (const RunRecord& each : {run, other, run}) records.keep(each);
+  EXPECT_THAT(records.with_open_hook("station-1"), ElementsAre(run.run));
+  EXPECT_THAT(records.with_open_hook(""), ElementsAre(run.run));
+  EXPECT_THAT(records.with_open_hook("another"), IsEmpty());
+  const RunEvent wanted = run.events.front();
+  run.events.push_back(new_event(kHookFailed, "exit code 3"));
+  records.keep(run);
+  EXPECT_THAT(records.with_open_hook("station-1"), ElementsAre(run.run));
+  run.events = {new_event(kHookDone, "")};  // by a program that knows nothing of the others
+  records.keep(run);
+  EXPECT_THAT(records.with_open_hook("station-1"), IsEmpty());
+  const auto found = records.find(run.run);
+  ASSERT_TRUE(found);
+  ASSERT_THAT(found->events, SizeIs(3));
+  EXPECT_EQ(found->events[0].event, wanted.event);
+  EXPECT_EQ(found->events[0].text, "label 'x'");
+  EXPECT_EQ(found->events[1].text, "exit code 3");
+  EXPECT_EQ(found->events[2].what, kHookDone);
+}
+
 /// What holds in every database.
 void check_records(const std::string& where) {
   Records records(where);
@@ -132,6 +157,7 @@ void check_records(const std::string& where) {
   EXPECT_DOUBLE_EQ(trend[2].value, 1.5);
   EXPECT_THAT(records.trend("tilt_deg", {}), IsEmpty());
   check_all_texts(records);
+  check_events(records);
 }
 
 /// Two programs that write at the same time, the first also makes the tables.
@@ -227,6 +253,7 @@ void check_migration(const std::string& where) {
   const auto found = records.find("20261121T134501Z-0001");
   ASSERT_TRUE(found);
   EXPECT_EQ(found->station, "station-1");
+  EXPECT_EQ(found->operator_name, "");
   EXPECT_EQ(found->begun_utc, "2026-11-21T13:45:01Z");
   EXPECT_EQ(found->calibration, "format: vlp-calibration/1");
   ASSERT_THAT(found->figures, SizeIs(5));
@@ -241,6 +268,8 @@ void check_migration(const std::string& where) {
   EXPECT_THAT(records.list({}), SizeIs(2));
   EXPECT_EQ(records.find(run_of(5))->figures[0].unit, "px");
   EXPECT_TRUE(records.find(run_of(5))->figures[0].guard);
+  EXPECT_THAT(found->events, IsEmpty());
+  check_events(records);
 }
 
 /// Of a database that holds kVersion1, which another program is about to bring up to date.
@@ -278,7 +307,7 @@ void check_later_version(const std::string& where) {
   answer_of(where, "UPDATE vlp_schema SET version = 99;\n");
   const std::string before = state_of(where);
   EXPECT_THAT(refusal_of([&] { Records records(where); }),
-              HasSubstr(": holds records of version 99, this program knows those up to 4: use the "
+              HasSubstr(": holds records of version 99, this program knows those up to 5: use the "
                         "newer vlp-station that wrote them"));
   EXPECT_EQ(state_of(where), before);
 }
@@ -415,7 +444,8 @@ TEST(ExportRuns, WritesCsv) {
   const std::string csv = TemporaryFolder::content_of(file);
   EXPECT_EQ(
       first_line(csv),
-      "run,kind,station,camera,begun_utc,ended_utc,verdict,causes,program,config_sha256,"
+      "run,kind,station,camera,operator_name,shift,begun_utc,ended_utc,verdict,causes,program,"
+      "config_sha256,"
       "blur_px,focal_percent,center_px,nominal_px,board_bend_mm,rms_px,uncertainty_px,halves_px,"
       "coverage,"
       "views,board_tilt_deg,rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_"
@@ -444,10 +474,10 @@ TEST(ExportRuns, WritesJson) {
   write_runs(file, {sample(run_of(1), "a", 0.25), all});
   const auto runs = nlohmann::ordered_json::parse(TemporaryFolder::content_of(file));
   ASSERT_THAT(runs, SizeIs(2));
-  EXPECT_THAT(
-      keys_of(runs[0]),
-      ElementsAre("run", "kind", "station", "camera", "begun_utc", "ended_utc", "verdict", "causes",
-                  "program", "libraries", "config_sha256", "calibration", "figures", "images"));
+  EXPECT_THAT(keys_of(runs[0]),
+              ElementsAre("run", "kind", "station", "camera", "operator_name", "shift", "begun_utc",
+                          "ended_utc", "verdict", "causes", "program", "libraries", "config_sha256",
+                          "calibration", "figures", "images", "events"));
   const auto& figures = runs[0]["figures"];
   EXPECT_THAT(keys_of(figures), ElementsAre("rms_px", "coverage", "tilt_deg"));
   EXPECT_THAT(keys_of(figures["tilt_deg"]),

@@ -153,6 +153,40 @@ TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
             "camera camera-2: run " + numbered_run(2).run);
 }
 
+/// A run that waits, whatever happened to it since, is one run.
+TEST(Spool, KeepsWhatBecameOfARun) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "away/records.db").string();
+  Spool spool(folder / "spool", where);
+  RunRecord run = numbered_run(1);
+  run.events = {new_event(kHookWanted, "label")};
+  spool.keep(run);
+  EXPECT_THAT(spool.with_open_hook("station-1"), testing::ElementsAre(run.run));
+  EXPECT_THAT(spool.with_open_hook("another"), IsEmpty());
+  const RunRecord before = run;
+  run.events.push_back(new_event(kHookFailed, "\"exit\" code 3"));
+  spool.keep(run);
+  run.events = {before.events[0], new_event(kHookDone, "")};
+  spool.keep(run);
+  EXPECT_THAT(spool.with_open_hook("station-1"), IsEmpty());
+  spool.deliver();
+  EXPECT_THAT(spool.state(), StartsWith("kept here, 1 waiting"));
+  ASSERT_THAT(spool.waiting(), SizeIs(1));
+  EXPECT_THAT(spool.waiting()[0].events, SizeIs(3));
+  EXPECT_THAT(spool.find(run.run)->events, SizeIs(3));
+
+  fs::create_directory(folder / "away");
+  Spool later(folder / "spool", where);
+  later.prepare();
+  EXPECT_EQ(later.state(), "");
+  EXPECT_TRUE(fs::is_empty(folder / "spool"));
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+  const auto kept = later.find(run.run);
+  ASSERT_THAT(kept->events, SizeIs(3));
+  EXPECT_EQ(kept->events[1].text, "\"exit\" code 3");
+  EXPECT_THAT(later.with_open_hook("station-1"), IsEmpty());
+}
+
 TEST(Spool, IsNotHeldUpByWhatIsNoRun) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
@@ -426,6 +460,39 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
 TEST(Spool, LosesNothingWhenItIsKilled) {
   const TemporaryFolder folder;
   kill_while_keeping(folder, (folder / "records.db").string(), 15);
+}
+
+/// A server that refuses is not away, and somebody has to do something about it; runs are kept.
+TEST(Spool, TellsARefusalFromAServerThatIsAway) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const TemporaryFolder folder;
+  const PostgresServer server("right");
+  ASSERT_NE(server.uri(), "");
+  const auto state_with = [&](const std::string& password, const std::string& database, int run) {
+    Spool spool(folder / "spool",
+                "postgresql://vlp:" + password + "@" + server.address() + "/" + database);
+    spool.prepare();
+    spool.keep(numbered_run(run));
+    spool.deliver();
+    return spool.state();
+  };
+  const std::string refuses = "the server of the records answers, but refuses 'records' as it is: ";
+  const std::string wrong_password = state_with("wrong", "postgres", 1);
+  EXPECT_THAT(wrong_password, AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr(refuses),
+                                    HasSubstr("password authentication failed for user \"vlp\""),
+                                    Not(HasSubstr("wrong")), Not(HasSubstr("\n"))));
+  EXPECT_THAT(state_with("right", "nowhere", 2),
+              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr(refuses),
+                    HasSubstr("database \"nowhere\" does not exist")));
+  EXPECT_THAT(state_with("right", "postgres?sslmode=require", 3),
+              AllOf(StartsWith("kept here, 2 waiting: "), HasSubstr(refuses),
+                    HasSubstr("server does not support SSL, but SSL was required")));
+  // What waited goes there with the right password.
+  EXPECT_THAT(state_with("right", "postgres", 4), StartsWith("1 here for other records"));
+  EXPECT_THAT(whole_runs(server.uri()), SizeIs(3));
+  server.stop();
+  EXPECT_THAT(state_with("right", "postgres", 5),
+              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("cannot be reached")));
 }
 
 TEST(Spool, OutlastsItsServer) {

@@ -92,6 +92,58 @@ TEST_F(StationYaml, HasGuardBandsWhereUncertaintiesAreStated) {
               HasSubstr("leaves nothing within the gate"));
 }
 
+TEST_F(StationYaml, HasAHook) {
+  EXPECT_FALSE(read_station(folder / "station.yaml").hook);
+  change("station.yaml", "records: records.db",
+         "records: records.db\nhook: {command: [./label, --to, it's]}");
+  const auto hook = read_station(folder / "station.yaml").hook;
+  ASSERT_TRUE(hook);
+  EXPECT_THAT(hook->command, testing::ElementsAre((folder / "./label").string(), "--to", "it's"));
+  EXPECT_EQ(hook->time_limit_s, 30);
+  change("station.yaml", "[./label, --to, it's]", "[label], time_limit_s: 0.5");
+  EXPECT_THAT(read_station(folder / "station.yaml").hook->command, testing::ElementsAre("label"));
+  EXPECT_EQ(read_station(folder / "station.yaml").hook->time_limit_s, 0.5);
+  change("station.yaml", "time_limit_s: 0.5", "time_limit_s: 0");
+  EXPECT_THAT(refusal(), HasSubstr("hook.time_limit_s: should be above 0"));
+  change("station.yaml", "[label], time_limit_s: 0", "[]");
+  EXPECT_THAT(refusal(), HasSubstr("hook.command: should be a program and its arguments"));
+}
+
+TEST_F(StationYaml, HasAPatternOfSerials) {
+  StationConfig config = read_station(folder / "station.yaml");
+  EXPECT_EQ(serial_problem(config, "anything"), "");
+  EXPECT_THAT(serial_problem(config, "a/b"), HasSubstr("a camera's id has letters"));
+  change("station.yaml", "records: records.db",
+         "records: records.db\nserial_pattern: 'SN-[0-9]{4}'");
+  config = read_station(folder / "station.yaml");
+  EXPECT_EQ(serial_problem(config, "SN-0123"), "");
+  EXPECT_EQ(serial_problem(config, "SN-01234"), "'SN-01234' is not of the form SN-[0-9]{4}");
+  EXPECT_THAT(serial_problem(config, ""), HasSubstr("a camera's id has letters"));
+  change("station.yaml", "'SN-[0-9]{4}'", "'SN-[0-9'");
+  EXPECT_THAT(refusal(), HasSubstr("serial_pattern: is no regular expression"));
+}
+
+TEST_F(StationYaml, SaysWhenTheGoldenUnitIsDueAndWhatIsKept) {
+  change("station.yaml", "records: records.db",
+         "records: records.db\nkeep: {images_days: 90}\nverify_due: {hours: 24, units: 200}");
+  EXPECT_THAT(refusal(), HasSubstr("verify_due: needs a golden unit"));
+  folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
+  change("station.yaml", "records: records.db",
+         "records: records.db\n"
+         "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
+  const StationConfig config = read_station(folder / "station.yaml");
+  EXPECT_EQ(config.verify_due->hours, 24);
+  EXPECT_EQ(config.verify_due->units, 200);
+  EXPECT_EQ(config.keep.images_days, 90);
+  EXPECT_FALSE(config.keep.results_days);
+  change("station.yaml", "{hours: 24, units: 200}", "{}");
+  EXPECT_THAT(refusal(), HasSubstr("verify_due: should have hours or units"));
+  change("station.yaml", "images_days: 90", "images_days: 0");
+  EXPECT_THAT(refusal(), HasSubstr("verify_due"));
+  change("station.yaml", "verify_due: {}", "verify_due: {units: 1}");
+  EXPECT_THAT(refusal(), HasSubstr("keep.images_days"));
+}
+
 TEST_F(StationYaml, RefusesAGoldenUnitWithoutRowTime) {
   folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
   change("station.yaml", "records: records.db",

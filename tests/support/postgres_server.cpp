@@ -2,8 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "support/postgres_server.h"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -26,6 +29,19 @@ fs::path programs() {
   return versions.empty() ? fs::path() : *std::max_element(versions.begin(), versions.end());
 }
 
+/// One that nobody listens to.
+int free_port() {
+  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ::bind(socket, reinterpret_cast<sockaddr*>(&address), size);
+  ::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size);
+  ::close(socket);
+  return ntohs(address.sin_port);
+}
+
 }  // namespace
 
 bool PostgresServer::installed() { return !programs().empty(); }
@@ -39,18 +55,23 @@ int PostgresServer::as_owner(const std::string& command) const {
                          .c_str());
 }
 
-PostgresServer::PostgresServer() {
+PostgresServer::PostgresServer(const std::string& password) {
   std::string folder = (fs::temp_directory_path() / "vlp-postgres-XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr) return;
   folder_ = folder;
   if (::geteuid() == 0 && std::system(("chown postgres '" + folder + "'").c_str()) != 0) return;
   const std::string data = "-D '" + folder + "/data' ";
-  if (as_owner("initdb " + data + "--auth=trust --username=vlp --no-sync --encoding=UTF8") != 0) {
-    return;
+  std::string auth = "--auth=trust ";
+  if (!password.empty()) {
+    std::ofstream(folder_ / "password") << password << "\n";
+    auth = "--auth-local=trust --auth-host=scram-sha-256 --pwfile='" + folder + "/password' ";
+    port_ = free_port();
   }
+  if (as_owner("initdb " + data + auth + "--username=vlp --no-sync --encoding=UTF8") != 0) return;
   start();
   if (as_owner("pg_ctl " + data + "status") != 0) return;
   uri_ = "postgresql://vlp@/postgres?host=" + folder;
+  if (port_ != 0) uri_ += "&port=" + std::to_string(port_);
 }
 
 std::string PostgresServer::plain_uri() const {
@@ -64,8 +85,9 @@ void PostgresServer::stop() const {
 }
 
 void PostgresServer::start() const {
-  as_owner("pg_ctl -D '" + folder_.string() +
-           "/data' -w -o \"-c listen_addresses= -c fsync=off -k " + folder_.string() + "\" start");
+  as_owner("pg_ctl -D '" + folder_.string() + "/data' -w -o \"-c listen_addresses=" +
+           (port_ == 0 ? "" : "127.0.0.1 -p " + std::to_string(port_)) + " -c fsync=off -k " +
+           folder_.string() + "\" start");
 }
 
 void PostgresServer::signal(int number) const {

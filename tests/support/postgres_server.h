@@ -12,7 +12,8 @@ namespace vlp {
 /// only.
 class PostgresServer {
  public:
-  PostgresServer();
+  /// With a password it also listens to a port of 127.0.0.1, where user vlp needs it, without TLS.
+  explicit PostgresServer(const std::string& password = "");
   ~PostgresServer();
   PostgresServer(const PostgresServer&) = delete;
   PostgresServer& operator=(const PostgresServer&) = delete;
@@ -22,6 +23,9 @@ class PostgresServer {
   const std::string& uri() const { return uri_; }
   /// The same without a parameter: the socket's folder stands for the host.
   std::string plain_uri() const;
+
+  /// 127.0.0.1:PORT, if it listens there.
+  std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
 
   /// At once, as by a power cut; and again.
   void stop() const;
@@ -36,6 +40,7 @@ class PostgresServer {
 
   std::filesystem::path folder_;
   std::string uri_;
+  int port_ = 0;
 };
 
 }  // namespace vlp

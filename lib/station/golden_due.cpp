@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/golden_due.h"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "captures/digest.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "station/station_folders.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kUnitLine = "unit\n";
+
+fs::path note_of(const StationConfig& config) {
+  constexpr std::size_t digits = 16;
+  return config.spool / (".golden-" + sha256_of_text(config.station).substr(0, digits));
+}
+
+}  // namespace
+
+GoldenState golden_state(const StationConfig& config) {
+  constexpr const char* verify = "'vlp-station verify' is due";
+  if (!config.verify_due) return {};
+  const fs::path file = note_of(config);
+  std::error_code none;
+  if (!fs::exists(file, none)) {
+    return {false, fmt::format("the golden unit was not measured here yet: {}", verify)};
+  }
+  constexpr std::size_t most_bytes = 1 << 24;
+  const std::string text = read_text_file(file, most_bytes);
+  std::istringstream words(text);
+  std::string run, verdict, ended_utc;
+  words >> run >> verdict >> ended_utc;
+  if (verdict != name_of(Verdict::pass)) {
+    return {true,
+            fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify)};
+  }
+  constexpr double second_per_hour = 3600;
+  const double age_h = seconds_since(ended_utc) / second_per_hour;
+  const auto& due = *config.verify_due;
+  if (due.hours && !(age_h >= 0 && age_h <= *due.hours)) {
+    return {false, fmt::format("the golden unit was measured {} (run {}), not within {:g} h: {}",
+                               ended_utc, run, *due.hours, verify)};
+  }
+  const auto units = std::count(text.begin(), text.end(), '\n') - 1;
+  if (due.units && units >= *due.units) {
+    return {false, fmt::format("{} units since the golden unit was measured (run {}): {}", units,
+                               run, verify)};
+  }
+  return {};
+}
+
+void note_for_golden(const StationConfig& config, const RunRecord& record) {
+  if (!config.verify_due || record.invalid()) return;
+  const fs::path file = note_of(config);
+  make_folder(config.spool);
+  if (record.kind == "golden") {
+    return write_file(file,
+                      fmt::format("{} {} {}\n", record.run, record.verdict, record.ended_utc));
+  }
+  const int note = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (note < 0) return;  // never measured: nothing to count from
+  const std::string_view line = kUnitLine;
+  const bool written = ::write(note, line.data(), line.size()) == ssize_t(line.size());
+  ::close(note);
+  if (!written) throw InputError(file, "cannot be written");
+}
+
+}  // namespace vlp

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "station/run_record.h"
+#include "station/station_config.h"
+
+namespace vlp {
+
+/// What the golden unit says of a station now.
+struct GoldenState {
+  /// It was measured last, and failed.
+  bool failed = false;
+  /// Why no unit may pass: it failed, is due (StationConfig::verify_due), or was never measured
+  /// here; empty when nothing is due.
+  std::string problem = {};
+};
+
+/// Of what note_for_golden() has noted in the station's spool, whatever the records say, which may
+/// be away. A clock that was set back makes it due.
+GoldenState golden_state(const StationConfig& config);
+
+/// Notes a run: of the golden unit that it passed or failed, of a unit that was judged that it is
+/// one more. An INVALID run is neither. File .golden-DIGEST of the station's name: run, verdict and
+/// end of the golden unit, then a line for each unit since. Throws InputError. Without
+/// `verify_due` nothing is noted.
+void note_for_golden(const StationConfig& config, const RunRecord& record);
+
+}  // namespace vlp

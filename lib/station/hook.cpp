@@ -1,0 +1,205 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/hook.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <optional>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "captures/printable.h"
+#include "station/export_runs.h"
+
+namespace vlp {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { close(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  int get() const { return number_; }
+  void close() {
+    if (number_ >= 0) ::close(number_);
+    number_ = -1;
+  }
+
+ private:
+  int number_;
+};
+
+/// What a process of its own group writes, and how it ends.
+struct Process {
+  pid_t id;
+  int output;
+  /// The last of it.
+  std::string written = {};
+  bool closed = false;
+
+  void read() {
+    constexpr std::size_t most = 4096;
+    std::array<char, most> part{};
+    for (;;) {
+      const ssize_t count = ::read(output, part.data(), part.size());
+      closed = closed || count == 0;
+      if (count <= 0) return;
+      written.append(part.data(), static_cast<std::size_t>(count));
+      if (written.size() > most) written.erase(0, written.size() - most);
+    }
+  }
+  /// Its status; nothing when it had to be killed.
+  std::optional<int> wait(double time_limit_s) {
+    constexpr int often_ms = 10;
+    const auto begun = Clock::now();
+    int status = 0;
+    while (::waitpid(id, &status, WNOHANG) == 0) {
+      if (std::chrono::duration<double>(Clock::now() - begun).count() > time_limit_s) {
+        ::kill(-id, SIGKILL);
+        ::waitpid(id, &status, 0);
+        return std::nullopt;
+      }
+      pollfd ready{output, POLLIN, 0};
+      if (closed) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(often_ms));
+      } else if (::poll(&ready, 1, often_ms) > 0) {
+        read();
+      }
+    }
+    read();  // not to its end: what it left running may hold the pipe
+    return status;
+  }
+};
+
+/// A file without a name that holds a text, open at its beginning.
+int file_with(const std::string& text) {
+  const int file = ::memfd_create("run", MFD_CLOEXEC);
+  for (std::size_t at = 0; file >= 0 && at < text.size();) {
+    const ssize_t count = ::write(file, text.data() + at, text.size() - at);
+    if (count <= 0) break;
+    at += static_cast<std::size_t>(count);
+  }
+  if (file >= 0) ::lseek(file, 0, SEEK_SET);
+  return file;
+}
+
+/// Starts it in a group of its own; an errno when it could not be.
+int start(const Hook& hook, int input, int output, pid_t& id) {
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawnattr_init(&attributes);
+  ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  ::posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
+  ::posix_spawn_file_actions_addchdir_np(&actions, hook.folder.c_str());
+  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  ::posix_spawnattr_setpgroup(&attributes, 0);
+  std::vector<char*> arguments;
+  for (const std::string& word : hook.command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  const int error =
+      ::posix_spawnp(&id, arguments[0], &actions, &attributes, arguments.data(), environ);
+  ::posix_spawnattr_destroy(&attributes);
+  ::posix_spawn_file_actions_destroy(&actions);
+  return error;
+}
+
+/// The last line that is not empty, shortened.
+std::string last_line(std::string text) {
+  constexpr std::size_t most = 200;
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) {
+    text.pop_back();
+  }
+  text.erase(0, text.rfind('\n') + 1);  // npos + 1 is 0
+  text = printable(text);
+  std::replace(text.begin(), text.end(), '\t', ' ');
+  return printable(text.substr(0, most));
+}
+
+RunEvent failed(const std::string& why) { return new_event(kHookFailed, why); }
+
+const RunEvent* last_of(const RunRecord& record, const char* what) {
+  const RunEvent* last = nullptr;
+  for (const RunEvent& event : record.events) {
+    if (event.what == what) last = &event;
+  }
+  return last;
+}
+
+}  // namespace
+
+RunEvent hook_wanted(const Hook& hook) {
+  return new_event(kHookWanted, printable(fmt::format("{}", fmt::join(hook.command, " "))));
+}
+
+RunEvent run_hook(const Hook& hook, const RunRecord& record) {
+  std::array<int, 2> pipe{};
+  const Descriptor input(file_with(run_json(record)));
+  if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
+    return failed("cannot be started: " + std::generic_category().message(errno));
+  }
+  const Descriptor from(pipe[0]);
+  Descriptor to(pipe[1]);
+  ::fcntl(from.get(), F_SETFL, O_NONBLOCK);
+  Process process{0, from.get()};
+  if (const int error = start(hook, input.get(), to.get(), process.id); error != 0) {
+    return failed(hook.command.front() +
+                  " cannot be started: " + std::generic_category().message(error));
+  }
+  to.close();
+  const auto status = process.wait(hook.time_limit_s);
+  const std::string line = last_line(process.written);
+  if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return new_event(kHookDone, line);
+  std::string why;
+  if (!status) {
+    why = fmt::format("no end within {:g} s, killed", hook.time_limit_s);
+  } else if (WIFEXITED(*status)) {
+    why = fmt::format("exit code {}", WEXITSTATUS(*status));
+  } else {
+    why = fmt::format("ended by signal {}", WTERMSIG(*status));
+  }
+  return failed(line.empty() ? why : why.append(": ").append(line));
+}
+
+bool hook_is_open(const RunRecord& record) {
+  return last_of(record, kHookWanted) != nullptr && last_of(record, kHookDone) == nullptr;
+}
+
+std::string hook_problem(const RunRecord& record) {
+  if (!hook_is_open(record)) return "";
+  const RunEvent* last = last_of(record, kHookFailed);
+  return last == nullptr ? "was not run to its end" : "failed: " + last->text;
+}
+
+HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)
+    : file_(spool / (".hook-" + run)),
+      descriptor_(::open(file_.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644)) {
+  if (descriptor_ >= 0) held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
+}
+
+HookLock::~HookLock() {
+  if (descriptor_ < 0) return;
+  if (held_) ::unlink(file_.c_str());
+  ::close(descriptor_);
+}
+
+}  // namespace vlp

@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "station/run_record.h"
+#include "station/station_config.h"
+
+namespace vlp {
+
+/// The trail's entry that a run's hook is to be run, which is kept together with the run: a hook
+/// that never came to its end is known by it.
+RunEvent hook_wanted(const Hook& hook);
+
+/// Runs the hook with run_json() of the run on its stdin. Whatever becomes of it is what the event
+/// tells: kHookDone with the last line that it wrote, kHookFailed with exit code, signal or time
+/// limit before that line, or why it could not be started. Takes no longer than the time limit.
+RunEvent run_hook(const Hook& hook, const RunRecord& record);
+
+/// Whether a hook was wanted for a run and has not been done.
+bool hook_is_open(const RunRecord& record);
+/// Why a hook is open, for people in one line; empty when it is not.
+std::string hook_problem(const RunRecord& record);
+
+/// The right to run the hook of a run, among the programs that share a spool: file .hook-RUN there.
+/// Where that cannot be written, there is none to share.
+class HookLock {
+ public:
+  HookLock(const std::filesystem::path& spool, const std::string& run);
+  ~HookLock();
+  HookLock(const HookLock&) = delete;
+  HookLock& operator=(const HookLock&) = delete;
+
+  /// Whether no other program runs it now.
+  bool held() const { return held_; }
+
+ private:
+  std::filesystem::path file_;
+  int descriptor_ = -1;
+  bool held_ = true;
+};
+
+}  // namespace vlp

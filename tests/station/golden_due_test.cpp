@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/golden_due.h"
+
+#include <gmock/gmock.h>
+
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class GoldenDue : public testing::Test {
+ protected:
+  GoldenDue() {
+    config.station = "a/station";
+    config.spool = folder / "spool";
+    config.verify_due = VerifyDue{24, 2};
+  }
+  void note(const std::string& kind, const std::string& verdict,
+            const std::string& ended_utc = now_utc()) const {
+    RunRecord run;
+    run.run = "RUN";
+    run.kind = kind;
+    run.verdict = verdict;
+    run.ended_utc = ended_utc;
+    note_for_golden(config, run);
+  }
+  std::string problem() const { return golden_state(config).problem; }
+
+  TemporaryFolder folder;
+  StationConfig config;
+};
+
+TEST_F(GoldenDue, HasToBeMeasuredFirst) {
+  note("unit", "PASS");
+  EXPECT_THAT(problem(), StartsWith("the golden unit was not measured here yet: "));
+  note("golden", "INVALID");
+  EXPECT_THAT(problem(), HasSubstr("not measured"));
+  note("golden", "PASS");
+  EXPECT_EQ(problem(), "");
+  config.station = "another";
+  EXPECT_THAT(problem(), HasSubstr("not measured"));
+}
+
+TEST_F(GoldenDue, AfterSoManyUnitsThatWereJudged) {
+  note("golden", "PASS");
+  note("unit", "FAIL");
+  note("unit", "INVALID");
+  EXPECT_EQ(problem(), "");
+  note("unit", "PASS");
+  EXPECT_THAT(problem(), StartsWith("2 units since the golden unit was measured (run RUN)"));
+  note("golden", "INVALID");
+  EXPECT_THAT(problem(), StartsWith("2 units since"));
+  note("golden", "PASS");
+  EXPECT_EQ(problem(), "");
+}
+
+TEST_F(GoldenDue, AfterSoManyHours) {
+  note("golden", "PASS", "2026-01-01T00:00:00Z");
+  EXPECT_THAT(problem(), HasSubstr("measured 2026-01-01T00:00:00Z (run RUN), not within 24 h"));
+  note("golden", "PASS", "9999-01-01T00:00:00Z");  // by a clock that was set back since
+  EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
+  config.verify_due->hours.reset();
+  EXPECT_EQ(problem(), "");
+}
+
+TEST_F(GoldenDue, AfterItFailed) {
+  note("golden", "PASS");
+  EXPECT_FALSE(golden_state(config).failed);
+  note("golden", "FAIL");
+  EXPECT_TRUE(golden_state(config).failed);
+  EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): mend the station"));
+  note("golden", "INVALID");
+  EXPECT_TRUE(golden_state(config).failed);
+}
+
+TEST_F(GoldenDue, IsNothingWithoutTheKey) {
+  config.verify_due.reset();
+  note("golden", "FAIL");
+  EXPECT_EQ(problem(), "");
+  EXPECT_FALSE(std::filesystem::exists(config.spool));
+}
+
+}  // namespace
+}  // namespace vlp
