@@ -74,7 +74,7 @@ class Seen:
             for entry in entries:
                 if prefix or entry.name in INPUT_NAMES:
                     self._add(entry, opened, prefix + entry.name)
-        except NotADirectoryError:
+        except OSError:  # in the middle of it
             pass
         finally:
             os.close(opened)
