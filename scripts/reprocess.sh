@@ -26,10 +26,10 @@
 # --session-gates  gates (vlp-gates/1) for sessions that have no gates.yaml of their own
 # --shard-size N   sessions in a job at most (default 50)
 # --keep N         results that a session had before, of which so many stay in former/ (default 0)
-# --look           what tells that a session has changed: files (default), sees all that the file system shows;
-#                  folders, and tables and YAML files: some eight times as fast, for archives in which no image is
-#                  written over in place
-# --rebuild-catalogue  forgets what was seen of the archive: the contents of all files are looked at again
+# --look           at what, to see that a session changed: files (default) shows all
+#                  that the file system does; folders, with tables and YAML files, is
+#                  some eight times as fast: where no image is written over in place
+# --rebuild-catalogue  forgets what was seen: all contents are looked at again
 # --diff           says what differs between a session's result and a former one, by its key's first letters
 #                  (default: the last one), or that of other results
 #

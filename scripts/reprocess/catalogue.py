@@ -74,7 +74,7 @@ class Seen:
             for entry in entries:
                 if prefix or entry.name in INPUT_NAMES:
                     self._add(entry, opened, prefix + entry.name)
-        except NotADirectoryError:
+        except OSError:  # in the middle of it
             pass
         finally:
             os.close(opened)
@@ -133,7 +133,7 @@ class Catalogue:
             self.stated = dict(database.execute("SELECT name, value FROM stated"))
             self.places = [paths.split("\n") for (paths,) in database.execute("SELECT paths FROM places ORDER BY id")]
             rows = database.execute("SELECT session, shard, glance, at_folders, places FROM sessions")
-            self.sessions = {name: tuple(row) for name, *row in rows}
+            self.sessions = {row[0]: row[1:] for row in rows}
         finally:
             database.close()
         self.new = False

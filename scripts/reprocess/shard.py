@@ -14,13 +14,13 @@ import shlex
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from files import digest, input_digests, json_text, read_table, table, write_whole
 from outcome import ALL, KEPT, outcome_of
 
 STATE = Path(".state")
-COSTS = STATE / "costs"
 LONGEST_S = 3600
 
 
@@ -124,19 +124,15 @@ def publish(row, work, keep=0):
     return sum(file.stat().st_size for file in place.iterdir())
 
 
-def stated_cost(name):
-    """In seconds; empty when .state was taken away since."""
-    try:
-        return (COSTS / name).read_text()
-    except FileNotFoundError:
-        return ""
+def tell(folder, shard, *words):
+    (STATE / folder).mkdir(exist_ok=True)
+    with open(STATE / folder / shard, "a") as told:
+        told.write("\t".join(words) + "\n")
 
 
 def tell_run(shard, row, cost, size):
     """A line for what this run did, also of one that is killed and goes on."""
-    (STATE / "ran").mkdir(exist_ok=True)
-    with open(STATE / "ran" / shard, "a") as ran:
-        ran.write(f"{row['camera']}/{row['session']}\t{row['verdict']}\t{cost}\t{size}\n")
+    tell("ran", shard, f"{row['camera']}/{row['session']}", row["verdict"], cost, str(size))
 
 
 def rows_before(shard):
@@ -162,11 +158,11 @@ def reprocess(run, shard, glances, lock, keep):
         if row is None:
             outcome, cost = calibrate(run, name, work, lock)
             row = outcome | {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
-            write_whole(COSTS / name, cost)
+            tell("costs", shard, name, cost, f"{time.time():.3f}")  # a session may come to another shard
             tell_run(shard, row, cost, publish(row, work, keep))
             shutil.rmtree(work / name)
             made += 1
-        rows.append(row | {"cpu_s": stated_cost(name), "glance": glance})
+        rows.append(row | {"glance": glance})
     shutil.rmtree(work, ignore_errors=True)
     print(f"{len(rows)} sessions, {made} reprocessed")
     return rows

@@ -4,6 +4,7 @@
 a calibration: its figures over time) and lamps.csv (a row per session and lamp: where the others see it)."""
 import gc
 import json
+import re
 from pathlib import Path
 
 from files import read_table, table, write_whole
@@ -20,14 +21,27 @@ def lamps_of(row):
         yield row | figures
 
 
+def costs_in(folder):
+    """Of each session the processor time of its last result, as text; of none when .state was taken away since."""
+    costs = {}
+    for file in filter(Path.is_file, folder.glob("*")):
+        for line in file.read_text().splitlines():
+            if whole := re.fullmatch(r"([^\t]+)\t([\d.]+)\t(\d+\.\d{3})", line):  # some may be cut off by a kill
+                name, cost, at = whole.groups()
+                costs[name] = max(costs.get(name, (0, "")), (float(at), cost))
+    return {name: cost for name, (_, cost) in costs.items()}
+
+
 def main():
     shards = sorted(file.stem for file in Path(".state/shards").glob("*.list"))
     stated = {(row["camera"], row["session"]): row for row in read_table(".state/dates.csv")}
     rows = [row for shard in shards for row in read_table(f".state/rows/{shard}.csv")]
+    costs = costs_in(Path(".state/costs"))
     rows.sort(key=lambda row: (row["camera"], row["session"]))
     for row in rows:
         known = stated.get((row["camera"], row["session"]), {"date": "", "room": ""})
         row |= {"date": known["date"], "room": known["room"]}
+        row["cpu_s"] = costs.get(f"{row['camera']}/{row['session']}", "")
     calibrated = [row for row in rows if row["focal_x_px"]]
     write_whole("lamps.csv", table(LAMPS, (lamp for row in calibrated for lamp in lamps_of(row))))
     write_whole("fleet.csv", table(FLEET, calibrated))

@@ -91,6 +91,7 @@ def write_rows(state, rows):
         listed = [line.split("\t") for line in file.read_text().splitlines()]
         of_it = [rows[line[0]] | {"glance": line[1]} for line in listed]
         files.write_whole(state / "rows" / f"{file.stem}.csv", files.table(outcome.ALL, of_it))
+        files.write_whole(state / "costs" / file.stem, "".join(f"{line[0]}\t0.600\t1.000\n" for line in listed))
 
 
 def main():

@@ -360,6 +360,16 @@ class Shard(unittest.TestCase):
                 self.assertFalse(Path("former/c/s").exists())
 
 
+class Summary(unittest.TestCase):
+    def test_cost_is_that_of_the_last_result_in_whatever_shard(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = Path(folder)
+            (folder / "000000").write_text("c/1\t0.5\t100.000\nc/2\t0.25\t101.000\nc/1\t0.75\t300.000\n")
+            (folder / "000001").write_text("c/2\t0.125\t200.000\nc/3\t0.5\t100.000\nc/1\t0.1\t200.000\nc/3\t9\t\nc/3\t9\t40")
+            self.assertEqual(summary.costs_in(folder), {"c/1": "0.75", "c/2": "0.125", "c/3": "0.5"})
+            self.assertEqual(summary.costs_in(folder / "nowhere"), {})
+
+
 class Diff(unittest.TestCase):
     def test_names_what_differs_and_nothing_else(self):
         def result(verdict, focal, mean, warnings, parts):
