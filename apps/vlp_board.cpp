@@ -1,9 +1,11 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-board: a board of AprilTags to print.
+/// vlp-board: a board to print.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -17,20 +19,36 @@ namespace vlp {
 namespace {
 
 struct Options {
-  std::string output, paper = "A4", family = "tag36h11";
-  int cols = 6, rows = 5, first_id = 0;
-  std::optional<double> tag_mm, spacing;
-  bool kalibr = false;
+  std::string output, paper = "A4", family = "tag36h11", dictionary = "DICT_5X5_100";
+  std::optional<int> cols, rows;
+  int first_id = 0;
+  std::optional<double> tag_mm, square_mm, spacing;
+  double marker_share = 0.75;
+  bool kalibr = false, chessboard = false, charuco = false;
 };
 
 constexpr double kMillimetresPerMetre = 1000;
 
+Board board_of_squares(const Options& options) {
+  constexpr int cols = 10, rows = 7;
+  Board board{"", options.cols.value_or(cols),   options.rows.value_or(rows), 0, 1, 1, false,
+              0,  {false, BoardCorner::top_left}};
+  board.kind = options.charuco ? BoardKind::charuco : BoardKind::chessboard;
+  board.square_size_m = options.square_mm.value_or(0) / kMillimetresPerMetre;
+  if (!options.charuco) return board;
+  board.family = options.dictionary;
+  board.first_id = options.first_id;
+  return board;
+}
+
 Board board_of(const Options& options) {
+  if (options.chessboard || options.charuco) return board_of_squares(options);
+  constexpr int cols = 6, rows = 5;
   constexpr double lattice = 1, kalibr = 0.3;
   const IdOrder order{false, options.kalibr ? BoardCorner::bottom_left : BoardCorner::top_left};
   return {options.family,
-          options.cols,
-          options.rows,
+          options.cols.value_or(cols),
+          options.rows.value_or(rows),
           options.tag_mm.value_or(0) / kMillimetresPerMetre,
           options.spacing.value_or(options.kalibr ? kalibr : lattice),
           options.kalibr ? 2 : 1,
@@ -49,21 +67,38 @@ const Paper& paper_of(const std::string& name) {
 }
 
 void run(const Options& options) {
+  constexpr int least = 4;
+  const bool squares = options.chessboard || options.charuco;
+  if (squares && std::min(options.cols.value_or(least), options.rows.value_or(least)) < least) {
+    throw std::invalid_argument("a board of squares has 4 x 4 of them or more");
+  }
+  if (!squares && options.square_mm) {
+    throw std::invalid_argument("--square-mm is for --chessboard and --charuco");
+  }
   const Paper& paper = paper_of(options.paper);
   Board board = board_of(options);
-  if (!options.tag_mm) {
-    const auto largest_m = largest_tag_m(board, paper);
-    if (!largest_m) throw std::invalid_argument("so many tags do not fit on " + paper.name);
-    board.tag_size_m = *largest_m;
+  if (board.has_squares() ? !options.square_mm : !options.tag_mm) {
+    const auto largest_m = largest_size_m(board, paper);
+    if (!largest_m) throw std::invalid_argument("so many do not fit on " + paper.name);
+    (board.has_squares() ? board.square_size_m : board.tag_size_m) = *largest_m;
+  }
+  if (options.charuco) {
+    constexpr double um_per_m = 1e6;
+    board.tag_size_m = std::round(options.marker_share * board.square_size_m * um_per_m) / um_per_m;
   }
   const std::string pdf = board_pdf(board, paper);
   const std::string yaml =
       std::filesystem::path(options.output).replace_extension(".yaml").string();
   write_file(options.output, pdf);
   write_board(yaml, board);
-  fmt::print("{}: {} x {} tags of {:g} mm, gap {:g} mm, on {}\n", options.output, board.cols,
-             board.rows, board.tag_size_m * kMillimetresPerMetre,
-             board.tag_size_m * board.tag_spacing * kMillimetresPerMetre, paper.name);
+  if (board.has_squares()) {
+    fmt::print("{}: {} x {} squares of {:g} mm, on {}\n", options.output, board.cols, board.rows,
+               board.square_size_m * kMillimetresPerMetre, paper.name);
+  } else {
+    fmt::print("{}: {} x {} tags of {:g} mm, gap {:g} mm, on {}\n", options.output, board.cols,
+               board.rows, board.tag_size_m * kMillimetresPerMetre,
+               board.tag_size_m * board.tag_spacing * kMillimetresPerMetre, paper.name);
+  }
   fmt::print("{}: for vlp-intrinsics; measure the ruler on the print first\n", yaml);
 }
 
@@ -72,7 +107,8 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Makes a board of AprilTags to print at true scale, and the board.yaml that tells\n"
+      "Makes a board to print at true scale, of AprilTags, of squares (chessboard) or of both\n"
+      "(ChArUco, with markers of OpenCV's dictionaries), and the board.yaml that tells\n"
       "vlp-intrinsics of it. Print it at 100 %, measure its ruler, and glue it to something "
       "flat.\n\n"
       "Examples:\n"
@@ -87,22 +123,45 @@ int main(int argc, char** argv) {
         return name.ends_with(".pdf") ? std::string() : "the file's name should end in .pdf";
       });
   app.add_option("--paper", options.paper, "A0 to A4 or Letter (default: A4)");
-  app.add_option("--cols", options.cols, "Tags along the width (default: 6)")
+  app.add_option("--cols", options.cols, "Tags or squares along the width (default: 6 tags, 10)")
       ->check(CLI::Range(1, 100));
-  app.add_option("--rows", options.rows, "Tags along the height (default: 5)")
+  app.add_option("--rows", options.rows, "Tags or squares along the height (default: 5 tags, 7)")
       ->check(CLI::Range(1, 100));
-  app.add_option("--tag-mm", options.tag_mm,
-                 "Width of a tag's black border (default: as wide as the paper allows)")
-      ->check(CLI::Range(1.0, 1000.0));
-  app.add_option("--spacing", options.spacing,
-                 "Gap between tags over the width of a tag (default: 1; 0.3 with --kalibr)")
-      ->check(CLI::Range(0.05, 5.0));
-  app.add_option("--family", options.family, "Family of the tags (default: tag36h11)")
-      ->check(CLI::IsMember({"tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagCircle49h12",
+  auto* tag_mm =
+      app.add_option("--tag-mm", options.tag_mm,
+                     "Width of a tag's black border (default: as wide as the paper allows)")
+          ->check(CLI::Range(1.0, 1000.0));
+  auto* spacing =
+      app.add_option("--spacing", options.spacing,
+                     "Gap between tags over the width of a tag (default: 1; 0.3 with --kalibr)")
+          ->check(CLI::Range(0.05, 5.0));
+  auto* family =
+      app.add_option("--family", options.family, "Family of the tags (default: tag36h11)")
+          ->check(
+              CLI::IsMember({"tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagCircle49h12",
                              "tagCustom48h12", "tagStandard41h12", "tagStandard52h13"}));
   app.add_option("--first-id", options.first_id, "Id of the first tag (default: 0)")
       ->check(CLI::Range(0, 100000));
-  app.add_flag("--kalibr", options.kalibr,
-               "A Kalibr AprilGrid: borders of two bits, corner squares");
+  auto* kalibr = app.add_flag("--kalibr", options.kalibr,
+                              "A Kalibr AprilGrid: borders of two bits, corner squares");
+  auto* chessboard =
+      app.add_flag("--chessboard", options.chessboard, "Black and white squares")->excludes(kalibr);
+  auto* charuco = app.add_flag("--charuco", options.charuco,
+                               "Squares with a marker in each white one, as OpenCV draws them")
+                      ->excludes(kalibr)
+                      ->excludes(chessboard);
+  for (CLI::Option* of_tags : {tag_mm, spacing, family}) {
+    of_tags->excludes(chessboard)->excludes(charuco);
+  }
+  app.add_option("--square-mm", options.square_mm,
+                 "Width of a square (default: as wide as the paper allows)")
+      ->check(CLI::Range(1.0, 1000.0));
+  app.add_option("--dictionary", options.dictionary,
+                 "OpenCV's dictionary of the markers (default: DICT_5X5_100)")
+      ->needs(charuco);
+  app.add_option("--marker-share", options.marker_share,
+                 "Width of a marker over that of its square (default: 0.75)")
+      ->check(CLI::Range(0.3, 0.9))
+      ->needs(charuco);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

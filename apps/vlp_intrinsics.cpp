@@ -4,6 +4,8 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -17,6 +19,7 @@
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/mrcal_files.h"
 #include "capture_options.h"
+#include "detection/boards/corner_table.h"
 #include "evaluation/gate.h"
 #include "history.h"
 #include "print_intrinsics.h"
@@ -31,7 +34,8 @@ namespace {
 
 struct Options {
   std::vector<std::string> images;
-  std::string board, output, cache, ros, kalibr, opencv, plot;
+  std::string board, output, cache, corners, ros, kalibr, opencv, plot;
+  std::optional<std::array<int, 2>> imager_px;
   std::string camera_id = "camera", lens = "LENSMODEL_OPENCV8";
   std::optional<Readout> readout;
   std::optional<double> row_time_s, pixel_pitch_m;
@@ -53,8 +57,33 @@ Camera known_camera(const Options& options) {
   return camera;
 }
 
+/// The one file of corners that is given instead of images; empty when images are given.
+std::string corner_file(const Options& options) {
+  const auto found = std::find_if(options.images.begin(), options.images.end(),
+                                  [](const auto& name) { return holds_corners(name); });
+  if (found == options.images.end()) {
+    if (options.imager_px) {
+      throw std::invalid_argument("--imager-px is for files of corners: images tell their size");
+    }
+    return "";
+  }
+  if (!options.corners.empty()) {
+    throw std::invalid_argument("--corners is for images: " + *found + " has them already");
+  }
+  if (options.images.size() > 1) {
+    throw std::invalid_argument(*found + " holds corners: give it alone, without images");
+  }
+  if (!options.imager_px) {
+    throw std::invalid_argument(
+        *found + " holds corners, but not the size of their images: --imager-px has to tell it");
+  }
+  return *found;
+}
+
 SeenBoards boards_in(const std::vector<std::filesystem::path>& images, const Board& board,
                      const Options& options) {
+  const std::string corners = corner_file(options);
+  if (!corners.empty()) return see_corners({corners, board, options.board, *options.imager_px});
   Progress progress("images");
   return see_boards({images, board, options.board, options.threads, options.cache, options.max_mpx},
                     [&](std::size_t done, std::size_t total) { progress.update(done, total); });
@@ -82,6 +111,7 @@ void check_outputs(const Options& options, const std::vector<std::string>& input
       {"--ros", options.ros},
       {"--kalibr", options.kalibr},
       {"--opencv", options.opencv},
+      {"--corners", options.corners},
       {"--plot", options.plot}};
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const auto& [option, file] = outputs[i];
@@ -111,12 +141,15 @@ std::vector<Gate> gates_of(const Options& options) {
 void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = gates_of(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
-  const auto images = image_files(options.images);
+  const auto images = corner_file(options).empty()
+                          ? image_files(options.images)
+                          : std::vector<std::filesystem::path>{options.images.front()};
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
   check_outputs(options, inputs);
   const Board board = read_board(options.board);
   const SeenBoards seen = boards_in(images, board, options);
+  if (!options.corners.empty()) write_corner_table(options.corners, seen.views, board);
   tell(seen);
   require(seen);
   const LensResult lens = solve_lens({seen.views, board, options.board, known_camera(options),
@@ -149,7 +182,10 @@ void run(const CLI::App& app, const Options& options) {
 }
 
 void add_options(CLI::App& app, Options& options) {
-  app.add_option("images", options.images, "Images of the board, or folders of them")->required();
+  app.add_option("images", options.images,
+                 "Images of the board, or folders of them; or a file of its corners, mrcal's .vnl "
+                 "or a .csv as of --corners, with --imager-px")
+      ->required();
   app.add_option("--board", options.board,
                  "The board, board.yaml, or Kalibr's description of an aprilgrid")
       ->required();
@@ -164,6 +200,16 @@ void add_options(CLI::App& app, Options& options) {
                  "lamps needs; vlp-train --row-time finds it, too")
       ->check(CLI::Range(1e-8, 1e-3));
   add_readout_option(app, options.readout);
+  app.add_option("--imager-px", options.imager_px,
+                 "Width and height of the images that a file of corners is of")
+      ->check(CLI::Range(16, 100000))
+      ->option_text("WIDTH HEIGHT");
+  app.add_option("--corners", options.corners,
+                 "Write the corners as they were seen, too, a .csv to calibrate from again without "
+                 "the images")
+      ->check([](const std::string& name) {
+        return name.ends_with(".csv") ? std::string() : "the file's name should end in .csv";
+      });
   app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Width of a pixel")
       ->check(CLI::Range(1e-7, 1e-4));
   app.add_option("--held-out", options.held_out,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "rig/file.h"
 #include "rig/yaml_parts.h"
@@ -19,7 +20,11 @@ constexpr std::array kFamilies{"tag36h11",         "tag25h9",         "tag16h5",
 // In the order of BoardCorner.
 constexpr std::array kCorners{"bottom-left", "bottom-right", "top-left", "top-right"};
 
+// In the order of BoardKind.
+constexpr std::array kKinds{"apriltags", "chessboard", "charuco"};
+
 constexpr int kMostTags = 1000;
+constexpr int kLeastSquares = 4, kMostSquares = 100;
 constexpr int kLargestId = 1'000'000;  // families have fewer
 constexpr double kLeastTag_m = 1e-4, kLargestTag_m = 2;
 
@@ -43,14 +48,75 @@ std::string read_family(const YamlValue& value) {
   throw value.unknown("the families are: " + names);
 }
 
+/// Without tags.
+Board board_of_squares(BoardKind kind) {
+  Board board{"", 0, 0, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
+  board.kind = kind;
+  return board;
+}
+
+BoardKind read_kind(const YamlValue& value) {
+  std::string names;
+  for (std::size_t kind = 0; kind < kKinds.size(); ++kind) {
+    if (value.text() == kKinds[kind]) return static_cast<BoardKind>(kind);
+    names += (names.empty() ? "" : ", ") + std::string(kKinds[kind]);
+  }
+  throw value.unknown("the kinds of boards are: " + names);
+}
+
+Board read_squares(YamlMap& map, BoardKind kind) {
+  Board board = board_of_squares(kind);
+  board.cols = map.required("cols").integer_within(kLeastSquares, kMostSquares);
+  board.rows = map.required("rows").integer_within(kLeastSquares, kMostSquares);
+  board.square_size_m =
+      map.required("square_size_m").number_within(kLeastTag_m, kLargestTag_m, "m");
+  if (kind == BoardKind::chessboard) return board;
+  const YamlValue marker = map.required("marker_size_m");
+  board.tag_size_m = marker.number_within(kLeastTag_m, kLargestTag_m, "m");
+  if (!(board.tag_size_m < board.square_size_m)) {
+    throw marker.error("a marker is smaller than the square around it");
+  }
+  const YamlValue dictionary = map.required("dictionary");
+  board.family = dictionary.text();
+  if (!board.family.starts_with("DICT_")) {
+    throw dictionary.error("should be one of OpenCV's dictionaries, such as DICT_5X5_100");
+  }
+  if (const auto first = map.optional("first_id")) {
+    board.first_id = first->integer_within(0, kLargestId);
+  }
+  if (const auto top_left = map.optional("top_left")) {
+    board.top_left_white = top_left->text() == "white";
+    if (!board.top_left_white && top_left->text() != "black") {
+      throw top_left->unknown("the colours of a square are: black, white");
+    }
+  }
+  return board;
+}
+
+/// Kalibr's checkerboard counts corners.
+Board read_kalibr_checkerboard(YamlMap& map) {
+  Board board = board_of_squares(BoardKind::chessboard);
+  board.cols = map.required("targetCols").integer_within(kLeastSquares - 1, kMostSquares - 1) + 1;
+  board.rows = map.required("targetRows").integer_within(kLeastSquares - 1, kMostSquares - 1) + 1;
+  const YamlValue height = map.required("rowSpacingMeters");
+  board.square_size_m =
+      map.required("colSpacingMeters").number_within(kLeastTag_m, kLargestTag_m, "m");
+  constexpr double rounding = 1e-9;
+  if (std::abs(height.number_within(kLeastTag_m, kLargestTag_m, "m") - board.square_size_m) >
+      rounding) {
+    throw height.error("is not colSpacingMeters: the lens is found from squares");
+  }
+  return board;
+}
+
 /// Kalibr's target of kind aprilgrid, as its documentation describes it: tag36h11 with a border of
 /// two bits and squares at the corners, ids from codeOffset, or 0, along the rows, from the bottom
-/// left.
+/// left; or of kind checkerboard.
 Board read_kalibr_target(YamlMap& map) {
   const YamlValue kind = map.required("target_type");
+  if (kind.text() == "checkerboard") return read_kalibr_checkerboard(map);
   if (kind.text() != "aprilgrid") {
-    throw kind.error(
-        "is a target of Kalibr's without AprilTags; the lens is found from an aprilgrid");
+    throw kind.error("should be aprilgrid or checkerboard; from others no lens is found");
   }
   Board board{"tag36h11", 0, 0, 0, 0, 2, true, 0, {false, BoardCorner::bottom_left}};
   board.cols = map.required("tagCols").integer_within(1, kMostTags);
@@ -71,6 +137,9 @@ std::string name_of(const IdOrder& order) {
 }
 
 Board read_board(YamlMap& map) {
+  const auto named = map.optional("kind");
+  const BoardKind kind = named ? read_kind(*named) : BoardKind::apriltags;
+  if (kind != BoardKind::apriltags) return read_squares(map, kind);
   Board board;
   board.family = read_family(map.required("family"));
   board.cols = map.required("cols").integer_within(1, kMostTags);
@@ -97,6 +166,20 @@ void write_board(const std::filesystem::path& file, const Board& board) {
   YAML::Emitter out;
   out << YAML::BeginMap;
   emit_word(out, "format", kBoardFormat);
+  if (board.has_squares()) {
+    emit_word(out, "kind", kKinds[static_cast<std::size_t>(board.kind)]);
+    emit_integer(out, "cols", board.cols);
+    emit_integer(out, "rows", board.rows);
+    emit_number(out, "square_size_m", board.square_size_m);
+    if (board.kind == BoardKind::charuco) {
+      emit_number(out, "marker_size_m", board.tag_size_m);
+      emit_word(out, "dictionary", board.family);
+      emit_integer(out, "first_id", board.first_id);
+      emit_word(out, "top_left", board.top_left_white ? "white" : "black");
+    }
+    out << YAML::EndMap << YAML::Newline;
+    return write_file(file, out.c_str());
+  }
   emit_word(out, "family", board.family);
   emit_integer(out, "cols", board.cols);
   emit_integer(out, "rows", board.rows);

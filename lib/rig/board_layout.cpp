@@ -15,16 +15,53 @@ int id_at(const Board& board, int col, int row) {
                                         : along_rows * board.cols + along_cols);
 }
 
+std::vector<BoardTag> markers_of(const Board& board) {
+  const double margin_m = (board.square_size_m - board.tag_size_m) / 2;
+  std::vector<BoardTag> markers;
+  for (int row = 0; row < board.rows; ++row) {
+    for (int col = 0; col < board.cols; ++col) {
+      if (is_black(board, col, row)) continue;
+      const double left = (col - 1) * board.square_size_m + margin_m;
+      const double top = (row - 1) * board.square_size_m + margin_m;
+      const double right = left + board.tag_size_m, bottom = top + board.tag_size_m;
+      markers.push_back({board.first_id + static_cast<int>(markers.size()),
+                         {{{left, bottom}, {right, bottom}, {right, top}, {left, top}}}});
+    }
+  }
+  return markers;
+}
+
 }  // namespace
 
-double tag_pitch_m(const Board& board) { return board.tag_size_m * (1 + board.tag_spacing); }
+double tag_pitch_m(const Board& board) {
+  return board.has_squares() ? board.square_size_m : board.tag_size_m * (1 + board.tag_spacing);
+}
+
+bool is_black(const Board& board, int col, int row) {
+  return ((col + row) % 2 == 0) != board.top_left_white;
+}
 
 Eigen::Vector2d tag_field_m(const Board& board) {
+  if (board.has_squares()) {
+    return Eigen::Vector2d(board.cols - 2, board.rows - 2) * board.square_size_m;
+  }
   return Eigen::Vector2d(board.cols - 1, board.rows - 1) * tag_pitch_m(board) +
          Eigen::Vector2d::Constant(board.tag_size_m);
 }
 
+std::vector<Eigen::Vector2d> square_corners_m(const Board& board) {
+  std::vector<Eigen::Vector2d> corners_m;
+  for (int row = 0; row < board.rows - 1; ++row) {
+    for (int col = 0; col < board.cols - 1; ++col) {
+      corners_m.emplace_back(col * board.square_size_m, row * board.square_size_m);
+    }
+  }
+  return corners_m;
+}
+
 std::vector<BoardTag> board_layout(const Board& board) {
+  if (board.kind == BoardKind::charuco) return markers_of(board);
+  if (board.kind == BoardKind::chessboard) return {};
   std::vector<BoardTag> tags;
   for (int row = 0; row < board.rows; ++row) {
     for (int col = 0; col < board.cols; ++col) {

@@ -5,12 +5,18 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <opencv2/core/utility.hpp>
+#include <utility>
 
 #include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/mrcal_files.h"
 #include "detection/boards/corner_cache.h"
+#include "detection/boards/corner_table.h"
 #include "detection/boards/other_tags.h"
+#include "detection/boards/square_corners.h"
 #include "detection/image_file.h"
+#include "rig/board_layout.h"
 #include "rig/input_error.h"
 #include "session/skipped_images.h"
 
@@ -30,7 +36,7 @@ void check_sizes(const std::vector<BoardView>& views) {
   }
 }
 
-/// By its tags; their ids and corners are read all the same.
+/// By its tags, where it has any; their ids and corners are read all the same.
 bool upside_down(const BoardView& view) {
   double down_px = 0;
   for (const SeenTag& tag : view.seen.tags) {
@@ -43,25 +49,40 @@ bool upside_down(const BoardView& view) {
 /// Skips views that show the same as one before them to the last digit: copies of a file, under
 /// whatever name, tell nothing new.
 void skip_copies(SeenBoards& seen) {
-  const auto same = [](const BoardView& a, const BoardView& b) {
-    return !a.seen.tags.empty() &&
-           std::equal(a.seen.tags.begin(), a.seen.tags.end(), b.seen.tags.begin(),
-                      b.seen.tags.end(), [](const SeenTag& one, const SeenTag& two) {
-                        return one.id == two.id && one.corners_px == two.corners_px;
-                      });
-  };
   std::vector<BoardView> kept;
+  std::vector<std::vector<SeenPoint>> known;
   for (BoardView& view : seen.views) {
-    const auto original = std::find_if(kept.begin(), kept.end(),
-                                       [&](const BoardView& other) { return same(view, other); });
-    if (original != kept.end()) {
-      seen.skipped.push_back({view.image, "is the same picture as " + original->image});
+    auto corners = corners_of(view.seen);
+    const auto original = std::find_if(known.begin(), known.end(), [&](const auto& other) {
+      return !corners.empty() &&
+             std::equal(corners.begin(), corners.end(), other.begin(), other.end(),
+                        [](const SeenPoint& one, const SeenPoint& two) {
+                          return one.index == two.index && one.pixel == two.pixel;
+                        });
+    });
+    if (original != known.end()) {
+      const BoardView& same = kept[static_cast<std::size_t>(original - known.begin())];
+      seen.skipped.push_back({view.image, "is the same picture as " + same.image});
     } else {
       kept.push_back(std::move(view));
+      known.push_back(std::move(corners));
     }
   }
   seen.views = std::move(kept);
 }
+
+void tell_turned(SeenBoards& seen, const Board& board) {
+  if (board.kind == BoardKind::chessboard) {
+    seen.details.push_back(
+        "a chessboard does not tell which of its ends is up; the lens does not depend on it");
+  }
+  const auto turned = std::count_if(seen.views.begin(), seen.views.end(), upside_down);
+  if (turned == 0) return;
+  seen.details.push_back(
+      fmt::format("{} views show the board upside down; that does no harm", turned));
+}
+
+bool is_mrcal_table(const fs::path& file) { return file.extension() == ".vnl"; }
 
 /// Share of an image's pixels that are at its brightest level.
 double white_share(const cv::Mat& image) {
@@ -97,9 +118,50 @@ Looked looked_at(const BoardImages& input) {
   return looked;
 }
 
+/// Why no chessboard is seen, by the largest one in a few of the images.
+void explain_no_chessboard(const BoardImages& input, SeenBoards& seen) {
+  constexpr std::size_t tried = 12;
+  const Board& board = input.board;
+  std::array<int, 2> most{0, 0};
+  for (std::size_t i = 0; i < std::min(tried, input.images.size()); ++i) {
+    try {
+      const auto shown = chessboard_shown(read_image(input.images[i], input.max_mpx));
+      if (shown[0] * shown[1] > most[0] * most[1]) most = shown;
+    } catch (const InputError&) {
+      continue;  // it is skipped already
+    }
+  }
+  // It may be turned by a quarter.
+  if ((most[0] < most[1]) != (board.cols < board.rows)) std::swap(most[0], most[1]);
+  const auto [cols, rows] = most;
+  if (cols > board.cols || rows > board.rows) {
+    std::string words =
+        fmt::format("the images show a chessboard of {} x {} squares or more", cols, rows);
+    if (cols == board.cols + 1 && rows == board.rows + 1) {
+      words += ": cols and rows count squares, not the corners between them";
+    }
+    return seen.fail(StepFailure::wrong_board, std::move(words), input.board_file);
+  }
+  std::string words = fmt::format(
+      "no chessboard of {} x {} squares is seen in {} images: is all of it in them, with white "
+      "around it, sharp, well lit, and each square wider than 10 px?",
+      board.cols, board.rows, seen.views.size());
+  if (cols > 0) words += fmt::format(" At most {} x {} squares are seen", cols, rows);
+  seen.fail(StepFailure::undetermined, std::move(words));
+}
+
+std::string not_seen(const Board& board, std::size_t images) {
+  return fmt::format(
+      "no {} of {} is seen in {} images: is the board in them, sharp, well lit, and each {} wider "
+      "than 20 px?",
+      board.has_squares() ? "marker" : "tag", board.family, images,
+      board.has_squares() ? "marker" : "tag");
+}
+
 /// Why no tag of the board is seen, if a few of the images show why.
 void explain_no_tags(const BoardImages& input, SeenBoards& seen) {
   const Board& board = input.board;
+  if (board.kind == BoardKind::chessboard) return explain_no_chessboard(input, seen);
   int unusable = 0, overexposed = 0;
   for (const BoardView& view : seen.views) {
     unusable += view.seen.unusable;
@@ -134,18 +196,20 @@ void explain_no_tags(const BoardImages& input, SeenBoards& seen) {
         StepFailure::wrong_board,
         fmt::format("the images show tags of {}, but with other ids than the board has, "
                     "{} to {} ({} of them in {}){}",
-                    board.family, board.first_id, board.first_id + board.cols * board.rows - 1,
+                    board.family, board.first_id,
+                    board.first_id + static_cast<int>(board_layout(board).size()) - 1,
                     stranger->seen.foreign.size(), stranger->image,
                     shown.empty() ? "" : "; " + shown),
         input.board_file);
   }
-  seen.fail(StepFailure::undetermined,
-            fmt::format("no tag of {} is seen in {} images: is the board in them, sharp, well lit, "
-                        "and each tag wider than 20 px?",
-                        board.family, seen.views.size()));
+  seen.fail(StepFailure::undetermined, not_seen(board, seen.views.size()));
 }
 
 }  // namespace
+
+bool holds_corners(const fs::path& file) {
+  return is_mrcal_table(file) || file.extension() == ".csv";
+}
 
 std::vector<fs::path> image_files(const std::vector<std::string>& names) {
   std::vector<fs::path> files;
@@ -178,13 +242,28 @@ SeenBoards see_boards(const BoardImages& input, const StepProgress& progress) {
   check_sizes(seen.views);
   skip_copies(seen);
   const bool any = std::any_of(seen.views.begin(), seen.views.end(),
-                               [](const BoardView& view) { return !view.seen.tags.empty(); });
+                               [](const BoardView& view) { return view.seen.any(); });
   if (!any) explain_no_tags(input, seen);
-  const auto turned = std::count_if(seen.views.begin(), seen.views.end(), upside_down);
-  if (turned > 0) {
-    seen.details.push_back(
-        fmt::format("{} views show the board upside down; that does no harm", turned));
+  tell_turned(seen, input.board);
+  return seen;
+}
+
+SeenBoards see_corners(const CornerFile& input) {
+  SeenBoards seen;
+  seen.views = is_mrcal_table(input.file)
+                   ? read_corners(input.file, input.board, input.imager_px)
+                   : read_corner_table(input.file, input.board, input.imager_px);
+  skip_copies(seen);
+  const bool any = std::any_of(seen.views.begin(), seen.views.end(),
+                               [](const BoardView& view) { return view.seen.any(); });
+  if (!any) {
+    seen.fail(StepFailure::wrong_board,
+              fmt::format("none of its {} images has a corner of the board; is it of another board "
+                          "than {}?",
+                          seen.views.size(), input.board_file.string()),
+              input.file);
   }
+  tell_turned(seen, input.board);
   return seen;
 }
 

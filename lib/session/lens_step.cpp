@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
@@ -18,7 +19,14 @@
 namespace vlp {
 namespace {
 
-std::string too_few(const SeenBoard& seen) {
+std::string too_few(const Board& board, const SeenBoard& seen) {
+  if (board.kind == BoardKind::chessboard && seen.points.empty()) {
+    return "the chessboard is not seen as a whole";
+  }
+  if (board.has_squares() || !seen.points.empty()) {
+    return fmt::format("only {} corners of the board can be used, or too many of them in a line",
+                       seen.points.size());
+  }
   std::string words = fmt::format("only {} tags of the board can be used", seen.tags.size());
   if (2 * seen.overexposed > seen.unusable) {
     words += fmt::format(", around {} more white is overexposed and runs over the corners",
@@ -34,17 +42,16 @@ std::string too_few(const SeenBoard& seen) {
 bool alike(const BoardView& a, const BoardView& b) {
   constexpr double near = 0.01, shared = 0.7;
   double squares = 0, common = 0;
-  auto other = b.seen.tags.begin();  // both by id
-  for (const SeenTag& tag : a.seen.tags) {
-    while (other != b.seen.tags.end() && other->id < tag.id) ++other;
-    if (other == b.seen.tags.end()) break;
-    if (other->id != tag.id) continue;
+  const auto corners = corners_of(a.seen), others = corners_of(b.seen);
+  auto other = others.begin();
+  for (const SeenPoint& corner : corners) {
+    while (other != others.end() && other->index < corner.index) ++other;
+    if (other == others.end()) break;
+    if (other->index != corner.index) continue;
     ++common;
-    for (std::size_t k = 0; k < 4; ++k) {
-      squares += (tag.corners_px[k] - other->corners_px[k]).squaredNorm() / 4;
-    }
+    squares += (corner.pixel - other->pixel).squaredNorm();
   }
-  const auto most = static_cast<double>(std::max(a.seen.tags.size(), b.seen.tags.size()));
+  const auto most = static_cast<double>(std::max(corners.size(), others.size()));
   return common >= shared * most && std::sqrt(squares / common) <= near * a.imager_px[0];
 }
 
@@ -56,18 +63,31 @@ struct Sorted {
   IntrinsicsInput solved, held_out;
 };
 
+/// A square chessboard looks the same after a quarter turn, which takes its bend along one edge for
+/// that along the other.
+WarpChoice warp_of(const LensInput& input) {
+  const Board& board = input.board;
+  if (board.kind != BoardKind::chessboard || board.cols != board.rows) return input.warp;
+  if (input.warp == WarpChoice::on) {
+    throw std::invalid_argument(
+        "a square chessboard looks the same after a quarter turn, so that its bend cannot be told: "
+        "leave --warp on out");
+  }
+  return WarpChoice::off;
+}
+
 Sorted sorted(const LensInput& input, LensResult& result) {
   const IntrinsicsInput none{BoardLattice(input.board),
                              {},
                              input.views.front().imager_px,
                              input.camera.lens_model,
-                             input.warp};
+                             warp_of(input)};
   Sorted sorted{none, none};
   int usable = 0;
   std::vector<const BoardView*> different;
   for (const BoardView& view : input.views) {
     if (!none.lattice.enough(view.seen)) {
-      result.skipped.push_back({view.image, too_few(view.seen)});
+      result.skipped.push_back({view.image, too_few(input.board, view.seen)});
       continue;
     }
     const auto like = std::find_if(different.begin(), different.end(),

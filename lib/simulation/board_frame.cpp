@@ -8,9 +8,15 @@
 namespace vlp {
 namespace {
 
-/// Points all over the tags, for the smear.
+/// Points all over the board, for the smear.
 std::vector<Eigen::Vector3d> points_on(const Board& board) {
   std::vector<Eigen::Vector3d> points_m;
+  if (board.has_squares()) {
+    for (const Eigen::Vector2d& at_m : square_corners_m(board)) {
+      points_m.emplace_back(at_m.x(), at_m.y(), 0);
+    }
+    return points_m;
+  }
   for (const BoardTag& tag : board_layout(board)) {
     points_m.emplace_back(tag.corners_m[0].x(), tag.corners_m[0].y(), 0);
     points_m.emplace_back(tag.corners_m[2].x(), tag.corners_m[2].y(), 0);

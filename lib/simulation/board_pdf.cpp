@@ -10,7 +10,7 @@
 
 #include "rig/board_layout.h"
 #include "rig/yaml_text.h"
-#include "simulation/tag_pattern.h"
+#include "simulation/board_pattern.h"
 
 namespace vlp {
 namespace {
@@ -22,10 +22,10 @@ constexpr double kMargin_m = 0.008, kFooter_m = 0.022;
 using Context = std::unique_ptr<cairo_t, void (*)(cairo_t*)>;
 using Surface = std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)>;
 
-/// From the first tag to the end of what has to stay white, or is a corner square.
+/// From the first tag or corner to the end of what is printed, or has to stay white.
 double border_m(const Board& board) {
-  const double gap_m = board.tag_size_m * board.tag_spacing;
-  return board.corner_squares ? gap_m : std::min(gap_m, board.tag_size_m) / 2;
+  if (board.has_squares() || board.corner_squares) return printed_border_m(board);
+  return std::min(board.tag_size_m * board.tag_spacing, board.tag_size_m) / 2;
 }
 
 Eigen::Vector2d print_m(const Board& board) {
@@ -48,30 +48,10 @@ std::optional<Eigen::Vector2d> sheet_for(const Board& board, const Paper& paper)
 
 /// Everything black, in one path: no seams between neighbouring bits.
 void draw_board(cairo_t* context, const Board& board) {
-  const double gap_m = board.tag_size_m * board.tag_spacing;
-  if (board.corner_squares) {
-    for (int row = 0; row <= board.rows; ++row) {
-      for (int col = 0; col <= board.cols; ++col) {
-        cairo_rectangle(context, col * tag_pitch_m(board) - gap_m, row * tag_pitch_m(board) - gap_m,
-                        gap_m, gap_m);
-      }
-    }
-  }
-  for (const BoardTag& tag : board_layout(board)) {
-    const TagPattern pattern = tag_pattern(board.family, tag.id, board.border_bits);
-    const double bit_m = board.tag_size_m / pattern.border_width;
-    if (2 * pattern.outside * bit_m > gap_m) {
-      throw std::invalid_argument("the gap between the tags is too small for " + board.family);
-    }
-    const Eigen::Vector2d corner_m =
-        tag.corners_m[3] - Eigen::Vector2d::Constant(pattern.outside * bit_m);
-    for (int row = 0; row < pattern.width(); ++row) {
-      for (int col = 0; col < pattern.width(); ++col) {
-        if (pattern.white[pattern.index(col, row)]) continue;
-        cairo_rectangle(context, corner_m.x() + col * bit_m, corner_m.y() + row * bit_m, bit_m,
-                        bit_m);
-      }
-    }
+  for (const PrintedRectangle& part : board_pattern(board)) {
+    if (part.white) continue;
+    cairo_rectangle(context, part.left_m, part.top_m, part.right_m - part.left_m,
+                    part.bottom_m - part.top_m);
   }
   cairo_fill(context);
 }
@@ -81,7 +61,18 @@ std::string in_mm(double length_m) {
   return shortest(std::round(length_m * um_per_m) / um_per_mm) + " mm";
 }
 
+std::string parameters_of_squares(const Board& board) {
+  const bool charuco = board.kind == BoardKind::charuco;
+  std::string text = charuco ? "ChArUco, " : "chessboard, ";
+  text.append(std::to_string(board.cols)).append(" x ").append(std::to_string(board.rows));
+  text.append(" squares of ").append(in_mm(board.square_size_m));
+  if (!charuco) return text;
+  text.append(", markers of ").append(in_mm(board.tag_size_m)).append(", ").append(board.family);
+  return text.append(" from id ").append(std::to_string(board.first_id));
+}
+
 std::string parameters_of(const Board& board) {
+  if (board.has_squares()) return parameters_of_squares(board);
   std::string text = board.family + ", ";
   text.append(std::to_string(board.cols)).append(" x ").append(std::to_string(board.rows));
   text.append(" tags of ").append(in_mm(board.tag_size_m)).append(", gap ");
@@ -124,12 +115,13 @@ const std::vector<Paper>& papers() {
   return all;
 }
 
-std::optional<double> largest_tag_m(const Board& board, const Paper& paper) {
+std::optional<double> largest_size_m(const Board& board, const Paper& paper) {
   constexpr int least_mm = 5, most_mm = 1000;
   Board tried = board;
+  double& size_m = board.has_squares() ? tried.square_size_m : tried.tag_size_m;
   for (int size_mm = most_mm; size_mm >= least_mm; --size_mm) {
-    tried.tag_size_m = size_mm / 1000.0;
-    if (sheet_for(tried, paper)) return tried.tag_size_m;
+    size_m = size_mm / 1000.0;
+    if (sheet_for(tried, paper)) return size_m;
   }
   return {};
 }

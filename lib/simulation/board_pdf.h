@@ -20,9 +20,9 @@ struct Paper {
 /// A0 to A4 and Letter.
 const std::vector<Paper>& papers();
 
-/// How large a tag a sheet has room for, upright or lying, in whole millimetres; nothing when less
-/// than 5 mm. board: its tag_size_m is not looked at.
-std::optional<double> largest_tag_m(const Board& board, const Paper& paper);
+/// How large a tag, or square, a sheet has room for, upright or lying, in whole millimetres;
+/// nothing when less than 5 mm. board: its tag_size_m, or square_size_m, is not looked at.
+std::optional<double> largest_size_m(const Board& board, const Paper& paper);
 
 /// The board as a PDF at true scale in the middle of a sheet, upright or lying, with its parameters
 /// and a ruler of 100 mm to check the print with. The same board gives the same bytes. Throws

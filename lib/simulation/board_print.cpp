@@ -4,47 +4,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "rig/board_layout.h"
-#include "simulation/tag_pattern.h"
+#include "simulation/board_pattern.h"
 
 namespace vlp {
 namespace {
 
 /// What is printed, in the order of printing; the last on a spot is seen.
 std::vector<Rectangle> rectangles_of(const SceneBoard& board) {
-  const Board& print = board.print;
   const double white = board.white_e_per_s - board.surround_e_per_s;
   const double black = board.black_e_per_s - board.surround_e_per_s;
-  const double tag_m = print.tag_size_m, gap_m = tag_m * print.tag_spacing;
-  const double margin_m = board.margin_m + (print.corner_squares ? gap_m : 0);
-  const Eigen::Vector2d field_m = tag_field_m(print);
+  const double margin_m = board.margin_m + printed_border_m(board.print);
+  const Eigen::Vector2d field_m = tag_field_m(board.print);
   std::vector<Rectangle> all;
   all.push_back({-margin_m, -margin_m, field_m.x() + margin_m, field_m.y() + margin_m, white});
-  if (print.corner_squares) {
-    for (int row = 0; row <= print.rows; ++row) {
-      for (int column = 0; column <= print.cols; ++column) {
-        const double right_m = column * tag_pitch_m(print), bottom_m = row * tag_pitch_m(print);
-        all.push_back({right_m - gap_m, bottom_m - gap_m, right_m, bottom_m, black});
-      }
-    }
-  }
-  for (const BoardTag& tag : board_layout(print)) {
-    const TagPattern pattern = tag_pattern(print.family, tag.id, print.border_bits);
-    const double bit_m = tag_m / pattern.border_width;
-    if (2 * pattern.outside * bit_m > gap_m) {
-      throw std::invalid_argument("the gap between the tags is too small for " + print.family);
-    }
-    const Eigen::Vector2d corner_m =
-        tag.corners_m[3] - Eigen::Vector2d::Constant(pattern.outside * bit_m);
-    for (int row = 0; row < pattern.width(); ++row) {
-      for (int column = 0; column < pattern.width(); ++column) {
-        const double left_m = corner_m.x() + column * bit_m, top_m = corner_m.y() + row * bit_m;
-        all.push_back({left_m, top_m, left_m + bit_m, top_m + bit_m,
-                       pattern.white[pattern.index(column, row)] ? white : black});
-      }
-    }
+  for (const auto& [left_m, top_m, right_m, bottom_m, is_white] : board_pattern(board.print)) {
+    all.push_back({left_m, top_m, right_m, bottom_m, is_white ? white : black});
   }
   return all;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "rig/board_layout.h"
 #include "rig/yaml_parts.h"
 #include "simulation/board_print.h"
 #include "simulation/scene_parts.h"
@@ -18,7 +19,7 @@ SceneBoard read_scene_board(YamlMap map) {
   board.margin_m = map.required("margin_m").number_within(0, 2, "m");
   const YamlValue warp = map.required("warp_m");
   board.warp_m = Eigen::Vector2d(warp.numbers(2).data());
-  const double most = 0.1 * board.print.tag_size_m * std::min(board.print.cols, board.print.rows);
+  const double most = 0.1 * tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
   for (const YamlValue& part : warp.list()) part.number_within(-most, most, "m");
   board.white_e_per_s = read_radiance(map, "white_e_per_s");
   board.black_e_per_s = read_radiance(map, "black_e_per_s");

@@ -106,12 +106,20 @@ std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& re
   const BoardBend bend(*scene.board);
   const auto camera_from_board = [&](double time_s) { return shot.camera_from_board(time_s); };
   std::vector<TrueCorner> corners;
-  for (const BoardTag& tag : board_layout(scene.board->print)) {
+  const auto add = [&](std::optional<int> tag, int corner, const Eigen::Vector2d& at_m) {
+    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), bend.depth(at_m).depth_m);
+    const auto at = seen(renderer, renderer.shutter(shot.exposure_s), camera_from_board, point_m);
+    if (at && in_image(scene.camera, at->pixel)) corners.push_back({tag, corner, at->pixel});
+  };
+  const Board& print = scene.board->print;
+  if (print.has_squares()) {
+    const auto corners_m = square_corners_m(print);
+    for (std::size_t i = 0; i < corners_m.size(); ++i) add({}, static_cast<int>(i), corners_m[i]);
+    return corners;
+  }
+  for (const BoardTag& tag : board_layout(print)) {
     for (int corner = 0; corner < 4; ++corner) {
-      const Eigen::Vector2d& at_m = tag.corners_m[static_cast<std::size_t>(corner)];
-      const Eigen::Vector3d point_m(at_m.x(), at_m.y(), bend.depth(at_m).depth_m);
-      const auto at = seen(renderer, renderer.shutter(shot.exposure_s), camera_from_board, point_m);
-      if (at && in_image(scene.camera, at->pixel)) corners.push_back({tag.id, corner, at->pixel});
+      add(tag.id, corner, tag.corners_m[static_cast<std::size_t>(corner)]);
     }
   }
   return corners;

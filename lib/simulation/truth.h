@@ -25,9 +25,11 @@ struct TrueLamp {
 std::vector<TrueLamp> true_lamps(const Scene& scene, const FrameRenderer& renderer,
                                  const LampShot& shot);
 
-/// A corner of a tag's black border as a capture shows it; see BoardTag for the order.
+/// A corner of a tag's black border as a capture shows it, see BoardTag for the order; of a board
+/// of squares, without a tag, one in which they touch, counted as square_corners_m() does.
 struct TrueCorner {
-  int tag, corner;
+  std::optional<int> tag;
+  int corner;
   Eigen::Vector2d pixel;
 };
 

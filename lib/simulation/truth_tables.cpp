@@ -75,7 +75,9 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
                               const CaptureSet& set, const std::filesystem::path& folder) {
   CsvWriter boards(folder / "true_boards.csv",
                    {"image", "x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"});
-  CsvWriter corners(folder / "true_corners.csv", {"image", "tag", "corner", "u_px", "v_px"});
+  std::vector<std::string> columns{"image", "tag", "corner", "u_px", "v_px"};
+  if (scene.board->print.has_squares()) columns.erase(columns.begin() + 1);
+  CsvWriter corners(folder / "true_corners.csv", columns);
   std::size_t empty = 0;
   for (std::size_t i = 0; i < shots_in(set); ++i) {
     const BoardShot shot = board_shot(scene, set, i);
@@ -88,8 +90,10 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
     const auto seen = true_corners(scene, renderer, shot);
     empty += seen.empty();
     for (const auto& [tag, corner, at_px] : seen) {
-      corners.row({shot.image, std::to_string(tag), std::to_string(corner), pixel(at_px.x()),
-                   pixel(at_px.y())});
+      std::vector<std::string> row{shot.image};
+      if (tag) row.push_back(std::to_string(*tag));
+      row.insert(row.end(), {std::to_string(corner), pixel(at_px.x()), pixel(at_px.y())});
+      corners.row(row);
     }
   }
   boards.save();

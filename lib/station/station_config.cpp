@@ -205,7 +205,11 @@ StationConfig read_station(const fs::path& file) {
   StationConfig config;
   config.station = document.required("station").text();
   config.type = read_shutter(document.required("camera_type"), files).camera;
-  config.board = read_board(files(document.required("board")));
+  const YamlValue board = document.required("board");
+  config.board = read_board(files(board));
+  if (config.board.has_squares()) {
+    throw board.error("is a board of squares: the station looks for one of AprilTags");
+  }
   config.lamps = read_lamp_map(files(document.required("lamps")));
   if (const auto place = document.optional("dispersion_station_m")) {
     config.dispersion_station_m = Eigen::Vector2d(place->numbers(2).data());

@@ -18,6 +18,24 @@ std::vector<int> ids_of(const IdOrder& order) {
   return ids;
 }
 
+TEST(BoardLayout, PutsMarkersIntoWhiteSquares) {
+  Board board{"DICT_4X4_50", 5, 4, 0.01, 1, 1, false, 3, {false, BoardCorner::top_left}};
+  board.kind = BoardKind::charuco;
+  board.square_size_m = 0.02;
+  const auto markers = board_layout(board);
+  ASSERT_EQ(markers.size(), 10U);
+  // The corner in which the first squares touch is the origin; the square right of the first one.
+  EXPECT_EQ(markers[0].id, 3);
+  EXPECT_NEAR(markers[0].corners_m[3].x(), 0.005, 1e-12);
+  EXPECT_NEAR(markers[0].corners_m[3].y(), -0.015, 1e-12);
+  EXPECT_NEAR(markers[0].corners_m[1].y() - markers[0].corners_m[2].y(), 0.01, 1e-12);
+  EXPECT_TRUE(is_black(board, 0, 0));
+  EXPECT_EQ(tag_field_m(board), Eigen::Vector2d(0.06, 0.04));
+  EXPECT_EQ(square_corners_m(board).back(), Eigen::Vector2d(0.06, 0.04));
+  board.top_left_white = true;
+  EXPECT_NEAR(board_layout(board)[0].corners_m[3].x(), -0.015, 1e-12);
+}
+
 TEST(BoardLayout, CountsIdsInTheirOrder) {
   using enum BoardCorner;
   EXPECT_EQ(ids_of({false, top_left}), (std::vector{10, 11, 12, 13, 14, 15}));

@@ -82,10 +82,67 @@ TEST(Board, RefusesKalibrsOtherTargetsAndKeys) {
   const auto refusal_of = [&](const std::string& from, const std::string& to) {
     return refusal(read_board, folder.file("target.yaml", changed(kKalibrTarget, from, to)));
   };
-  EXPECT_THAT(refusal_of("aprilgrid", "checkerboard"), HasSubstr("without AprilTags"));
+  EXPECT_THAT(refusal_of("aprilgrid", "circlegrid"), HasSubstr("aprilgrid or checkerboard"));
   EXPECT_THAT(refusal_of("tagSize", "tagsize"), HasSubstr("key 'tagSize' is missing"));
   EXPECT_THAT(refusal_of("tagCols: 5", "tagCols: 0"), HasSubstr("tagCols"));
   EXPECT_THAT(refusal_of("#gridtype", "\nrowSpacingMeters: 1"), HasSubstr("'rowSpacingMeters'"));
+}
+
+Board squares(BoardKind kind) {
+  Board board{"", 10, 7, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
+  board.kind = kind;
+  board.square_size_m = 0.03;
+  return board;
+}
+
+constexpr const char* kCharuco =
+    "format: vlp-board/1\nkind: charuco\ncols: 10\nrows: 7\nsquare_size_m: 0.03\n"
+    "marker_size_m: 0.02\ndictionary: DICT_5X5_100\n";
+
+TEST(Board, MayBeOfSquares) {
+  const TemporaryFolder folder;
+  const std::string chessboard =
+      "format: vlp-board/1\nkind: chessboard\ncols: 10\nrows: 7\nsquare_size_m: 0.03\n";
+  expect_same(read_board(folder.file("board.yaml", chessboard)), squares(BoardKind::chessboard));
+  write_board(folder / "written.yaml", squares(BoardKind::chessboard));
+  EXPECT_EQ(folder.content_of(folder / "written.yaml"), chessboard);
+
+  Board charuco = squares(BoardKind::charuco);
+  charuco.family = "DICT_5X5_100";
+  charuco.tag_size_m = 0.02;
+  expect_same(read_board(folder.file("board.yaml", kCharuco)), charuco);
+  charuco.first_id = 5;
+  charuco.top_left_white = true;
+  const std::string all = std::string(kCharuco) + "first_id: 5\ntop_left: white\n";
+  expect_same(read_board(folder.file("board.yaml", all)), charuco);
+  write_board(folder / "written.yaml", charuco);
+  EXPECT_EQ(folder.content_of(folder / "written.yaml"), all);
+}
+
+TEST(Board, OfSquaresIsRefusedForWhatItCannotBe) {
+  const TemporaryFolder folder;
+  const auto refusal_of = [&](const std::string& from, const std::string& to) {
+    return refusal(read_board, folder.file("board.yaml", changed(kCharuco, from, to)));
+  };
+  EXPECT_THAT(refusal_of("charuco", "checkers"),
+              HasSubstr("board.yaml:2: kind: 'checkers' is unknown; the kinds of boards are: "
+                        "apriltags, chessboard, charuco"));
+  EXPECT_THAT(refusal_of("charuco", "chessboard"), HasSubstr("'marker_size_m'"));
+  EXPECT_THAT(refusal_of("rows: 7", "rows: 3"), HasSubstr("within 4 and 100"));
+  EXPECT_THAT(refusal_of("0.02", "0.03"), HasSubstr("smaller than the square around it"));
+  EXPECT_THAT(refusal_of("DICT_5X5_100", "tag36h11"), HasSubstr("one of OpenCV's dictionaries"));
+  EXPECT_THAT(refusal_of("dictionary", "top_left: red\ndictionary"),
+              HasSubstr("top_left: 'red' is unknown; the colours of a square are: black, white"));
+}
+
+TEST(Board, IsReadFromKalibrsDescriptionOfACheckerboard) {
+  const TemporaryFolder folder;
+  const std::string target =
+      "target_type: 'checkerboard'\ntargetCols: 9\ntargetRows: 6\n"
+      "rowSpacingMeters: 0.03\ncolSpacingMeters: 0.03\n";
+  expect_same(read_board(folder.file("target.yaml", target)), squares(BoardKind::chessboard));
+  EXPECT_THAT(refusal(read_board, folder.file("target.yaml", changed(target, "0.03", "0.031"))),
+              HasSubstr("target.yaml:4: rowSpacingMeters: is not colSpacingMeters"));
 }
 
 TEST(Board, KeepsTheOtherValueOfEachSwitch) {

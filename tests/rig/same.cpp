@@ -31,6 +31,9 @@ void expect_same(const Board& found, const Board& expected) {
   EXPECT_EQ(found.first_id, expected.first_id);
   EXPECT_EQ(found.id_order.column_major, expected.id_order.column_major);
   EXPECT_EQ(found.id_order.from, expected.id_order.from);
+  EXPECT_EQ(found.kind, expected.kind);
+  EXPECT_EQ(found.square_size_m, expected.square_size_m);
+  EXPECT_EQ(found.top_left_white, expected.top_left_white);
 }
 
 namespace {

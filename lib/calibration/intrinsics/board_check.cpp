@@ -286,6 +286,59 @@ bool gap_agrees(const Fit& fit, double expected, double tolerance) {
          sigmas * fit.line->pitch_sd / expected <= tolerance;
 }
 
+/// The ChArUco board that explains the steps, if one does: of other numbers of squares, or with
+/// another colour first.
+std::string charuco_problem(const Board& board, const std::vector<Step>& steps) {
+  constexpr double enough = 0.8;
+  constexpr int least = 4, most = 60;
+  const Fit stated = fit_of(board, steps);
+  // Markers that it does not have may be of another board beside it.
+  if (stated.share >= enough && 2 * stated.counted > steps.size()) return "";
+  int largest = 0;
+  for (const Step& step : steps) largest = std::max({largest, step.from, step.to});
+  std::optional<Board> best;
+  double best_share = 0;
+  for (const bool white : {board.top_left_white, !board.top_left_white}) {
+    for (int cols = least; cols <= most; ++cols) {
+      Board tried = board;
+      tried.cols = cols;
+      tried.top_left_white = white;
+      // As many as the markers need; more when that is stated.
+      const int markers = largest - board.first_id + 1;
+      tried.rows = std::max(least, (2 * markers + cols - 1) / cols);
+      if (tried.rows > most) continue;
+      if (cols == board.cols) tried.rows = std::max(tried.rows, board.rows);
+      const Fit fit = fit_of(tried, steps);
+      const double share =
+          fit.share * static_cast<double>(fit.counted) / static_cast<double>(steps.size());
+      if (share < enough || share <= best_share) continue;
+      best_share = share;
+      best = tried;
+    }
+  }
+  if (!best) {
+    if (stated.share >= enough) return "";
+    return "the markers in the images do not lie as on a ChArUco board of " +
+           std::to_string(board.cols) + " x " + std::to_string(board.rows) + " squares from id " +
+           std::to_string(board.first_id) + "; is it another board?";
+  }
+  return "the images show cols " + std::to_string(best->cols) + ", rows " +
+         std::to_string(best->rows) + ", top_left " + (best->top_left_white ? "white" : "black");
+}
+
+BoardCheck check_charuco(const Board& board, const std::vector<Step>& steps) {
+  BoardCheck check{charuco_problem(board, steps), fit_of(board, steps).pitch};
+  if (!check.problem.empty() || !check.pitch) return check;
+  // The markers' outlines are known to a pixel or two.
+  constexpr double tolerance = 0.15, hundreds = 100;
+  const double stated = board.square_size_m / board.tag_size_m;
+  if (std::abs(*check.pitch / stated - 1) <= tolerance) return check;
+  check.problem = "a square is " + shortest(std::round(hundreds * stated) / hundreds) +
+                  " markers wide by board.yaml, but " +
+                  shortest(std::round(hundreds * *check.pitch) / hundreds) + " in the images";
+  return check;
+}
+
 }  // namespace
 
 BoardCheck check_board(const Board& board, std::span<const BoardView> views,
@@ -294,6 +347,7 @@ BoardCheck check_board(const Board& board, std::span<const BoardView> views,
   const auto steps = steps_in(views, lens, std::clamp(shift_px, -kMostShift_px, kMostShift_px));
   constexpr std::size_t least_steps = 10;
   if (steps.size() < least_steps) return {};
+  if (board.has_squares()) return check_charuco(board, steps);
   BoardCheck check{layout_problem(board, steps), {}};
   const Fit fit = fit_of(board, steps);
   check.pitch = fit.pitch;

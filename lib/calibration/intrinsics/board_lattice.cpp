@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <stdexcept>
@@ -36,8 +37,19 @@ Eigen::Vector2d inward_at(const SeenTag& tag, std::size_t k) {
 
 }  // namespace
 
-BoardLattice::BoardLattice(const Board& board) : touching_(board.corner_squares) {
+BoardLattice::BoardLattice(const Board& board)
+    : squares_(board.has_squares()), touching_(board.corner_squares) {
   constexpr double rounding = 1e-9;
+  field_m_ = tag_field_m(board);
+  if (squares_) {
+    parts_ = 1;
+    cols_ = board.cols - 1;
+    rows_ = board.rows - 1;
+    spacing_m_ = board.square_size_m;
+    origins_m_.fill(Eigen::Vector2d::Zero());
+    warp_of_board_.setOnes();
+    return;
+  }
   const bool uniform = std::abs(board.tag_spacing - 1) < rounding;
   if (!uniform && (board.cols < 2 || board.rows < 2)) {
     throw std::invalid_argument("a board of one row of tags needs tag_spacing 1");
@@ -54,13 +66,24 @@ BoardLattice::BoardLattice(const Board& board) : touching_(board.corner_squares)
   origins_m_ = tags.front().corners_m;
   if (uniform) origins_m_.fill(Eigen::Vector2d::Zero());
   const Eigen::Array2d part_m = spacing_m_ * Eigen::Array2d(cols_ - 1, rows_ - 1);
-  field_m_ = tag_field_m(board);
   warp_of_board_ = (field_m_.array() / part_m).square();
 }
 
 std::vector<BoardLattice::Corner> BoardLattice::corners(const SeenBoard& seen) const {
   constexpr int right[] = {0, 1, 1, 0}, down[] = {1, 1, 0, 0};  // bottom left, bottom right, ...
   std::vector<Corner> all;
+  if (squares_ || !seen.points.empty()) {
+    all.reserve(seen.points.size());
+    for (const auto& [index, pixel, weight] : seen.points) {
+      const std::size_t part = index / points(), point = index % points();
+      const auto cols = static_cast<std::size_t>(cols_);
+      const Eigen::Vector2d node(static_cast<double>(point % cols),
+                                 static_cast<double>(point / cols));
+      const Eigen::Vector2d in_board_m = origins_m_[part] + spacing_m_ * node;
+      all.push_back({{in_board_m.x(), in_board_m.y(), 0}, pixel, part, point, {0, 0}, weight});
+    }
+    return all;
+  }
   all.reserve(4 * seen.tags.size());
   for (const SeenTag& tag : seen.tags) {
     const Place& place = places_.at(tag.id);
@@ -97,7 +120,27 @@ BoardPose BoardLattice::pose_of_board(const BoardPose& camera_from_part) const {
           camera_from_part.translation_m - turned(camera_from_part, origins_m_[0])};
 }
 
+bool BoardLattice::enough_points(const std::vector<SeenPoint>& seen) const {
+  constexpr std::size_t least = 12, least_of_parts = 6;  // of a part, where there are four
+  std::vector<std::map<std::size_t, int>> in_row(parts_);
+  std::vector<std::size_t> count(parts_);
+  for (const SeenPoint& point : seen) {
+    const std::size_t part = point.index / points();
+    ++count[part];
+    ++in_row[part][point.index % points() / static_cast<std::size_t>(cols_)];
+  }
+  for (std::size_t part = 0; part < parts_; ++part) {
+    const auto rows = std::count_if(in_row[part].begin(), in_row[part].end(),
+                                    [](const auto& row) { return row.second > 1; });
+    if (rows < 2) return false;
+    // A small board may have no more.
+    if (count[part] < std::min(points(), parts_ == 1 ? least : least_of_parts)) return false;
+  }
+  return true;
+}
+
 bool BoardLattice::enough(const SeenBoard& seen) const {
+  if (squares_ || !seen.points.empty()) return enough_points(seen.points);
   constexpr std::size_t least = 3, least_of_parts = 6;
   std::set<int> cols, rows;
   for (const SeenTag& tag : seen.tags) {

@@ -12,9 +12,9 @@
 
 namespace vlp {
 
-/// A board's corners as uniform lattices, which is what mrcal solves for. When the gap is as wide
-/// as a tag all corners form one; otherwise corner k of every tag is a lattice of its own, with a
-/// pose of its own, a part.
+/// A board's corners as uniform lattices, which is what mrcal solves for. Those of a board of
+/// squares are one; when the gap is as wide as a tag all corners of the tags form one, too;
+/// otherwise corner k of every tag is a lattice of its own, with a pose of its own, a part.
 class BoardLattice {
  public:
   /// Throws std::invalid_argument for a board whose parts would be lines: one row or column of tags
@@ -40,9 +40,15 @@ class BoardLattice {
     /// Where the corner goes, per px, when the edges of its tag go inwards; 0 where squares that
     /// touch make the corner, which stays.
     Eigen::Vector2d inward{0, 0};
+    /// What its residual is multiplied by.
+    double weight = 1;
   };
-  /// Every corner of what was seen, of a flat board: four of each tag, in its order.
+  /// Every corner of what was seen, of a flat board: its points, or four of each tag, in its order.
   std::vector<Corner> corners(const SeenBoard& seen) const;
+  /// SeenPoint::index of a point: part by part, row by row.
+  std::size_t index_of(std::size_t part, std::size_t point) const {
+    return part * points() + point;
+  }
   /// The corners of a board of which a part is bent by so much.
   std::vector<Corner> bent(std::vector<Corner> corners,
                            const Eigen::Vector2d& warp_of_part_m) const;
@@ -50,16 +56,17 @@ class BoardLattice {
   /// The pose of a part from that of the board, and of the board from that of its first part.
   BoardPose pose_of_part(const BoardPose& camera_from_board, std::size_t part) const;
   BoardPose pose_of_board(const BoardPose& camera_from_part) const;
-  /// Tags that fix every part's pose: not all in one row or column, where that matters.
+  /// Corners that fix every part's pose: twelve, and not all in one row or column.
   bool enough(const SeenBoard& seen) const;
 
  private:
+  bool enough_points(const std::vector<SeenPoint>& seen) const;
   struct Place {
     int col, row;
     std::array<Eigen::Vector2d, 4> corners_m;
   };
   std::map<int, Place> places_;
-  bool touching_;
+  bool squares_, touching_;
   std::size_t parts_;
   int cols_, rows_;
   double spacing_m_;

@@ -89,19 +89,20 @@ class BoardCost : public ceres::CostFunction {
           projected(lens, lattice_point(problem_, seen_[k] % count), rotation, left, pose, warp_m);
       if (!point) return false;
       const auto row = static_cast<Eigen::Index>(2 * k);
+      const double weight = problem_.points[seen_[k]].z();
       Eigen::Map<Eigen::Vector2d>(residuals + row) =
-          point->pixel - problem_.points[seen_[k]].head<2>();
+          weight * (point->pixel - problem_.points[seen_[k]].head<2>());
       if (jacobians == nullptr) continue;
       const auto rows = static_cast<Eigen::Index>(2 * seen_.size());
       if (jacobians[0] != nullptr) {
         Eigen::Map<Rows>(jacobians[0], rows, columns).middleRows<2>(row) =
-            point->by_lens.d_pixel_d_parameters;
+            weight * point->by_lens.d_pixel_d_parameters;
       }
       if (jacobians[1] != nullptr) {
-        Eigen::Map<Rows>(jacobians[1], rows, 6).middleRows<2>(row) = point->by_pose;
+        Eigen::Map<Rows>(jacobians[1], rows, 6).middleRows<2>(row) = weight * point->by_pose;
       }
       if (jacobians[2] != nullptr) {
-        Eigen::Map<Rows>(jacobians[2], rows, 2).middleRows<2>(row) = point->by_warp;
+        Eigen::Map<Rows>(jacobians[2], rows, 2).middleRows<2>(row) = weight * point->by_warp;
       }
     }
     return true;
@@ -165,11 +166,12 @@ bool solve_once(BoardProblem& problem, const SolveFor& what) {
 
 /// Marks corners beyond 5 sigmas on either axis; true when there are any.
 bool mark_outliers(BoardProblem& problem) {
-  constexpr double sigmas = 5, outlier = -1;
-  const auto residuals = residuals_of(problem);
+  constexpr double sigmas = 5;
+  auto residuals = residuals_of(problem);
   double squares = 0, count = 0;
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (!(problem.points[i].z() > 0) || !residuals[i].allFinite()) continue;
+    residuals[i] *= problem.points[i].z();
     squares += residuals[i].squaredNorm();
     count += 2;
   }
@@ -178,7 +180,7 @@ bool mark_outliers(BoardProblem& problem) {
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (!(problem.points[i].z() > 0)) continue;
     if (residuals[i].cwiseAbs().maxCoeff() <= limit_px) continue;
-    problem.points[i].z() = outlier;
+    problem.points[i].z() *= -1;
     any = true;
   }
   return any;
@@ -236,7 +238,8 @@ Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what
                   left_jacobian(pose.rotation), pose, problem.warp_m);
     if (!point) continue;
     const auto row = static_cast<Eigen::Index>(2 * i);
-    result.residuals_px.segment<2>(row) = point->pixel - problem.points[i].head<2>();
+    const double weight = problem.points[i].z();
+    result.residuals_px.segment<2>(row) = weight * (point->pixel - problem.points[i].head<2>());
     const auto add = [&](Eigen::Index first, const auto& block) {
       for (Eigen::Index r = 0; r < 2; ++r) {
         for (Eigen::Index c = 0; c < block.cols(); ++c) {
@@ -245,9 +248,9 @@ Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what
         }
       }
     };
-    add(0, point->by_lens.d_pixel_d_parameters);
-    add(intrinsics + 6 * static_cast<Eigen::Index>(i / count), point->by_pose);
-    if (what.warp) add(warp, point->by_warp);
+    add(0, (weight * point->by_lens.d_pixel_d_parameters).eval());
+    add(intrinsics + 6 * static_cast<Eigen::Index>(i / count), (weight * point->by_pose).eval());
+    if (what.warp) add(warp, (weight * point->by_warp).eval());
   }
   for (double& each : result.scale) each = each > 0 ? 1 / std::sqrt(each) : 1;
   result.jacobian_transposed.resize(states, rows);

@@ -29,8 +29,9 @@ struct BoardProblem {
   double spacing_m;
   Eigen::Vector2d warp_m = Eigen::Vector2d::Zero();
   std::vector<BoardPose> poses;
-  /// u_px, v_px, weight; row by row, pose by pose. The weight is 1, kUnseen, or another below 0 for
-  /// an outlier. Every pose needs four points or more, not on a line.
+  /// u_px, v_px, weight; row by row, pose by pose. The weight, at most 1, is what the residual is
+  /// multiplied by; kUnseen, or another below 0 for an outlier. Every pose needs four points or
+  /// more, not on a line.
   std::vector<Eigen::Vector3d> points;
   static constexpr double kUnseen = -2;
 

@@ -131,7 +131,7 @@ IntrinsicsSolution IntrinsicsSolver::solution() const {
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const double weight = problem_.points[i].z();
     if (weight > 0) {
-      squares += residuals[i].squaredNorm();
+      squares += weight * weight * residuals[i].squaredNorm();
       ++result.corners;
     } else if (weight != BoardProblem::kUnseen) {
       ++result.outliers;

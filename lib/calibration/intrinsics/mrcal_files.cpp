@@ -2,10 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/mrcal_files.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/numpy_archive.h"
 #include "captures/csv_writer.h"
 #include "rig/file.h"
+#include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
@@ -94,7 +98,8 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
       text += name;
       if (point.z() > 0) {
         text.append(" ").append(significant(point.x(), kDigits));
-        text.append(" ").append(significant(point.y(), kDigits)).append(" 0\n");
+        text.append(" ").append(significant(point.y(), kDigits)).append(" ");
+        text.append(shortest(std::max(0.0, -std::log2(point.z())))).append("\n");
       } else {
         text += " -1 -1 -\n";
       }

@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
+#include "detection/boards/detect_boards.h"
+#include "rig/board.h"
 
 namespace vlp {
 
@@ -18,11 +22,20 @@ namespace vlp {
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
 
 /// Writes the corners that were solved for as mrcal-calibrate-cameras reads them (--corners-cache):
-/// filename x y level, row by row of the lattice, "-" for a corner not seen or left out. Of a board
-/// in four parts each image stands four times, as NAME-corner0 to NAME-corner3. images: the names
-/// of the input's views. Throws InputError.
+/// filename x y level, with level -log2(weight), row by row of the lattice, "-" for a corner not
+/// seen or left out. Of a board in four parts each image stands four times, as NAME-corner0 to
+/// NAME-corner3. images: the names of the input's views. Throws InputError.
 void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
                    std::span<const std::string> images);
+
+/// Corners of a board as mrcal's tools keep them (--corners-cache; of mrgingham, or what
+/// write_corners() wrote): `filename x y level`, every point of the board's lattice, row by row,
+/// image after image. The residual of a point is weighted by 2^-level, or by a fourth column named
+/// `weight`, 1 at most; without a fourth column by 1. A point with "-" or a negative x, y or level
+/// was not seen; a single row with "-" is an image without the board. Throws InputError, with file
+/// and line.
+std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,
+                                    const std::array<int, 2>& imager_px);
 
 /// The version of mrcal that the toolbox was built with, as Debian's package tells it; "unknown"
 /// where there is no package.

@@ -48,7 +48,7 @@ void IntrinsicsSolver::assemble(const Lens& lens) {
     }
     for (const auto& corner : input_.views[used_[i]]) {
       const std::size_t board = i * lattice.parts() + corner.part;
-      problem_.points[board * lattice.points() + corner.point] << corner.pixel, 1;
+      problem_.points[board * lattice.points() + corner.point] << corner.pixel, corner.weight;
     }
   }
 }
@@ -60,7 +60,8 @@ std::vector<double> IntrinsicsSolver::rms_of_views() const {
   for (std::size_t i = 0; i < used_.size(); ++i) {
     double squares = 0;
     for (std::size_t k = i * count; k < (i + 1) * count; ++k) {
-      if (problem_.points[k].z() > 0) squares += residuals[k].squaredNorm();
+      const double weight = problem_.points[k].z();
+      if (weight > 0) squares += weight * weight * residuals[k].squaredNorm();
     }
     const double value =
         std::sqrt(squares / (2 * static_cast<double>(input_.views[used_[i]].size())));

@@ -30,7 +30,7 @@ double squares_of(Corners corners, const Lens& lens, const Placed& pose) {
   for (const auto& corner : corners) {
     const auto pixel = lens.project(pose.in_camera(corner.in_board_m));
     if (!pixel) return INFINITY;
-    squares += (*pixel - corner.pixel).squaredNorm();
+    squares += corner.weight * corner.weight * (*pixel - corner.pixel).squaredNorm();
   }
   return squares;
 }
@@ -47,8 +47,9 @@ std::optional<Placed> stepped(Corners corners, const Lens& lens, const Placed& p
     const Eigen::Vector3d turned = point - pose.translation_m;
     Eigen::Matrix<double, 2, 6> jacobian;
     jacobian << -projection->d_pixel_d_point * cross_matrix(turned), projection->d_pixel_d_point;
+    jacobian *= corner.weight;
     normal += jacobian.transpose() * jacobian;
-    right += jacobian.transpose() * (corner.pixel - projection->pixel);
+    right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
   }
   normal.diagonal() *= 1 + damping;
   const Eigen::Matrix<double, 6, 1> step = normal.ldlt().solve(right);

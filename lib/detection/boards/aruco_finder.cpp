@@ -9,14 +9,64 @@
 #include <opencv2/aruco.hpp>
 #endif
 
+#include <array>
+#include <map>
 #include <stdexcept>
 
+#include "detection/boards/aruco_marker.h"
 #include "detection/boards/tag_finder.h"
 
 namespace vlp {
 namespace {
 
-int dictionary_of(const std::string& family) {
+/// By OpenCV's own names; those of AprilTags' families, too.
+const std::map<std::string, int>& dictionaries() {
+  using namespace cv::aruco;
+  static const std::map<std::string, int> all{
+      {"DICT_4X4_50", DICT_4X4_50},
+      {"DICT_4X4_100", DICT_4X4_100},
+      {"DICT_4X4_250", DICT_4X4_250},
+      {"DICT_4X4_1000", DICT_4X4_1000},
+      {"DICT_5X5_50", DICT_5X5_50},
+      {"DICT_5X5_100", DICT_5X5_100},
+      {"DICT_5X5_250", DICT_5X5_250},
+      {"DICT_5X5_1000", DICT_5X5_1000},
+      {"DICT_6X6_50", DICT_6X6_50},
+      {"DICT_6X6_100", DICT_6X6_100},
+      {"DICT_6X6_250", DICT_6X6_250},
+      {"DICT_6X6_1000", DICT_6X6_1000},
+      {"DICT_7X7_50", DICT_7X7_50},
+      {"DICT_7X7_100", DICT_7X7_100},
+      {"DICT_7X7_250", DICT_7X7_250},
+      {"DICT_7X7_1000", DICT_7X7_1000},
+      {"DICT_ARUCO_ORIGINAL", DICT_ARUCO_ORIGINAL},
+      {"DICT_APRILTAG_16h5", DICT_APRILTAG_16h5},
+      {"DICT_APRILTAG_25h9", DICT_APRILTAG_25h9},
+      {"DICT_APRILTAG_36h10", DICT_APRILTAG_36h10},
+      {"DICT_APRILTAG_36h11", DICT_APRILTAG_36h11},
+  };
+  return all;
+}
+
+int dictionary_named(const std::string& name) {
+  const auto found = dictionaries().find(name);
+  if (found != dictionaries().end()) return found->second;
+  std::string names;
+  for (const auto& [known, number] : dictionaries()) {
+    names += (names.empty() ? "" : ", ") + known;
+  }
+  throw std::invalid_argument("OpenCV has no dictionary '" + name + "', but " + names);
+}
+
+#ifdef VLP_ARUCO_IS_A_CLASS
+using Dictionary = cv::aruco::Dictionary;
+const cv::aruco::Dictionary& contents(const Dictionary& dictionary) { return dictionary; }
+#else
+using Dictionary = cv::Ptr<cv::aruco::Dictionary>;
+const cv::aruco::Dictionary& contents(const Dictionary& dictionary) { return *dictionary; }
+#endif
+
+int dictionary_of_tags(const std::string& family) {
   if (family == "tag36h11") return cv::aruco::DICT_APRILTAG_36h11;
   if (family == "tag25h9") return cv::aruco::DICT_APRILTAG_25h9;
   if (family == "tag16h5") return cv::aruco::DICT_APRILTAG_16h5;
@@ -29,7 +79,10 @@ int dictionary_of(const std::string& family) {
 class ArucoFinder : public TagFinder {
  public:
   explicit ArucoFinder(const Board& board)
-      : dictionary_(dictionary_of(board.family)), border_bits_(board.border_bits) {}
+      : charuco_(board.kind == BoardKind::charuco),
+        dictionary_(cv::aruco::getPredefinedDictionary(
+            charuco_ ? dictionary_named(board.family) : dictionary_of_tags(board.family))),
+        border_bits_(board.border_bits) {}
 
   std::vector<SeenTag> find(const cv::Mat1b& image) const override {
     std::vector<std::vector<cv::Point2f>> corners;
@@ -37,18 +90,17 @@ class ArucoFinder : public TagFinder {
 #ifdef VLP_ARUCO_IS_A_CLASS
     cv::aruco::DetectorParameters parameters;
     parameters.markerBorderBits = border_bits_;
-    const cv::aruco::ArucoDetector detector(cv::aruco::getPredefinedDictionary(dictionary_),
-                                            parameters);
+    const cv::aruco::ArucoDetector detector(dictionary_, parameters);
     detector.detectMarkers(image, corners, ids);
 #else
     const auto parameters = cv::aruco::DetectorParameters::create();
     parameters->markerBorderBits = border_bits_;
-    cv::aruco::detectMarkers(image, cv::aruco::getPredefinedDictionary(dictionary_), corners, ids,
-                             parameters);
+    cv::aruco::detectMarkers(image, dictionary_, corners, ids, parameters);
 #endif
-    // OpenCV counts corners clockwise from the top left, of tags that are turned by 180 degrees
+    // OpenCV counts corners clockwise from the top left; its AprilTags are turned by 180 degrees
     // against libapriltag's.
-    constexpr std::size_t opencv_corner[] = {1, 0, 3, 2};
+    constexpr std::array<std::size_t, 4> of_markers{3, 2, 1, 0}, of_tags{1, 0, 3, 2};
+    const auto& opencv_corner = charuco_ ? of_markers : of_tags;
     std::vector<SeenTag> tags(ids.size());
     for (std::size_t i = 0; i < ids.size(); ++i) {
       tags[i].id = ids[i];
@@ -61,11 +113,27 @@ class ArucoFinder : public TagFinder {
   }
 
  private:
-  int dictionary_;
+  bool charuco_;
+  Dictionary dictionary_;
   int border_bits_;
 };
 
 }  // namespace
+
+ArucoMarker aruco_marker(const std::string& name, int id) {
+  const Dictionary dictionary = cv::aruco::getPredefinedDictionary(dictionary_named(name));
+  const cv::Mat& codes = contents(dictionary).bytesList;
+  const int width = contents(dictionary).markerSize;
+  if (id < 0 || id >= codes.rows) {
+    throw std::invalid_argument(name + " has no marker " + std::to_string(id) + ", only 0 to " +
+                                std::to_string(codes.rows - 1));
+  }
+  const cv::Mat1b bits =
+      cv::aruco::Dictionary::getBitsFromByteList(codes.rowRange(id, id + 1), width);
+  ArucoMarker marker{width, {}};
+  for (const uchar bit : bits) marker.white.push_back(bit != 0);
+  return marker;
+}
 
 std::unique_ptr<TagFinder> aruco_finder(const Board& board) {
   return std::make_unique<ArucoFinder>(board);

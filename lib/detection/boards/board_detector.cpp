@@ -6,6 +6,7 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
+#include "detection/boards/square_corners.h"
 #include "detection/boards/tag_edges.h"
 #include "detection/boards/tag_families.h"
 #include "detection/boards/tag_finder.h"
@@ -65,10 +66,26 @@ bool overexposed(const SeenTag& tag, const cv::Mat1b& levels) {
 
 }  // namespace
 
-BoardDetector::BoardDetector(const Board& board)
-    : finder_(board.corner_squares ? aruco_finder(board) : apriltag_finder(board)) {
+std::vector<SeenPoint> corners_of(const SeenBoard& seen) {
+  if (!seen.points.empty()) return seen.points;
+  std::vector<SeenPoint> corners;
+  for (const SeenTag& tag : seen.tags) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      corners.push_back({4 * static_cast<std::size_t>(tag.id) + k, tag.corners_px[k]});
+    }
+  }
+  return corners;
+}
+
+BoardDetector::BoardDetector(const Board& board) {
   for (const BoardTag& tag : board_layout(board)) ids_.insert(tag.id);
-  if (board.corner_squares) {
+  if (board.kind != BoardKind::chessboard) {
+    const bool aruco = board.corner_squares || board.has_squares();
+    finder_ = aruco ? aruco_finder(board) : apriltag_finder(board);
+  }
+  if (board.has_squares()) {
+    squares_ = std::make_unique<SquareCorners>(board);
+  } else if (board.corner_squares) {
     touching_ = std::make_unique<TouchingTags>(board);
   } else {
     stripes_ = std::make_unique<EdgeStripes>(stripes_of(board));
@@ -82,11 +99,38 @@ std::optional<SeenTag> BoardDetector::exact(const SeenTag& tag, const GreyLevels
   return with_exact_edges(tag, image.sharp, *stripes_).value_or(tag);
 }
 
+SeenBoard BoardDetector::seen_squares(const cv::Mat1b& levels) const {
+  const GreyLevels grey{levels, smooth(levels)};
+  SeenBoard seen;
+  if (!finder_) {
+    seen.points = squares_->of_chessboard(grey);
+    return seen;
+  }
+  std::map<int, std::vector<SeenTag>> found;
+  for (const SeenTag& marker : finder_->find(levels)) {
+    if (ids_.contains(marker.id)) {
+      found[marker.id].push_back(marker);
+    } else {
+      seen.foreign.push_back(marker);
+    }
+  }
+  for (const auto& [id, same] : found) {
+    if (same.size() > 1) {
+      ++seen.unusable;
+    } else {
+      seen.tags.push_back(same.front());
+    }
+  }
+  seen.points = squares_->beside(seen.tags, grey);
+  return seen;
+}
+
 SeenBoard BoardDetector::detect(const cv::Mat& image) const {
   // No tag is narrower, and libapriltag reads beyond images of a row or two.
   constexpr int least_px = 10;
   if (std::min(image.cols, image.rows) < least_px) return {};
   const cv::Mat1b levels = eight_bits(image);
+  if (squares_) return seen_squares(levels);
   std::map<int, std::vector<SeenTag>> found;
   SeenBoard seen;
   for (SeenTag& tag : finder_->find(levels)) {

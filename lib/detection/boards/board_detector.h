@@ -17,6 +17,7 @@ namespace vlp {
 class TagFinder;
 struct EdgeStripes;
 class TouchingTags;
+class SquareCorners;
 struct GreyLevels;
 
 /// A tag as an image shows it.
@@ -26,9 +27,19 @@ struct SeenTag {
   std::array<Eigen::Vector2d, 4> corners_px;
 };
 
+/// A point of a board's lattice as an image shows it: a corner in which squares touch.
+struct SeenPoint {
+  /// Of boards of squares row by row from the top left, as OpenCV counts a ChArUco board's corners;
+  /// of boards of AprilTags, whose points come from a file, as BoardLattice::index_of() does.
+  std::size_t index;
+  Eigen::Vector2d pixel;
+  /// What its residual is multiplied by.
+  double weight = 1;
+};
+
 /// What of a board an image shows.
 struct SeenBoard {
-  /// By id, each once.
+  /// By id, each once; of a ChArUco board its markers, to a pixel.
   std::vector<SeenTag> tags;
   /// Tags of the family that the board does not have, in the order found; corners to 1 or 2 px.
   std::vector<SeenTag> foreign = {};
@@ -37,16 +48,26 @@ struct SeenBoard {
   int unusable = 0;
   /// Of these, tags with a tenth of their pixels or more at the image's brightest level, white.
   int overexposed = 0;
+  /// Of boards of squares, and from files that hold corners without their tags: by index.
+  std::vector<SeenPoint> points = {};
+
+  /// Whether there is something to calibrate from.
+  bool any() const { return !tags.empty() || !points.empty(); }
 };
 
-/// Finds a board's tags. Boards without corner squares by libapriltag, with corners where the
+/// The corners that a calibration rests on, by a number that is the same in every view, rising.
+std::vector<SeenPoint> corners_of(const SeenBoard& seen);
+
+/// Finds a board's tags, or the corners of its squares (SquareCorners). Boards of AprilTags without
+/// corner squares by libapriltag, with corners where the
 /// tag's edges cross (with_exact_edges()), or its own where that fails; the gap between tags has to
 /// be white. Boards with corner squares, where tags touch, by OpenCV's ArUco module and from one to
 /// the next, with corners where the squares' edges cross (edge_crossing()). Safe to share between
 /// threads.
 class BoardDetector {
  public:
-  /// Throws std::invalid_argument when the detector that the board needs lacks the family.
+  /// Throws std::invalid_argument when the detector that the board needs lacks the family or the
+  /// dictionary.
   explicit BoardDetector(const Board& board);
   ~BoardDetector();
   BoardDetector(const BoardDetector&) = delete;
@@ -59,8 +80,13 @@ class BoardDetector {
   /// With exact corners; nothing when they cannot be found.
   std::optional<SeenTag> exact(const SeenTag& tag, const GreyLevels& image) const;
 
+  SeenBoard seen_squares(const cv::Mat1b& levels) const;
+
+  /// None of chessboards.
   std::unique_ptr<TagFinder> finder_;
   std::set<int> ids_;
+  /// Of boards of squares.
+  std::unique_ptr<SquareCorners> squares_;
   /// Of boards without corner squares.
   std::unique_ptr<EdgeStripes> stripes_;
   /// Of boards with corner squares.

@@ -20,19 +20,25 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string settings_of(const Board& board) {
-  return fmt::format("2 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
-                     board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
-                     board.border_bits, board.corner_squares, board.first_id,
-                     name_of(board.id_order));
+  std::string settings =
+      fmt::format("2 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+                  board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
+                  board.border_bits, board.corner_squares, board.first_id, name_of(board.id_order));
+  if (board.has_squares()) {
+    settings += fmt::format(" {} {} {}", static_cast<int>(board.kind),
+                            shortest(board.square_size_m), board.top_left_white);
+  }
+  return settings;
 }
 
-/// A row per tag, then one per foreign tag; the first row, with id -1, holds the image's size and
-/// the three counts.
+/// A row per tag, then one per foreign tag, then one per point, with its place; the first row, with
+/// id -1, holds the image's size and the four counts.
 void write_view(const fs::path& file, const BoardView& view) {
   CsvWriter csv(file, {"id", "u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"});
   csv.row({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
            std::to_string(view.seen.foreign.size()), std::to_string(view.seen.unusable),
-           std::to_string(view.seen.overexposed), "0", "0", "0"});
+           std::to_string(view.seen.overexposed), std::to_string(view.seen.points.size()), "0",
+           "0"});
   for (const auto* tags : {&view.seen.tags, &view.seen.foreign}) {
     for (const SeenTag& tag : *tags) {
       const auto& [a, b, c, d] = tag.corners_px;
@@ -40,6 +46,10 @@ void write_view(const fs::path& file, const BoardView& view) {
                shortest(b.y()), shortest(c.x()), shortest(c.y()), shortest(d.x()),
                shortest(d.y())});
     }
+  }
+  for (const SeenPoint& point : view.seen.points) {
+    csv.row({std::to_string(point.index), shortest(point.pixel.x()), shortest(point.pixel.y()), "0",
+             "0", "0", "0", "0", "0"});
   }
   csv.save();
 }
@@ -55,9 +65,15 @@ BoardView read_view(const fs::path& file, const std::string& image) {
   view.seen.overexposed = static_cast<int>(at(0, "u2"));
   const auto rows = static_cast<std::size_t>(csv.rows());
   const auto foreign = static_cast<std::size_t>(at(0, "u1"));
-  if (foreign >= rows) throw InputError(file, "is not of the cache");
-  for (std::size_t row = 1; row < rows; ++row) {
-    auto& tags = row < rows - foreign ? view.seen.tags : view.seen.foreign;
+  const auto points = static_cast<std::size_t>(at(0, "v2"));
+  if (foreign + points >= rows) throw InputError(file, "is not of the cache");
+  const std::size_t tag_rows = rows - points;
+  for (std::size_t row = tag_rows; row < rows; ++row) {
+    view.seen.points.push_back(
+        {static_cast<std::size_t>(at(row, "id")), {at(row, "u0"), at(row, "v0")}});
+  }
+  for (std::size_t row = 1; row < tag_rows; ++row) {
+    auto& tags = row < tag_rows - foreign ? view.seen.tags : view.seen.foreign;
     tags.push_back({static_cast<int>(at(row, "id")),
                     {{{at(row, "u0"), at(row, "v0")},
                       {at(row, "u1"), at(row, "v1")},

@@ -21,14 +21,42 @@ SeenBoard seen_in(const cv::Mat& image, const Board& board) {
   return BoardDetector(board).detect(image);
 }
 
+/// Of the largest dictionary of each number of bits.
+std::string other_markers(const Board& board, const cv::Mat& image) {
+  constexpr const char* dictionaries[] = {"DICT_4X4_1000",       "DICT_5X5_1000",
+                                          "DICT_6X6_1000",       "DICT_7X7_1000",
+                                          "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_36h11"};
+  int most = std::max(kEnough - 1, tags_in(seen_in(image, board)));
+  std::string found;
+  for (const std::string dictionary : dictionaries) {
+    Board other = board;
+    other.family = dictionary;
+    const SeenBoard seen = seen_in(image, other);
+    if (tags_in(seen) <= most) continue;
+    most = tags_in(seen);
+    int largest = 0;
+    for (const auto* tags : {&seen.tags, &seen.foreign}) {
+      for (const SeenTag& tag : *tags) largest = std::max(largest, tag.id);
+    }
+    const bool sized = dictionary.ends_with("_1000");
+    found = "the image shows markers of " +
+            (sized ? dictionary.substr(0, dictionary.rfind('_')) + ", the largest of id " +
+                         std::to_string(largest)
+                   : dictionary);
+  }
+  return found;
+}
+
 }  // namespace
 
 std::string other_tags(const Board& board, const cv::Mat& image) {
+  if (board.kind == BoardKind::chessboard) return "";  // it has none
   cv::Mat mirrored;
   cv::flip(image, mirrored, 1);
   if (tags_in(seen_in(mirrored, board)) >= kEnough) {
     return "the image is mirrored: mirror it back, or tell the camera not to";
   }
+  if (board.kind == BoardKind::charuco) return other_markers(board, image);
   // Families of few tags, which can be searched for quickly.
   constexpr const char* families[] = {"tag36h11", "tag25h9", "tag16h5", "tagStandard41h12",
                                       "tagCircle21h7"};

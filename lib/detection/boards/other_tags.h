@@ -10,8 +10,8 @@
 namespace vlp {
 
 /// What an image shows that has no tag of a board: a mirrored board, tags of another family, or
-/// with another border. In one line; empty when it is none of these. It takes a second for each
-/// image.
+/// with another border, markers of another dictionary. In
+/// one line; empty when it is none of these. It takes a second for each image.
 std::string other_tags(const Board& board, const cv::Mat& image);
 
 }  // namespace vlp

@@ -8,6 +8,12 @@
 
 namespace vlp {
 
+/// An image, and smoothed, as saddle_point() takes it.
+struct GreyLevels {
+  cv::Mat1b sharp;
+  cv::Mat1f smoothed;
+};
+
 /// Where two black squares touch at a corner: the saddle point of the grey levels. The pixel with
 /// the most negative determinant of the Hessian within reach_px of guess_px, then the saddle of
 ///   a x^2 + b x y + c y^2 + d x + e y + f

@@ -22,7 +22,8 @@ class TagFinder {
 std::unique_ptr<TagFinder> apriltag_finder(const Board& board);
 
 /// By OpenCV's ArUco module: also tags that black squares touch; corners are good to 1 or 2 px.
-/// Throws std::invalid_argument for families that it lacks.
+/// Or the markers of a ChArUco board. Throws std::invalid_argument for families and dictionaries
+/// that it lacks.
 std::unique_ptr<TagFinder> aruco_finder(const Board& board);
 
 }  // namespace vlp

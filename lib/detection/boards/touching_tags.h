@@ -7,16 +7,11 @@
 #include <vector>
 
 #include "detection/boards/board_detector.h"
+#include "detection/boards/saddle_point.h"
 #include "detection/boards/tag_families.h"
 #include "rig/board_layout.h"
 
 namespace vlp {
-
-/// An image, and smoothed: see saddle_point().
-struct GreyLevels {
-  cv::Mat1b sharp;
-  cv::Mat1f smoothed;
-};
 
 /// The exact corners of tags that black squares touch, and the tags that were not found at first.
 class TouchingTags {

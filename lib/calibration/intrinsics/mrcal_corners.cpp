@@ -1,0 +1,241 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string_view>
+
+#include "calibration/intrinsics/board_lattice.h"
+#include "calibration/intrinsics/mrcal_files.h"
+#include "detection/boards/corner_table.h"
+#include "detection/boards/lattice_order.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "rig/yaml_text.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kMostBytes = std::size_t{1} << 30;
+
+/// A row of the file; nothing was seen where there is no pixel.
+struct CornerRow {
+  std::size_t line;
+  std::string_view image;
+  std::optional<Eigen::Vector2d> pixel;
+  double weight;
+};
+
+std::vector<std::string_view> words_in(std::string_view line) {
+  constexpr std::string_view blank = " \t\r";
+  std::vector<std::string_view> words;
+  for (auto from = line.find_first_not_of(blank); from != line.npos;) {
+    const auto end = std::min(line.find_first_of(blank, from), line.size());
+    words.push_back(line.substr(from, end - from));
+    from = line.find_first_not_of(blank, end);
+  }
+  return words;
+}
+
+/// Reads the rows of the one file.
+class CornerRows {
+ public:
+  CornerRows(const std::filesystem::path& file, const std::array<int, 2>& imager_px)
+      : file_(file), imager_px_(imager_px), text_(read_text_file(file, kMostBytes)) {
+    std::size_t line = 0;
+    for (std::size_t from = 0; from < text_.size();) {
+      const std::size_t end = text_.find('\n', from);
+      read(++line, std::string_view(text_).substr(from, end - from));
+      from = end + 1;
+    }
+    if (rows.empty()) throw InputError(file, "holds no corner");
+  }
+
+  InputError error(std::size_t line, const std::string& problem) const {
+    return {file_, line, "", problem};
+  }
+
+  std::vector<CornerRow> rows;
+
+ private:
+  void read(std::size_t line, std::string_view text) {
+    const auto words = words_in(text);
+    if (words.empty()) return;
+    if (words[0].front() == '#') {
+      // The legend; "##" and "#!" are comments.
+      if (words.size() == 5 && words[0] == "#") weights_ = words[4] == "weight";
+      return;
+    }
+    if (words.size() < 3 || words.size() > 4) {
+      throw error(line, "should be: filename x y level; is it mrcal's table of corners?");
+    }
+    CornerRow row{line, words[0], {}, 1};
+    const auto x = number(line, words[1]), y = number(line, words[2]);
+    const auto fourth = words.size() == 4 ? number(line, words[3]) : 1;
+    if (words.size() == 4) row.weight = weight_of(line, fourth);
+    if (x && y && *x >= 0 && *y >= 0 && row.weight > 0) {
+      row.pixel = {*x, *y};
+      const std::string outside = outside_words(*row.pixel, imager_px_);
+      if (!outside.empty()) throw error(line, outside);
+    }
+    rows.push_back(row);
+  }
+
+  /// Nothing for "-".
+  std::optional<double> number(std::size_t line, std::string_view word) const {
+    if (word == "-") return {};
+    double value = 0;
+    const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (problem != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
+      throw error(line, in_quotes(shortened(word, 40)) + " should be a finite number, or -");
+    }
+    return value;
+  }
+
+  /// 0 where nothing was seen.
+  double weight_of(std::size_t line, std::optional<double> fourth) const {
+    constexpr double most_level = 30;
+    if (!fourth || *fourth < 0) return 0;
+    if (weights_) {
+      if (*fourth > 1) throw error(line, "a weight should be within 0 and 1");
+      return *fourth;
+    }
+    if (*fourth > most_level) throw error(line, "a level should be within 0 and 30");
+    return std::exp2(-std::floor(*fourth));
+  }
+
+  const std::filesystem::path& file_;
+  const std::array<int, 2>& imager_px_;
+  std::string text_;
+  bool weights_ = false;
+};
+
+/// How far the points of lines of so many are from lying evenly, all images together; NaN with too
+/// few.
+double unevenness(const std::vector<std::vector<CornerRow>>& images, std::size_t line) {
+  double sum_px = 0, count = 0;
+  for (const auto& rows : images) {
+    for (std::size_t i = 2; i < rows.size(); ++i) {
+      if (i % line < 2 || !rows[i].pixel || !rows[i - 1].pixel || !rows[i - 2].pixel) continue;
+      sum_px += (*rows[i].pixel - 2 * *rows[i - 1].pixel + *rows[i - 2].pixel).norm();
+      count += 1;
+    }
+  }
+  return count > 0 ? sum_px / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// The number of points after which a new line begins, by what is most even.
+std::size_t line_shown(const std::vector<std::vector<CornerRow>>& images) {
+  constexpr double better = 0.5;
+  const std::size_t points = images.front().size();
+  std::size_t best = points;
+  double least = std::numeric_limits<double>::infinity();
+  // Parts of a line are as even as it is.
+  for (std::size_t line = points / 3; line >= 3; --line) {
+    if (points % line != 0) continue;
+    const double px = unevenness(images, line);
+    if (!(px < better * least)) continue;
+    least = px;
+    best = line;
+  }
+  return best;
+}
+
+/// How a board's lattice is counted, for messages.
+std::string counted(const Board& board, const BoardLattice& lattice) {
+  return fmt::format("a board of {} x {} {} has {} x {} corners", board.cols, board.rows,
+                     board.has_squares() ? "squares" : "tags", lattice.cols(), lattice.rows());
+}
+
+std::string wrong_count(const Board& board, const BoardLattice& lattice, std::size_t rows) {
+  std::string words = fmt::format("{} rows, but {}", rows, counted(board, lattice));
+  if (lattice.parts() > 1) words += " of each kind";
+  if (board.has_squares() && rows == static_cast<std::size_t>(board.cols * board.rows)) {
+    words += fmt::format(
+        "; cols and rows of board.yaml count squares, not the corners between them: cols {}, rows "
+        "{}",
+        board.cols + 1, board.rows + 1);
+  } else {
+    words += "; is the file cut short, or of another board?";
+  }
+  return words;
+}
+
+}  // namespace
+
+std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,
+                                    const std::array<int, 2>& imager_px) {
+  const BoardLattice lattice(board);
+  const CornerRows table(file, imager_px);
+  std::vector<BoardView> views;
+  std::set<std::string_view> known;
+  std::vector<std::vector<CornerRow>> images;
+  for (std::size_t from = 0; from < table.rows.size();) {
+    const auto [line, name, first_pixel, weight] = table.rows[from];
+    std::size_t end = from + 1;
+    while (end < table.rows.size() && table.rows[end].image == name) ++end;
+    if (!known.insert(name).second) {
+      throw table.error(line, fmt::format("image '{}' stands twice", name));
+    }
+    std::string image(name);
+    std::size_t part = 0;
+    if (lattice.parts() > 1) {
+      const auto ending = image.rfind("-corner");
+      if (ending == image.npos || ending + 8 != image.size() || image.back() < '0' ||
+          image.back() > '3') {
+        throw table.error(line,
+                          "an image of a board whose gaps are not as wide as its tags stands "
+                          "four times, as NAME-corner0 to NAME-corner3, as vlp-intrinsics "
+                          "writes it");
+      }
+      part = static_cast<std::size_t>(image.back() - '0');
+      image.resize(ending);
+    }
+    auto view = std::find_if(views.begin(), views.end(),
+                             [&](const BoardView& other) { return other.image == image; });
+    if (view == views.end()) view = views.insert(view, {image, imager_px, {}});
+    const bool none = end == from + 1 && !first_pixel;
+    if (!none && end - from != lattice.points()) {
+      throw table.error(
+          line, fmt::format("image '{}' has {}", name, wrong_count(board, lattice, end - from)));
+    }
+    for (std::size_t i = from; i < end; ++i) {
+      if (!table.rows[i].pixel) continue;
+      view->seen.points.push_back(
+          {lattice.index_of(part, i - from), *table.rows[i].pixel, table.rows[i].weight});
+    }
+    if (!none)
+      images.emplace_back(table.rows.begin() + static_cast<std::ptrdiff_t>(from),
+                          table.rows.begin() + static_cast<std::ptrdiff_t>(end));
+    from = end;
+  }
+  if (images.empty()) return views;
+  for (BoardView& view : views) {
+    std::sort(view.seen.points.begin(), view.seen.points.end(),
+              [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
+  }
+  const auto stated = static_cast<std::size_t>(lattice.cols());
+  const std::size_t shown = line_shown(images);
+  if (shown < lattice.points() && shown != stated &&
+      unevenness(images, shown) < unevenness(images, stated) / 2) {
+    throw table.error(
+        images.front().front().line,
+        fmt::format("the corners lie in rows of {}, but {}{}", shown, counted(board, lattice),
+                    shown == static_cast<std::size_t>(lattice.rows())
+                        ? "; swap cols and rows of board.yaml"
+                        : "; is board.yaml that of the board?"));
+  }
+  if (lattice.parts() == 1) {
+    for (BoardView& view : views) {
+      order_lattice(view.seen.points, lattice.cols(), lattice.rows(),
+                    board.kind == BoardKind::chessboard);
+    }
+  }
+  return views;
+}
+
+}  // namespace vlp

@@ -1,0 +1,160 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/corner_table.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <unordered_map>
+
+#include "captures/csv_reader.h"
+#include "captures/csv_writer.h"
+#include "rig/board_layout.h"
+#include "rig/yaml_text.h"
+
+namespace vlp {
+namespace {
+
+/// The corners of an image: of its tags in the order in which the table has them first.
+struct ImageCorners {
+  std::string image;
+  std::vector<int> tags;
+  std::map<int, std::array<std::optional<Eigen::Vector2d>, 4>> of_tag;
+  std::vector<SeenPoint> points;
+};
+
+SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
+  SeenBoard seen;
+  for (const int id : corners.tags) {
+    SeenTag tag{id, {}};
+    bool whole = true;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto& corner = corners.of_tag[id][k];
+      whole = whole && corner;
+      if (corner) tag.corners_px[k] = *corner;
+    }
+    if (!whole) {
+      seen.unusable += ids.contains(id) ? 1 : 0;
+      continue;
+    }
+    (ids.contains(id) ? seen.tags : seen.foreign).push_back(tag);
+  }
+  std::sort(seen.tags.begin(), seen.tags.end(),
+            [](const SeenTag& a, const SeenTag& b) { return a.id < b.id; });
+  seen.points = std::move(corners.points);
+  std::sort(seen.points.begin(), seen.points.end(),
+            [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
+  return seen;
+}
+
+}  // namespace
+
+std::string outside_words(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px) {
+  constexpr double edge = 0.5;  // of the outermost pixels
+  const auto [width, height] = imager_px;
+  if (pixel.x() >= -edge && pixel.y() >= -edge && pixel.x() <= width - edge &&
+      pixel.y() <= height - edge) {
+    return "";
+  }
+  return fmt::format(
+      "a corner at ({}, {}) is outside an image of {} x {} px; is it of this camera?",
+      shortest(pixel.x()), shortest(pixel.y()), width, height);
+}
+
+std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
+                                         const std::array<int, 2>& imager_px) {
+  const CsvTable csv(file);
+  const auto image = csv.required("image"), number = csv.required("corner");
+  const auto u_px = csv.required("u_px"), v_px = csv.required("v_px");
+  const auto tag_id = board.has_squares() ? number : csv.required("tag");
+  const int last = board.has_squares() ? (board.cols - 1) * (board.rows - 1) - 1 : 3;
+  std::vector<ImageCorners> images;
+  std::unordered_map<std::string, std::size_t> index_of;
+  std::set<std::pair<std::size_t, std::size_t>> known;  // of points
+  for (std::size_t row = 0; row < csv.rows(); ++row) {
+    const std::string name(csv.text(row, image));
+    if (name.empty()) throw csv.error(row, image, "is empty");
+    const auto [entry, is_new] = index_of.try_emplace(name, images.size());
+    if (is_new) images.push_back({name, {}, {}, {}});
+    const auto cells = {tag_id, number, u_px, v_px};
+    if (std::all_of(cells.begin(), cells.end(),
+                    [&](auto cell) { return csv.text(row, cell).empty(); })) {
+      continue;
+    }
+    const Eigen::Vector2d pixel(csv.number(row, u_px), csv.number(row, v_px));
+    if (const auto words = outside_words(pixel, imager_px); !words.empty()) {
+      throw csv.error(row, u_px, words);
+    }
+    const int corner = csv.integer(row, number);
+    if (corner < 0 || corner > last) {
+      throw csv.error(row, number,
+                      board.has_squares()
+                          ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
+                                        "squares; is board.yaml that of the board?",
+                                        last, board.cols, board.rows)
+                          : "should be within 0 and 3");
+    }
+    const auto twice = [&] {
+      return csv.error(row, number, fmt::format("{} stands twice in image '{}'", corner, name));
+    };
+    ImageCorners& corners = images[entry->second];
+    if (board.has_squares()) {
+      const auto index = static_cast<std::size_t>(corner);
+      if (!known.emplace(entry->second, index).second) throw twice();
+      corners.points.push_back({index, pixel});
+      continue;
+    }
+    const int id = csv.integer(row, tag_id);
+    const auto [tag, first] = corners.of_tag.try_emplace(id);
+    if (first) corners.tags.push_back(id);
+    auto& place = tag->second[static_cast<std::size_t>(corner)];
+    if (place) throw twice();
+    place = pixel;
+  }
+  if (images.empty()) throw InputError(file, "holds no corner");
+  std::set<int> ids;
+  for (const BoardTag& tag : board_layout(board)) ids.insert(tag.id);
+  std::vector<BoardView> views;
+  for (ImageCorners& corners : images) {
+    const std::string name = corners.image;
+    views.push_back({name, imager_px, seen_board(std::move(corners), ids)});
+  }
+  return views;
+}
+
+void write_corner_table(const std::filesystem::path& file, std::span<const BoardView> views,
+                        const Board& board) {
+  const bool squares = board.has_squares();
+  std::vector<std::string> header{"image", "tag", "corner", "u_px", "v_px"};
+  if (squares) header.erase(header.begin() + 1);
+  CsvWriter csv(file, header);
+  for (const BoardView& view : views) {
+    const auto& [tags, foreign, unusable, overexposed, points] = view.seen;
+    if (squares ? points.empty() : tags.empty() && foreign.empty()) {
+      std::vector<std::string> empty(header.size());
+      empty.front() = view.image;
+      csv.row(empty);
+    }
+    if (squares) {
+      for (const SeenPoint& point : points) {
+        csv.row({view.image, std::to_string(point.index), shortest(point.pixel.x()),
+                 shortest(point.pixel.y())});
+      }
+      continue;
+    }
+    for (const auto* each : {&tags, &foreign}) {
+      for (const SeenTag& tag : *each) {
+        for (std::size_t k = 0; k < 4; ++k) {
+          csv.row({view.image, std::to_string(tag.id), std::to_string(k),
+                   shortest(tag.corners_px[k].x()), shortest(tag.corners_px[k].y())});
+        }
+      }
+    }
+  }
+  csv.save();
+}
+
+}  // namespace vlp

@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "detection/boards/detect_boards.h"
+#include "rig/board.h"
+
+namespace vlp {
+
+/// Corners of a board in images, instead of the images: a table of `image, tag, corner, u_px,
+/// v_px`, with the corners of a tag from 0 to 3 as in BoardTag::corners_m, or, of a board of
+/// squares, `image, corner, u_px, v_px`, with corners as in SeenPoint::index. An image without any
+/// has one row, empty but for its name. Tags without all four corners are left out, those that the
+/// board does not have are foreign. Throws InputError, with file and line, also for a corner that
+/// stands twice or is outside the image.
+std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
+                                         const std::array<int, 2>& imager_px);
+
+/// Writes what read_corner_table() reads back as the same doubles, whole or not at all. Throws
+/// InputError.
+void write_corner_table(const std::filesystem::path& file, std::span<const BoardView> views,
+                        const Board& board);
+
+/// What is wrong with the place of a corner; empty when nothing is.
+std::string outside_words(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px);
+
+}  // namespace vlp

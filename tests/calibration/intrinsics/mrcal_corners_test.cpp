@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "calibration/intrinsics/mrcal_files.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/synthetic_views.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::array kImager_px{800, 600};
+
+IntrinsicsInput input_of(const Board& board, const std::vector<BoardView>& views, LensModel model) {
+  IntrinsicsInput input{BoardLattice(board), {}, kImager_px, model};
+  for (const BoardView& view : views) input.views.push_back(input.lattice.corners(view.seen));
+  return input;
+}
+
+class MrcalCorners : public testing::TestWithParam<bool> {
+ protected:
+  const TemporaryFolder folder;
+  const SyntheticViews views{synthetic_board(GetParam()), synthetic_lens()};
+};
+
+/// Of a plain board, and of a Kalibr board, which is four lattices to mrcal.
+TEST_P(MrcalCorners, ComeBackAsTheyWereSolvedFor) {
+  constexpr int count = 12;
+  Random random(3);
+  const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
+  ASSERT_TRUE(solution.ok());
+  std::vector<std::string> names;
+  for (int i = 0; i < count; ++i) names.push_back(std::to_string(i) + ".png");
+  write_corners(folder / "corners.vnl", solution, names);
+  const auto read = read_corners(folder / "corners.vnl", views.board, kImager_px);
+  ASSERT_EQ(read.size(), solution.views.size());
+  std::size_t corners = 0;
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].image, names[solution.views[i]]);
+    corners += read[i].seen.points.size();
+  }
+  EXPECT_EQ(corners, static_cast<std::size_t>(solution.corners));
+  const IntrinsicsSolution again =
+      solve_intrinsics(input_of(views.board, read, LensModel::opencv8));
+  ASSERT_TRUE(again.ok());
+  EXPECT_LT(projection_difference(solution.lens(), again.lens(), kImager_px, even)->worst_px, 1e-3);
+  EXPECT_NEAR(again.rms_px, solution.rms_px, 1e-5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Boards, MrcalCorners, testing::Values(false, true));
+
+Board chessboard() {
+  Board board{"", 4, 5, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
+  board.kind = BoardKind::chessboard;
+  board.square_size_m = 0.02;
+  return board;
+}
+
+std::string row(const std::string& x_and_y, const std::string& fourth) {
+  return "0.png " + x_and_y + " " + fourth + "\n";
+}
+
+TEST(MrcalTable, WeighsCornersByTheirLevels) {
+  const TemporaryFolder folder;
+  std::string rows;
+  for (int i = 0; i < 12; ++i) {
+    rows += row(std::to_string(100 + 40 * (i % 3)) + " " + std::to_string(100 + 40 * (i / 3)),
+                i == 0   ? "-"
+                : i == 1 ? "0.5"
+                         : "1");
+  }
+  rows += "none.png - -\n";
+  const auto read = [&](const std::string& legend) {
+    return read_corners(folder.file("corners.vnl", "## a comment\n" + legend + rows), chessboard(),
+                        kImager_px);
+  };
+  const auto by_level = read("# filename x y level\n");
+  ASSERT_EQ(by_level.size(), 2U);
+  EXPECT_FALSE(by_level[1].seen.any());
+  ASSERT_EQ(by_level[0].seen.points.size(), 11U);
+  EXPECT_EQ(by_level[0].seen.points[0].index, 1U);
+  EXPECT_EQ(by_level[0].seen.points[0].weight, 1);  // mrcal takes the whole part
+  EXPECT_EQ(by_level[0].seen.points[1].weight, 0.5);
+  const auto by_weight = read("# filename x y weight\n");
+  EXPECT_EQ(by_weight[0].seen.points[0].weight, 0.5);
+  EXPECT_EQ(by_weight[0].seen.points[1].weight, 1);
+}
+
+/// With either solver: corners of large errors that weigh little spoil little.
+TEST(WeightedCorners, CountByTheirWeights) {
+  const std::array fisheye{450.0, 451.0, 402.0, 297.0, 0.02, -0.01, 0.003, -0.0004};
+  for (const Lens& lens : {synthetic_lens(), Lens(LensModel::fisheye, fisheye)}) {
+    SCOPED_TRACE(name_of(lens.model()));
+    const SyntheticViews views{synthetic_board(false), lens};
+    Random random(5);
+    IntrinsicsInput input = views.input(16, random, 0.05);
+    input.warp = WarpChoice::off;
+    for (auto& view : input.views) {
+      for (auto& corner : view) corner.inward.setZero();
+    }
+    const IntrinsicsSolution whole = solve_intrinsics(input);
+    IntrinsicsInput weighted = input;
+    for (auto& view : weighted.views) {
+      for (auto& corner : view) corner.weight = 0.5;
+    }
+    const IntrinsicsSolution half = solve_intrinsics(weighted);
+    ASSERT_TRUE(whole.ok() && half.ok());
+    EXPECT_NEAR(half.rms_px, whole.rms_px / 2, 0.02 * whole.rms_px);
+    // Every other corner is off by a pixel, at a fiftieth of the weight.
+    for (auto& view : input.views) {
+      for (std::size_t i = 0; i < view.size(); i += 2) {
+        view[i].pixel += Eigen::Vector2d(random.normal(), random.normal());
+        view[i].weight = 0.02;
+      }
+    }
+    const IntrinsicsSolution spoilt = solve_intrinsics(input);
+    ASSERT_TRUE(spoilt.ok());
+    EXPECT_LT(projection_difference(lens, spoilt.lens(), kImager_px, even)->mean_px, 0.1);
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,165 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <opencv2/core/version.hpp>
+#include <opencv2/imgproc.hpp>
+#if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
+#include <opencv2/objdetect/aruco_board.hpp>
+#define VLP_ARUCO_IS_A_CLASS
+#else
+#include <opencv2/aruco/charuco.hpp>
+#endif
+
+#include "detection/boards/board_detector.h"
+#include "detection/boards/lattice_order.h"
+#include "detection/boards/other_tags.h"
+#include "detection/boards/square_corners.h"
+#include "rig/board_layout.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kSquare_px = 40, kMargin_px = 20;
+
+Board squares(BoardKind kind, int cols, int rows) {
+  Board board{"", cols, rows, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
+  board.kind = kind;
+  board.square_size_m = 0.02;
+  if (kind != BoardKind::charuco) return board;
+  board.family = "DICT_5X5_100";
+  board.tag_size_m = 0.75 * board.square_size_m;
+  return board;
+}
+
+/// As OpenCV itself draws it, a little blurred.
+cv::Mat drawn_by_opencv(const Board& board) {
+  const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_100);
+  const cv::Size size(board.cols * kSquare_px + 2 * kMargin_px,
+                      board.rows * kSquare_px + 2 * kMargin_px);
+  const auto square = static_cast<float>(board.square_size_m);
+  const auto marker = static_cast<float>(board.tag_size_m);
+  cv::Mat image;
+#ifdef VLP_ARUCO_IS_A_CLASS
+  cv::aruco::CharucoBoard drawn({board.cols, board.rows}, square, marker, dictionary);
+  drawn.setLegacyPattern(board.top_left_white);
+  drawn.generateImage(size, image, kMargin_px, 1);
+#else
+  cv::aruco::CharucoBoard::create(board.cols, board.rows, square, marker, dictionary)
+      ->draw(size, image, kMargin_px, 1);
+#endif
+  cv::GaussianBlur(image, image, {}, 0.7);
+  return image;
+}
+
+/// Corners lie between pixels.
+Eigen::Vector2d place_of(const Board& board, std::size_t index) {
+  const auto cols = static_cast<std::size_t>(board.cols - 1);
+  const Eigen::Vector2d node(static_cast<double>(index % cols), static_cast<double>(index / cols));
+  return Eigen::Vector2d::Constant(kMargin_px + kSquare_px - 0.5) + kSquare_px * node;
+}
+
+cv::Mat drawn_chessboard(const Board& board) {
+  cv::Mat image(board.rows * kSquare_px + 2 * kMargin_px, board.cols * kSquare_px + 2 * kMargin_px,
+                CV_8U, cv::Scalar(255));
+  for (int row = 0; row < board.rows; ++row) {
+    for (int col = 0; col < board.cols; ++col) {
+      if (!is_black(board, col, row)) continue;
+      image(cv::Rect(kMargin_px + col * kSquare_px, kMargin_px + row * kSquare_px, kSquare_px,
+                     kSquare_px)) = 0;
+    }
+  }
+  cv::GaussianBlur(image, image, {}, 0.7);
+  return image;
+}
+
+void expect_all_corners(const Board& board, const SeenBoard& seen) {
+  ASSERT_EQ(seen.points.size(), static_cast<std::size_t>((board.cols - 1) * (board.rows - 1)));
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    EXPECT_EQ(seen.points[i].index, i);
+    EXPECT_LT((seen.points[i].pixel - place_of(board, i)).norm(), 0.05) << i;
+  }
+}
+
+TEST(SquareCorners, AreThoseOfOpencvsCharucoBoard) {
+  std::vector<Board> boards{squares(BoardKind::charuco, 7, 5), squares(BoardKind::charuco, 7, 6)};
+#ifdef VLP_ARUCO_IS_A_CLASS
+  // As it was drawn before OpenCV 4.6, with a white square first.
+  boards.push_back(boards.back());
+  boards.back().top_left_white = true;
+#endif
+  for (const Board& board : boards) {
+    SCOPED_TRACE(board.rows);
+    const cv::Mat image = drawn_by_opencv(board);
+    const SeenBoard seen = BoardDetector(board).detect(image);
+    EXPECT_EQ(seen.tags.size(), board_layout(board).size());
+    EXPECT_TRUE(seen.foreign.empty());
+    expect_all_corners(board, seen);
+  }
+}
+
+TEST(SquareCorners, OfACharucoBoardAreThoseInView) {
+  const Board board = squares(BoardKind::charuco, 7, 5);
+  const cv::Mat image = drawn_by_opencv(board);
+  const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
+  const SeenBoard seen = BoardDetector(board).detect(part);
+  EXPECT_GE(seen.points.size(), 8U);
+  for (const SeenPoint& point : seen.points) {
+    EXPECT_LT((point.pixel - place_of(board, point.index)).norm(), 0.05);
+  }
+}
+
+TEST(SquareCorners, OfAChessboardAreCountedWithTheImage) {
+  for (const auto& [cols, rows] : {std::pair(9, 6), std::pair(9, 7), std::pair(8, 8)}) {
+    SCOPED_TRACE(cols * 10 + rows);
+    const Board board = squares(BoardKind::chessboard, cols, rows);
+    const cv::Mat image = drawn_chessboard(board);
+    const BoardDetector detector(board);
+    expect_all_corners(board, detector.detect(image));
+    // Upside down what is up is counted first.
+    cv::Mat turned;
+    cv::rotate(image, turned, cv::ROTATE_180);
+    expect_all_corners(board, detector.detect(turned));
+  }
+}
+
+TEST(SquareCorners, OfAChessboardAreAllOrNone) {
+  const Board board = squares(BoardKind::chessboard, 9, 6);
+  cv::Mat image = drawn_chessboard(board);
+  EXPECT_TRUE(BoardDetector(board)
+                  .detect(image(cv::Rect(80, 0, image.cols - 80, image.rows)))
+                  .points.empty());
+  image(cv::Rect(100, 100, 60, 60)) = 128;
+  EXPECT_TRUE(BoardDetector(board).detect(image).points.empty());
+}
+
+TEST(SquareCorners, TellAnotherBoard) {
+  const cv::Mat image = drawn_chessboard(squares(BoardKind::chessboard, 9, 6));
+  const auto [cols, rows] = chessboard_shown(image);
+  EXPECT_EQ(std::max(cols, rows), 9);
+  EXPECT_EQ(std::min(cols, rows), 6);
+  Board charuco = squares(BoardKind::charuco, 7, 5);
+  const cv::Mat markers = drawn_by_opencv(charuco);
+  charuco.family = "DICT_4X4_50";
+  EXPECT_EQ(other_tags(charuco, markers),
+            "the image shows markers of DICT_5X5, the largest of id 16");
+}
+
+TEST(LatticeOrder, TurnsWhatGoesUpTheColumnsAround) {
+  std::vector<SeenPoint> points;
+  for (std::size_t i = 0; i < 12; ++i) {
+    points.push_back({i, {10.0 * static_cast<double>(i % 4), -10.0 * static_cast<double>(i / 4)}});
+  }
+  order_lattice(points, 4, 3, false);
+  EXPECT_EQ(points[0].pixel, Eigen::Vector2d(0, -20));
+  EXPECT_EQ(points[11].pixel, Eigen::Vector2d(30, 0));
+}
+
+TEST(ArucoMarkers, OfADictionaryThatThereIsNotAreRefused) {
+  Board board = squares(BoardKind::charuco, 7, 5);
+  board.family = "DICT_9X9_50";
+  EXPECT_THROW(BoardDetector{board}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,181 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-intrinsics on files of corners instead of images, against the same from images and against
+/// mrcal's own tool.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "calibration/intrinsics/camera_imports.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "pipeline/intrinsics_program.h"
+#include "rig/calibration.h"
+#include "support/datasets.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class CornerFiles : public IntrinsicsProgram {
+ protected:
+  /// The rows of a table of 3 x 3 corners of a chessboard; an image to each place.
+  static std::string vnl(std::initializer_list<const char*> names) {
+    std::string text = "# filename x y level\n";
+    for (const std::string name : names) {
+      for (int i = 0; i < 9; ++i) {
+        text += name + " " + std::to_string(100 + 50 * (i % 3)) + " " +
+                std::to_string(100 + 50 * (i / 3)) + " 0\n";
+      }
+    }
+    return text;
+  }
+  std::string refusal(const std::string& corners, const std::string& options) const {
+    const auto result = calibrate(corners, chessboard, options);
+    EXPECT_EQ(result.exit_code, 2) << result.output;
+    return result.errors;
+  }
+  Lens lens_of(const char* name) const {
+    const Camera camera = read_calibration(folder / name).camera;
+    return Lens(camera.lens_model, camera.intrinsics);
+  }
+
+  const std::string chessboard =
+      folder
+          .file("chessboard.yaml",
+                "format: vlp-board/1\nkind: chessboard\ncols: 4\nrows: 4\nsquare_size_m: 0.02\n")
+          .string();
+};
+
+constexpr const char* kSize = "--imager-px 800 600";
+
+TEST_F(CornerFiles, GiveTheLensOfTheImagesToTheLastBit) {
+  const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
+  ASSERT_EQ(run_program("vlp-simulate -q " VLP_SOURCE_DIR
+                        "/datasets/paper-rig/scene.yaml --only boards -o " +
+                        rig)
+                .exit_code,
+            0);
+  const std::string table = (folder / "corners.csv").string();
+  const std::string views = rig + "/boards/00[01]?.png";
+  ASSERT_EQ(calibrate(views, board, "--warp on --corners " + table).exit_code, 0);
+  const std::string model = content("camera.cameramodel"), corners = content("camera.corners.vnl");
+  const Camera from_images = read_calibration(folder / "camera.yaml").camera;
+
+  const auto again = calibrate(table, board, std::string("--warp on ") + kSize);
+  ASSERT_EQ(again.exit_code, 0) << again.errors;
+  EXPECT_EQ(read_calibration(folder / "camera.yaml").camera.intrinsics, from_images.intrinsics);
+  EXPECT_EQ(content("camera.cameramodel"), model);
+  EXPECT_EQ(content("camera.corners.vnl"), corners);
+
+  // mrcal's table has the corners without the shift of their edges.
+  const Lens lens = lens_of("camera.yaml");
+  fs::create_directory(folder / "mrcal");
+  fs::copy(folder / "camera.corners.vnl", folder / "mrcal/corners.vnl");
+  const std::string vnl = (folder / "mrcal/corners.vnl").string();
+  const auto solved = calibrate(vnl, board, std::string("--warp on ") + kSize);
+  ASSERT_EQ(solved.exit_code, 0) << solved.errors;
+  const Lens here = lens_of("camera.yaml");
+  const std::array imager_px{800, 600};
+  const auto one = [](const auto&) { return 1; };
+  EXPECT_LT(projection_difference(lens, here, imager_px, one)->worst_px, 1e-3);
+  EXPECT_EQ(read_calibration(folder / "camera.yaml").intrinsics_report->outliers, 0);
+  const IntrinsicsReport report = *read_calibration(folder / "camera.yaml").intrinsics_report;
+
+  if (run_program("command -v mrcal-calibrate-cameras").exit_code != 0) {
+    GTEST_SKIP() << "no mrcal-calibrate-cameras here";
+  }
+  const auto mrcal = run_program(
+      "cd " + (folder / "mrcal").string() +
+      " && mrcal-calibrate-cameras --corners-cache corners.vnl --lensmodel LENSMODEL_OPENCV8 "
+      "--focal 520 --object-spacing 0.02 --object-width-n 12 --object-height-n 10 "
+      "--imagersize 800 600 --skip-outlier-rejection --outdir . '*.png'");
+  ASSERT_EQ(mrcal.exit_code, 0) << mrcal.errors;
+  const Camera found = read_any_camera(folder / "mrcal/camera-0.cameramodel");
+  const Lens theirs(found.lens_model, found.intrinsics);
+  EXPECT_LT(projection_difference(theirs, here, imager_px, one)->worst_px, 0.01);
+  // mrcal counts the corners that are not seen, too, and its regularization.
+  constexpr double points = 12 * 10;
+  const std::string before = "## RMS error: ";
+  const auto at = mrcal.errors.rfind(before);
+  ASSERT_NE(at, std::string::npos) << mrcal.errors;
+  const double theirs_px = std::stod(mrcal.errors.substr(at + before.size()));
+  EXPECT_NEAR(theirs_px / (std::sqrt(report.corners / (report.views * points)) * report.rms_px), 1,
+              0.03);
+}
+
+TEST_F(CornerFiles, AreRefusedInOneTrueLine) {
+  const std::string good = vnl({"0.png", "1.png"});
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string changed = good;
+    changed.replace(changed.find(from), from.size(), to);
+    return folder.file("corners.vnl", changed).string();
+  };
+  const std::string file = with("0.png", "0.png");
+  EXPECT_THAT(refusal(file, ""), HasSubstr("--imager-px has to tell it"));
+  EXPECT_THAT(refusal(file + " other.png", kSize), HasSubstr("give it alone, without images"));
+  EXPECT_THAT(refusal(file, std::string(kSize) + " --corners " + (folder / "a.csv").string()),
+              HasSubstr("--corners is for images"));
+  EXPECT_THAT(
+      refusal(file, "--imager-px 120 600"),
+      HasSubstr("corners.vnl:3: a corner at (150, 100) is outside an image of 120 x 600 px"));
+  EXPECT_THAT(refusal(with("0.png 200 100 0\n", ""), kSize),
+              HasSubstr("corners.vnl:2: image '0.png' has 8 rows, but a board of 4 x 4 squares has "
+                        "3 x 3 corners"));
+  EXPECT_THAT(refusal(with("200 100 0", "nan 100 0"), kSize),
+              HasSubstr("corners.vnl:4: 'nan' should be a finite number, or -"));
+  EXPECT_THAT(refusal(with("200 100 0", "200"), kSize),
+              HasSubstr("corners.vnl:4: should be: filename x y level"));
+  EXPECT_THAT(refusal(with("1.png 100 100 0", "0.png 100 100 0\n1.png 100 100 0"), kSize),
+              HasSubstr("corners.vnl:2: image '0.png' has 10 rows"));
+  EXPECT_THAT(refusal(with("200 100 0", "200 100 99"), kSize), HasSubstr("a level should be"));
+  const std::string cut = good.substr(0, good.size() - 3);
+  EXPECT_THAT(refusal(folder.file("corners.vnl", cut).string(), kSize), HasSubstr("corners.vnl"));
+  EXPECT_THAT(
+      refusal(folder.file("corners.vnl", "# filename x y level\n0.png - - -\n").string(), kSize),
+      HasSubstr("none of its 1 images has a corner of the board"));
+  const std::string twice = vnl({"0.png", "1.png", "0.png"});
+  EXPECT_THAT(refusal(folder.file("corners.vnl", twice).string(), kSize),
+              HasSubstr("corners.vnl:20: image '0.png' stands twice"));
+
+  const auto table = [&](const std::string& rows) {
+    return folder.file("corners.csv", "image,corner,u_px,v_px\n" + rows).string();
+  };
+  EXPECT_THAT(refusal(table("0.png,0,5,5\n0.png,0,6,5\n"), kSize),
+              HasSubstr("corners.csv:3: corner: 0 stands twice in image '0.png'"));
+  EXPECT_THAT(refusal(table("0.png,9,5,5\n"), kSize), HasSubstr("should be within 0 and 8"));
+  EXPECT_THAT(refusal(table("0.png,0,inf,5\n"), kSize), HasSubstr("corners.csv:2: u_px"));
+  EXPECT_THAT(refusal(table("0.png,0,801,5\n"), kSize), HasSubstr("outside an image"));
+}
+
+/// Tables of chessboards whose sizes are miscounted.
+TEST_F(CornerFiles, TellWhatIsWrongWithTheSize) {
+  std::string text = "# filename x y level\n";
+  for (int row = 0; row < 5; ++row) {
+    for (int col = 0; col < 8; ++col) {
+      text +=
+          "0.png " + std::to_string(100 + 50 * col) + " " + std::to_string(100 + 50 * row) + " 0\n";
+    }
+  }
+  const std::string corners = folder.file("corners.vnl", text).string();
+  const auto refusal_of = [&](const std::string& size) {
+    const std::string board = folder
+                                  .file("board.yaml", "format: vlp-board/1\nkind: chessboard\n" +
+                                                          size + "\nsquare_size_m: 0.02\n")
+                                  .string();
+    const auto result = calibrate(corners, board, kSize);
+    return std::to_string(result.exit_code) + " " + result.errors;
+  };
+  EXPECT_THAT(refusal_of("cols: 8\nrows: 5"),
+              HasSubstr("count squares, not the corners between them: cols 9, rows 6"));
+  EXPECT_THAT(refusal_of("cols: 6\nrows: 9"),
+              HasSubstr("2 vlp-intrinsics: error: " + corners +
+                        ":2: the corners lie in rows of 8, but a board of 6 x 9 squares has 5 x 8 "
+                        "corners; swap cols and rows"));
+  EXPECT_THAT(refusal_of("cols: 9\nrows: 6"), HasSubstr("3 "));  // one view is too few
+}
+
+}  // namespace
+}  // namespace vlp
