@@ -103,7 +103,7 @@ TEST_P(BoardCorners, AreRenderedWhereTheyProject) {
     for (const auto& [tag, corner, pixel] : true_corners(scene_, renderer, shot)) {
       constexpr double edge_px = 8;
       if (pixel.minCoeff() > edge_px && pixel.x() < 799 - edge_px && pixel.y() < 599 - edge_px) {
-        tags[tag][corner] = pixel;
+        tags[*tag][corner] = pixel;
       }
     }
     for (const auto& [tag, at] : tags) {
@@ -131,7 +131,7 @@ TEST_P(BoardCorners, ProjectAsMrcalSays) {
   const auto layout = board_layout(scene_.board->print);
   const Eigen::Vector2d field_m = tag_field_m(scene_.board->print);
   for (const auto& [tag, corner, pixel] : true_corners(scene_, renderer, shot)) {
-    const Eigen::Vector2d at_m = layout.at(std::size_t(tag)).corners_m.at(std::size_t(corner));
+    const Eigen::Vector2d at_m = layout.at(std::size_t(*tag)).corners_m.at(std::size_t(corner));
     const Eigen::Vector2d share = 2 * at_m.cwiseQuotient(field_m) - Eigen::Vector2d(1, 1);
     const double depth_m = scene_.board->warp_m.dot(
         Eigen::Vector2d(1 - share.x() * share.x(), 1 - share.y() * share.y()));

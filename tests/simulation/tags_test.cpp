@@ -48,9 +48,10 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
     const auto truth = true_corners(scene, renderer, shot);
     EXPECT_EQ(found.size(), truth.size());
     for (const auto& [tag, corner, pixel] : truth) {
-      const auto at = found.find({tag, corner});
-      ASSERT_NE(at, found.end()) << tag;
-      EXPECT_LT((at->second - pixel).norm(), 0.5) << tag << ' ' << corner;
+      ASSERT_TRUE(tag);
+      const auto at = found.find({*tag, corner});
+      ASSERT_NE(at, found.end()) << *tag;
+      EXPECT_LT((at->second - pixel).norm(), 0.5) << *tag << ' ' << corner;
     }
   }
 }

@@ -81,8 +81,8 @@ TEST_P(BoardCheckOf, TagsThatTheBoardLacksCountToo) {
   Board board = views_.board;
   board.rows = 4;
   for (BoardView& view : seen_) {
-    auto& [tags, foreign, unusable, overexposed] = view.seen;
-    std::copy_if(tags.begin(), tags.end(), std::back_inserter(foreign),
+    auto& tags = view.seen.tags;
+    std::copy_if(tags.begin(), tags.end(), std::back_inserter(view.seen.foreign),
                  [](const SeenTag& tag) { return tag.id >= 24; });
     std::erase_if(tags, [](const SeenTag& tag) { return tag.id >= 24; });
   }
