@@ -140,8 +140,8 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
     const auto signal = line_signal(lines, low - beyond, high + beyond, background.level);
     return judge(striped_part(without_glow(signal)));
   }
-  const RimBox box{low, high, shape_.turned(light.pixel)};
-  auto better = shape_.light_of(refined(lines, light.outline, box, background), background);
+  const DiscImage disc{low, high, shape_.turned(light.pixel)};
+  auto better = shape_.light_of(refined(lines, light.outline, disc, background), background);
   if (better && 2 * better->outline.size() > light.outline.size()) {
     better->roundness = light.roundness;
     better->outside = light.outside;

@@ -3,6 +3,7 @@
 #include "detection/lights/outline.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 
@@ -56,43 +57,41 @@ std::vector<EdgePoint> outline(const cv::Mat& image, const Blob& blob, double da
   return points;
 }
 
-/// The ellipse in a box, of a light's rim.
-class RimInBox {
+/// The ellipse of a disc's rim, upright in its box.
+class RimEllipse {
  public:
-  RimInBox(const RimBox& box)
-      : center((box.low + box.high) / 2), half((box.high - box.low) / 2), box_(box) {}
+  explicit RimEllipse(const DiscImage& disc)
+      : disc_(disc), center_((disc.low + disc.high) / 2), half_((disc.high - disc.low) / 2) {}
 
   /// Across the rim, outwards. Precondition: the point is near it.
   Eigen::Vector2d normal_at(const Eigen::Vector2d& point) const {
-    return (point - center).cwiseQuotient(half.cwiseAbs2()).normalized();
+    return (point - center_).cwiseQuotient(half_.cwiseAbs2()).normalized();
   }
   /// Of the curvature where the normal is that.
   double radius_px(const Eigen::Vector2d& normal) const {
-    return std::pow(half.prod(), 2) / std::pow(half.cwiseProduct(normal).norm(), 3);
+    return std::pow(half_.prod(), 2) / std::pow(half_.cwiseProduct(normal).norm(), 3);
   }
   double chord_px(double row) const {
-    const double up = (row - center.y()) / half.y();
-    return 2 * half.x() * std::sqrt(std::max(0.0, 1 - up * up));
+    const double up = (row - center_.y()) / half_.y();
+    return 2 * half_.x() * std::sqrt(std::max(0.0, 1 - up * up));
   }
   /// From the image of the disc's centre to the rim's first or last column.
   double half_width_px(bool begins) const {
-    return begins ? box_.middle.x() - box_.low.x() : box_.high.x() - box_.middle.x();
+    return begins ? disc_.center.x() - disc_.low.x() : disc_.high.x() - disc_.center.x();
   }
-  /// Of (u / w)^2, inwards, w that half width, u pixels from the image of the disc's centre.
-  double bend_slope(double column, bool begins) const {
-    const double u = (column - box_.middle.x()) * (begins ? 1 : -1);
-    return 2 * u / std::pow(half_width_px(begins), 2);
+  /// From the image of the disc's centre outwards.
+  double outwards_px(double column, bool begins) const {
+    return begins ? disc_.center.x() - column : column - disc_.center.x();
   }
-
-  Eigen::Vector2d center, half;
 
  private:
-  RimBox box_;
+  DiscImage disc_;
+  Eigen::Vector2d center_, half_;
 };
 
-/// The standard deviation of the blur across the rim, from how steeply its levels rise. No more
-/// than optics blur: what rises slower is the lamp itself.
-double blur_px(const std::vector<EdgePoint>& points, const RimInBox& rim) {
+/// The standard deviation of the blur along the rows, times the cosine there, from how steeply the
+/// levels rise. Of a slower rise no more is corrected: it may be the lamp itself.
+double blur_px(const std::vector<EdgePoint>& points, const RimEllipse& rim) {
   constexpr double quarters = 1.349;  // of a normal distribution, in standard deviations
   constexpr double most = 1.5;
   std::vector<double> blurs;
@@ -108,15 +107,17 @@ double blur_px(const std::vector<EdgePoint>& points, const RimInBox& rim) {
 struct InnerLevel {
   EdgePoint point;
   Eigen::Vector2d normal;
-  /// The pixel from which a profile inwards counts, and the first and the middle one of the line.
-  int origin, first;
+  /// The column from which a profile inwards counts.
+  int origin;
+  /// The first pixel of the line in that profile, and the middle of all.
+  int first;
   double middle;
   /// At the middle, above the dark; how much more with each pixel inwards.
   double level, slope;
 
   int direction() const { return point.begins ? 1 : -1; }
   double cosine() const { return std::abs(normal.x()); }
-  double along_row(double i) const { return origin + direction() * i; }
+  double column(double i) const { return origin + direction() * i; }
 };
 
 constexpr int kBefore = 8, kSamples = 8;
@@ -129,7 +130,7 @@ Profile<Level> profile_of(const cv::Mat& image, const InnerLevel& inner) {
 
 template <typename Level>
 std::vector<InnerLevel> inner_levels(const cv::Mat& image, const std::vector<EdgePoint>& points,
-                                     const RimInBox& rim, double dark) {
+                                     const RimEllipse& rim, double dark) {
   constexpr double flattest = 0.35, depth_px = 3, most_bent = 0.35;
   constexpr double square = kSamples * (kSamples * kSamples - 1) / 12.0;
   std::vector<InnerLevel> result;
@@ -139,8 +140,8 @@ std::vector<InnerLevel> inner_levels(const cv::Mat& image, const std::vector<Edg
     InnerLevel inner{};
     inner.point = point;
     inner.normal = rim.normal_at(point.pixel);
-    const double depth = depth_px / inner.cosine();
     if (inner.cosine() < flattest) continue;
+    const double depth = depth_px / inner.cosine();
     if (2 * depth + kSamples > rim.chord_px(point.pixel.y())) continue;
     inner.origin = static_cast<int>(std::lround(point.pixel.x())) - inner.direction() * kBefore;
     inner.first = kBefore + static_cast<int>(std::lround(depth));
@@ -162,48 +163,64 @@ std::vector<InnerLevel> inner_levels(const cv::Mat& image, const std::vector<Edg
 }
 
 /// How a light's levels bend: q of 1 + q (u / w)^2, u pixels along a row from the image of the
-/// disc's centre, w from there to the rim, the median by their slopes. Of a light that is
-/// darker at its rim it is negative.
-double bend_of(const std::vector<InnerLevel>& levels, const RimInBox& rim) {
-  std::vector<double> bends;
-  bends.reserve(levels.size());
+/// disc's centre, w from there to the rim. Of a light that is darker at its rim it is negative. The
+/// median by the slopes of each side, and the mean of both, which a change from one side to the
+/// other leaves as it is. None of a light too small for slopes away from the middle,
+/// or of which something hides a side.
+double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
+  constexpr double least_u = 1 / 3.0;  // of w: nearer to the middle no slope shows the bend
+  constexpr double most = 0.8;
+  std::array<std::vector<double>, 2> bends;
   for (const InnerLevel& inner : levels) {
-    const double of_one = rim.bend_slope(inner.along_row(inner.middle), inner.point.begins);
-    if (of_one < 0) bends.push_back(inner.slope / (inner.level * of_one));
+    const bool begins = inner.point.begins;
+    const double width_px = rim.half_width_px(begins);
+    const double share = rim.outwards_px(inner.column(inner.middle), begins) / width_px;
+    if (share < least_u) continue;
+    bends[begins ? 0 : 1].push_back(-inner.slope * width_px / (2 * share * inner.level));
   }
-  return bends.empty() ? 0 : std::clamp(upper_median(std::move(bends)), -1.0, 1.0);
+  const std::size_t fewer = std::min(bends[0].size(), bends[1].size());
+  const std::size_t more = std::max(bends[0].size(), bends[1].size());
+  if (fewer == 0 || 2 * fewer < more) return 0;
+  const double bend = (upper_median(std::move(bends[0])) + upper_median(std::move(bends[1]))) / 2;
+  return std::clamp(bend, -most, most);
 }
 
 template <typename Level>
 std::vector<EdgePoint> refine(const cv::Mat& image, const std::vector<EdgePoint>& points,
-                              const RimBox& box, double dark) {
-  constexpr double spread = (kSamples * kSamples - 1) / 12.0;  // of the pixels of a line, squared
+                              const DiscImage& disc, double dark) {
+  constexpr double variance = (kSamples * kSamples - 1) / 12.0;  // of the places on a line
+  // Of more blur the tail reaches the samples, and would pass for a bend.
+  constexpr double most_blur_to_bend_px = 1.3;
+  // Of the blur that rises show: they are taken from levels between pixels.
+  constexpr double between_pixels = 1 / 8.0;
   if (points.empty()) return {};
-  const RimInBox rim(box);
-  const double blur_square = std::pow(blur_px(points, rim), 2);
+  const RimEllipse rim(disc);
+  const double blur = blur_px(points, rim), square = blur * blur;
+  const double square_across = std::max(0.0, square - between_pixels);
   const auto levels = inner_levels<Level>(image, points, rim, dark);
-  const double bend = bend_of(levels, rim);
+  const double bend = blur < most_blur_to_bend_px ? bend_of(levels, rim) : 0;
   std::vector<EdgePoint> result;
   result.reserve(levels.size());
   for (const InnerLevel& inner : levels) {
-    const double back = inner.middle - kBefore, half_px = rim.half_width_px(inner.point.begins);
-    const double level = inner.level * (1 + bend * (back * back - spread) / (half_px * half_px)) -
-                         inner.slope * back;
-    // The lamp's own at its rim: the lens darkens what is blurred already.
-    const double slope =
-        bend * inner.level * rim.bend_slope(inner.along_row(kBefore), inner.point.begins);
+    const bool begins = inner.point.begins;
+    const double back = inner.middle - kBefore, width_px = rim.half_width_px(begins);
+    const double bent = bend * (back * back - variance) / (width_px * width_px);
+    const double level = inner.level * (1 + bent) - inner.slope * back;
     if (level <= 0) continue;
     const auto profile = profile_of<Level>(image, inner);
     const auto at = profile.crossing(dark + level / 2, 0, inner.first);
     if (!at) continue;
+    // The lamp's own slope at its rim, inwards: the lens darkens what is blurred already.
+    const double rim_px = rim.outwards_px(inner.column(kBefore), begins);
+    const double slope = -2 * bend * inner.level * rim_px / (width_px * width_px);
     // Blurred, the half of a level lies further out where the light grows inwards, and further in
     // behind a bent rim: for a standard deviation s of the blur across it and a radius r of the
     // rim by s^2 slope / level and s^2 / (2 r), to first order.
     const double cosine = inner.cosine();
-    const double further_in =
-        blur_square / cosine * (slope / (level * cosine) - 0.5 / rim.radius_px(inner.normal));
+    const double further_in = square * slope / (level * cosine * cosine) -
+                              square_across / (2 * rim.radius_px(inner.normal) * cosine);
     EdgePoint better = inner.point;
-    better.pixel.x() = inner.along_row(*at + further_in);
+    better.pixel.x() = inner.column(*at + further_in);
     better.level = level;
     result.push_back(better);
   }
@@ -213,9 +230,9 @@ std::vector<EdgePoint> refine(const cv::Mat& image, const std::vector<EdgePoint>
 }  // namespace
 
 std::vector<EdgePoint> refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
-                               const RimBox& box, const Background& background) {
-  return image.depth() == CV_8U ? refine<std::uint8_t>(image, points, box, background.level)
-                                : refine<std::uint16_t>(image, points, box, background.level);
+                               const DiscImage& disc, const Background& background) {
+  return image.depth() == CV_8U ? refine<std::uint8_t>(image, points, disc, background.level)
+                                : refine<std::uint16_t>(image, points, disc, background.level);
 }
 
 std::vector<EdgePoint> outermost(std::vector<EdgePoint> points) {

@@ -24,20 +24,20 @@ struct EdgePoint {
   bool begins;
 };
 
-/// A light that is known to be a disc: the box around its rim's image, and the image of its centre,
-/// (column, row) each.
-struct RimBox {
-  Eigen::Vector2d low, high, middle;
+/// The image of a disc: the box around its rim, and the image of its centre, (column, row) each.
+struct DiscImage {
+  Eigen::Vector2d low, high, center;
 };
 
-/// The points again, now that the light is known to be a disc whose image is close to an ellipse:
-/// the level is taken at the same depth below the outline everywhere, where a row cuts it at a flat
-/// angle further in, and extrapolated to it as that of a disc which darkens with the square of the
-/// distance from its centre. A blur of standard deviation s moves the half of the level by
-/// s^2 level' / level - s^2 / (2 r), level' inwards and r the rim's radius, which is undone. Points
-/// where a row cuts flatter than 20 degrees are left out.
+/// The points again, now that the light is known to be a disc, whose rim is taken as the upright
+/// ellipse in its box: the level is taken at the same depth below the outline everywhere, where a
+/// row cuts it at a flat angle further in, and extrapolated to it as that of a disc which darkens
+/// with the square of the distance from its centre. A blur of standard deviation s, up to 1.5 px,
+/// moves the half of the level outwards by s^2 level' / level - s^2 / (2 r), level' inwards and r
+/// the rim's radius of curvature, which is undone to first order. Points where a row cuts flatter
+/// than 20 degrees are left out.
 std::vector<EdgePoint> refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
-                               const RimBox& box, const Background& background);
+                               const DiscImage& disc, const Background& background);
 
 /// Of each row the first begin and the last end: the outline of a light that something in the way
 /// splits.

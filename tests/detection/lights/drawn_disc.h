@@ -15,7 +15,8 @@ constexpr double kDark = 0.04;  // of white
 /// Cosine between the row and the normal, from which on the first outline is good.
 constexpr double kSteep = 0.75;
 
-/// A disc on a dark image of 200 x 160 pixels, blurred, seen by pixels that are lit all over.
+/// A disc on a dark image of 200 x 160 pixels, blurred, seen by pixels that are lit all over. The
+/// blur is with theirs: 0.3 px or more.
 struct DrawnDisc {
   Eigen::Vector2d center{101.3, 79.6};
   double radius_px = 38.4, blur_px = 0.8;
