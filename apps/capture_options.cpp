@@ -51,6 +51,7 @@ void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {
   app.add_option("--max-mpx", max_mpx,
                  "Skip images of more than so many million pixels, unread (default: 200)")
+      ->check(finite_positive())
       ->check(CLI::Range(0.001, 1e6));
 }
 

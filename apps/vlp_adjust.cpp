@@ -207,7 +207,8 @@ int main(int argc, char** argv) {
                  "Of a lens whose calibration states no covariance: by how much each of its "
                  "parameters may be off, as the shift of the image that it makes, rms; such a lens "
                  "is then estimated (default: it is exact)")
-      ->check(CLI::Range(1e-3, 1e3));
+      ->check(vlp::finite_positive())
+      ->check(CLI::Range(1e-3, 1e3));  // px: less is exact, more no lens at all
   vlp::add_detect_options(app, options.images);
   return vlp::run_app(app, argc, argv, [&] {
     if (options.sets.empty() && options.turns.empty()) {

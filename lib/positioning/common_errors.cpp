@@ -365,6 +365,13 @@ std::optional<Matrix2> whole_zenith_covariance(const Calibration& calibration) {
 std::optional<Matrix2> whole_offset_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
   if (!errors.stated(CommonPart::offset) || lack_lens(errors, calibration)) return std::nullopt;
+  if (!calibration.adjustment) {
+    const Dispersion& dispersion = *calibration.dispersion;
+    const auto& report = calibration.intrinsics_report;
+    if (report && report->covariance && !dispersion.by_intrinsics) return std::nullopt;
+    const bool turned = calibration.rotation_center.has_value();
+    if (turned && !(errors.stated(CommonPart::zenith) && dispersion.by_zenith)) return std::nullopt;
+  }
   const Eigen::Index offset = errors.joint().rows() - 2;
   const Eigen::Vector2d focal_px = focal_px_of(calibration.camera);
   return Matrix2(focal_px.asDiagonal() * errors.joint().block<2, 2>(offset, offset) *

@@ -134,8 +134,9 @@ struct Unexplained {
 Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<const Matrix2> common,
                              const WeightedFix& fix);
 
-/// Of the zenith's normalized point, from all that it rests on: its captures and the lens. Nothing
-/// where a part is not stated, or how the lens' errors move it. Precondition: a rotation centre.
+/// Of the zenith's normalized point, from all that it rests on: its captures and the lens, or of
+/// the adjustment where there is one. Nothing where a part is not stated, or how the lens' errors
+/// move it. Precondition: a rotation centre.
 std::optional<Matrix2> whole_zenith_covariance(const Calibration& calibration);
 
 /// The same of the dispersion's offset in pixels: its captures, the zenith, and the lens, which

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -26,17 +27,18 @@ double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& re
 
 /// Of the whole state, packed.
 Eigen::VectorXd pull_of(const Linearization& at, double sigma_px) {
-  constexpr double least_px = 0.01;  // without noise all of it would be in the way
+  constexpr double least_px = 0.01;  // coefficients that the corners leave open have no end
   const Eigen::Index corners = at.residuals_px.size(), pulls = at.regularization.size();
-  const Eigen::VectorXd none = Eigen::VectorXd::Zero(at.jacobian_transposed.rows());
-  if (pulls == 0) return none;
+  if (pulls == 0) return Eigen::VectorXd::Zero(at.jacobian_transposed.rows());
   const Eigen::SparseMatrix<double> by_corners = at.jacobian_transposed.leftCols(corners);
   const Eigen::SparseMatrix<double> by_pulls = at.jacobian_transposed.rightCols(pulls);
   const double share = std::min(1.0, std::pow(std::max(sigma_px, least_px), 2));
   const Eigen::SparseMatrix<double> normal =
       by_corners * by_corners.transpose() + share * (by_pulls * by_pulls.transpose());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
-  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) return none;
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) {
+    return Eigen::VectorXd::Zero(normal.rows());
+  }
   return (1 - share) * factor.solve(by_pulls * at.regularization);
 }
 

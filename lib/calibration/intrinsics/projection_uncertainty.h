@@ -33,10 +33,10 @@ class ProjectionUncertainty {
   /// Of the intrinsics alone.
   Eigen::MatrixXd intrinsics_covariance() const;
 
-  /// How much further off zero the intrinsics would be, to first order, were the distortion's
-  /// coefficients drawn to zero no harder than the corners call for: mrcal's regularization is made
-  /// for a noise of a pixel. With its residuals r
-  ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r.
+  /// How much further the intrinsics would be, to first order, from where mrcal's regularization
+  /// draws them (coefficients to zero, the principal point to the imager's middle), were it made
+  /// for the noise s of these corners instead of a pixel's. With its residuals r
+  ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r,  s at least 0.01 and at most 1.
   /// Zero where there is none. A standard deviation of the intrinsics that no noise explains.
   const Eigen::VectorXd& intrinsics_pull() const { return intrinsics_pull_; }
 
