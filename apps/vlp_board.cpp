@@ -79,7 +79,11 @@ void run(const Options& options) {
   Board board = board_of(options);
   if (board.has_squares() ? !options.square_mm : !options.tag_mm) {
     const auto largest_m = largest_size_m(board, paper);
-    if (!largest_m) throw std::invalid_argument("so many do not fit on " + paper.name);
+    if (!largest_m) {
+      throw std::invalid_argument(std::string("so many ") +
+                                  (board.has_squares() ? "squares" : "tags") + " do not fit on " +
+                                  paper.name);
+    }
     (board.has_squares() ? board.square_size_m : board.tag_size_m) = *largest_m;
   }
   if (options.charuco) {

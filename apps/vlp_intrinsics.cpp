@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -123,6 +124,16 @@ void check_outputs(const Options& options, const std::vector<std::string>& input
   }
 }
 
+/// A table of corners tells images by their names.
+void check_names(const std::vector<std::filesystem::path>& images) {
+  std::set<std::string> names;
+  for (const auto& image : images) {
+    if (names.insert(image.filename().string()).second) continue;
+    throw std::invalid_argument(fmt::format(
+        "--corners tells images by their names, and two are called {}", image.filename().string()));
+  }
+}
+
 /// Throws std::invalid_argument for a format that has no lens model like the camera's, before
 /// anything is written.
 void check_exports(const Options& options, Camera camera) {
@@ -147,11 +158,12 @@ void run(const CLI::App& app, const Options& options) {
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
   check_outputs(options, inputs);
+  if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
   const SeenBoards seen = boards_in(images, board, options);
-  if (!options.corners.empty()) write_corner_table(options.corners, seen.views, board);
   tell(seen);
   require(seen);
+  if (!options.corners.empty()) write_corner_table(options.corners, seen.views, board);
   const LensResult lens = solve_lens({seen.views, board, options.board, known_camera(options),
                                       options.held_out, options.warp, chooses_lens(options)},
                                      history_entry(app, inputs));

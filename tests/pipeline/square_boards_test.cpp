@@ -78,8 +78,6 @@ TEST_F(SquareBoards, AChessboardGivesTheLens) {
   EXPECT_THAT(corners.errors,
               HasSubstr("the images show a chessboard of 10 x 7 squares or more: cols and "
                         "rows count squares, not the corners between them"));
-  const auto square = calibrate(boards, board_with("cols: 10", "cols: 7"), "--warp on");
-  EXPECT_EQ(square.exit_code, 2);
 }
 
 TEST_F(SquareBoards, ACharucoBoardGivesTheLens) {

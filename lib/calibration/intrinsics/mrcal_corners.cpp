@@ -66,8 +66,10 @@ class CornerRows {
     const auto words = words_in(text);
     if (words.empty()) return;
     if (words[0].front() == '#') {
-      // The legend; "##" and "#!" are comments.
-      if (words.size() == 5 && words[0] == "#") weights_ = words[4] == "weight";
+      // The first is the legend; "##" and "#!" are comments.
+      if (legend_ || words[0].starts_with("##") || words[0].starts_with("#!")) return;
+      legend_ = true;
+      weights_ = words.back() == "weight";
       return;
     }
     if (words.size() < 3 || words.size() > 4) {
@@ -112,6 +114,7 @@ class CornerRows {
   const std::array<int, 2>& imager_px_;
   std::string text_;
   bool weights_ = false;
+  bool legend_ = false;
 };
 
 /// How far the points of lines of so many are from lying evenly, all images together; NaN with too

@@ -89,9 +89,14 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
   const BoardProblem& problem = solution.problem;
   const std::size_t parts = problem.poses.size() / solution.views.size();
   const std::size_t count = problem.points_of_a_board();
-  std::string text = "# filename x y level\n";
+  // mrcal cuts levels off to whole ones; it takes weights as well, when it is told to.
+  const bool weights = std::ranges::any_of(problem.points, [](const Eigen::Vector3d& point) {
+    return point.z() > 0 && std::log2(point.z()) != std::floor(std::log2(point.z()));
+  });
+  std::string text = weights ? "# filename x y weight\n" : "# filename x y level\n";
   for (std::size_t board = 0; board < problem.poses.size(); ++board) {
     std::string name = images[solution.views[board / parts]];
+    std::ranges::replace(name, ' ', '_');  // words of the table
     if (parts > 1) name += "-corner" + std::to_string(board % parts);
     for (std::size_t i = board * count; i < (board + 1) * count; ++i) {
       const Eigen::Vector3d& point = problem.points[i];
@@ -99,7 +104,7 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
       if (point.z() > 0) {
         text.append(" ").append(significant(point.x(), kDigits));
         text.append(" ").append(significant(point.y(), kDigits)).append(" ");
-        text.append(shortest(std::max(0.0, -std::log2(point.z())))).append("\n");
+        text.append(shortest(weights ? point.z() : 0 - std::log2(point.z()))).append("\n");
       } else {
         text += " -1 -1 -\n";
       }

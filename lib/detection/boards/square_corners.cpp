@@ -130,6 +130,8 @@ std::vector<SeenPoint> SquareCorners::beside(const std::vector<SeenTag>& markers
 }
 
 std::array<int, 2> chessboard_shown(const cv::Mat& image) {
+  constexpr int least_px = 10;
+  if (std::min(image.cols, image.rows) < least_px) return {0, 0};
   cv::Mat1b levels;
   image.convertTo(levels, CV_8U, image.depth() == CV_16U ? 1 / 257.0 : 1);
   std::vector<cv::Point2f> corners;

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
 #include <opencv2/objdetect/aruco_board.hpp>
+#include <opencv2/objdetect/aruco_dictionary.hpp>
 #define VLP_ARUCO_IS_A_CLASS
 #else
 #include <opencv2/aruco/charuco.hpp>
