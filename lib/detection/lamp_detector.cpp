@@ -12,6 +12,7 @@
 #include "detection/lights/glow.h"
 #include "detection/lights/glow_envelope.h"
 #include "detection/lights/lines.h"
+#include "detection/lights/rectangle.h"
 #include "detection/lights/rim.h"
 #include "detection/lights/runs.h"
 #include "geometry/frames.h"
@@ -81,7 +82,9 @@ LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera,
       camera_(camera),
       shape_(camera),
       classifier_(std::move(classifier)),
-      most_dark_rows_(most_dark_rows_of(lamps, camera.row_time_s)) {}
+      most_dark_rows_(most_dark_rows_of(lamps, camera.row_time_s)),
+      has_rectangles_(std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
+                                  [](const Lamp& lamp) { return lamp.rectangle.has_value(); })) {}
 
 std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& blob,
                                               const Background& background) const {
@@ -90,6 +93,11 @@ std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& 
   const cv::Rect box = blob.box();
   std::vector<LightPart> parts;
   auto rest = outline_of(lines, blob, background);
+  if (has_rectangles_) {
+    if (auto light = rectangle_of(lines, blob, rest, background, shape_)) {
+      return {{std::move(light), {}, box}};
+    }
+  }
   while (parts.size() < most_lights) {
     auto light = shape_.light_of(rest, background);
     if (!light && !parts.empty()) break;
@@ -130,14 +138,22 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
     const Eigen::Vector2d from = shape_.turned(light.low), to = shape_.turned(light.high);
     light.stripes = stripes_of(signal);
     if (light.stripes.period_lines > 0) {
-      light.coherence = coherence_of(lines, from, to, background, light.stripes.period_lines);
+      const auto chords = is_rectangle(light)
+                              ? chords_within(shape_.turned(light.face), lines.size())
+                              : chords_of(from, to, lines.size());
+      light.coherence = coherence_of(lines, chords, background, light.stripes.period_lines);
     }
     if (light.stripes.contrast < kLeastContrast) light.clipped = clipped_share(lines, from, to);
   };
+  if (is_rectangle(light)) {
+    const auto chords = chords_within(shape_.turned(light.face), lines.size());
+    return judge(line_signal(lines, chords, background.level));
+  }
   if (light.glows || light.uneven) {
     // Its stripes reach further than its outline.
     const Eigen::Vector2d beyond(0, light.radius_px);
-    const auto signal = line_signal(lines, low - beyond, high + beyond, background.level);
+    const auto chords = chords_of(low - beyond, high + beyond, lines.size());
+    const auto signal = line_signal(lines, chords, background.level);
     return judge(striped_part(without_glow(signal)));
   }
   const DiscImage disc{low, high, shape_.turned(light.pixel)};
@@ -147,7 +163,8 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
     better->outside = light.outside;
     light = std::move(*better);
   }
-  judge(line_signal(lines, shape_.turned(light.low), shape_.turned(light.high), background.level));
+  const auto chords = chords_of(shape_.turned(light.low), shape_.turned(light.high), lines.size());
+  judge(line_signal(lines, chords, background.level));
 }
 
 std::vector<Light> LampDetector::detect(const cv::Mat& image) const {

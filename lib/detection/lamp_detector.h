@@ -26,7 +26,8 @@ DetectorCamera detector_camera(const Calibration& calibration);
 /// between threads.
 ///
 /// Centre: from the outline of the lit lines, never from brightness, see LightShape. A lamp that
-/// is lit unevenly is outlined by its rim, see rim_of(). One that has no edge because it glows is
+/// is lit unevenly is outlined by its rim, see rim_of(). Rectangles are looked for when the map has
+/// one, see rectangle_of(). A light that has no edge because it glows is
 /// outlined where it passes a tenth of its brightest level; how round its glow is limits its centre
 /// then, and sigma_px may be too small. Identity: a lamp of
 /// frequency f has stripes of 1 / (f row_time) lines (Chen and Guan, section 2.1), or what a
@@ -49,6 +50,8 @@ class LampDetector {
   /// The outline once more, exactly, and the stripes.
   void measure(const cv::Mat& lines, const Background& background, Light& light) const;
   void identify(std::vector<Light>& lights, const cv::Size& size) const;
+  /// Whether a light looks like that lamp: round, or a rectangle with its sides' ratio.
+  bool has_shape_of(const Light& light, int lamp) const;
   /// The lamp whose stripes these are; nothing when none or two may be.
   std::optional<int> lamp_of(const Stripes& stripes) const;
 
@@ -57,6 +60,7 @@ class LampDetector {
   LightShape shape_;
   std::optional<LampClassifier> classifier_;
   int most_dark_rows_;
+  bool has_rectangles_;
 };
 
 }  // namespace vlp

@@ -20,6 +20,10 @@ std::vector<std::size_t> lamps_in_view(const LampMap& map, const Lens& lens,
   const auto seen_whole = [&](const Lamp& lamp) {
     if (lamp.position_m.z() <= level.position_m.z()) return false;
     if (!in_image(lamp.position_m)) return false;
+    if (lamp.rectangle) {
+      const auto corners = corners_of(*lamp.rectangle, lamp.position_m);
+      return std::all_of(corners.begin(), corners.end(), in_image);
+    }
     constexpr int rim_points = 16;
     const double radius_m = lamp.diameter_m.value_or(0) / 2;
     for (int i = 0; i < rim_points && radius_m > 0; ++i) {

@@ -88,6 +88,7 @@ class LampFrame {
   }
   /// `target` is the window's part of an image.
   void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
+    if (glow.rectangle) return draw(panel_of(glow), glow.radiance_e_per_s, window, target);
     const Eigen::Isometry3d glow_from_world(Eigen::Translation3d(-glow.position_m));
     const TargetFromCamera glow_from_camera = target_from_camera(glow_from_world);
     if (glow.recess || glow.halo) {
@@ -99,8 +100,10 @@ class LampFrame {
   }
   void draw(const Panel& panel, double value, cv::Mat1f& image) const {
     const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
-    if (window.empty()) return;
-    cv::Mat1f target = window.of(image, rays_.margin_px());
+    if (!window.empty()) draw(panel, value, window, window.of(image, rays_.margin_px()));
+  }
+  /// `target` is the window's part of an image.
+  void draw(const Panel& panel, double value, const PixelWindow& window, cv::Mat1f target) const {
     add_shape(rays_, window, target_from_camera(panel_from_world(panel)),
               Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}}), value, target);
   }

@@ -50,7 +50,14 @@ PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const Carri
           std::min(all.place_end, int(std::ceil(most[1])) + spare + 1)};
 }
 
+Panel panel_of(const Glow& glow) {
+  const auto corners_m = corners_of(*glow.rectangle, glow.position_m);
+  return {corners_m[0], corners_m[1] - corners_m[0], corners_m[3] - corners_m[0],
+          glow.radiance_e_per_s};
+}
+
 std::vector<Eigen::Vector3d> outline_of(const Glow& glow) {
+  if (glow.rectangle) return outline_of(panel_of(glow));
   constexpr int count = 48;
   std::vector<Eigen::Vector3d> points_m;
   for (int i = 0; i < count; ++i) {

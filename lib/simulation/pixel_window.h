@@ -35,6 +35,9 @@ PixelWindow whole_window(const PixelRays& rays);
 PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const CarrierMotion& motion,
                       const Shutter& shutter, const PixelRays& rays);
 
+/// Of a glow that is a rectangle.
+Panel panel_of(const Glow& glow);
+
 /// Points around the light of a glow (its rim, or where its halo ends), or along the edges of a
 /// panel.
 std::vector<Eigen::Vector3d> outline_of(const Glow& glow);

@@ -50,7 +50,8 @@ struct Halo {
 
 /// A horizontal disc of light. Its radiance at the distance r of its centre is
 ///   radiance (1 - (1 - edge_share) (2 r / diameter)^2),
-/// or that of its recess, of which the disc is the rim.
+/// or that of its recess, of which the disc is the rim. Or a rectangle that is lit evenly, and has
+/// nothing of what a disc has.
 struct Glow {
   Eigen::Vector3d position_m;
   double diameter_m;
@@ -58,6 +59,7 @@ struct Glow {
   double edge_share;
   std::optional<Recess> recess = {};
   std::optional<Halo> halo = {};
+  std::optional<LampRectangle> rectangle = {};
 };
 
 /// A lamp of the lamp map: a glow that a square wave switches.

@@ -33,10 +33,12 @@ Recess read_recess(YamlMap map, const Glow& rim) {
 
 }  // namespace
 
-Glow read_glow(YamlMap& map, const Room& room) {
+Glow read_glow(YamlMap& map, const Room& room, const std::optional<LampRectangle>& rectangle) {
   const YamlValue position = map.required("position_m");
-  const Glow glow{read_point(position), map.required("diameter_m").number_within(1e-3, 10, "m"),
-                  read_radiance(map, "radiance_e_per_s"), 0};
+  Glow glow{read_point(position), 0, 0, 0};
+  if (!rectangle) glow.diameter_m = map.required("diameter_m").number_within(1e-3, 10, "m");
+  glow.radiance_e_per_s = read_radiance(map, "radiance_e_per_s");
+  glow.rectangle = rectangle;
   const Eigen::Array3d at = glow.position_m.array();
   if ((at < room.min_m.array()).any() || (at > room.max_m.array()).any()) {
     throw position.error("is outside the room");
@@ -68,12 +70,12 @@ std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room)
     check_lamp(earlier, lamp, item);
     earlier.push_back(lamp);
     SceneLamp read{lamp.id,
-                   read_glow(map, room),
+                   read_glow(map, room, lamp.rectangle),
                    map.required("frequency_hz").number(),
                    map.required("duty").number(),
                    {},
                    Eigen::Vector3d::Zero()};
-    read_profile(map, read.glow);
+    if (!lamp.rectangle) read_profile(map, read.glow);
     if (const auto phase = map.optional("phase")) {
       read.phase = phase->number_within(0, 1, "(of a period)");
     }

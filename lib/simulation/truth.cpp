@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <vector>
 
 #include "rig/board_layout.h"
 #include "simulation/board_print.h"
@@ -54,12 +55,42 @@ bool hidden_by(const Panel& panel, const Eigen::Vector3d& eye_m, const Eigen::Ve
   return a >= 0 && a <= 1 && b >= 0 && b <= 1;
 }
 
+/// Points spread evenly over a glow, and around its rim.
+struct GlowPoints {
+  std::vector<Eigen::Vector3d> face_m, rim_m;
+};
+
+GlowPoints points_of(const Glow& glow) {
+  GlowPoints points;
+  if (glow.rectangle) {
+    constexpr int per_side = 14;
+    const Panel panel = panel_of(glow);
+    for (int i = 0; i < per_side * per_side; ++i) {
+      const double a = (i / per_side + 0.5) / per_side, b = (i % per_side + 0.5) / per_side;
+      points.face_m.push_back(panel.corner_m + a * panel.edge_a_m + b * panel.edge_b_m);
+    }
+    points.rim_m = outline_of(panel);
+    return points;
+  }
+  constexpr int count = 200, rim_points = 120;
+  constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
+  const auto at = [&](double radius_m, double angle) -> Eigen::Vector3d {
+    return glow.position_m + radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+  };
+  for (int i = 0; i < count; ++i) {
+    points.face_m.push_back(
+        at(glow.diameter_m / 2 * std::sqrt((i + 0.5) / count), golden_angle * i));
+  }
+  for (int i = 0; i < rim_points; ++i) {
+    points.rim_m.push_back(at(glow.diameter_m / 2, 2 * std::numbers::pi / rim_points * i));
+  }
+  return points;
+}
+
 template <typename Motion>
 double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Shutter& shutter,
                      const Motion& camera_from_world, const Glow& glow) {
-  const auto visible = [&](double radius_m, double angle) {
-    const Eigen::Vector3d point_m =
-        glow.position_m + radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+  const auto visible = [&](const Eigen::Vector3d& point_m) {
     const auto at = seen(renderer, shutter, camera_from_world, point_m);
     if (!at || !in_image(scene.camera, at->pixel)) return false;
     const Eigen::Vector3d eye_m = camera_from_world(at->time_s).inverse().translation();
@@ -67,21 +98,12 @@ double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Sh
     return std::none_of(occluders.begin(), occluders.end(),
                         [&](const Panel& occluder) { return hidden_by(occluder, eye_m, point_m); });
   };
-  constexpr int points = 200, rim_points = 120;
-  constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
-  int count = 0;
-  for (int i = 0; i < points; ++i) {
-    const double radius_m = glow.diameter_m / 2 * std::sqrt((i + 0.5) / points);
-    count += visible(radius_m, golden_angle * i);
-  }
-  if (count < points) return double(count) / points;
+  const auto [face_m, rim_m] = points_of(glow);
+  const auto count = std::count_if(face_m.begin(), face_m.end(), visible);
+  const auto points = static_cast<double>(face_m.size());
+  if (count < std::ptrdiff_t(face_m.size())) return double(count) / points;
   // Wholly in view is said only of a lamp whose rim is.
-  for (int i = 0; i < rim_points; ++i) {
-    if (!visible(glow.diameter_m / 2, 2 * std::numbers::pi / rim_points * i)) {
-      return (points - 0.5) / points;
-    }
-  }
-  return 1;
+  return std::all_of(rim_m.begin(), rim_m.end(), visible) ? 1 : (points - 0.5) / points;
 }
 
 }  // namespace
@@ -143,7 +165,10 @@ LampMap lamp_map_of(const Scene& scene, bool surveyed) {
   for (const SceneLamp& lamp : scene.lamps) {
     Eigen::Vector3d position_m = lamp.glow.position_m;
     if (surveyed) position_m += lamp.map_error_m;
-    map.lamps.push_back({lamp.id, position_m, lamp.glow.diameter_m, lamp.frequency_hz, lamp.duty});
+    Lamp mapped{lamp.id, position_m, {}, lamp.frequency_hz, lamp.duty};
+    mapped.rectangle = lamp.glow.rectangle;
+    if (!mapped.rectangle) mapped.diameter_m = lamp.glow.diameter_m;
+    map.lamps.push_back(mapped);
   }
   return map;
 }

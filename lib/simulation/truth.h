@@ -14,9 +14,9 @@ namespace vlp {
 /// A lamp as a capture shows it.
 struct TrueLamp {
   int id;
-  /// Where the centre of the disc is seen, each line of the image at its own time.
+  /// Where the centre of the disc or rectangle is seen, each line of the image at its own time.
   Eigen::Vector2d pixel;
-  /// The share of the disc that is in the image and not hidden, of 200 points spread over it.
+  /// The share of it that is in the image and not hidden, of some 200 points spread over it.
   double in_view;
 };
 

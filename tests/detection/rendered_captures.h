@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -43,11 +44,14 @@ class Captures {
   std::vector<TrueLamp> truth(const LampShot& shot) const {
     return true_lamps(scene_, renderer_, shot);
   }
-  LampDetector detector() const {
-    return {lamp_map_of(scene_, false), detector_camera(true_calibration(scene_))};
-  }
+  LampMap lamps() const { return lamp_map_of(scene_, false); }
+  Calibration calibration() const { return true_calibration(scene_); }
+  LampDetector detector() const { return {lamps(), detector_camera(calibration())}; }
+  std::size_t size() const { return shots_in(set_); }
 
-  Score score(std::size_t step) const {
+  /// Of the lamps that count; what is wrong of others counts, too.
+  Score score(
+      std::size_t step, const std::function<bool(int)>& counts = [](int) { return true; }) const {
     const LampDetector lamp_detector = detector();
     Score score;
     for (std::size_t i = 0; i < shots_in(set_); i += step) {
@@ -58,24 +62,25 @@ class Captures {
         EXPECT_FALSE(found.contains(*light.lamp)) << "one lamp twice in image " << i;
         found[*light.lamp] = light;
       }
-      add(truth(shot), found, score);
+      add(truth(shot), found, counts, score);
     }
     return score;
   }
 
  private:
-  void add(const std::vector<TrueLamp>& truth, std::map<int, Light>& found, Score& score) const {
+  void add(const std::vector<TrueLamp>& truth, std::map<int, Light>& found,
+           const std::function<bool(int)>& counts, Score& score) const {
     for (const auto& [id, pixel, in_view] : truth) {
       const auto light = found.find(id);
       if (light == found.end()) {
-        score.missed += in_view == 1;
+        score.missed += in_view == 1 && counts(id);
         continue;
       }
       const double error_px = (light->second.pixel - pixel).norm();
       const double sigma_px = light->second.sigma_px;
       found.erase(light);
       if (error_px > 5) ++score.wrong;
-      if (in_view < 1 || error_px > 5) continue;
+      if (in_view < 1 || error_px > 5 || !counts(id)) continue;
       ++score.lamps;
       score.squares += error_px * error_px;
       score.worst_px = std::max(score.worst_px, error_px);

@@ -31,7 +31,7 @@ TEST(LampMapRefusals, NameLineAndKeyOfAMissingKey) {
 TEST(LampMapRefusals, NameLineAndKeyOfAnUnknownKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], position_mm: [0, 0, 2000]"),
             "lamps.yaml:3: lamps[0]: key 'position_mm' is unknown here; the keys are: id, "
-            "position_m, diameter_m, frequency_hz, duty, sd_m");
+            "position_m, diameter_m, frequency_hz, duty, sd_m, shape, size_m, yaw_rad");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nunits: mm\nlamps: []\n"),
             "lamps.yaml:2: key 'units' is unknown here; the keys are: format, sd_m, lamps");
 }
@@ -41,6 +41,26 @@ TEST(LampMapRefusals, NameLineAndKeyOfAKeyThatStandsTwice) {
             "lamps.yaml:3: lamps[0]: key 'id' stands twice");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\nlamps: []\n"),
             "lamps.yaml:3: key 'lamps' stands twice");
+}
+
+TEST(LampMapRefusals, NameWhatARectangleLacksAndADiscDoesNotHave) {
+  const std::string lamp = "id: 1, position_m: [0, 0, 2], ", place = "lamps.yaml:3: lamps[0]";
+  EXPECT_EQ(refusal_of_lamp(lamp + "size_m: [1.2, 0.1]"),
+            place + ".size_m: is of a rectangle: say 'shape: rectangle', too");
+  EXPECT_EQ(refusal_of_lamp(lamp + "shape: disc, yaw_rad: 0.1"),
+            place + ".yaw_rad: is of a rectangle: say 'shape: rectangle', too");
+  EXPECT_THAT(refusal_of_lamp(lamp + "shape: rectangle"),
+              HasSubstr(place + ": key 'size_m' is missing"));
+  EXPECT_EQ(refusal_of_lamp(lamp + "shape: rectangle, size_m: [1.2, 0.1], diameter_m: 0.2"),
+            place + ".diameter_m: is of a disc, and this lamp is a rectangle: it has a size_m");
+  EXPECT_THAT(refusal_of_lamp(lamp + "shape: square, size_m: [1, 1]"),
+              HasSubstr(place + ".shape: 'square' is "));
+  EXPECT_THAT(refusal_of_lamp(lamp + "shape: rectangle, size_m: [1.2]"),
+              HasSubstr(place + ".size_m: should be "));
+  EXPECT_THAT(refusal_of_lamp(lamp + "shape: rectangle, size_m: [1200, 100]"),
+              HasSubstr(place + ".size_m[0]: 1200 m is not within 0.001 and 10 m"));
+  EXPECT_THAT(refusal_of_lamp(lamp + "shape: rectangle, size_m: [1, 1], yaw_rad: 90"),
+              HasSubstr(place + ".yaw_rad: 90 rad is not within -6.3 and 6.3 rad"));
 }
 
 TEST(LampMapRefusals, NameTheLineOfAnIdThatStandsTwice) {

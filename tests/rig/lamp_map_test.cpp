@@ -41,6 +41,36 @@ lamps:
   expect_same(read_lamp_map(folder / "written.yaml"), map);
 }
 
+TEST(LampMap, HasDiscsAndRectangles) {
+  const TemporaryFolder folder;
+  const std::string yaml = R"(format: vlp-lamps/1
+lamps:
+  - {id: 1, position_m: [0, 0, 2.1], shape: rectangle, size_m: [1.2, 0.1], yaw_rad: 0.3, frequency_hz: 2000, duty: 0.5}
+  - {id: 2, position_m: [1, 0, 2.1], shape: rectangle, size_m: [0.6, 0.6], yaw_rad: 0}
+  - {id: 3, position_m: [2, 0, 2.1], diameter_m: 0.18}
+)";
+  const LampMap map = read_lamp_map(folder.file("lamps.yaml", yaml));
+  ASSERT_EQ(map.lamps.size(), 3U);
+  EXPECT_EQ(map.lamps[0].rectangle->size_m, Eigen::Vector2d(1.2, 0.1));
+  EXPECT_EQ(map.lamps[0].rectangle->yaw_rad, 0.3);
+  EXPECT_FALSE(map.lamps[2].rectangle);
+  write_lamp_map(folder / "written.yaml", map);
+  EXPECT_EQ(folder.content_of(folder / "written.yaml"), yaml);
+  const auto read_as = [&](const std::string& from, const std::string& to) {
+    return read_lamp_map(folder.file("other.yaml", changed(yaml, from, to)));
+  };
+  expect_same(read_as(", yaw_rad: 0}", "}"), map);
+  expect_same(read_as("2.1], diameter_m", "2.1], shape: disc, diameter_m"), map);
+}
+
+TEST(LampMap, KnowsTheCornersOfARectangle) {
+  const auto corners = corners_of({{1.2, 0.4}, std::acos(-1) / 2}, {1, 2, 3});
+  EXPECT_LT((corners[0] - Eigen::Vector3d(1.2, 1.4, 3)).norm(), 1e-12);
+  EXPECT_LT((corners[1] - Eigen::Vector3d(1.2, 2.6, 3)).norm(), 1e-12);
+  EXPECT_LT((corners[2] - Eigen::Vector3d(0.8, 2.6, 3)).norm(), 1e-12);
+  EXPECT_LT((corners[3] - Eigen::Vector3d(0.8, 1.4, 3)).norm(), 1e-12);
+}
+
 TEST(LampMap, FindsALampByItsId) {
   LampMap map;
   for (const int id : {7, 2, 40}) map.lamps.push_back({id, {0, 0.1 * id, 2}, {}, {}, {}});

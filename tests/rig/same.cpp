@@ -17,6 +17,10 @@ void expect_same(const LampMap& found, const LampMap& expected) {
     EXPECT_EQ(found.lamps[i].frequency_hz, expected.lamps[i].frequency_hz);
     EXPECT_EQ(found.lamps[i].duty, expected.lamps[i].duty);
     EXPECT_EQ(found.lamps[i].sd_m, expected.lamps[i].sd_m);
+    ASSERT_EQ(found.lamps[i].rectangle.has_value(), expected.lamps[i].rectangle.has_value());
+    if (!found.lamps[i].rectangle) continue;
+    EXPECT_EQ(found.lamps[i].rectangle->size_m, expected.lamps[i].rectangle->size_m);
+    EXPECT_EQ(found.lamps[i].rectangle->yaw_rad, expected.lamps[i].rectangle->yaw_rad);
   }
 }
 

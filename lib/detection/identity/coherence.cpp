@@ -19,20 +19,11 @@ using PieceLevels = Eigen::Array<double, kPieces, 1>;
 
 /// The levels of each line's parts, above the dark.
 template <typename Level>
-std::vector<PieceLevels> piece_levels(const cv::Mat& lines, const Eigen::Vector2d& low,
-                                      const Eigen::Vector2d& high, double dark) {
-  constexpr double used_width = 0.8;
-  const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
-  const int first = std::max(0, static_cast<int>(std::ceil(center.y() - kUsedHeight * half.y())));
-  const int last =
-      std::min(lines.rows - 1, static_cast<int>(std::floor(center.y() + kUsedHeight * half.y())));
+std::vector<PieceLevels> piece_levels(const cv::Mat& lines, const std::vector<Run>& chords,
+                                      double dark) {
   std::vector<PieceLevels> levels;
-  for (int row = first; row <= last; ++row) {
-    const double off = (row - center.y()) / half.y();
-    const double used = used_width * half.x() * std::sqrt(std::max(0.0, 1 - off * off));
-    const int begin = std::max(0, static_cast<int>(std::lround(center.x() - used)));
-    const int end = std::min(lines.cols, static_cast<int>(std::lround(center.x() + used)) + 1);
-    if (begin >= end) continue;
+  levels.reserve(chords.size());
+  for (const auto& [row, begin, end] : chords) {
     const auto* pixels = lines.ptr<Level>(row);
     PieceLevels& line = levels.emplace_back();
     for (int piece = 0; piece < static_cast<int>(kPieces); ++piece) {
@@ -49,13 +40,13 @@ std::vector<PieceLevels> piece_levels(const cv::Mat& lines, const Eigen::Vector2
 
 }  // namespace
 
-double coherence_of(const cv::Mat& lines, const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+double coherence_of(const cv::Mat& lines, const std::vector<Run>& chords,
                     const Background& background, double period_lines) {
   constexpr double share = 0.05;
   constexpr std::size_t least_values = 3;
   const auto levels = lines.depth() == CV_8U
-                          ? piece_levels<std::uint8_t>(lines, low, high, background.level)
-                          : piece_levels<std::uint16_t>(lines, low, high, background.level);
+                          ? piece_levels<std::uint8_t>(lines, chords, background.level)
+                          : piece_levels<std::uint16_t>(lines, chords, background.level);
   const auto quarter = static_cast<std::size_t>(std::max(1L, std::lround(period_lines / 4)));
   if (levels.size() + 1 < least_values + 2 * quarter) return 0;
   double brightest = 0;

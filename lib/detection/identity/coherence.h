@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
 #include <opencv2/core.hpp>
+#include <vector>
 
 #include "detection/lights/background.h"
+#include "detection/lights/runs.h"
 
 namespace vlp {
 
@@ -27,9 +28,9 @@ inline constexpr double kLeastCoherence = 0.85;
 /// kLeastCoherence with a chance of (1 - 0.85) / 2 each, and four of five together with 1.5e-4.
 /// Bars that lean reach it within 7 degrees when a light shows two of them.
 ///
-/// The light is the ellipse in the box from `low` to `high` (column, row) of `lines`, see
-/// lines_of(). 0 when it has too few lines to tell.
-double coherence_of(const cv::Mat& lines, const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+/// `chords` are the light's pixels on each of its `lines`, see lines_of() and chords_of(). 0 when
+/// it has too few lines to tell.
+double coherence_of(const cv::Mat& lines, const std::vector<Run>& chords,
                     const Background& background, double period_lines);
 
 }  // namespace vlp

@@ -22,7 +22,8 @@ struct StripeConditions {
 };
 
 /// Lines of the image on the lamp, of which kUsedHeight are used: diameter focal / height above the
-/// camera. Nothing without a diameter or a focal length, or when the lamp is not above the camera.
+/// camera. Of a rectangle the shorter side counts, which crosses the lines at worst. Nothing
+/// without a size or a focal length, or when the lamp is not above the camera.
 std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions);
 
 /// Relative standard deviation of the period that stripes_of() measures on so many lines. A period

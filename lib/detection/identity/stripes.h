@@ -6,6 +6,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "detection/lights/runs.h"
+
 namespace vlp {
 
 /// The shortest period that stripes are looked for with: two lines would be all that a shutter can
@@ -22,10 +24,13 @@ inline constexpr double kEnoughPeriods = 2.5;
 /// The share of a disc's height whose lines are used: those at the rim are short and dim.
 inline constexpr double kUsedHeight = 0.9;
 
-/// How bright each line of a light is, from its first line on, above the dark, where nothing hides
-/// the line. The light is an ellipse in the box from `low` to `high` (column, row).
-std::vector<double> line_signal(const cv::Mat& image, const Eigen::Vector2d& low,
-                                const Eigen::Vector2d& high, double dark);
+/// The pixels that a light has on each line, without those at its rim. The light is an ellipse in
+/// the box from `low` to `high` (column, row) of an image of that size.
+std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                           const cv::Size& size);
+
+/// How bright each chord of a light is, above the dark, where nothing hides it.
+std::vector<double> line_signal(const cv::Mat& image, const std::vector<Run>& chords, double dark);
 
 struct Stripes {
   /// (bright - dark) / bright of the lines: 0 for steady light, 1 for full stripes.

@@ -30,6 +30,7 @@ enum class LightReason {
   incoherent,    ///< steady: its parts vary each in its way, see coherence_of()
   irregular,     ///< unknown: the stripes are not readable()
   like_no_lamp,  ///< unknown: the period is like no lamp's, or like two lamps'
+  other_shape,   ///< unknown: that lamp has another shape in the map: disc, rectangle, its sides
   soft,          ///< unknown: much softer than others, a reflection
   not_round,     ///< unknown: most of its edge is not on its outline
   seen_better,   ///< unknown: another light is that lamp, and has the surer centre
@@ -49,6 +50,7 @@ struct Light {
   Eigen::Vector2d pixel;
   /// Standard deviation of `pixel` per axis, from the scatter of the outline.
   double sigma_px;
+  /// Of a rectangle that of the disc of its area.
   double radius_px;
   /// The corners of the box around the outline, top left and bottom right.
   Eigen::Vector2d low, high;
@@ -65,7 +67,12 @@ struct Light {
   bool uneven;
   /// How soft the outline is: from a quarter to three quarters of the level.
   double rise_px;
-  /// The share of the blob's edge that lies on the circle.
+  /// Of a rectangle, see rectangle_of(), a polygon around it within its edges, (u, v), and its long
+  /// side over the short one, behind the lens; empty of others.
+  std::vector<Eigen::Vector2d> face;
+  double aspect;
+  /// The share of the blob's edge that lies on the circle; of a rectangle the share of the pixels
+  /// along the edge that is seen worst that look like an edge.
   double roundness;
   /// Points of the blob's edge that lie outside this and its other lights, over those on the
   /// circle.
@@ -73,6 +80,8 @@ struct Light {
   /// As (column, row) of the lines that the shutter reads: (v, u) for a read-out along columns.
   std::vector<EdgePoint> outline;
 };
+
+inline bool is_rectangle(const Light& light) { return !light.face.empty(); }
 
 /// Whether it may be a lamp, of this map or another.
 inline bool flickers(const Light& light) {

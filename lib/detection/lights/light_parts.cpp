@@ -5,8 +5,15 @@
 #include <algorithm>
 #include <utility>
 
+#include "detection/lights/rectangle.h"
+
 namespace vlp {
 namespace {
+
+bool covers(const Light& light, const Eigen::Vector2d& pixel) {
+  if (is_rectangle(light)) return contains(light.face, pixel);
+  return (light.pixel - pixel).norm() < light.radius_px;
+}
 
 /// Whether two blobs may be parts of one light.
 bool near(const cv::Rect& a, const cv::Rect& b) {
@@ -18,7 +25,7 @@ bool near(const cv::Rect& a, const cv::Rect& b) {
 
 /// Whether it is no part of a light that something in the way splits.
 bool whole(const LightPart& part) {
-  return part.light && (part.light->glows || part.light->uneven);
+  return part.light && (part.light->glows || part.light->uneven || is_rectangle(*part.light));
 }
 
 std::size_t points_of(const LightPart& part) { return part.light ? part.light->outline.size() : 0; }
@@ -45,6 +52,13 @@ LightReason reason_of(const LightPart& part, const cv::Size& size) {
   return small ? LightReason::small : LightReason::no_outline;
 }
 
+bool overlap(const Light& a, const Light& b) {
+  if (!is_rectangle(a) && !is_rectangle(b)) {
+    return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
+  }
+  return covers(a, b.pixel) || covers(b, a.pixel);
+}
+
 /// No two lights overlap: the one with more of an outline stands, the other is a piece of it.
 std::vector<Light> without_pieces(std::vector<Light> found) {
   std::stable_sort(found.begin(), found.end(), [](const Light& a, const Light& b) {
@@ -52,9 +66,8 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
   });
   std::vector<Light> lights;
   for (Light& light : found) {
-    const bool piece = std::any_of(lights.begin(), lights.end(), [&](const Light& other) {
-      return (light.pixel - other.pixel).norm() < std::max(light.radius_px, other.radius_px);
-    });
+    const bool piece = std::any_of(lights.begin(), lights.end(),
+                                   [&](const Light& other) { return overlap(light, other); });
     if (!piece) lights.push_back(std::move(light));
   }
   return lights;
@@ -103,9 +116,8 @@ std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vect
     light.high = shape.turned({box.br().x - 0.5, box.br().y - 0.5});
     light.pixel = (light.low + light.high) / 2;
     light.radius_px = (light.high - light.low).mean() / 2;
-    const bool inside = std::any_of(lights.begin(), lights.end(), [&](const Light& other) {
-      return (light.pixel - other.pixel).norm() < other.radius_px;
-    });
+    const bool inside = std::any_of(lights.begin(), lights.end(),
+                                    [&](const Light& other) { return covers(other, light.pixel); });
     if (inside) continue;
     light.outline = std::move(part.outline);
     formless.push_back(std::move(light));

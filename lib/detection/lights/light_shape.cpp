@@ -73,6 +73,11 @@ Eigen::Vector2d LightShape::turned(const Eigen::Vector2d& at) const {
   return camera_.readout == Readout::rows ? at : Eigen::Vector2d(at.reverse());
 }
 
+std::vector<Eigen::Vector2d> LightShape::turned(std::vector<Eigen::Vector2d> points) const {
+  for (Eigen::Vector2d& point : points) point = turned(point);
+  return points;
+}
+
 std::optional<Eigen::Vector2d> LightShape::plane_of(const Eigen::Vector2d& pixel) const {
   if (!camera_.lens) return pixel;
   const auto ray = camera_.lens->unproject(pixel);

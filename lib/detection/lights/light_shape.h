@@ -44,11 +44,15 @@ class LightShape {
 
   /// (column, row) of the lines that the shutter reads from (u, v) of the image, and back.
   Eigen::Vector2d turned(const Eigen::Vector2d& at) const;
+  std::vector<Eigen::Vector2d> turned(std::vector<Eigen::Vector2d> points) const;
 
- private:
+  bool has_lens() const { return camera_.lens.has_value(); }
+  /// The point of the level plane, at height 1, that is seen at (u, v), and back; without a lens
+  /// that is the pixel itself.
   std::optional<Eigen::Vector2d> plane_of(const Eigen::Vector2d& pixel) const;
   std::optional<Eigen::Vector2d> pixel_of(const Eigen::Vector2d& plane) const;
 
+ private:
   DetectorCamera camera_;
 };
 

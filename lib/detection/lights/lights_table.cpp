@@ -16,6 +16,7 @@ namespace {
 std::string_view outline_name(const Light& light) {
   if (light.kind == LightKind::formless) return "";
   if (light.glows) return "glow";
+  if (is_rectangle(light)) return "rectangle";
   return light.uneven ? "rim" : "edge";
 }
 
@@ -85,6 +86,8 @@ std::string_view name_of(LightReason reason) {
       return "irregular";
     case LightReason::like_no_lamp:
       return "like_no_lamp";
+    case LightReason::other_shape:
+      return "other_shape";
     case LightReason::soft:
       return "soft";
     case LightReason::not_round:
@@ -128,6 +131,9 @@ std::string explanation_of(LightReason reason) {
     case LightReason::like_no_lamp:
       return "its period is like no lamp's, or like two lamps': are frequencies, row time and "
              "read-out right, and the classifier, if there is one, of these lamps?";
+    case LightReason::other_shape:
+      return "the lamp of its period has another shape in the map: is it a disc, or a rectangle of "
+             "that size, and does nothing hide a part?";
     case LightReason::soft:
       return "it is much softer than others, as reflections are: if it is a lamp, bring it into "
              "focus";
@@ -161,8 +167,9 @@ std::string line_of(const Light& light) {
   line += fmt::format(": {}; radius {:.1f} px", explanation_of(light.reason), light.radius_px);
   if (light.kind == LightKind::formless) return line;
   const Stripes& stripes = light.stripes;
-  line += fmt::format(", {} {:.0f} % round, contrast {:.2f}", outline_name(light),
-                      100 * light.roundness, stripes.contrast);
+  line +=
+      fmt::format(", {} {:.0f} % {}, contrast {:.2f}", outline_name(light), 100 * light.roundness,
+                  is_rectangle(light) ? "straight" : "round", stripes.contrast);
   if (!(stripes.period_lines > 0)) return line;
   return line + fmt::format(", {:.1f} periods of {:.2f} lines, clarity {:.2f}, coherence {:.2f}",
                             stripes.periods, stripes.period_lines, stripes.clarity,

@@ -16,6 +16,7 @@ using FromName = std::optional<LensModel>(std::string_view);
 struct Types {
   LampMap map;
   Lamp lamp;
+  LampRectangle lamp_rectangle;
   Calibration calibration;
   Camera camera;
   IntrinsicsReport report;

@@ -17,8 +17,8 @@ const cv::Size kPictureSize(200, 160);
 
 double coherence_in(const cv::Mat& image, const DrawnLamp& lamp) {
   const Eigen::Vector2d half(lamp.radius_px, lamp.radius_px);
-  return coherence_of(image, lamp.center - half, lamp.center + half, background_of(image),
-                      lamp.stripes.period_lines);
+  return coherence_of(image, chords_of(lamp.center - half, lamp.center + half, image.size()),
+                      background_of(image), lamp.stripes.period_lines);
 }
 
 double coherence_of_drawn(const DrawnLamp& lamp) {
@@ -71,7 +71,8 @@ TEST(Coherence, IsSeldomReachedByPartsThatVaryEachInItsWay) {
         image(cv::Rect(column, row, 7, patch)) = random.uniform(10, 200);
       }
     }
-    coherent += coherence_of(image, {40, 40}, {80, 80}, {10, 1, 14.5}, 4 * patch) > kLeastCoherence;
+    coherent += coherence_of(image, chords_of({40, 40}, {80, 80}, image.size()), {10, 1, 14.5},
+                             4 * patch) > kLeastCoherence;
   }
   EXPECT_LE(coherent, 10);
 }
@@ -80,7 +81,8 @@ TEST(Coherence, OfTooFewLinesIsNone) {
   const DrawnLamp lamp{.stripes = {.period_lines = 170}};
   EXPECT_EQ(coherence_of_drawn(lamp), 0);
   const cv::Mat image(120, 120, CV_8U, cv::Scalar(10));
-  EXPECT_EQ(coherence_of(image, {200, 20}, {240, 60}, {10, 1, 14.5}, 8), 0);
+  EXPECT_EQ(coherence_of(image, chords_of({200, 20}, {240, 60}, image.size()), {10, 1, 14.5}, 8),
+            0);
 }
 
 }  // namespace

@@ -64,7 +64,8 @@ TEST(Glow, IsFoundWithItsCentreAndItsStripes) {
       ++count;
       const Vector2d beyond(0, light->radius_px);
       const auto signal =
-          line_signal(image, light->low - beyond, light->high + beyond, background_of(image).level);
+          line_signal(image, chords_of(light->low - beyond, light->high + beyond, image.size()),
+                      background_of(image).level);
       const Stripes seen = stripes_of(striped_part(without_glow(signal)));
       EXPECT_NEAR(seen.period_lines / lamp.stripes.period_lines, 1, 0.02);
     });

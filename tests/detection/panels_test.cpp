@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Panels and tubes among discs, by a camera that leans.
+#include <algorithm>
+
+#include "detection/rendered_captures.h"
+#include "positioning/positioner.h"
+#include "rig/find_lamp.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kStep = 11;  // of 144 captures, through all yaws
+
+bool is_panel_or_tube(int lamp) { return lamp <= 4; }
+
+TEST(Panels, AreFoundByTheirFourEdges) {
+  const Score score = Captures("panels", "check").score(kStep, is_panel_or_tube);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_GE(score.lamps, 34);
+  EXPECT_LE(score.missed, score.lamps / 3) << "a dark stripe hides an edge along the lines";
+  EXPECT_LT(score.rms_px(), 0.1);
+  EXPECT_GT(score.chi_square / score.lamps, 0.7);
+  EXPECT_LT(score.chi_square / score.lamps, 1.5);
+}
+
+TEST(Panels, LeaveDiscsAsTheyAre) {
+  const Captures captures("panels", "check");
+  LampMap discs = captures.lamps();
+  for (Lamp& lamp : discs.lamps) lamp.rectangle.reset();
+  const LampDetector without(discs, detector_camera(captures.calibration()));
+  int compared = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
+    const cv::Mat image = captures.image(captures.shot(i));
+    const auto lights = captures.detector().detect(image), others = without.detect(image);
+    for (const Light& light : lights) {
+      if (!light.lamp || is_panel_or_tube(*light.lamp)) continue;
+      const auto same = std::find_if(others.begin(), others.end(), [&](const Light& other) {
+        return other.lamp == light.lamp && other.pixel == light.pixel &&
+               other.sigma_px == light.sigma_px;
+      });
+      EXPECT_NE(same, others.end()) << "lamp " << *light.lamp << " in image " << i;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 8);
+}
+
+TEST(Panels, AreNoLampsOfAnotherShape) {
+  const Captures captures("panels", "check");
+  LampMap swapped = captures.lamps();
+  for (Lamp& lamp : swapped.lamps) {
+    if (lamp.rectangle) lamp.rectangle->size_m = Eigen::Vector2d(0.6, 0.2);
+  }
+  const LampDetector detector(swapped, detector_camera(captures.calibration()));
+  int refused = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
+    for (const Light& light : detector.detect(captures.image(captures.shot(i)))) {
+      if (!is_rectangle(light)) continue;
+      EXPECT_FALSE(light.lamp);
+      EXPECT_EQ(light.kind, LightKind::unknown);
+      refused += light.reason == LightReason::other_shape;
+    }
+  }
+  EXPECT_GT(refused, 6);
+}
+
+TEST(Panels, AreFoundWithoutALensLessSurely) {
+  const Captures captures("panels", "check");
+  const LampDetector detector(captures.lamps(), {Readout::rows, 3e-5, std::nullopt});
+  int found = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 3 * kStep) {
+    const LampShot shot = captures.shot(i);
+    const auto truth = captures.truth(shot);
+    for (const Light& light : detector.detect(captures.image(shot))) {
+      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      const auto lamp = std::find_if(truth.begin(), truth.end(),
+                                     [&](const TrueLamp& one) { return one.id == light.lamp; });
+      ASSERT_NE(lamp, truth.end());
+      EXPECT_LT((light.pixel - lamp->pixel).norm(), 4 * light.sigma_px) << "lamp " << lamp->id;
+      ++found;
+    }
+  }
+  EXPECT_GT(found, 5);
+}
+
+TEST(Panels, GiveFixes) {
+  const Captures captures("panels", "check");
+  const Positioner positioner(captures.lamps(), captures.calibration());
+  int fixes = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 2 * kStep) {
+    const LampShot shot = captures.shot(i);
+    std::vector<Detection> detections;
+    for (const Light& light : captures.detector().detect(captures.image(shot))) {
+      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      detections.push_back({*light.lamp, light.pixel, light.sigma_px});
+    }
+    if (detections.size() < 3) continue;
+    const Fix fix = positioner.locate(detections);
+    ASSERT_EQ(fix.status, FixStatus::ok) << i;
+    EXPECT_LT((fix.estimate.pose.position_m - shot.motion.pose(0).position_m).norm(), 0.002) << i;
+    ++fixes;
+  }
+  EXPECT_GE(fixes, 3);
+}
+
+}  // namespace
+}  // namespace vlp
