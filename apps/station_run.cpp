@@ -200,6 +200,10 @@ void run_verify(const StationRunOptions& options) {
   const bool batch = !options.batch.empty();
   auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
                                            new_run(), kProgram, options.threads);
+  if (config.verify_due) {
+    refuse_used_images(record,
+                       [&](const std::string& sha256) { return spool.golden_run_of(sha256); });
+  }
   record.operator_name = options.operator_name;
   record.shift = options.shift;
   Terminal terminal;
