@@ -41,6 +41,8 @@ void say(const std::string& text) { fmt::print("{}", printable(text)); }
 struct Known {
   std::optional<Spool> spool;
   std::optional<Records> records;
+  /// Empty for all.
+  std::string station = {};
   /// Why the records cannot be asked.
   std::string away = {};
 
@@ -52,6 +54,7 @@ struct Known {
     if (where.empty()) {
       const StationConfig config = read_station(options.station);
       where = config.records;
+      station = config.station;
       spool.emplace(config.spool, where);
       spool->deliver();
     }
@@ -74,10 +77,10 @@ struct Known {
     }
   }
   std::vector<RunRecord> waiting() { return spool ? spool->waiting() : std::vector<RunRecord>(); }
-  /// Of all stations.
+  /// Of the station: 'vlp-station hook' runs no others.
   std::vector<std::string> with_open_hook() {
-    if (spool) return spool->with_open_hook("");
-    return records ? records->with_open_hook("") : std::vector<std::string>();
+    if (spool) return spool->with_open_hook(station);
+    return records ? records->with_open_hook(station) : std::vector<std::string>();
   }
   /// For what cannot do without them.
   Records& all() {
@@ -242,6 +245,22 @@ MeasurementStudy study_of(const std::vector<StudyValue>& values) {
   }
 }
 
+/// Deletes the folder of a run; its record tells of it as soon as nothing is in it. Throws
+/// InputError.
+void clear_away(const ExpiredFolder& expired, double mb, Spool& spool) {
+  delete_content(expired);
+  const auto& events = expired.run.events;
+  const bool told = std::any_of(events.begin(), events.end(),
+                                [&](const RunEvent& event) { return event.what == expired.what; });
+  if (!told) {
+    RunRecord run = expired.run;
+    run.events.push_back(
+        new_event(expired.what, fmt::format("kept {} days, {:.1f} MB", expired.days, mb)));
+    spool.keep(run);
+  }
+  delete_folder(expired);
+}
+
 }  // namespace
 
 void list_runs(const StationRecordsOptions& options) {
@@ -329,29 +348,29 @@ void clean_up(const StationRecordsOptions& options) {
   const Retained found = look_for_expired(config, known.all());
   constexpr double megabyte = 1e6;
   double all_mb = 0;
-  for (const auto& [folder, what, days, bytes, run] : found.expired) {
-    const double mb = double(bytes) / megabyte;
-    all_mb += mb;
-    if (options.remove) {
-      RunRecord told = run;
-      const bool told_before =
-          std::any_of(run.events.begin(), run.events.end(),
-                      [&](const RunEvent& event) { return event.what == what; });
-      if (!told_before) {
-        told.events.push_back(new_event(what, fmt::format("kept {} days, {:.1f} MB", days, mb)));
-        known.spool->keep(told);  // before: a killed program goes on the next time
-      }
-      delete_expired({folder, what, days, bytes, run});
+  std::size_t done = 0;
+  for (const ExpiredFolder& expired : found.expired) {
+    const double mb = double(expired.bytes) / megabyte;
+    try {
+      if (options.remove) clear_away(expired, mb, *known.spool);
+    } catch (const InputError& error) {
+      spdlog::warn("{}", printable(error.what()));
+      continue;
     }
-    say(fmt::format("{:>10.1f} MB  {} of {}, {} {}\n", mb, folder.string(), run.ended_utc,
-                    run.verdict, options.remove ? "(deleted)" : ""));
+    ++done;
+    all_mb += mb;
+    say(fmt::format("{:>10.1f} MB  {} of {}, {} {}\n", mb, expired.folder.string(),
+                    expired.run.ended_utc, expired.run.verdict, options.remove ? "(deleted)" : ""));
   }
   for (const auto& folder : found.without_record) {
     spdlog::warn("{}: is of no run of the records: left", folder.string());
   }
-  fmt::print("{} folders, {:.1f} MB{}\n", found.expired.size(), all_mb,
+  fmt::print("{} folders, {:.1f} MB{}\n", done, all_mb,
              options.remove ? " deleted" : ": --delete deletes them");
   known.spool->deliver();
+  if (done == found.expired.size()) return;
+  throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
+                                       found.expired.size() - done, found.expired.size()));
 }
 
 void export_runs(const StationRecordsOptions& options) {

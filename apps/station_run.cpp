@@ -59,9 +59,9 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
     lock.emplace(spool.folder(), record.run);
     record.events.push_back(hook_wanted(*config.hook));
   }
-  // Killed in between, a station that failed is known as such, one that passed is not.
-  const bool golden_failed = record.kind == "golden" && !record.passed();
-  if (golden_failed) note(config, record);
+  // Killed in between, the golden unit is due rather too early than too late.
+  const bool golden_passed = record.kind == "golden" && record.passed();
+  if (!golden_passed) note(config, record);
   try {
     spool.keep(record);
   } catch (const InputError&) {
@@ -71,7 +71,7 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
   }
   mark_kept();
   terminal.print(lines);
-  if (!golden_failed) note(config, record);
+  if (golden_passed) note(config, record);
   std::string undone, mend;
   try {
     mend = fmt::format("'vlp-station restore {}' writes the files", record.run);
@@ -200,6 +200,10 @@ void run_verify(const StationRunOptions& options) {
   const bool batch = !options.batch.empty();
   auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
                                            new_run(), kProgram, options.threads);
+  if (config.verify_due) {
+    refuse_used_images(record,
+                       [&](const std::string& sha256) { return spool.golden_run_of(sha256); });
+  }
   record.operator_name = options.operator_name;
   record.shift = options.shift;
   Terminal terminal;

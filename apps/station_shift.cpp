@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <map>
@@ -84,12 +85,13 @@ std::vector<std::string> command_of(const StationRunOptions& options, bool golde
   return command;
 }
 
-/// How this program ends with these arguments.
+/// How this program ends with these arguments; an error is told.
 int exit_code_of(const std::vector<std::string>& command) {
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   pid_t process = 0;
+  std::signal(SIGCHLD, SIG_DFL);  // who inherited that it is ignored never hears how it ended
   if (const int error =
           ::posix_spawn(&process, "/proc/self/exe", nullptr, nullptr, arguments.data(), environ)) {
     throw std::runtime_error("the unit's process cannot be started: " +
@@ -97,7 +99,14 @@ int exit_code_of(const std::vector<std::string>& command) {
   }
   int status = 0;
   bool told = false;
-  while (::waitpid(process, &status, WNOHANG) == 0) {
+  for (;;) {
+    const pid_t ended = ::waitpid(process, &status, WNOHANG);
+    if (ended == process) break;
+    if (ended < 0 && errno != EINTR) {
+      spdlog::error("how the unit's process ended is not known: {}",
+                    std::generic_category().message(errno));
+      return kBadInput;
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     if (interrupted() && !told) told = ::kill(process, SIGTERM) == 0;
   }
@@ -120,10 +129,15 @@ void run_shift(StationRunOptions options) {
     options.camera_id = *serial;
     const bool golden = config.golden && *serial == config.golden->camera_id;
     const int code = exit_code_of(command_of(options, golden));
-    if (interrupted()) throw std::runtime_error("the shift was left in the middle of a unit");
-    if (golden) continue;
-    ++units;
-    ++ends[code];
+    terminal.forget_keys();
+    if (!golden) {
+      ++units;
+      ++ends[code];
+    }
+    const bool judged = code == kDone || code == kGateNotMet || code == kUndetermined;
+    if (interrupted() && !judged) {
+      throw std::runtime_error("the shift was left in the middle of a unit");
+    }
   }
   const int judged = ends[kDone] + ends[kGateNotMet] + ends[kUndetermined];
   fmt::print("{} units: {} passed, {} failed, {} invalid{}\n", units, ends[kDone],

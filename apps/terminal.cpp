@@ -42,6 +42,8 @@ bool read_key(char& key, int wait_ms) {
   return ::poll(&input, 1, wait_ms) > 0 && ::read(STDIN_FILENO, &key, 1) == 1;
 }
 
+constexpr int kSlowerThanAScanner_ms = 30;
+
 }  // namespace
 
 struct Terminal::Saved {
@@ -131,10 +133,14 @@ std::optional<char> Terminal::key(int wait_ms) const {
   }
   char first = 0, key = 0;
   if (!read_key(first, wait_ms)) return std::nullopt;
-  constexpr int slower_than_a_scanner_ms = 30;
   bool alone = true;
-  while (read_key(key, slower_than_a_scanner_ms)) alone = false;
+  while (!interrupted() && read_key(key, kSlowerThanAScanner_ms)) alone = alone && key == first;
   return alone ? std::optional(first) : std::nullopt;
+}
+
+void Terminal::forget_keys() const {
+  char key = 0;
+  while (saved_->keys && !interrupted() && read_key(key, kSlowerThanAScanner_ms)) continue;
 }
 
 std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {

@@ -30,9 +30,11 @@ class Terminal {
   void print(const std::vector<ScreenLine>& lines);
   /// Whether the terminal has another size than when it was drawn.
   bool resized() const;
-  /// The key that was pressed, if one was, waiting so long at most. Keys that come together are a
-  /// scanner's, and none.
+  /// The key that was pressed, if one was, waiting so long at most. Several that come together are
+  /// a scanner's, and none; but one key many times is an impatient operator's.
   std::optional<char> key(int wait_ms) const;
+  /// Takes what was typed before now, at a terminal, up to a scanner's pause.
+  void forget_keys() const;
   /// The line that is typed, or comes from a scanner or a file: asked for by `prompt`, whose last
   /// line it follows. Nothing at the end of the input, and when SIGINT or SIGTERM came.
   std::optional<std::string> line(std::vector<ScreenLine> prompt);

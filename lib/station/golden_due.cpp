@@ -7,7 +7,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <sstream>
+#include <system_error>
 
 #include "captures/digest.h"
 #include "rig/file.h"
@@ -26,6 +28,19 @@ fs::path note_of(const StationConfig& config) {
   return config.spool / (".golden-" + sha256_of_text(config.station).substr(0, digits));
 }
 
+/// Of a note that is no whole one.
+GoldenState damaged(const std::string& why) {
+  return {
+      true,
+      fmt::format("what the golden unit said is not known ({}): 'vlp-station verify' is due", why)};
+}
+
+/// An earlier PASS must not stand where this run could not be noted: without a note it is due.
+void forget(const fs::path& file) {
+  std::error_code ignored;
+  fs::remove(file, ignored);
+}
+
 }  // namespace
 
 GoldenState golden_state(const StationConfig& config) {
@@ -33,15 +48,24 @@ GoldenState golden_state(const StationConfig& config) {
   if (!config.verify_due) return {};
   const fs::path file = note_of(config);
   std::error_code none;
-  if (!fs::exists(file, none)) {
-    return {false, fmt::format("the golden unit was not measured here yet: {}", verify)};
+  if (fs::status(file, none).type() == fs::file_type::not_found) {
+    return {true, fmt::format("the golden unit was not measured here yet: {}", verify)};
   }
   constexpr std::size_t most_bytes = 1 << 24;
-  const std::string text = read_text_file(file, most_bytes);
+  std::string text;
+  try {
+    text = read_text_file(file, most_bytes);
+  } catch (const InputError& error) {
+    return damaged(error.what());
+  }
   std::istringstream words(text);
   std::string run, verdict, ended_utc;
   words >> run >> verdict >> ended_utc;
-  if (verdict != name_of(Verdict::pass)) {
+  const bool failed = verdict == name_of(Verdict::fail);
+  if ((!failed && verdict != name_of(Verdict::pass)) || ended_utc.empty()) {
+    return damaged(file.string() + " is damaged");
+  }
+  if (failed) {
     return {true,
             fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify)};
   }
@@ -65,15 +89,22 @@ void note_for_golden(const StationConfig& config, const RunRecord& record) {
   const fs::path file = note_of(config);
   make_folder(config.spool);
   if (record.kind == "golden") {
-    return write_file(file,
-                      fmt::format("{} {} {}\n", record.run, record.verdict, record.ended_utc));
+    try {
+      return write_file(file,
+                        fmt::format("{} {} {}\n", record.run, record.verdict, record.ended_utc));
+    } catch (const InputError&) {
+      forget(file);
+      throw;
+    }
   }
   const int note = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
-  if (note < 0) return;  // never measured: nothing to count from
+  if (note < 0 && errno == ENOENT) return;  // never measured: nothing to count from
   const std::string_view line = kUnitLine;
-  const bool written = ::write(note, line.data(), line.size()) == ssize_t(line.size());
-  ::close(note);
-  if (!written) throw InputError(file, "cannot be written");
+  const bool written = note >= 0 && ::write(note, line.data(), line.size()) == ssize_t(line.size());
+  if (note >= 0) ::close(note);
+  if (written) return;
+  forget(file);
+  throw InputError(file, "cannot be written");
 }
 
 }  // namespace vlp

@@ -55,10 +55,12 @@ struct Process {
   std::string written = {};
   bool closed = false;
 
+  /// No more at once than a pipe holds: one that is always full must not keep from the time limit.
   void read() {
     constexpr std::size_t most = 4096;
+    constexpr int parts = 16;
     std::array<char, most> part{};
-    for (;;) {
+    for (int i = 0; i < parts; ++i) {
       const ssize_t count = ::read(output, part.data(), part.size());
       closed = closed || count == 0;
       if (count <= 0) return;
@@ -66,15 +68,20 @@ struct Process {
       if (written.size() > most) written.erase(0, written.size() - most);
     }
   }
-  /// Its status; nothing when it had to be killed.
+  /// Its status; nothing when it had to be killed. Throws std::system_error when it cannot be
+  /// known.
   std::optional<int> wait(double time_limit_s) {
     constexpr int often_ms = 10;
     const auto begun = Clock::now();
     int status = 0;
-    while (::waitpid(id, &status, WNOHANG) == 0) {
+    for (;;) {
+      const pid_t ended = ::waitpid(id, &status, WNOHANG);
+      if (ended == id) break;
+      if (ended < 0 && errno != EINTR) throw std::system_error(errno, std::generic_category());
       if (std::chrono::duration<double>(Clock::now() - begun).count() > time_limit_s) {
         ::kill(-id, SIGKILL);
-        ::waitpid(id, &status, 0);
+        ::kill(id, SIGKILL);  // it may have left its group
+        while (::waitpid(id, &status, 0) < 0 && errno == EINTR) continue;
         return std::nullopt;
       }
       pollfd ready{output, POLLIN, 0};
@@ -89,19 +96,27 @@ struct Process {
   }
 };
 
-/// A file without a name that holds a text, open at its beginning.
+/// A file without a name that holds the whole text, open at its beginning; negative, with errno,
+/// when there is no room.
 int file_with(const std::string& text) {
   const int file = ::memfd_create("run", MFD_CLOEXEC);
   for (std::size_t at = 0; file >= 0 && at < text.size();) {
     const ssize_t count = ::write(file, text.data() + at, text.size() - at);
-    if (count <= 0) break;
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int error = count < 0 ? errno : ENOSPC;
+      ::close(file);
+      errno = error;
+      return -1;
+    }
     at += static_cast<std::size_t>(count);
   }
   if (file >= 0) ::lseek(file, 0, SEEK_SET);
   return file;
 }
 
-/// Starts it in a group of its own; an errno when it could not be.
+/// Starts it in a group of its own, with no descriptors and signals of this program; an errno when
+/// it could not be.
 int start(const Hook& hook, int input, int output, pid_t& id) {
   posix_spawn_file_actions_t actions;
   posix_spawnattr_t attributes;
@@ -110,9 +125,16 @@ int start(const Hook& hook, int input, int output, pid_t& id) {
   ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   ::posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
+  ::posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
   ::posix_spawn_file_actions_addchdir_np(&actions, hook.folder.c_str());
-  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  ::posix_spawnattr_setflags(
+      &attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
   ::posix_spawnattr_setpgroup(&attributes, 0);
+  sigset_t signals;
+  ::sigemptyset(&signals);
+  ::posix_spawnattr_setsigmask(&attributes, &signals);
+  for (const int each : {SIGPIPE, SIGCHLD, SIGINT, SIGHUP}) ::sigaddset(&signals, each);
+  ::posix_spawnattr_setsigdefault(&attributes, &signals);
   std::vector<char*> arguments;
   for (const std::string& word : hook.command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
@@ -161,12 +183,18 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record) {
   Descriptor to(pipe[1]);
   ::fcntl(from.get(), F_SETFL, O_NONBLOCK);
   Process process{0, from.get()};
+  std::signal(SIGCHLD, SIG_DFL);  // who inherited that it is ignored never hears how it ended
   if (const int error = start(hook, input.get(), to.get(), process.id); error != 0) {
     return failed(hook.command.front() +
                   " cannot be started: " + std::generic_category().message(error));
   }
   to.close();
-  const auto status = process.wait(hook.time_limit_s);
+  std::optional<int> status;
+  try {
+    status = process.wait(hook.time_limit_s);
+  } catch (const std::system_error& error) {
+    return failed("how it ended is not known: " + error.code().message());
+  }
   const std::string line = last_line(process.written);
   if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return new_event(kHookDone, line);
   std::string why;

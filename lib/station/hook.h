@@ -17,6 +17,7 @@ RunEvent hook_wanted(const Hook& hook);
 /// Runs the hook with run_json() of the run on its stdin. Whatever becomes of it is what the event
 /// tells: kHookDone with the last line that it wrote, kHookFailed with exit code, signal or time
 /// limit before that line, or why it could not be started. Takes no longer than the time limit.
+/// Sets SIGCHLD to its default.
 RunEvent run_hook(const Hook& hook, const RunRecord& record);
 
 /// Whether a hook was wanted for a run and has not been done.

@@ -384,6 +384,18 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
   });
 }
 
+std::string Records::golden_run_of(const std::string& sha256) {
+  return database_->run([&](Watch&) {
+    std::string run;
+    const std::string invalid = name_of(Verdict::invalid);
+    database_->sql << "SELECT runs.run FROM images JOIN runs ON runs.run = images.run WHERE "
+                      "images.sha256 = :sha256 AND images.refused = '' AND runs.kind = 'golden' "
+                      "AND runs.verdict <> :invalid ORDER BY runs.run LIMIT 1",
+        soci::into(run), soci::use(sha256), soci::use(invalid);
+    return run;
+  });
+}
+
 std::vector<std::string> Records::with_open_hook(const std::string& station) {
   return database_->run(
       [&](Watch&) {

@@ -78,6 +78,9 @@ class Records {
   /// "camera 0001: run RUN" of the first run of another camera that uses an image of this digest;
   /// empty when there is none.
   std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
+  /// The first judged run of a golden unit that uses an image of this digest; empty when there is
+  /// none.
+  std::string golden_run_of(const std::string& sha256);
   /// The runs of this station, or of all when it is empty, whose hook is open (hook_is_open()),
   /// from the first to the last.
   std::vector<std::string> with_open_hook(const std::string& station);

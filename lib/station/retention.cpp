@@ -26,7 +26,8 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
        entry.increment(error)) {
-    if (entry->is_directory(error)) folders.push_back(entry->path());
+    std::error_code gone;
+    if (!entry->is_symlink(gone) && entry->is_directory(gone)) folders.push_back(entry->path());
   }
   std::sort(folders.begin(), folders.end());
   return folders;
@@ -37,8 +38,8 @@ std::uintmax_t bytes_in(const fs::path& folder) {
   std::error_code error;
   for (fs::recursive_directory_iterator entry(folder, error);
        !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
-    if (entry->is_symlink() || !entry->is_regular_file()) continue;
     std::error_code gone;
+    if (entry->is_symlink(gone) || !entry->is_regular_file(gone)) continue;
     const auto size = entry->file_size(gone);
     if (!gone) bytes += size;
   }
@@ -46,13 +47,14 @@ std::uintmax_t bytes_in(const fs::path& folder) {
 }
 
 /// A folder that is named by this camera and run.
-void add_if_expired(Retained& found, Records& records, const fs::path& folder,
-                    const std::string& camera, const std::string& run, const char* what, int days) {
+void add_if_expired(Retained& found, Records& records, const std::string& station,
+                    const fs::path& folder, const std::string& camera, const std::string& run,
+                    const char* what, int days) {
   if (run.size() != kRunLength || !is_older(begun_utc(run), days)) return;
   auto record = records.find(run);
   if (!record || record->camera != camera) {
     found.without_record.push_back(folder);
-  } else if (is_older(record->ended_utc, days)) {
+  } else if (record->station == station && is_older(record->ended_utc, days)) {
     found.expired.push_back({folder, what, days, bytes_in(folder), std::move(*record)});
   }
 }
@@ -67,14 +69,14 @@ Retained look_for_expired(const StationConfig& config, Records& records) {
       if (name.size() < kRunLength + 2) continue;
       const std::size_t dot = name.size() - kRunLength - 1;
       if (name[dot] != '.') continue;
-      add_if_expired(found, records, folder, name.substr(0, dot), name.substr(dot + 1),
-                     kImagesDeleted, *days);
+      add_if_expired(found, records, config.station, folder, name.substr(0, dot),
+                     name.substr(dot + 1), kImagesDeleted, *days);
     }
   }
   if (const auto& days = config.keep.results_days) {
     for (const fs::path& camera : folders_in(config.results)) {
       for (const fs::path& folder : folders_in(camera)) {
-        add_if_expired(found, records, folder, camera.filename().string(),
+        add_if_expired(found, records, config.station, folder, camera.filename().string(),
                        folder.filename().string(), kResultsDeleted, *days);
       }
     }
@@ -82,9 +84,22 @@ Retained look_for_expired(const StationConfig& config, Records& records) {
   return found;
 }
 
-void delete_expired(const ExpiredFolder& expired) {
+void delete_content(const ExpiredFolder& expired) {
   std::error_code error;
-  fs::remove_all(expired.folder, error);
+  std::vector<fs::path> entries;
+  for (fs::directory_iterator entry(expired.folder, error);
+       !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    entries.push_back(entry->path());
+  }
+  for (auto entry = entries.begin(); !error && entry != entries.end(); ++entry) {
+    fs::remove_all(*entry, error);
+  }
+  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
+}
+
+void delete_folder(const ExpiredFolder& expired) {
+  std::error_code error;
+  fs::remove(expired.folder, error);
   if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
 }
 

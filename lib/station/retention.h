@@ -31,10 +31,14 @@ struct Retained {
 
 /// What of a station's runs is kept no longer, by StationConfig::keep and the end of each run as
 /// the records have it: images that were put away, CAPTURES/CAMERA.RUN, and results,
-/// RESULTS/CAMERA/RUN. What has another name, such as images that still arrive, is not looked at.
+/// RESULTS/CAMERA/RUN. What has another name, such as images that still arrive, is not looked at,
+/// nor are runs of other stations and symbolic links.
 Retained look_for_expired(const StationConfig& config, Records& records);
 
-/// Deletes the folder with all that is in it; links are not followed. Throws InputError.
-void delete_expired(const ExpiredFolder& expired);
+/// Deletes all that is in the folder; links are not followed. Throws InputError. The folder stays,
+/// so that a program that is killed before it has told of it finds the folder again.
+void delete_content(const ExpiredFolder& expired);
+/// Deletes the folder, which is empty. Throws InputError.
+void delete_folder(const ExpiredFolder& expired);
 
 }  // namespace vlp

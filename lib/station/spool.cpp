@@ -378,4 +378,16 @@ std::string Spool::owner_of(const std::string& sha256, const std::string& other_
   return owner;
 }
 
+std::string Spool::golden_run_of(const std::string& sha256) {
+  read();
+  for (const auto& [file, spooled] : known_) {
+    const RunRecord& run = spooled.run;
+    if (run.kind == "golden" && !run.invalid() && uses(run, sha256)) return run.run;
+  }
+  std::string run;
+  const auto look = [&](Records& records) { run = records.golden_run_of(sha256); };
+  if (!may_ask() || !ask(look).empty()) ++not_asked_;
+  return run;
+}
+
 }  // namespace vlp

@@ -50,7 +50,7 @@ class Spool {
   /// the records refuse holds up no other.
   void deliver();
   /// "kept here, 3 waiting: WHY", or why the records are away; how many are here for other records;
-  /// a file that cannot be read; how many digests owner_of() has looked for here only. Empty when
+  /// a file that cannot be read; how many digests were looked for here only. Empty when
   /// there is nothing to tell.
   std::string state();
   const std::filesystem::path& folder() const { return folder_; }
@@ -66,6 +66,8 @@ class Spool {
   std::vector<std::string> with_open_hook(const std::string& station);
   /// Records::owner_of() of those that wait and, when they answer, the records.
   std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
+  /// Records::golden_run_of() of those that wait and, when they answer, the records.
+  std::string golden_run_of(const std::string& sha256);
 
  private:
   std::vector<std::filesystem::path> files();

@@ -158,4 +158,17 @@ Verified verify_station(const StationConfig& config, const fs::path& folder, con
   return {verification.record(run, program), verification.pictures()};
 }
 
+void refuse_used_images(
+    RunRecord& record, const std::function<std::string(const std::string& sha256)>& golden_run_of) {
+  for (const RunRecord::Image& image : record.images) {
+    if (!image.refused.empty()) continue;
+    const std::string run = golden_run_of(image.sha256);
+    if (run.empty()) continue;
+    record.verdict = name_of(Verdict::invalid);
+    record.causes = fmt::format("image {}/{} was used in golden run {}: measure it anew\n{}",
+                                image.step, image.name, run, record.causes);
+    return;
+  }
+}
+
 }  // namespace vlp

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <string>
 
 #include "station/run_record.h"
 
@@ -23,5 +25,11 @@ struct Verified {
 /// images. Precondition: the configuration has a golden unit.
 Verified verify_station(const StationConfig& config, const std::filesystem::path& folder,
                         const std::string& run, const ProgramVersion& program, int threads);
+
+/// INVALID, as the first cause says, when an image that the record uses was used before: it says
+/// nothing of the station now. `golden_run_of`: the earlier run that used an image of this digest;
+/// empty when there is none.
+void refuse_used_images(RunRecord& record,
+                        const std::function<std::string(const std::string& sha256)>& golden_run_of);
 
 }  // namespace vlp

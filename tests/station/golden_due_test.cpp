@@ -3,7 +3,11 @@
 #include "station/golden_due.h"
 
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
+#include <csignal>
+
+#include "rig/input_error.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -11,6 +15,26 @@ namespace {
 
 using testing::HasSubstr;
 using testing::StartsWith;
+
+/// A disk that is full: nothing can be written to a file.
+class FullDisk {
+ public:
+  FullDisk() {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit none{0, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = std::signal(SIGXFSZ, SIG_IGN);
+};
 
 class GoldenDue : public testing::Test {
  protected:
@@ -75,6 +99,38 @@ TEST_F(GoldenDue, AfterItFailed) {
   EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): mend the station"));
   note("golden", "INVALID");
   EXPECT_TRUE(golden_state(config).failed);
+}
+
+/// No earlier PASS stands where a later run could not be noted.
+TEST_F(GoldenDue, WhenARunCannotBeNoted) {
+  for (const std::string kind : {"golden", "unit"}) {
+    note("golden", "PASS");
+    ASSERT_EQ(problem(), "");
+    {
+      const FullDisk full;
+      EXPECT_THROW(note(kind, "FAIL"), InputError) << kind;
+    }
+    EXPECT_THAT(problem(), HasSubstr("not measured here yet")) << kind;
+    EXPECT_TRUE(golden_state(config).failed) << kind;
+  }
+}
+
+TEST_F(GoldenDue, WhenItsNoteIsDamaged) {
+  note("golden", "PASS");
+  ASSERT_EQ(problem(), "");
+  const auto file = std::filesystem::directory_iterator(config.spool)->path();
+  const std::string name = "spool/" + file.filename().string();
+  for (const std::string text :
+       {"", "RUN", "RUN PASS\n", "RUN PASS 2026-01-01T00:00:00Z", "RUN PASS "}) {
+    folder.file(name, text);
+    EXPECT_THAT(problem(), StartsWith("what the golden unit said is not known")) << text;
+    EXPECT_TRUE(golden_state(config).failed);
+  }
+  folder.file(name, "RUN PASS " + now_utc() + "\nunit\nun");
+  EXPECT_THAT(problem(), HasSubstr("is the file cut short?"));
+  std::filesystem::remove(file);
+  std::filesystem::create_directory(file);
+  EXPECT_THAT(problem(), HasSubstr("what the golden unit said is not known"));
 }
 
 TEST_F(GoldenDue, IsNothingWithoutTheKey) {

@@ -4,7 +4,11 @@
 
 #include <gmock/gmock.h>
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <chrono>
+#include <csignal>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -85,6 +89,32 @@ TEST_F(HookTest, IsKilledWithItsChildrenWhenItTakesTooLong) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   EXPECT_EQ(TemporaryFolder::content_of(its), "");
+}
+
+TEST_F(HookTest, IsKilledThoughItWritesWithoutEndAndLeftItsGroup) {
+  EXPECT_EQ(run("exec cat /dev/zero", 0.3).what, kHookFailed);
+  EXPECT_LT(took_s, 5);
+  const RunEvent event =
+      run("exec python3 -c 'import os, time; os.setpgid(0, os.getpgid(os.getppid())); "
+          "time.sleep(100)' || exit 7",
+          1);
+  EXPECT_EQ(event.text, "no end within 1 s, killed");
+  EXPECT_LT(took_s, 5);
+}
+
+/// Whoever started this program may ignore signals, and leave files open.
+TEST_F(HookTest, InheritsNoSignalsAndNoFiles) {
+  std::signal(SIGCHLD, SIG_IGN);
+  EXPECT_EQ(run("exit 3").text, "exit code 3");
+  const auto interrupt = std::signal(SIGINT, SIG_IGN), pipe = std::signal(SIGPIPE, SIG_IGN);
+  const int open = ::open("/dev/null", O_RDONLY), far = ::fcntl(open, F_DUPFD, 57);
+  EXPECT_EQ(run("kill -INT $$").text, "ended by signal 2");
+  EXPECT_EQ(run("kill -PIPE $$").text, "ended by signal 13");
+  EXPECT_EQ(run("test ! -e /proc/self/fd/" + std::to_string(far)).what, kHookDone);
+  ::close(open);
+  ::close(far);
+  std::signal(SIGINT, interrupt);
+  std::signal(SIGPIPE, pipe);
 }
 
 TEST_F(HookTest, IsOpenUntilItIsDone) {

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "rig/input_error.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -22,10 +23,13 @@ class RetentionTest : public testing::Test {
     config.captures = folder / "captures";
     config.results = folder / "results";
     config.keep = {90, 730};
+    config.station = "hall";
   }
-  void keep(const std::string& run, const std::string& camera, const std::string& ended_utc) {
+  void keep(const std::string& run, const std::string& camera, const std::string& ended_utc,
+            const std::string& station = "hall") {
     RunRecord record;
     record.run = run;
+    record.station = station;
     record.camera = camera;
     record.verdict = "PASS";
     record.ended_utc = ended_utc;
@@ -67,6 +71,20 @@ TEST_F(RetentionTest, FindsWhatIsOlderThanItIsKept) {
   EXPECT_THAT(look_for_expired(config, records).expired, IsEmpty());
 }
 
+/// Stations may share folders and records.
+TEST_F(RetentionTest, LeavesOtherStationsRunsAndLinks) {
+  const std::string other = "20200101T000000Z-fedcba9876543210";
+  keep(kOld, "a", "2020-01-01T01:00:00Z");
+  keep(other, "a", "2020-01-01T01:00:00Z", "attic");
+  with_file("captures/a." + other);
+  with_file("results/a/" + other);
+  fs::create_directory_symlink(with_file("elsewhere"), folder / "captures" / ("a." + kOld));
+  fs::create_directory_symlink(folder / "nowhere", folder / "results" / "a" / kOld);
+  const Retained found = look_for_expired(config, records);
+  EXPECT_THAT(found.expired, IsEmpty());
+  EXPECT_THAT(found.without_record, IsEmpty());
+}
+
 TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path images = with_file("captures/a." + kOld), elsewhere = with_file("elsewhere");
@@ -74,7 +92,11 @@ TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
   const Retained found = look_for_expired(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].bytes, 1000U);
-  delete_expired(found.expired[0]);
+  EXPECT_THROW(delete_folder(found.expired[0]), InputError);
+  delete_content(found.expired[0]);
+  EXPECT_TRUE(fs::is_empty(images));
+  delete_folder(found.expired[0]);
+  EXPECT_THROW(delete_content(found.expired[0]), InputError);
   EXPECT_FALSE(fs::exists(images));
   EXPECT_TRUE(fs::exists(elsewhere / "check/0.png"));
   EXPECT_TRUE(records.find(kOld));

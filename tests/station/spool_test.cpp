@@ -153,6 +153,24 @@ TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
             "camera camera-2: run " + numbered_run(2).run);
 }
 
+TEST(Spool, KnowsWhichGoldenRunUsedAnImage) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  RunRecord golden = numbered_run(1), invalid = numbered_run(2);
+  golden.kind = invalid.kind = "golden";
+  invalid.verdict = "INVALID";
+  for (const RunRecord& run : {numbered_run(0), golden, invalid}) spool.keep(run);
+  for (const std::string state : {"here", "in the records"}) {
+    EXPECT_EQ(spool.golden_run_of("digest-1-7"), golden.run) << state;
+    EXPECT_EQ(spool.golden_run_of("digest-0-7"), "") << "of a unit, " << state;
+    EXPECT_EQ(spool.golden_run_of("digest-2-7"), "") << "not judged, " << state;
+    spool.deliver();
+  }
+  EXPECT_TRUE(fs::is_empty(folder / "spool"));
+}
+
 /// A run that waits, whatever happened to it since, is one run.
 TEST(Spool, KeepsWhatBecameOfARun) {
   const TemporaryFolder folder;
