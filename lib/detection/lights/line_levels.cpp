@@ -50,7 +50,7 @@ LineLevels::LineLevels(const cv::Mat& lines, const std::vector<Run>& chords,
   std::vector<double> signal;
   signal.reserve(sums.size());
   for (const ChordSums& line : sums) {
-    signal.push_back(std::max(0.0, line.mean / std::max(0.1, share_at(line.middle))));
+    signal.push_back(std::max(0.0, line.mean / share_at(line.middle)));
     brightest_ = std::max(brightest_, signal.back());
   }
   if (!(brightest_ > 0)) brightest_ = 1;

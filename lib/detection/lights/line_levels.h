@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -32,7 +33,7 @@ class LineLevels {
   double brightest() const { return brightest_; }
   std::optional<LineLevel> at(int line) const;
   /// The level at that column over that in the middle.
-  double share_at(double column) const { return 1 + slope_ * (column - middle_); }
+  double share_at(double column) const { return std::max(0.1, 1 + slope_ * (column - middle_)); }
 
  private:
   LineLevel predicted(int line) const;

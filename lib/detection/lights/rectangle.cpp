@@ -216,14 +216,30 @@ double area_of(const std::vector<Eigen::Vector2d>& polygon) {
   return std::abs(twice) / 2;
 }
 
+/// Whether the outline reaches into the corners, as no disc's does: (2 u / length)^2 +
+/// (2 v / width)^2 is 1 on an ellipse within the sides, and up to 2 on the sides.
+bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
+                 const Eigen::Vector2d& center) {
+  constexpr double beyond = 1.35, least_share = 0.1;
+  const auto off_middle = [&](const Eigen::Vector2d& at, std::size_t i) {
+    const double length = (sides[i].to - sides[i].from).norm();
+    return std::pow(2 * (at - center).dot(sides[i].way()) / length, 2);
+  };
+  const auto far = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
+    return off_middle(at, 0) + off_middle(at, 1) > beyond;
+  });
+  return double(far) >= least_share * double(points.size());
+}
+
 /// `points` are the outline in the plane.
 std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& sides, double per_px,
                               const std::vector<Eigen::Vector2d>& points, const LightShape& shape) {
   constexpr double stray_px = 3;
   if (!rectangular(sides)) return std::nullopt;
   const auto center = center_of(sides);
+  if (!center || !has_corners(points, sides, *center)) return std::nullopt;
   const auto covariance = center_covariance(edges, per_px, shape);
-  const auto pixel = center ? shape.pixel_of(*center) : std::nullopt;
+  const auto pixel = shape.pixel_of(*center);
   const auto around = face_of(sides, 0, shape);
   if (!pixel || !covariance || around.empty()) return std::nullopt;
   Light light{};
@@ -329,6 +345,9 @@ std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
     const double inset = std::min(inset_px * per_px, narrow / 3);
     const auto chords = chords_within(shape.turned(face_of(sides, inset, shape)), lines.size());
     if (chords.size() < least_lines) return std::nullopt;
+    // Lines that follow one another, or levels would be taken for those of others.
+    const int rows = chords.back().row - chords.front().row + 1;
+    if (rows != static_cast<int>(chords.size())) return std::nullopt;
     const LineLevels levels(lines, chords, background);
     search.reach_px = std::min(search.reach_px, narrow / per_px / 2);
     Sides found;
@@ -339,7 +358,7 @@ std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
       edges[i] = std::move(*edge);
       found[i] = edges[i].side;
     }
-    corners = corners_of(found);
+    corners = rectangular(found) ? corners_of(found) : std::nullopt;
     if (!corners) return std::nullopt;
   }
   return light_of(edges, sides_of(*corners), per_px, points, shape);

@@ -23,8 +23,9 @@ namespace vlp {
 /// the image of a rectangle, whatever the angle from which it is seen, that is the image of its
 /// centre. The sigma is that of the eight ends of the sides. Nothing when four edges do not make a
 /// rectangle, to 20 degrees (a lean that nobody knows of bends it), when it is less than 10 px
-/// wide, or when an edge is not seen: wholly in the image, and lit where a side lies along the
-/// lines and a dark stripe may hide it.
+/// wide, has less than some 18 lines, is more than 40 times as long as wide, or when an edge is not
+/// seen: wholly in the image, and lit where a side lies along the lines and a dark stripe may hide
+/// it.
 std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
                                   const std::vector<EdgePoint>& outline,
                                   const Background& background, const LightShape& shape);

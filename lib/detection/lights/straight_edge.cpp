@@ -116,7 +116,9 @@ class Samples {
       const double t = double(i) / kPieces;
       const auto pixel = shape_.pixel_of(side_.from + t * (side_.to - side_.from));
       if (!pixel) return false;
-      trace_[static_cast<std::size_t>(i)] = shape_.turned(*pixel);
+      const Eigen::Vector2d at = shape_.turned(*pixel);
+      if (!(at.minCoeff() > -1 && at.x() < lines_.cols && at.y() < lines_.rows)) return false;
+      trace_[static_cast<std::size_t>(i)] = at;
     }
     return true;
   }
