@@ -66,7 +66,8 @@ GlowPoints points_of(const Glow& glow) {
     constexpr int per_side = 14;
     const Panel panel = panel_of(glow);
     for (int i = 0; i < per_side * per_side; ++i) {
-      const double a = (i / per_side + 0.5) / per_side, b = (i % per_side + 0.5) / per_side;
+      const int row = i / per_side, column = i % per_side;
+      const double a = (row + 0.5) / per_side, b = (column + 0.5) / per_side;
       points.face_m.push_back(panel.corner_m + a * panel.edge_a_m + b * panel.edge_b_m);
     }
     points.rim_m = outline_of(panel);

@@ -77,8 +77,8 @@ std::vector<BoardLattice::Corner> BoardLattice::corners(const SeenBoard& seen) c
     for (const auto& [index, pixel, weight] : seen.points) {
       const std::size_t part = index / points(), point = index % points();
       const auto cols = static_cast<std::size_t>(cols_);
-      const Eigen::Vector2d node(static_cast<double>(point % cols),
-                                 static_cast<double>(point / cols));
+      const std::size_t row = point / cols;
+      const Eigen::Vector2d node(static_cast<double>(point % cols), static_cast<double>(row));
       const Eigen::Vector2d in_board_m = origins_m_[part] + spacing_m_ * node;
       all.push_back({{in_board_m.x(), in_board_m.y(), 0}, pixel, part, point, {0, 0}, weight});
     }

@@ -77,7 +77,7 @@ double aspect_of(const Sides& sides) {
 
 /// The rectangle of the least area around the points, the light on the left of its sides.
 Corners rectangle_around(const std::vector<Eigen::Vector2d>& points, double per_px) {
-  const Eigen::Vector2d origin = points.front();
+  const Eigen::Vector2d& origin = points.front();
   std::vector<cv::Point2f> scaled;
   scaled.reserve(points.size());
   for (const Eigen::Vector2d& point : points) {
