@@ -156,11 +156,11 @@ TEST_F(StationTerminal, TakesAShift) {
   tmux.type("SN-0001 Enter");
   tmux.screen_with("q: verdict now");
   // The next unit was scanned too early: no key of it counts.
-  tmux.type("-l qq");
+  tmux.type("-l q-SN-0002");
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   EXPECT_THAT(tmux.screen(), Not(HasSubstr("INVALID")));
   tmux.resize("-x 45 -y 12");
-  tmux.type("q");
+  tmux.type("-l qq");  // an impatient operator's
   tmux.screen_with("INVALID   camera SN-0001");
   const std::string next = tmux.screen_with("Serial\n");
   // What was there before is broken anew to the width.

@@ -331,6 +331,11 @@ TEST_F(Station, PassesNoUnitWhileItsGoldenUnitIsDue) {
   const auto verified = records("verify --batch " + (folder / "unit").string());
   EXPECT_EQ(verified.exit_code, 0) << verified.output << verified.errors;
   EXPECT_EQ(run_program(batch()).exit_code, 0);
+  // What it said then it does not say now.
+  EXPECT_THAT(records("verify --batch " + (folder / "unit").string()).errors,
+              ContainsRegex("is not judged: image [a-z]+/[^ ]+ was used in golden run "
+                            "[0-9TZa-f-]+: measure it anew"));
+  EXPECT_EQ(run_program(batch()).exit_code, 0) << "no INVALID run is noted";
 }
 
 /// The images of a run go when they are old enough; its record, which tells of it, stays.
