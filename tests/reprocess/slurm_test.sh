@@ -107,6 +107,7 @@ a_shard_is_done() { ls "$results"/.state/rows/*.csv; }
 patiently 300 a_shard_is_done
 kill -0 "${runs[0]}" 2>/dev/null || fail "the run ended with its node: $(cat "$said")"
 kill -9 -- "-${runs[0]}"
+patiently 60 flock --nonblock "$results/.state/lock" true  # what was killed may take a moment to end
 [ ! -e "$results/summary.csv" ] || fail "Snakemake was killed too late"
 reprocess "$results" --profile slurm --shard-size 3
 expect_baseline "$results"
