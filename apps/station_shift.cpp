@@ -32,7 +32,7 @@ constexpr const char* kQuit = "q";
 std::optional<std::string> asked(const std::string& label, Terminal& terminal) {
   constexpr std::size_t longest = 64;
   const auto line = terminal.line({{label}});
-  return line ? std::optional(printable(line->substr(0, longest))) : std::nullopt;
+  return line ? std::optional(printable(first_characters(*line, longest))) : std::nullopt;
 }
 
 /// Asks who measures, and in which shift, where it is empty. Whether somebody said who.

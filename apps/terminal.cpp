@@ -102,7 +102,7 @@ void Terminal::draw(const std::vector<ScreenLine>& lines) {
   for (std::size_t i = 0; i < shown; ++i) {
     // The last line, with the keys, stays.
     const auto& [line, tone] = i + 1 == shown ? lines.back() : lines[i];
-    text += toned(printable(line).substr(0, columns), tone) + "\x1b[K\n";
+    text += toned(first_characters(printable(line), columns), tone) + "\x1b[K\n";
   }
   show(text, shown);
 }
@@ -146,9 +146,12 @@ void Terminal::forget_keys() const {
 std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
   constexpr char escape = 0x1b, backspace = 0x08, del = 0x7f, end = 0x04;
   constexpr int look_every_ms = 100;
-  constexpr std::size_t longest = 200;
+  constexpr std::size_t longest = 200, most_of_a_character = 4;
   const std::string asked = prompt.back().text;
   std::string typed;
+  if (!interactive_ && ::isatty(STDIN_FILENO) == 1) {
+    for (const auto& [line, tone] : prompt) fmt::print(stderr, "{}\n", printable(line));
+  }
   for (;;) {
     prompt.back().text = asked + typed;
     draw(prompt);
@@ -162,12 +165,14 @@ std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
     if (key == escape) {  // an arrow, or another key of several characters
       while (saved_->keys && read_key(key, 0)) continue;
     } else if (key == backspace || key == del) {
-      if (!typed.empty()) typed.pop_back();
-    } else if (static_cast<unsigned char>(key) >= ' ' && typed.size() < longest) {
+      if (!typed.empty()) typed = first_characters(typed, typed.size() - 1);
+    } else if (static_cast<unsigned char>(key) >= ' ' &&
+               typed.size() < longest + most_of_a_character) {
       typed += key;
     }
   }
   if (interactive_) print(prompt);  // to stay
+  typed = first_characters(typed, longest);
   const auto first = typed.find_first_not_of(' ');
   return first == std::string::npos ? ""
                                     : typed.substr(first, typed.find_last_not_of(' ') + 1 - first);

@@ -144,8 +144,9 @@ int main(int argc, char** argv) {
           ->check(
               CLI::IsMember({"tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagCircle49h12",
                              "tagCustom48h12", "tagStandard41h12", "tagStandard52h13"}));
-  app.add_option("--first-id", options.first_id, "Id of the first tag (default: 0)")
-      ->check(CLI::Range(0, 100000));
+  auto* first_id =
+      app.add_option("--first-id", options.first_id, "Id of the first tag or marker (default: 0)")
+          ->check(CLI::Range(0, 100000));
   auto* kalibr = app.add_flag("--kalibr", options.kalibr,
                               "A Kalibr AprilGrid: borders of two bits, corner squares");
   auto* chessboard =
@@ -157,6 +158,7 @@ int main(int argc, char** argv) {
   for (CLI::Option* of_tags : {tag_mm, spacing, family}) {
     of_tags->excludes(chessboard)->excludes(charuco);
   }
+  first_id->excludes(chessboard);
   app.add_option("--square-mm", options.square_mm,
                  "Width of a square (default: as wide as the paper allows)")
       ->check(CLI::Range(1.0, 1000.0));

@@ -50,4 +50,12 @@ std::string printable(std::string_view text) {
   return result;
 }
 
+std::string first_characters(std::string text, std::size_t most_bytes) {
+  const auto goes_on = [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; };
+  if (text.size() <= most_bytes) return text;
+  while (most_bytes > 0 && goes_on(text[most_bytes])) --most_bytes;
+  text.resize(most_bytes);
+  return text;
+}
+
 }  // namespace vlp

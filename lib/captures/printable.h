@@ -12,4 +12,7 @@ namespace vlp {
 /// tabulators stay.
 std::string printable(std::string_view text);
 
+/// The first characters of a text in UTF-8: so many bytes at most, no character cut.
+std::string first_characters(std::string text, std::size_t most_bytes);
+
 }  // namespace vlp

@@ -15,8 +15,8 @@ namespace vlp {
 std::string run_json(const RunRecord& run);
 
 /// Writes runs, whole or not at all. To .csv: a line for each with run, kind, station, camera,
-/// begun_utc, ended_utc, verdict, causes, program, config_sha256 and each figure, empty where there
-/// is none. To .json: a list of run_json(). Throws InputError, for
+/// operator_name, shift, begun_utc, ended_utc, verdict, causes, program, config_sha256 and each
+/// figure, empty where there is none. To .json: a list of run_json(). Throws InputError, for
 /// another ending, too.
 void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs);
 

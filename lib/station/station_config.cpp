@@ -130,6 +130,7 @@ VerifyDue read_verify_due(YamlMap map) {
   if (const auto hours = map.optional("hours")) due.hours = hours->number_within(0, most_h, "h");
   if (const auto units = map.optional("units")) due.units = units->integer_within(1, 1'000'000);
   if (!due.hours && !due.units) throw map.error("should have hours or units");
+  if (due.hours == 0) throw map.error("hours should be above 0");
   map.finish();
   return due;
 }

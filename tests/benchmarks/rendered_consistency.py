@@ -3,7 +3,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Errors of fixes, and what they state, from rendered images, over whole recalibrations.
 
-  rendered_consistency.py FOLDER [--programs BIN] [--units N] [--first SEED] [SCENE...]
+  rendered_consistency.py FOLDER [SCENE...] [--programs BIN] [--units N] [--first SEED] [--survey-sd-mm SD]
+                          [--right-places]
 
 For each scene and unit: a lamp map with survey errors of its own, images of the board, of a turn at two heights,
 of a known place, of five known places of the axis with twelve captures each, all with a seed of their own.
@@ -51,13 +52,13 @@ def rows_of(table):
         return list(csv.DictReader(file))
 
 
-def scene_of_unit(name, rng, folder):
+def scene_of_unit(name, survey_sd_m, rng, folder):
     """A copy of the scene: map errors of its own, five places, fewer captures to check."""
     text = (SOURCE / "datasets" / name / "scene.yaml").read_text()
     text = re.sub(r",\s*map_error_m: \[[^\]]*\]", "", text)
 
     def with_error(lamp):
-        error_m = ", ".join(f"{value:.7f}" for value in rng.normal(0, SURVEY_SD_M[name], 3))
+        error_m = ", ".join(f"{value:.7f}" for value in rng.normal(0, survey_sd_m, 3))
         return f"{lamp[0]}, map_error_m: [{error_m}]"
 
     text = re.sub(r"- \{id: \d+, position_m: \[[^\]]*\]", with_error, text)
@@ -75,7 +76,7 @@ def run(programs, program, *arguments, may_fail=False):
         sys.exit(f"{' '.join(map(str, command))}: {done.stderr}")
 
 
-def write_places(folder, rng, of, place_of):
+def write_places(folder, off_sd_m, rng, of, place_of):
     """captures.csv with places as one knows them who has measured them: off, alike for all captures of one."""
     truth = rows_of(folder / "truth.csv")
     errors_m = {}
@@ -86,7 +87,7 @@ def write_places(folder, rng, of, place_of):
         for row in truth:
             at_m = place_of(row)
             if at_m not in errors_m:
-                errors_m[at_m] = rng.normal(0, PLACE_SD_M, 3)
+                errors_m[at_m] = rng.normal(0, off_sd_m, 3)
             stated = [f"{value:.7f}" for value in np.add(at_m, errors_m[at_m])]
             spot = f"s{list(errors_m).index(at_m)}" if of == "axis" else ""
             writer.writerow([row["image"], spot, *stated, of, PLACE_SD_M])
@@ -117,17 +118,17 @@ def map_errors_m(refined, true):
     return found_m - true_m
 
 
-def unit(programs, name, seed, folder):
+def unit(programs, name, seed, survey_sd_m, place_off_sd_m, folder):
     """Of one unit: errors and standard deviations of its fixes by the way it was calibrated, and those of the map."""
     rng = np.random.default_rng([seed, len(name)])
     shutil.rmtree(folder, ignore_errors=True)
-    scene = scene_of_unit(name, rng, folder)
+    scene = scene_of_unit(name, survey_sd_m, rng, folder)
     session, fixes = folder / "session", folder / "fixes.csv"
     boards = name != "downlights"
     sets = ["boards", "rotation", "dispersion", "places", "check"] if boards else ["check"]
     run(programs, "vlp-simulate", "--quiet", scene, "--seed", seed, "--only", ",".join(sets), "-o", session)
     lamps, check = session / "lamps.yaml", session / "check"
-    lamps.write_text(lamps.read_text().replace("lamps:\n", f"sd_m: {SURVEY_SD_M[name]}\nlamps:\n", 1))
+    lamps.write_text(lamps.read_text().replace("lamps:\n", f"sd_m: {survey_sd_m}\nlamps:\n", 1))
 
     def located(by, with_map):
         run(programs, "vlp-locate", check, "--lamps", with_map, "--calibration", by, "-o", fixes)
@@ -135,8 +136,8 @@ def unit(programs, name, seed, folder):
 
     if not boards:
         return {"true lens": (*located(session / "true_calibration.yaml", lamps), None)}
-    write_places(session / "dispersion", rng, "camera", of_camera)
-    write_places(session / "places", rng, "axis", of_axis)
+    write_places(session / "dispersion", place_off_sd_m, rng, "camera", of_camera)
+    write_places(session / "places", place_off_sd_m, rng, "axis", of_axis)
     camera = (session / "true_calibration.yaml").read_text()
     run(programs, "vlp-calibrate", session, "-o", folder / "steps", "--no-report", "--row-time-s",
         re.search(r"row_time_s: ([^\s,}]+)", camera)[1], "--readout", re.search(r"readout: (\w+)", camera)[1],
@@ -157,12 +158,19 @@ def main():
     parser.add_argument("--programs", type=pathlib.Path, default=SOURCE / "build/bin")
     parser.add_argument("--units", type=int, default=20)
     parser.add_argument("--first", type=int, default=1000, metavar="SEED")
+    parser.add_argument("--survey-sd-mm", type=float, metavar="SD", help="another than that of the scene, which the "
+                        "map then states")
+    parser.add_argument("--right-places", action="store_true", help="known places are right, though 0.1 mm is stated "
+                        "(ratios are then below what is asked)")
     options = parser.parse_args()
+    place_off_sd_m = 0 if options.right_places else PLACE_SD_M
     missed = False
     for name in options.scenes:
         by_way = {}
+        survey_sd_m = SURVEY_SD_M[name] if options.survey_sd_mm is None else 1e-3 * options.survey_sd_mm
         for seed in range(options.first, options.first + options.units):
-            for way, found in unit(options.programs, name, seed, options.folder / name).items():
+            of_unit = unit(options.programs, name, seed, survey_sd_m, place_off_sd_m, options.folder / name)
+            for way, found in of_unit.items():
                 by_way.setdefault(way, []).append(found)
         for way, units in by_way.items():
             errors, sds, map_m = zip(*units)

@@ -33,5 +33,16 @@ TEST(Printable, EscapesWhatIsNoUtf8) {
   EXPECT_EQ(printable("\xff\xc0\xaf"), "\\xff\\xc0\\xaf");
 }
 
+TEST(FirstCharacters, CutNoneInTwo) {
+  EXPECT_EQ(first_characters("abc", 3), "abc");
+  EXPECT_EQ(first_characters("abc", 2), "ab");
+  EXPECT_EQ(first_characters("a\xc3\xb6", 2), "a");
+  EXPECT_EQ(first_characters("a\xe2\x82\xac"
+                             "b",
+                             4),
+            "a\xe2\x82\xac");
+  EXPECT_EQ(first_characters("\xc3\xb6", 1), "");
+}
+
 }  // namespace
 }  // namespace vlp

@@ -138,6 +138,9 @@ TEST_F(StationYaml, SaysWhenTheGoldenUnitIsDueAndWhatIsKept) {
   EXPECT_FALSE(config.keep.results_days);
   change("station.yaml", "{hours: 24, units: 200}", "{}");
   EXPECT_THAT(refusal(), HasSubstr("verify_due: should have hours or units"));
+  change("station.yaml", "verify_due: {}", "verify_due: {hours: 0}");
+  EXPECT_THAT(refusal(), HasSubstr("verify_due: hours should be above 0"));
+  change("station.yaml", "verify_due: {hours: 0}", "verify_due: {}");
   change("station.yaml", "images_days: 90", "images_days: 0");
   EXPECT_THAT(refusal(), HasSubstr("verify_due"));
   change("station.yaml", "verify_due: {}", "verify_due: {units: 1}");

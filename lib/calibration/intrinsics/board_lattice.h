@@ -56,7 +56,8 @@ class BoardLattice {
   /// The pose of a part from that of the board, and of the board from that of its first part.
   BoardPose pose_of_part(const BoardPose& camera_from_board, std::size_t part) const;
   BoardPose pose_of_board(const BoardPose& camera_from_part) const;
-  /// Corners that fix every part's pose: twelve, and not all in one row or column.
+  /// Corners that fix every part's pose: twelve of a board in one part (all, when it has no more),
+  /// six of each of four parts; two or more in each of two rows.
   bool enough(const SeenBoard& seen) const;
 
  private:

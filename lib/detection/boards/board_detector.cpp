@@ -19,15 +19,6 @@ namespace {
 /// A corner nearer to the image's edge was fitted to edges that are cut short.
 constexpr double kMargin = 2;
 
-cv::Mat1b eight_bits(const cv::Mat& image) {
-  if (image.depth() == CV_8U) return image;
-  double brightest = 0;
-  cv::minMaxLoc(image, nullptr, &brightest);
-  cv::Mat1b levels;
-  image.convertTo(levels, CV_8U, 255 / std::max(brightest, 1.0));
-  return levels;
-}
-
 cv::Mat1f smooth(const cv::Mat1b& levels) {
   constexpr double sigma_px = 1;
   cv::Mat exact;
@@ -125,6 +116,15 @@ SeenBoard BoardDetector::seen_squares(const cv::Mat1b& levels) const {
   return seen;
 }
 
+cv::Mat1b eight_bits(const cv::Mat& image) {
+  if (image.depth() == CV_8U) return image;
+  double brightest = 0;
+  cv::minMaxLoc(image, nullptr, &brightest);
+  cv::Mat1b levels;
+  image.convertTo(levels, CV_8U, 255 / std::max(brightest, 1.0));
+  return levels;
+}
+
 SeenBoard BoardDetector::detect(const cv::Mat& image) const {
   // No tag is narrower, and libapriltag reads beyond images of a row or two.
   constexpr int least_px = 10;
@@ -151,7 +151,9 @@ SeenBoard BoardDetector::detect(const cv::Mat& image) const {
       if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
     }
   }
-  std::erase_if(seen.tags, [&](const SeenTag& tag) { return !inside(tag, levels); });
+  for (auto* tags : {&seen.tags, &seen.foreign}) {
+    std::erase_if(*tags, [&](const SeenTag& tag) { return !inside(tag, levels); });
+  }
   std::sort(seen.tags.begin(), seen.tags.end(),
             [](const SeenTag& a, const SeenTag& b) { return a.id < b.id; });
   for (const auto& [id, same] : found) {

@@ -58,6 +58,9 @@ struct SeenBoard {
 /// The corners that a calibration rests on, by a number that is the same in every view, rising.
 std::vector<SeenPoint> corners_of(const SeenBoard& seen);
 
+/// Grey levels of 8 bits; of 16 bits with the brightest at 255.
+cv::Mat1b eight_bits(const cv::Mat& image);
+
 /// Finds a board's tags, or the corners of its squares (SquareCorners). Boards of AprilTags without
 /// corner squares by libapriltag, with corners where the
 /// tag's edges cross (with_exact_edges()), or its own where that fails; the gap between tags has to

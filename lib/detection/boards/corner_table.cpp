@@ -12,6 +12,7 @@
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
+#include "detection/boards/lattice_order.h"
 #include "rig/board_layout.h"
 #include "rig/yaml_text.h"
 
@@ -121,6 +122,9 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
   for (ImageCorners& corners : images) {
     const std::string name = corners.image;
     views.push_back({name, imager_px, seen_board(std::move(corners), ids)});
+    if (!board.has_squares()) continue;
+    order_lattice(views.back().seen.points, board.cols - 1, board.rows - 1,
+                  board.kind == BoardKind::chessboard);
   }
   return views;
 }

@@ -18,6 +18,11 @@ namespace {
 
 constexpr int kFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
 
+/// Whether the pixel lies in the image, which one that is not finite does not.
+bool in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
+  return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < image.cols && pixel.y() < image.rows;
+}
+
 /// Nothing is left to chance: what OpenCV draws is the same for every image.
 void start_chance() { cv::theRNG().state = 1; }
 
@@ -26,7 +31,6 @@ void start_chance() { cv::theRNG().state = 1; }
 SquareCorners::SquareCorners(const Board& board)
     : cols_(board.cols - 1),
       rows_(board.rows - 1),
-      kind_(board.kind),
       square_size_m_(board.square_size_m),
       margin_m_((board.square_size_m - board.tag_size_m) / 2),
       layout_(board_layout(board)) {}
@@ -38,6 +42,7 @@ std::vector<SeenPoint> SquareCorners::exact(const std::vector<Guess>& guesses,
   constexpr double edge_px = 2;  // a corner nearer to the image's edge is cut short
   std::vector<SeenPoint> points;
   for (const auto& [index, pixel, next, free_px] : guesses) {
+    if (!in_image(pixel, image.sharp)) continue;
     const int radius_px = std::clamp(static_cast<int>(free_px / 2), least_px, most_px);
     const int reach_px = std::clamp(static_cast<int>(free_px * 0.8), least_px, 2 * most_px);
     const auto saddle = saddle_point(image.smoothed, pixel, reach_px, radius_px);
@@ -87,6 +92,7 @@ std::vector<SeenPoint> SquareCorners::beside(const std::vector<SeenTag>& markers
                                              const GreyLevels& image) const {
   constexpr std::size_t enough = 4;
   constexpr double adjacent = 0.8, near = 2.2;  // in squares
+  constexpr double misread = 0.25;  // of a square: one of the markers is clutter, read as another
   std::vector<Guess> guesses;
   for (int row = 0; row < rows_; ++row) {
     for (int col = 0; col < cols_; ++col) {
@@ -118,8 +124,11 @@ std::vector<SeenPoint> SquareCorners::beside(const std::vector<SeenTag>& markers
       const Eigen::Vector2d here = seen(here_m);
       const Eigen::Vector2d right = seen(here_m + Eigen::Vector2d(square_size_m_, 0));
       const Eigen::Vector2d down = seen(here_m + Eigen::Vector2d(0, square_size_m_));
-      if (!here.allFinite() || !right.allFinite() || !down.allFinite()) continue;
       const double square_px = std::min((right - here).norm(), (down - here).norm());
+      const bool one_plane = std::all_of(pairs.begin(), pairs.end(), [&](const PlanePair& pair) {
+        return (seen(pair.from) - pair.to).norm() < misread * square_px;
+      });
+      if (!one_plane) continue;
       guesses.push_back({static_cast<std::size_t>(row * cols_ + col),
                          here,
                          {right, down},
@@ -132,8 +141,7 @@ std::vector<SeenPoint> SquareCorners::beside(const std::vector<SeenTag>& markers
 std::array<int, 2> chessboard_shown(const cv::Mat& image) {
   constexpr int least_px = 10;
   if (std::min(image.cols, image.rows) < least_px) return {0, 0};
-  cv::Mat1b levels;
-  image.convertTo(levels, CV_8U, image.depth() == CV_16U ? 1 / 257.0 : 1);
+  const cv::Mat1b levels = eight_bits(image);
   std::vector<cv::Point2f> corners;
   cv::Mat squares;
   start_chance();

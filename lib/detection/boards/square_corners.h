@@ -38,7 +38,6 @@ class SquareCorners {
   std::vector<SeenPoint> exact(const std::vector<Guess>& guesses, const GreyLevels& image) const;
 
   int cols_, rows_;
-  BoardKind kind_;
   double square_size_m_, margin_m_;
   std::vector<BoardTag> layout_;
 };

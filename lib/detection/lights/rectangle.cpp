@@ -207,7 +207,7 @@ std::optional<Matrix2> center_covariance(const std::array<StraightEdge, 4>& edge
   return covariance;
 }
 
-/// Half the product of the sides, of any polygon.
+/// By the cross products of its corners, one after the other.
 double area_of(const std::vector<Eigen::Vector2d>& polygon) {
   double twice = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {

@@ -110,6 +110,26 @@ TEST(SquareCorners, OfACharucoBoardAreThoseInView) {
   }
 }
 
+// Clutter that looks like a marker which the board has, and whose place is elsewhere.
+TEST(SquareCorners, AreNotMovedByAMisreadMarker) {
+  const Board board = squares(BoardKind::charuco, 7, 5);
+  const cv::Mat1b image = drawn_by_opencv(board);
+  cv::Mat1f smoothed;
+  image.convertTo(smoothed, CV_32F);
+  cv::GaussianBlur(smoothed, smoothed, {}, 1);
+  const GreyLevels grey{image, smoothed};
+  SeenBoard seen = BoardDetector(board).detect(image);
+  for (const double off_px : {30.0, 1e12}) {
+    for (auto& corner_px : seen.tags[7].corners_px) corner_px.x() += off_px;
+    const auto points = SquareCorners(board).beside(seen.tags, grey);
+    EXPECT_GE(points.size(), 8U);
+    EXPECT_LT(points.size(), seen.points.size());
+    for (const SeenPoint& point : points) {
+      EXPECT_LT((point.pixel - place_of(board, point.index)).norm(), 0.05) << point.index;
+    }
+  }
+}
+
 TEST(SquareCorners, OfAChessboardAreCountedWithTheImage) {
   for (const auto& [cols, rows] : {std::pair(9, 6), std::pair(9, 7), std::pair(8, 8)}) {
     SCOPED_TRACE(cols * 10 + rows);
