@@ -167,6 +167,21 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
   judge(line_signal(lines, chords, background.level));
 }
 
+void LampDetector::correct_shear(std::vector<Light>& lights) const {
+  const auto has_sharp_circle = [](const Light& light) {
+    return light.sums && !light.glows && !light.uneven;
+  };
+  std::vector<OutlineSums> sums;
+  for (const Light& light : lights) {
+    if (has_sharp_circle(light)) sums.push_back(*light.sums);
+  }
+  const auto shear = Shear::common(sums);
+  if (!shear) return;
+  for (Light& light : lights) {
+    if (has_sharp_circle(light)) shape_.shift(shear->oval_of(*light.sums), light);
+  }
+}
+
 std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
   const Background background = background_of(image);
   const cv::Mat lines = lines_of(image, camera_.readout, background);
@@ -178,6 +193,7 @@ std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
   }
   std::vector<Light> lights = joined(parts, shape_, background);
   for (Light& light : lights) measure(lines, background, light);
+  correct_shear(lights);
   for (Light& light : formless_lights(std::move(parts), lights, shape_, lines.size())) {
     lights.push_back(std::move(light));
   }

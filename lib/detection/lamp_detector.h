@@ -49,6 +49,8 @@ class LampDetector {
                                   const Background& background) const;
   /// The outline once more, exactly, and the stripes.
   void measure(const cv::Mat& lines, const Background& background, Light& light) const;
+  /// The centres of lights that a moving camera sees in part, see Shear.
+  void correct_shear(std::vector<Light>& lights) const;
   void identify(std::vector<Light>& lights, const cv::Size& size) const;
   /// Whether a light looks like that lamp: round, or a rectangle with its sides' ratio.
   bool has_shape_of(const Light& light, int lamp) const;

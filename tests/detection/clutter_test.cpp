@@ -14,6 +14,10 @@ TEST_P(Clutter, MisleadsNoDetection) {
   EXPECT_GE(score.lamps, 20);
   EXPECT_EQ(score.wrong, 0);
   EXPECT_EQ(score.missed, 0);
+  EXPECT_LT(score.chi_square / score.lamps, 2.5);
+  EXPECT_GE(score.hidden, 15);
+  EXPECT_LT(score.hidden_chi_square / score.hidden,
+            5);  // moving, too: 1 m/s and 90 degrees a second
 }
 
 INSTANTIATE_TEST_SUITE_P(Folders, Clutter,

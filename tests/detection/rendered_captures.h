@@ -21,6 +21,9 @@ namespace vlp {
 struct Score {
   int lamps = 0, missed = 0, wrong = 0;
   double squares = 0, worst_px = 0, chi_square = 0;
+  /// Of those hidden in part.
+  int hidden = 0;
+  double hidden_chi_square = 0;
 
   double rms_px() const { return std::sqrt(squares / lamps); }
 };
@@ -80,11 +83,17 @@ class Captures {
       const double sigma_px = light->second.sigma_px;
       found.erase(light);
       if (error_px > 5) ++score.wrong;
-      if (in_view < 1 || error_px > 5 || !counts(id)) continue;
+      if (error_px > 5 || !counts(id)) continue;
+      const double chi_square = error_px * error_px / 2 / std::pow(sigma_px, 2);
+      if (in_view < 1) {
+        ++score.hidden;
+        score.hidden_chi_square += chi_square;
+        continue;
+      }
       ++score.lamps;
       score.squares += error_px * error_px;
       score.worst_px = std::max(score.worst_px, error_px);
-      score.chi_square += error_px * error_px / 2 / std::pow(sigma_px, 2);
+      score.chi_square += chi_square;
     }
     score.wrong += static_cast<int>(found.size());
   }

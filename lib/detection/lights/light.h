@@ -8,6 +8,7 @@
 
 #include "detection/identity/stripes.h"
 #include "detection/lights/outline.h"
+#include "detection/lights/shear.h"
 
 namespace vlp {
 
@@ -79,6 +80,8 @@ struct Light {
   double outside;
   /// As (column, row) of the lines that the shutter reads: (v, u) for a read-out along columns.
   std::vector<EdgePoint> outline;
+  /// Of a circle in the level plane what it leaves of the outline.
+  std::optional<OutlineSums> sums;
 };
 
 inline bool is_rectangle(const Light& light) { return !light.face.empty(); }

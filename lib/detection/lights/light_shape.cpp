@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numbers>
 
 #include "detection/lights/robust_circle.h"
@@ -32,20 +33,19 @@ double median_rise_px(const std::vector<EdgePoint>& outline) {
 
 /// The points of the circle, but those next to a point that is not: where the edge of what hides a
 /// part of the light meets the outline, both are blurred.
-std::vector<EdgePoint> on_circle(const std::vector<EdgePoint>& outline,
-                                 const std::vector<bool>& inliers) {
+std::vector<bool> on_circle(const std::vector<EdgePoint>& outline,
+                            const std::vector<bool>& inliers) {
   constexpr double reach_px = 4;
-  std::vector<EdgePoint> all, clear;
+  std::vector<bool> clear = inliers;
   for (std::size_t i = 0; i < outline.size(); ++i) {
-    if (!inliers[i]) continue;
-    bool near = false;
-    for (std::size_t j = 0; j < outline.size() && !near; ++j) {
-      near = !inliers[j] && (outline[j].pixel - outline[i].pixel).norm() < reach_px;
+    for (std::size_t j = 0; j < outline.size() && clear[i]; ++j) {
+      clear[i] = inliers[j] || (outline[j].pixel - outline[i].pixel).norm() >= reach_px;
     }
-    all.push_back(outline[i]);
-    if (!near) clear.push_back(outline[i]);
   }
-  return 2 * clear.size() < all.size() ? all : clear;
+  const auto count = [](const std::vector<bool>& points) {
+    return std::count(points.begin(), points.end(), true);
+  };
+  return 2 * count(clear) < count(inliers) ? inliers : clear;
 }
 
 /// The ratio of an ellipse's axes.
@@ -57,14 +57,9 @@ double slenderness(const Matrix2& rim_from_circle) {
 }
 
 /// A circle is an ellipse, too.
-std::optional<RobustEllipse> fit_round(const std::vector<Eigen::Vector2d>& points,
-                                       const std::vector<double>& weights, double tolerance,
-                                       bool circle) {
-  if (!circle) return fit_robust_ellipse(points, weights, tolerance);
-  auto fit = fit_robust_circle(points, weights, tolerance);
-  if (!fit) return std::nullopt;
-  return RobustEllipse{fit->circle.center, fit->circle.radius * Matrix2::Identity(),
-                       fit->center_covariance, std::move(fit->inliers), fit->count};
+RobustEllipse as_ellipse(RobustCircle fit) {
+  return {fit.circle.center, fit.circle.radius * Matrix2::Identity(), fit.center_covariance,
+          std::move(fit.inliers), fit.count};
 }
 
 }  // namespace
@@ -115,7 +110,17 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   // Half a level is passed within half a pixel or so; noise blurs that, and a soft edge.
   const double tolerance_px =
       std::max({0.35, 8 * background.noise / brightest, 0.4 * median_rise_px(outline)});
-  const auto fit = fit_round(points, weights, tolerance_px * per_px, camera_.lens.has_value());
+  const double tolerance = tolerance_px * per_px;
+  std::optional<RobustEllipse> fit;
+  std::optional<Circle> circle;
+  if (camera_.lens) {
+    if (auto found = fit_robust_circle(points, weights, tolerance)) {
+      circle = found->circle;
+      fit = as_ellipse(std::move(*found));
+    }
+  } else {
+    fit = fit_robust_ellipse(points, weights, tolerance);
+  }
   if (!fit || fit->count < static_cast<int>(kLeastOutlinePoints)) return std::nullopt;
   if (!camera_.lens && slenderness(fit->rim_from_circle) > most_slender) return std::nullopt;
 
@@ -136,9 +141,33 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
   light.sigma_px = std::max(kMinSigma_px, sigma_px);
   light.roundness = double(fit->count) / double(outline.size());
-  light.outline = on_circle(outline, fit->inliers);
+  const std::vector<bool> shown = on_circle(outline, fit->inliers);
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    if (shown[i]) light.outline.push_back(outline[i]);
+  }
+  if (circle) light.sums.emplace(points, weights, shown, *circle, line_slope_at(*circle));
   light.rise_px = median_rise_px(light.outline);
   return light;
+}
+
+Eigen::Vector2d LightShape::line_slope_at(const Circle& circle) const {
+  const auto line = [&](double x, double y) {
+    const auto pixel = pixel_of(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
+    return pixel ? turned(*pixel).y() : std::numeric_limits<double>::quiet_NaN();
+  };
+  return Eigen::Vector2d(line(1, 0) - line(-1, 0), line(0, 1) - line(0, -1)) / circle.radius;
+}
+
+void LightShape::shift(const Oval& oval, Light& light) const {
+  const auto estimate = light.sums->solved(oval);
+  if (!estimate) return;
+  const Circle& circle = light.sums->circle();
+  const auto pixel = pixel_of(circle.center + circle.radius * estimate->p.head<2>());
+  if (!pixel) return;
+  light.pixel = *pixel;
+  const double sigma_px =
+      light.radius_px * std::sqrt(estimate->covariance.topLeftCorner<2, 2>().trace() / 2);
+  light.sigma_px = std::clamp(sigma_px, kMinSigma_px, kMaxSigma_px);
 }
 
 std::vector<EdgePoint> LightShape::outside(const Light& light,

@@ -39,6 +39,9 @@ class LightShape {
   /// when it is not round, or its centre is not known to a pixel or so.
   std::optional<Light> light_of(std::vector<EdgePoint> outline, const Background& background) const;
 
+  /// Moves the centre to where it is with the outline as oval as that, and states its sigma_px.
+  void shift(const Oval& oval, Light& light) const;
+
   /// The points that lie outside a light.
   std::vector<EdgePoint> outside(const Light& light, const std::vector<EdgePoint>& outline) const;
 
@@ -53,6 +56,9 @@ class LightShape {
   std::optional<Eigen::Vector2d> pixel_of(const Eigen::Vector2d& plane) const;
 
  private:
+  /// By how many lines the shutter reads a point later than the centre, over its x, y.
+  Eigen::Vector2d line_slope_at(const Circle& circle) const;
+
   DetectorCamera camera_;
 };
 
