@@ -100,6 +100,30 @@ class Look(unittest.TestCase):
         self.assertEqual(self.glance("folders"), said[-1])  # as the page says
         self.assertNotEqual(self.glance("files"), said[-1])
 
+    def looked(self, days=0):
+        """How, where nothing is asked for and sessions are many, so many days later."""
+        now = time.time_ns() + self.at_ns + days * 86400 * 10**9
+        with unittest.mock.patch.multiple(catalogue, FEW_SESSIONS=1):
+            with unittest.mock.patch.object(catalogue.time, "time_ns", return_value=now):
+                known = catalogue.Catalogue(self.file, self.archive)
+                how = known.look_for(2)
+                known.glances(["c/other", "c/s"], how)
+                known.save({0: ["c/other", "c/s"]}, 50)
+        return how
+
+    def test_many_sessions_are_looked_at_by_folders_and_once_a_week_by_files(self):
+        known = catalogue.Catalogue(self.file, self.archive)
+        self.assertEqual(known.look_for(catalogue.FEW_SESSIONS), "files")
+        said = [self.glance("folders")]  # the first look, which is at all
+        self.assertEqual([self.looked(days) for days in (0, 1, 6)], ["folders"] * 3)
+        self.written_over("boards/0.png", "two")
+        self.assertEqual(self.glance("folders"), said[0])
+        self.assertEqual([self.looked(days) for days in (8, 9, 14)], ["files", "folders", "folders"])
+        self.assertNotEqual(self.glance("folders"), said[0])  # noticed within the week
+        self.assertEqual(self.looked(-1), "files")  # the clock was set back
+        known = catalogue.Catalogue(self.file, self.archive)
+        self.assertEqual(known.look_for(catalogue.FEW_SESSIONS), "files")
+
     def test_what_is_as_new_as_the_look_is_looked_at_again(self):
         for how in ("files", "folders"):
             self.at_ns = -10_000_000_000
@@ -144,7 +168,7 @@ class Look(unittest.TestCase):
         known = catalogue.Catalogue(self.file, self.archive)
         self.assertEqual((known.shard_of("c/s"), known.shard_of("c/other")), (3, None))
         before = self.file.stat().st_mtime_ns
-        known.glances(["c/s"], "files")
+        known.glances(["c/s"], "folders")
         known.save({3: ["c/s"]}, 50)
         self.assertEqual(self.file.stat().st_mtime_ns, before)
 

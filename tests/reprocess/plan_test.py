@@ -41,6 +41,11 @@ class Plan(unittest.TestCase):
         self.assertEqual(sorted(name for names in then.values() for name in names), sorted(sessions))
         self.assertEqual(plan.shards_of(sorted(sessions), known, 5, 1)[0], sorted(sessions)[:5])  # another size
 
+    def test_says_what_was_looked_at(self):
+        known = unittest.mock.Mock(all_files_at_ns=lambda: 1_773_489_600 * 10**9)  # at noon in UTC
+        self.assertEqual(plan.looked_at(known, "files"), "looked at all files")
+        self.assertEqual(plan.looked_at(known, "folders"), "looked at folders and tables, at all files last on 2026-03-14")
+
     def test_only_shards_that_are_not_done_and_summed_up_are_to_do(self):
         with tempfile.TemporaryDirectory() as folder:
             state, summary_file = Path(folder) / ".state", Path(folder) / "summary.csv"
