@@ -90,6 +90,13 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   [ "$code" = 2 ] && grep -q 'archive.csv:2: date: should be as' "$scratch/errors" || fail "$code $(cat "$scratch/errors")"
 )
 
+"$source_dir/scripts/reprocess.sh" --help >"$said"
+[ "$(wc -L <"$said")" -le 80 ] && grep -q '^Exit code: ' "$said" || fail "help is wider than a terminal, or cut short"
+options_of() { sed -n '/^while/,/^done/p' "$1" | grep -o -- '--[a-z][a-z-]*' | grep -v -x -- '--camera-option\|--help' | sort -u; }
+for option in $(options_of "$source_dir/scripts/reprocess.sh"); do
+  grep -q -- "^$option " "$said" || fail "--help does not tell of $option"
+done
+
 refused() {  # MESSAGE ARGUMENT...: exit code 2 and one line
   local code=0
   "$source_dir/scripts/reprocess.sh" "${@:2}" >/dev/null 2>"$scratch/errors" || code=$?
