@@ -51,6 +51,23 @@ class OverTime(unittest.TestCase):
         self.assertGreaterEqual(found_cameras, 3 * fleets - 7)  # of 600 cameras 39 are missed, nearly all tilts
         self.assertLessEqual(false, 4)  # 1 is expected at most
 
+    def test_says_how_large_a_change_is_found(self):
+        fleets = 40
+        least = fleet.fleet_of(*fleet_rows(Fleet(0)))["least_found"]
+        self.assertEqual(set(least), {*made_up_fleet.SDS, "lamps"})
+        over_a_year = least["center"]["drift"] * 199 / 180  # a camera's sessions are not all of it
+        by_mm = least["lamps"]["step"]
+        drifts = steps = moved = 0
+        for seed in range(2000, 2000 + fleets):
+            changes_of_it = {"drifts": {4: {"center": (over_a_year, 0)}}, "broken": {9: (5, {"center": (0, least["center"]["step"])})}}
+            found = fleet.fleet_of(*fleet_rows(Fleet(seed, **changes_of_it, moved=[(0, 4, 182, complex(0, by_mm))])))
+            called = {alarm["camera"] for alarm in found["cameras"]}
+            drifts += "camera-04" in called
+            steps += "camera-09" in called
+            moved += any(lamp["lamp"] == 4 for lamp in found["lamps"])
+        for number in (drifts, steps, moved):
+            self.assertGreaterEqual(number, 33, (drifts, steps, moved))  # 38 are expected, less 3.6 sigma
+
     def test_says_of_a_camera_that_broke_between_which_sessions(self):
         for seed in range(5):
             made_up = Fleet(seed, broken={7: (6, {"center": (0.4, -0.3)})})
