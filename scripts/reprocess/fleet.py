@@ -143,27 +143,35 @@ def change_of(rows, series, tests):
     return {"kind": kind, "change": change, "sd": sd, "p": min(1.0, p), **ends}
 
 
+def usual(sds):
+    """The median sd of a change, of as many series as are worth the time."""
+    some = [sd for sd in (of_one() for of_one in sds[:: 1 + len(sds) // 1000]) if sd]
+    return statistics.median(some) if some else None
+
+
+def sd_in_the_middle(series):
+    """Of a step."""
+    half = len(series) // 2
+    return math.sqrt(sum(1 / sum(1 / sd**2 for _, sd in part) for part in (series[:half], series[half:])))
+
+
 def least_found_of(of_figures, factors, tests):
     """Of each kind of figure that is tried: {"drift", "step"}, in its unit. of_figures: (kind, times, series)."""
-    sds = {name: {"drift": [], "step": []} for name in TWO if factors[name]}
-    for name, times, series in of_figures:
-        if name in sds:
-            sds[name]["step"].append(list(steps(series))[len(series) // 2 - 1][1])
-            if line := drift(times, series):
-                sds[name]["drift"].append(line[1])
     z = {kind: NORMAL.inv_cdf(FOUND_SHARE) - NORMAL.inv_cdf(FALSE_ALARM_RATE / 4 / max(1, tests[kind])) for kind in tests}
-    return {
-        name: {kind: factors[name] * z[kind] * statistics.median(of_kind) for kind, of_kind in both.items() if of_kind}
-        for name, both in sds.items()
-    }
+    found = {}
+    for name in (name for name in TWO if factors[name]):
+        of_kind = [(times, series) for kind, times, series in of_figures if kind == name]
+        sds = {"drift": usual([lambda of=of: (drift(*of) or (0, None))[1] for of in of_kind])}
+        sds["step"] = usual([lambda of=of: sd_in_the_middle(of[1]) for of in of_kind])
+        found[name] = {kind: factors[name] * z[kind] * sd for kind, sd in sds.items() if sd}
+    return found
 
 
 def least_found_of_lamps(rooms, factor, tests):
     """In mm: a step in the middle, whatever its direction."""
-    series = [one for room in rooms for lamp in room.series for one in room.along(lamp, factor) if len(one) > 1]
-    sds = [list(steps(one))[len(one) // 2 - 1][1] for one in series]
+    series = [one for room in rooms for lamp in room.series for one in room.along(lamp) if len(one) > 1]
     z = math.sqrt(-2 * math.log(FALSE_ALARM_RATE / 2 / tests["step"])) + NORMAL.inv_cdf(FOUND_SHARE)
-    return {"step": z * statistics.median(sds)}
+    return {"step": z * factor * usual([lambda one=one: sd_in_the_middle(one) for one in series])}
 
 
 def smallness(change):
