@@ -4,37 +4,52 @@
 #
 # Runs vlp-calibrate again over an archive of captures, and says what changed.
 #
-#   scripts/reprocess.sh ARCHIVE RESULTS [--gates FILE] [--previous RESULTS] [--cores N]
-#                        [--profile slurm] [--session-gates FILE] [--row-time-s S]
-#                        [--readout rows|columns] [--shard-size N] [--keep N]
-#                        [--look files|folders] [--rebuild-catalogue]
+#   scripts/reprocess.sh ARCHIVE RESULTS [--gates FILE] [--previous RESULTS]
+#                        [--cores N] [--profile slurm] [--session-gates FILE]
+#                        [--row-time-s S] [--readout rows|columns]
+#                        [--shard-size N] [--keep N] [--look files|folders]
+#                        [--rebuild-catalogue]
 #   scripts/reprocess.sh --diff RESULTS CAMERA/SESSION [KEY | OTHER_RESULTS]
 #
-# ARCHIVE/CAMERA/SESSION/ is laid out as vlp-calibrate has it, and only read. RESULTS gets
-#   summary.csv            a row per session: verdict, figures, what to look at, reason, version, cost
-#   fleet.csv, lamps.csv   what was calibrated, and where each lamp was seen, over time
-#   overview.html          the same for people, with what changed since --previous
+# ARCHIVE/CAMERA/SESSION/ is laid out as vlp-calibrate has it, and only read.
+# RESULTS gets
+#   summary.csv            a row per session: verdict, figures, what to look at,
+#                          reason, version, cost
+#   fleet.csv, lamps.csv   what was calibrated, and where each lamp was seen,
+#                          over time
+#   overview.html          the same for people, with what changed since
+#                          --previous
 #   changes.json           that comparison for programs, and the gates
-#   sessions/, failed/     per session its results, or why there are none: session.json
-# What is current is not run again; an interrupted run goes on. A session without a result does not stop
-# the others.
+#   sessions/, failed/     per session its results, or why there are none:
+#                          session.json
+# What is current is not run again; an interrupted run goes on. A session
+# without a result does not stop the others.
 #
 # --cores N        at a time on this machine (default: all)
-# --profile NAME   a profile of scripts/reprocess/profiles or a folder: slurm submits shards to a cluster
+# --profile NAME   a profile of scripts/reprocess/profiles or a folder: slurm
+#                  submits shards to a cluster
 # --previous       results of an earlier run to compare with
-# --gates          what the archive as a whole has to keep to, vlp-archive-gates/1
-# --session-gates  gates (vlp-gates/1) for sessions that have no gates.yaml of their own
+# --gates          what the archive as a whole has to keep to,
+#                  vlp-archive-gates/1
+# --session-gates  gates (vlp-gates/1) for sessions that have no gates.yaml of
+#                  their own
+# --row-time-s     from one row of the read-out to the next (default: found)
+# --readout        along which the shutter reads (default: found)
 # --shard-size N   sessions in a job at most (default 50)
-# --keep N         results that a session had before, of which so many stay in former/ (default 0)
-# --look           at what, to see that a session changed: files (default) shows all
-#                  that the file system does; folders, with tables and YAML files, is
-#                  some eight times as fast: where no image is written over in place
+# --keep N         results that a session had before, of which so many stay in
+#                  former/ (default 0)
+# --look           at what, to see that a session changed: at its files, or at
+#                  its folders, tables and YAML files, to which an image that
+#                  is written over in place looks the same. Default: files; in
+#                  an archive of more than 10,000 sessions folders, and files
+#                  once in 7 days
 # --rebuild-catalogue  forgets what was seen: all contents are looked at again
-# --diff           says what differs between a session's result and a former one, by its key's first letters
-#                  (default: the last one), or that of other results
+# --diff           says what differs between a session's result and a former
+#                  one, by its key's first letters (default: the last one), or
+#                  that of other results
 #
-# Exit code: 0 done; 1 done, and a gate is not met, of the archive or, where it has no gate_share, of a
-# session; 2 bad input; 3 not all could be done.
+# Exit code: 0 done; 1 done, and a gate is not met, of the archive or, where it
+# has no gate_share, of a session; 2 bad input; 3 not all could be done.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
 bin=${VLP_PROGRAMS_DIR:-}

@@ -18,6 +18,7 @@
 #include "positioning/lean.h"
 #include "positioning/residual_noise.h"
 #include "rig/find_lamp.h"
+#include "session/lamp_offsets.h"
 
 namespace vlp {
 namespace {
@@ -268,37 +269,27 @@ bool has_a_lamp_twice(const std::vector<Detection>& detections) {
   return ids.size() < detections.size();
 }
 
-/// Of those that two captures or more see beside two other lamps or more.
-std::vector<LampOffset> offsets_of_lamps(const LocateInput& input, const PositionerOptions& how) {
-  const Positioner positioner(input.lamps, input.calibration, how);
+/// What the fixes see.
+std::vector<CeilingView> ceiling_views(const LocateInput& input, const std::vector<Fix>& fixes) {
   const Lens lens(input.calibration.camera.lens_model, input.calibration.camera.intrinsics);
-  const Eigen::Matrix3d base_from_camera = level_from_camera(input.calibration, how.correction);
-  std::map<int, std::vector<Eigen::Vector2d>> seen;
+  const Eigen::Matrix3d base_from_camera =
+      level_from_camera(input.calibration, input.how.correction);
+  std::vector<CeilingView> views;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const auto& [image, detections] = input.frames[i];
+    const auto& detections = input.frames[i].detections;
     if (has_a_lamp_twice(detections)) continue;  // which of the two it is nobody knows
+    if (!fixes[i].ok() || fixes[i].lamps < 2) continue;
+    const Eigen::Vector3d& camera_m = fixes[i].estimate.pose.position_m;
+    CeilingView view{camera_m.head<2>(), {}};
     for (const Detection& one : detections) {
-      std::vector<Detection> others;
-      std::copy_if(detections.begin(), detections.end(), std::back_inserter(others),
-                   [&](const Detection& other) { return other.lamp != one.lamp; });
-      const Fix fix = positioner.locate(others, sensors_of(image, input));
-      if (!fix.ok() || fix.lamps < 2) continue;
-      const auto off = off_m(input, i, fix, one.lamp, lens, base_from_camera);
-      if (off) seen[one.lamp].push_back(*off);
+      const auto off = off_m(input, i, fixes[i], one.lamp, lens, base_from_camera);
+      if (!off) continue;
+      const Eigen::Vector3d& map_m = find_lamp(input.lamps.lamps, one.lamp)->position_m;
+      view.lamps.push_back({one.lamp, map_m.head<2>() + *off, map_m.z() - camera_m.z()});
     }
+    views.push_back(std::move(view));
   }
-  std::vector<LampOffset> offsets;
-  for (const auto& [id, all_m] : seen) {
-    if (all_m.size() < 2) continue;
-    const auto count = static_cast<double>(all_m.size());
-    Eigen::Vector2d mean_m(0, 0), squares_m2(0, 0);
-    for (const Eigen::Vector2d& one_m : all_m) mean_m += one_m / count;
-    for (const Eigen::Vector2d& one_m : all_m) squares_m2 += (one_m - mean_m).cwiseAbs2();
-    offsets.push_back({id, static_cast<int>(all_m.size()),
-                       find_lamp(input.lamps.lamps, id)->position_m.head<2>(), mean_m,
-                       (squares_m2 / (count * (count - 1))).cwiseSqrt()});
-  }
-  return offsets;
+  return views;
 }
 
 void tell_of_lamps_left_out(LocateResult& result, const LocateInput& input) {
@@ -382,7 +373,9 @@ LocateResult locate_frames(const LocateInput& input) {
   warn_of_map(result, input);
   warn_of_captures(result, input);
   tell_of_lamps_left_out(result, input);
-  if (input.lamp_offsets) result.lamp_offsets = offsets_of_lamps(input, how);
+  if (input.lamp_offsets) {
+    result.lamp_offsets = offsets_of_lamps(input.lamps, ceiling_views(input, result.fixes));
+  }
   result.summary = summarize(result.rows);
   if (result.summary.fixes == 0) {
     result.fail(StepFailure::undetermined,

@@ -37,7 +37,7 @@ struct LocateInput {
   double lean_sd_rad = 0;
   /// Standard deviation of the z_m of `captures`, which then counts.
   std::optional<double> height_sd_m = {};
-  /// Of every lamp, too: a fix more for each lamp of a capture.
+  /// Of every lamp, too.
   bool lamp_offsets = false;
   /// Captures that are fixed together, with one velocity: this and those before it, within 0.2 s.
   int frames_together = 1;

@@ -39,9 +39,9 @@ struct LampLeftOut {
   int captures;
 };
 
-/// Where the other lamps see a lamp, on the ceiling and in the world, less where the map has it:
-/// the mean over captures, and its standard deviation by their scatter. A lamp that moves by d is
-/// seen d off, the others otherwise.
+/// Where the other lamps see a lamp, on the ceiling and in the world, less where the map has it, by
+/// all captures together, and its standard deviation by what they leave over. A lamp that moves by
+/// d is seen d off, the others otherwise.
 struct LampOffset {
   int lamp;
   int captures;

@@ -11,6 +11,9 @@ the time of an inode. Two ways to look:
            go, are renamed or replaced by others of their name. An image that is written over in place, or to which a
            symbolic link leads, is not seen to change. Where something did, all files of the session are looked at.
 
+Unless one is asked for, an archive of FEW_SESSIONS, where it takes few seconds, is looked at by its files, and a
+larger one by its folders, once in ALL_FILES_AGAIN_NS by its files.
+
 A change within RACY_NS of a look may leave times as they were, since file systems count them in steps and clocks of
 machines differ: a glance at files that are so new is salted with the time, and is another one the next time.
 A catalogue that is new, is another archive's, or cannot be read has a salt of its own: all glances are others than
@@ -28,6 +31,8 @@ from urllib.parse import quote
 from files import INPUTS
 
 LOOKS = ("files", "folders")
+FEW_SESSIONS = 10_000
+ALL_FILES_AGAIN_NS = 7 * 86400 * 1_000_000_000
 RACY_NS = 2_000_000_000  # FAT counts in 2 s
 CHUNK = 100  # sessions
 AT_A_TIME = 16  # looks, where the file system lets us wait
@@ -119,7 +124,7 @@ class Catalogue:
 
     def _begin(self):
         self.stated = {"archive": self.archive, "salt": str(time.time_ns())}
-        self.sessions, self.places, self.new = {}, [], True
+        self.saved, self.sessions, self.places, self.new = {}, {}, [], True
 
     def _open(self, file):
         # The run's lock keeps others away; locks of SQLite are not for every network's file system.
@@ -131,6 +136,7 @@ class Catalogue:
             if database.execute("PRAGMA user_version").fetchone()[0] != FORMAT:
                 return False
             self.stated = dict(database.execute("SELECT name, value FROM stated"))
+            self.saved = dict(self.stated)
             self.places = [paths.split("\n") for (paths,) in database.execute("SELECT paths FROM places ORDER BY id")]
             rows = database.execute("SELECT session, shard, glance, at_folders, places FROM sessions")
             self.sessions = {row[0]: row[1:] for row in rows}
@@ -139,16 +145,29 @@ class Catalogue:
         self.new = False
         return self.stated.get("archive") == self.archive
 
+    def look_for(self, sessions):
+        """How to look at so many."""
+        age_ns = time.time_ns() - self.all_files_at_ns()
+        return "folders" if sessions > FEW_SESSIONS and 0 <= age_ns < ALL_FILES_AGAIN_NS else "files"
+
+    def all_files_at_ns(self):
+        """When all files were looked at last."""
+        return int(self.stated.get("all_files_at_ns", 0))
+
     def glances(self, names, how):
         """Of each session, in this order."""
+        began_ns = time.time_ns()
         archive = os.open(self.archive, os.O_RDONLY)
         try:
-            return self._glances(names, how, archive)
+            found = self._glances(names, how, archive, began_ns)
         finally:
             os.close(archive)
+        if how == "files" or self.new:
+            self.stated["all_files_at_ns"] = str(began_ns)
+        return found
 
-    def _glances(self, names, how, archive):
-        began_ns, salt = time.time_ns(), self.stated["salt"]
+    def _glances(self, names, how, archive, began_ns):
+        salt = self.stated["salt"]
         numbers_of_places = {"\n".join(paths): number for number, paths in enumerate(self.places)}
 
         def look(name):
@@ -193,8 +212,8 @@ class Catalogue:
         now = {name: (number, *self.found[name]) for number, names in shards.items() for name in names}
         changed = [(name, *row) for name, row in now.items() if self.new or self.sessions.get(name) != row]
         gone = [] if self.new else [(name,) for name in self.sessions.keys() - now.keys()]
-        stated = self.stated | {"shard_size": str(size)}
-        if not (self.new or changed or gone or stated != self.stated):
+        self.stated["shard_size"] = str(size)
+        if not (self.new or changed or gone or self.stated != self.saved):
             return
         file = self.file.with_suffix(".new") if self.new else self.file
         if self.new:
@@ -208,7 +227,7 @@ class Catalogue:
                     database.execute("CREATE TABLE places (id INTEGER PRIMARY KEY, paths TEXT)")
                     columns = "session TEXT PRIMARY KEY, shard INTEGER, glance TEXT, at_folders TEXT, places INTEGER"
                     database.execute(f"CREATE TABLE sessions ({columns}) WITHOUT ROWID")
-                database.executemany("REPLACE INTO stated VALUES (?, ?)", stated.items())
+                database.executemany("REPLACE INTO stated VALUES (?, ?)", self.stated.items())
                 texts = [(number, "\n".join(paths)) for number, paths in enumerate(self.places)]
                 database.executemany("INSERT OR IGNORE INTO places VALUES (?, ?)", texts)
                 database.executemany("REPLACE INTO sessions VALUES (?, ?, ?, ?, ?)", changed)
@@ -218,4 +237,4 @@ class Catalogue:
         if self.new:
             self.file.with_name(self.file.name + "-journal").unlink(missing_ok=True)  # of the one that was there
             os.replace(file, self.file)
-        self.sessions, self.stated, self.new = now, stated, False
+        self.sessions, self.saved, self.new = now, dict(self.stated), False

@@ -16,6 +16,9 @@ divided by a factor with a relative variance v, exp(z^4 v / 2) times as many are
 z^2 v / 2 of it makes good, with z = 4.5. v = 2 / n is not derived but chosen on the safe side, since a few are left
 out and neighbours go together: of all of n independent ones it would be 1 / (2 n). Of too few differences nothing is tested.
 
+`least_found` says what the archive can show: the change of a figure that is called in FOUND_SHARE of cases, as of the
+sessions of the median series, a drift or a step in its middle.
+
 A lamp that moves by d is seen d off by the others. As seen by fixes that rest on it, too, lamp i is then
   P_ij d / P_ii,   P = I - 11'/n - q q^H / |q|^2,
 off: q are the map's places as complex numbers, less their mean, and what P takes off is the four unknowns of a fix,
@@ -30,6 +33,8 @@ from dates import days_of
 from outcome import TWO
 
 FALSE_ALARM_RATE = 0.05
+FOUND_SHARE = 0.95
+NORMAL = statistics.NormalDist()
 FEWEST_DIFFERENCES = 20
 KEPT_SHARE = 0.95
 VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1.96) / 0.95
@@ -136,6 +141,37 @@ def change_of(rows, series, tests):
     (p, _), (kind, k, change, sd) = min(zip(chances, found))
     ends = {"before": named(rows[k - 1 if kind == "step" else 0]), "since": named(rows[k])}
     return {"kind": kind, "change": change, "sd": sd, "p": min(1.0, p), **ends}
+
+
+def usual(sds):
+    """The median sd of a change, of as many series as are worth the time."""
+    some = [sd for sd in (of_one() for of_one in sds[:: 1 + len(sds) // 1000]) if sd]
+    return statistics.median(some) if some else None
+
+
+def sd_in_the_middle(series):
+    """Of a step."""
+    half = len(series) // 2
+    return math.sqrt(sum(1 / sum(1 / sd**2 for _, sd in part) for part in (series[:half], series[half:])))
+
+
+def least_found_of(of_figures, factors, tests):
+    """Of each kind of figure that is tried: {"drift", "step"}, in its unit. of_figures: (kind, times, series)."""
+    z = {kind: NORMAL.inv_cdf(FOUND_SHARE) - NORMAL.inv_cdf(FALSE_ALARM_RATE / 4 / max(1, tests[kind])) for kind in tests}
+    found = {}
+    for name in (name for name in TWO if factors[name]):
+        of_kind = [(times, series) for kind, times, series in of_figures if kind == name]
+        sds = {"drift": usual([lambda of=of: (drift(*of) or (0, None))[1] for of in of_kind])}
+        sds["step"] = usual([lambda of=of: sd_in_the_middle(of[1]) for of in of_kind])
+        found[name] = {kind: factors[name] * z[kind] * sd for kind, sd in sds.items() if sd}
+    return found
+
+
+def least_found_of_lamps(rooms, factor, tests):
+    """In mm: a step in the middle, whatever its direction."""
+    series = [one for room in rooms for lamp in room.series for one in room.along(lamp) if len(one) > 1]
+    z = math.sqrt(-2 * math.log(FALSE_ALARM_RATE / 2 / tests["step"])) + NORMAL.inv_cdf(FOUND_SHARE)
+    return {"step": z * factor * usual([lambda one=one: sd_in_the_middle(one) for one in series])}
 
 
 def smallness(change):
@@ -247,17 +283,25 @@ def rooms_of(rows):
 def fleet_of(rows, lamp_rows):
     """What changed, for changes.json: rows of fleet.csv and of lamps.csv."""
     cameras, rooms = camera_series(rows), rooms_of(lamp_rows)
-    of_figures = [(kind_of(figure), series) for figures in cameras.values() for figure, (_, series) in figures.items()]
+    of_figures = [
+        (kind_of(figure), times_of(of_it), series)
+        for figures in cameras.values()
+        for figure, (of_it, series) in figures.items()
+    ]
     factors = {}
     for name in TWO:
-        factors[name] = factor_of([one for kind, series in of_figures if kind == name for one in neighbours(series)])
+        factors[name] = factor_of([one for kind, _, series in of_figures if kind == name for one in neighbours(series)])
     pairs = sum(max(0, len(room.sessions) - 1) for room in rooms)  # the lamps of a session go together
     enough = 2 * pairs >= FEWEST_DIFFERENCES
     factors["lamps"] = factor_of([one for room in rooms for one in room.differences()]) if enough else None
-    tried = [series for kind, series in of_figures if factors[kind]]
+    tried = [series for kind, _, series in of_figures if factors[kind]]
     tests = {"drift": len(tried), "step": sum(len(series) - 1 for series in tried)}
     if factors["lamps"]:
         tests["step"] += sum(room.tests() for room in rooms)
+    least_found = least_found_of(of_figures, factors, tests)
+    if factors["lamps"]:
+        least_found["lamps"] = least_found_of_lamps(rooms, factors["lamps"], tests)
     moved = [lamp for room in rooms for lamp in (room.moved(factors["lamps"], tests) if factors["lamps"] else [])]
     alarms = changed_cameras(cameras, factors, tests)
-    return {"false_alarm_rate": FALSE_ALARM_RATE, "tests": tests, "factors": factors, "cameras": alarms, "lamps": moved}
+    found = {"factors": factors, "least_found": least_found, "cameras": alarms, "lamps": moved}
+    return {"false_alarm_rate": FALSE_ALARM_RATE, "tests": tests, **found}

@@ -84,6 +84,15 @@ def lamps(fleet, lamp_rows):
     return html
 
 
+def least_found(fleet):
+    html = "<p>What sessions like these show: a change of so much is called in 95 of 100 cases.</p>\n"
+    rows = []
+    for name, sizes in fleet["least_found"].items():
+        words = f"{name.replace('_', ' ')} ({TWO.get(name, 'mm')})"
+        rows.append((words, *(f"{sizes[kind]:.2g}" if kind in sizes else "" for kind in ("drift", "step"))))
+    return html + table(["", "steadily, from the first session to the last", "at once, in the middle"], rows)
+
+
 def page(fleet, fleet_rows, lamp_rows):
     html = cameras(fleet, fleet_rows) if fleet["cameras"] else ""
     html += lamps(fleet, lamp_rows) if fleet["lamps"] else ""
@@ -100,4 +109,4 @@ def page(fleet, fleet_rows, lamp_rows):
     html += f"false alarm in all of it is {rate} at most."
     if wide:
         html += f" Sessions differ by more than they state, and count so: {wide} times."
-    return html + " All figures: fleet.csv, lamps.csv.</p>\n"
+    return html + " All figures: fleet.csv, lamps.csv.</p>\n" + least_found(fleet)

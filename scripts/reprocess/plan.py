@@ -75,7 +75,8 @@ def write_shards(archive, state, options):
     dates = dates_of(archive, sessions)
     write_if_other(state / "dates.csv", table(["camera", "session", "date", "room"], dates))
     catalogue = Catalogue(state / "catalogue.sqlite", archive, options.rebuild_catalogue)
-    seen = dict(zip(sessions, catalogue.glances(sessions, options.look)))
+    look = options.look or catalogue.look_for(len(sessions))
+    seen = dict(zip(sessions, catalogue.glances(sessions, look)))
     shards = shards_of(sessions, catalogue, options.shard_size, options.at_a_time)
     wanted = set()
     for number, names in shards.items():
@@ -87,7 +88,14 @@ def write_shards(archive, state, options):
             file.unlink()
     write_if_other(state / "shards.txt", f"{len(wanted)}\n")
     catalogue.save(shards, options.shard_size)
-    return len(sessions)
+    return len(sessions), looked_at(catalogue, look)
+
+
+def looked_at(catalogue, look):
+    if look == "files":
+        return "looked at all files"
+    day = time.strftime("%Y-%m-%d", time.localtime(catalogue.all_files_at_ns() / 1e9))
+    return f"looked at folders and tables, at all files last on {day}"
 
 
 def changed_at(file):
@@ -126,7 +134,7 @@ def main():
     parser.add_argument("--keep", type=int, default=0)
     parser.add_argument("--shard-size", type=int, default=50)
     parser.add_argument("--at-a-time", type=int, default=1)
-    parser.add_argument("--look", choices=LOOKS, default=LOOKS[0])
+    parser.add_argument("--look", choices=LOOKS)
     parser.add_argument("--rebuild-catalogue", action="store_true")
     parser.add_argument("--camera-option", action="append", default=[])
     options = parser.parse_args()
@@ -144,7 +152,7 @@ def main():
         "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
         **toolbox(options.bin),
     }
-    count = write_shards(archive, state, options)
+    count, looked = write_shards(archive, state, options)
     write_if_other(state / "keep.txt", f"{options.keep}\n")
     write_if_other(state / "run.json", json_text(run))
     known, again = to_do(state, results / "summary.csv")
@@ -158,7 +166,7 @@ def main():
         "gates_digest": digest(options.gates.read_text()) if options.gates else "",
     }
     write_if_other(state / "compare.json", json_text(compare))
-    print(f"{count} sessions in {archive}")
+    print(f"{count} sessions in {archive}; {looked}")
 
 
 if __name__ == "__main__":

@@ -50,8 +50,8 @@ def main():
             value = "there is no such figure" if gate["value"] is None else f"is {gate['value']:.4g}"
             print(f"reprocess.sh: gate {gate['name']}: {value}, at most {gate['limit']} is asked for", file=sys.stderr)
     if beyond := sessions_beyond_gates(counts, said["gates"]):
-        words = f"reprocess.sh: {beyond} of {counts['sessions']} sessions miss a gate of theirs; how many may, a gate"
-        print(f"{words} gate_share of --gates says", file=sys.stderr)
+        many = f"{beyond} of {counts['sessions']} sessions"
+        print(f"reprocess.sh: {many} miss a gate of theirs; how many may, gate_share of --gates says", file=sys.stderr)
     return 0 if said["passed"] else 1
 
 

@@ -133,21 +133,20 @@ def run(options, folder):
     bin_folder = Path(os.environ.get("VLP_PROGRAMS_DIR", SOURCE / "build/bin"))
     python = ["/usr/bin/python3", "-B"]
     plan = [*python, SCRIPTS / "plan.py", archive, results, "--bin", bin_folder, "--at-a-time", os.cpu_count()]
-    only_folders = [*plan, "--look", "folders"]
     print(f"{options.sessions} sessions of {len(FILES)} files and {len(FOLDERS) + 1} folders")
     time.sleep(SETTLED_S)
     measured("plan, the first", *plan)
     apart(reprocessed, folder)
     files.write_whole(results / "summary.csv", "")  # as if that were summed up
-    measured("plan, unchanged", *plan)
-    took["plan, unchanged"] = measured("plan, unchanged, --look folders", *only_folders)
+    measured("plan, unchanged, --look files", *plan, "--look", "files")
+    took["plan, unchanged"] = measured("plan, unchanged", *plan)
     names = [f"{camera.name}/{session.name}" for camera in sorted(archive.iterdir()) for session in camera.iterdir()]
     some = names[:: max(1, len(names) // options.changed)][: options.changed]
 
     for name in some:
         (archive / name / "check/captures.csv").write_text(f"{time.time()}")
     time.sleep(SETTLED_S)
-    took["plan, changed"] = measured(f"plan, {options.changed} changed, --look folders", *only_folders)
+    took["plan, changed"] = measured(f"plan, {options.changed} changed", *plan)
     shards = len((results / ".state/to_do.txt").read_text().split())
     if not 0 < shards <= options.changed:
         sys.exit(f"reprocess_scale.py: {shards} shards are to do, and {options.changed} sessions have changed")
@@ -156,9 +155,9 @@ def run(options, folder):
     one = measured("summary", *python, SCRIPTS / "summary.py")
     two = measured("overview, with the fleet", *python, SCRIPTS / "overview.py")
     took["summary and overview"] = (one[0] + two[0], max(one[1], two[1]))
-    whole = [SOURCE / "scripts/reprocess.sh", archive, results, "--look", "folders"]
+    whole = [SOURCE / "scripts/reprocess.sh", archive, results]
     os.environ["VLP_PROGRAMS_DIR"] = str(bin_folder)
-    measured("reprocess.sh, unchanged, --look folders", *whole)
+    measured("reprocess.sh, unchanged", *whole)
     if left := Path(".state/to_do.txt").read_text().split():
         sys.exit(f"reprocess_scale.py: {len(left)} shards are to do, and nothing has changed")
     found = json.loads(Path("changes.json").read_text())["fleet"]

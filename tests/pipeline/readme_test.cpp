@@ -508,6 +508,33 @@ std::vector<std::string> messages_in(const fs::path& file) {
   return messages;
 }
 
+/// The scripts of reprocessing, which are programs, too.
+std::vector<fs::path> scripts_of_programs() {
+  auto files = files_of({".py", ".sh"});
+  std::erase_if(files, [](const fs::path& file) {
+    return !name_of_page(file).starts_with("scripts/reprocess");
+  });
+  return files;
+}
+
+/// What a script says of errors: the words of a line that refuses or speaks in its name. Values are
+/// "...".
+std::vector<std::string> messages_in_script(const fs::path& file) {
+  static const std::regex tells("\\b(refuse|usage|fail)\\b|ValueError\\(|reprocess\\.sh: |>&2");
+  static const std::regex python_value("\\{\\{|\\}\\}|\\{[^{}]*\\}");
+  static const std::regex shell_value("\\$\\{[^}]*\\}|\\$[a-z0-9_]+");
+  const bool python = file.extension() == ".py";
+  std::vector<std::string> messages;
+  for (const std::string& line : lines_in(file)) {
+    if (!std::regex_search(line, tells)) continue;
+    const std::string words = std::regex_replace(line, python ? python_value : shell_value, "...");
+    for (std::string& message : matches(words, "\"([^\"]+)\""))
+      messages.push_back(std::move(message));
+  }
+  std::erase_if(messages, [](const std::string& message) { return words_in(message) < 3; });
+  return messages;
+}
+
 /// Whether the parts of a message, "..." between them, stand there in their order.
 bool is_said_in(const std::string& text, const std::string& message) {
   std::size_t at = 0;
@@ -550,6 +577,9 @@ TEST(Messages, ThatAreExplainedCanOccur) {
       sources.back().append(literal.text).append("\n");
     }
   }
+  for (const fs::path& file : scripts_of_programs()) {
+    sources.push_back(TemporaryFolder::content_of(file));
+  }
   const auto said = [&](const std::string& message) {
     return std::any_of(sources.begin(), sources.end(),
                        [&](const std::string& source) { return is_said_in(source, message); });
@@ -562,16 +592,23 @@ TEST(Messages, ThatAreExplainedCanOccur) {
 
 TEST(Messages, AreAllExplained) {
   const auto explained = explained_messages();
-  std::size_t messages = 0;
-  for (const fs::path& file : sources_of_programs()) {
-    for (const std::string& message : messages_in(file)) {
-      ++messages;
+  const auto expect_explained = [&](const fs::path& file, const auto& messages) {
+    for (const std::string& message : messages) {
       EXPECT_TRUE(std::any_of(explained.begin(), explained.end(),
                               [&](const std::string& words) { return is_said_in(message, words); }))
           << name_of_page(file) << ": apps/MESSAGES.md has no entry for: " << message;
     }
+    return messages.size();
+  };
+  std::size_t messages = 0, of_scripts = 0;
+  for (const fs::path& file : sources_of_programs()) {
+    messages += expect_explained(file, messages_in(file));
+  }
+  for (const fs::path& file : scripts_of_programs()) {
+    of_scripts += expect_explained(file, messages_in_script(file));
   }
   EXPECT_GT(messages, 350U);
+  EXPECT_GT(of_scripts, 30U);
 }
 
 TEST(Messages, AreFoundInSources) {
@@ -584,6 +621,12 @@ TEST(Messages, AreFoundInSources) {
                   "warnings.push_back(c == '\"' ? \"one or two words\" : \"two\");\n");
   EXPECT_THAT(messages_in(file),
               testing::ElementsAre("lamp ... is loose: fasten it", "one or two words"));
+  const auto shell = folder.file(
+      "a.sh", "refuse \"$file: is not ${what[0]} of ours\"\necho \"all is well there\"\n");
+  EXPECT_THAT(messages_in_script(shell), testing::ElementsAre("...: is not ... of ours"));
+  const auto python = folder.file(
+      "a.py", "    fail(f\"{names[0]}: holds no {kind:s} here\")\nsay(\"all is well there\")\n");
+  EXPECT_THAT(messages_in_script(python), testing::ElementsAre("...: holds no ... here"));
 }
 
 }  // namespace

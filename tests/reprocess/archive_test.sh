@@ -24,6 +24,8 @@ while IFS=, read -r camera session _ damage _; do
     [ ! -e "$baseline/sessions/$name" ] || fail "$name is damaged ($damage) and has a result"
     grep -q '"reason": "[a-z]' "$baseline/failed/$name/row.json" || fail "$name has no reason"
     grep -q '"verdict": "no result"' "$baseline/failed/$name/session.json" || fail "$name has no session.json"
+    [ "$damage" != cut-images ] || grep -q '"reason": ".*none of its .* images can be used.*cut short' "$baseline/failed/$name/row.json" ||
+      fail "$name is not said to be cut short: $(grep reason "$baseline/failed/$name/row.json")"
     if grep -rq "$scratch" "$baseline/failed/$name"; then fail "$name tells of a folder of this machine"; fi
   else
     [ ! -e "$baseline/failed/$name" ] || fail "$name is whole and has no result"

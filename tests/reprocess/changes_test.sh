@@ -90,6 +90,33 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   [ "$code" = 2 ] && grep -q 'archive.csv:2: date: should be as' "$scratch/errors" || fail "$code $(cat "$scratch/errors")"
 )
 
+# A lamp that hangs elsewhere than its map says does not pass in silence, and where the others see it is told.
+(
+  take "$scratch/moved" camera-00001/session-01
+  mv "$archive/camera-00001/session-01" "$archive/camera-00001/by-3-mm"
+  cp -r "$archive/camera-00001/by-3-mm" "$archive/camera-00001/by-30-mm"
+  for mm in 3 30; do
+    awk -v mm=$mm '/id: 2,/ { match($0, /\[[-0-9.e]+/); x = substr($0, RSTART + 1, RLENGTH - 1)
+      sub(/\[[-0-9.e]+/, "[" x + mm / 1000) } 1' "$archive/camera-00001/by-$mm-mm/lamps.yaml" >"$scratch/moved-lamps.yaml"
+    mv "$scratch/moved-lamps.yaml" "$archive/camera-00001/by-$mm-mm/lamps.yaml"
+  done
+  moved=$scratch/moved-results
+  rm -rf "$moved"
+  reprocess "$moved" >"$said"
+  grep -q '^camera-00001,by-3-mm,look,.*the residuals show' "$moved/summary.csv" || fail "$(cat "$moved/summary.csv")"
+  grep -q '^camera-00001,by-30-mm,no result,.*is each lamp where the map has it' "$moved/summary.csv" ||
+    fail "$(cat "$moved/summary.csv")"
+  awk -F, '$5 == "by-3-mm" { off = sqrt($10 ^ 2 + $11 ^ 2); if (off > most) { most = off; lamp = $3 } }
+    END { exit !(lamp == 2 && most > 2 && most < 4) }' "$moved/lamps.csv" || fail "$(cat "$moved/lamps.csv")"
+)
+
+"$source_dir/scripts/reprocess.sh" --help >"$said"
+[ "$(wc -L <"$said")" -le 80 ] && grep -q '^Exit code: ' "$said" || fail "help is wider than a terminal, or cut short"
+options_of() { sed -n '/^while/,/^done/p' "$1" | grep -o -- '--[a-z][a-z-]*' | grep -v -x -- '--camera-option\|--help' | sort -u; }
+for option in $(options_of "$source_dir/scripts/reprocess.sh"); do
+  grep -q -- "^$option " "$said" || fail "--help does not tell of $option"
+done
+
 refused() {  # MESSAGE ARGUMENT...: exit code 2 and one line
   local code=0
   "$source_dir/scripts/reprocess.sh" "${@:2}" >/dev/null 2>"$scratch/errors" || code=$?
@@ -119,4 +146,4 @@ mkdir -p "$scratch/empty" "$scratch/odd/camera/it's"
 refused 'no sessions in it' "$scratch/empty" "$scratch/refused"
 refused 'names of cameras and sessions' "$scratch/odd" "$scratch/refused"
 [ ! -e "$scratch/refused" ] || fail "something is left of what was refused"
-rm -rf "$results" "$previous" "$scratch"/gates* "$scratch"/looked* "$scratch/refused"
+rm -rf "$results" "$previous" "$scratch"/gates* "$scratch"/looked* "$scratch"/moved* "$scratch/refused"

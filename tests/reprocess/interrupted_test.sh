@@ -36,6 +36,16 @@ redone() {  # since the last time
 }
 redone >/dev/null 2>&1 || true
 
+# A worker that is lost, as for want of memory, is replaced by the run itself.
+start_reprocess "$results-lost" --shard-size 1 --cores 1
+worker() { pgrep --session "$run" --full 'shard\.py'; }
+run=$!
+patiently 60 worker
+kill -9 $(worker)
+wait "$run" || fail "the run ended with its worker: $(cat "$said")"
+expect_baseline "$results-lost" "${sessions[@]:0:2}"
+grep -q 'Trying to restart job' "$results-lost/.state/reprocess.log" || fail "no worker was lost"
+
 # Nothing is done twice; a file that is only touched is looked at and found to be the same.
 touch "$archive/$good/lamps.yaml"
 run

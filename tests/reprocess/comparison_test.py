@@ -1,0 +1,150 @@
+#!/usr/bin/python3
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""What changed between two runs, its gates, and what differs between two results of a session."""
+import random
+import tempfile
+import unittest
+from pathlib import Path
+
+import parts  # noqa: F401
+import changes
+import diff
+
+
+def row(number, verdict, mean, inputs="same"):
+    mean = f"{mean:.6g}" if mean is not None else ""
+    name = {"camera": f"c{number // 2:04d}", "session": f"s{number % 2}"}
+    return {**name, "verdict": verdict, "mean_mm": mean, "inputs": inputs}
+
+
+class Changes(unittest.TestCase):
+    def test_counts_each_kind_once(self):
+        before = [row(0, "pass", 1), row(1, "pass", 1), row(2, "gate", 1), row(3, "pass", 1)]
+        before += [row(4, "no result", None), row(5, "pass", 1), row(6, "pass", 1), row(9, "pass", 1)]
+        now = [row(0, "pass", 0.5), row(1, "pass", 2), row(2, "gate", 1), row(3, "no result", None)]
+        now += [row(4, "pass", 1), row(5, "crashed", None), row(6, "pass", 2, "other"), row(8, "pass", 1)]
+        found, pairs = changes.changes_of(now, before)
+        self.assertEqual([found[key] for key in ("better", "worse", "same", "pairs")], [1, 1, 1, 3])
+        self.assertEqual(found["newly_failed"], ["c0001/s1", "c0002/s1"])
+        self.assertEqual(found["lost_with_other_inputs"], [])
+        self.assertEqual(found["newly_good"], ["c0002/s0"])
+        self.assertEqual([found[key] for key in ("other_inputs", "only_now", "only_before")], [1, 1, 1])
+        self.assertEqual(found["with_other_inputs"], ["c0003/s0"])
+        self.assertEqual([change for _, _, change in pairs], [1, -0.5, 0])
+        self.assertIn("cannot tell", found["verdict"])
+
+    def test_says_better_or_worse_only_with_evidence(self):
+        def verdict(shift):
+            chance = random.Random(1)
+            before = [row(i, "pass", 1) for i in range(100)]
+            now = [row(i, "pass", 1 + shift + chance.gauss(0, 0.05)) for i in range(100)]
+            return changes.changes_of(now, before)[0]["verdict"]
+
+        self.assertEqual([verdict(shift) for shift in (-0.05, 0, 0.05)], ["better", "no evidence", "worse"])
+
+    def test_interval_holds_the_truth_19_times_in_20(self):
+        # Sessions of a camera alike: were they counted alone, only 83 % of the intervals would.
+        chance = random.Random(2)
+        held = 0
+        for _ in range(1000):
+            differences = []
+            for camera in range(40):
+                shift = chance.gauss(0.3, 1)
+                differences += [(camera, shift)] * 2
+            _, (low, high) = changes.interval_of(differences)
+            held += low <= 0.3 <= high
+        self.assertGreater(held, 920)  # 950 expected, less 4 sigma of 7
+        self.assertLess(held, 975)
+
+    def test_gates_hold_what_they_say(self):
+        counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 3), row(2, "no result", None), row(3, "crashed", None)])
+        gates = {"no_result": 2, "no_result_share": 0.4, "gate_share": 0.25, "mean_mm": 2, "p90_mm": 2, "newly_failed": 0}
+        passed = [gate["passed"] for gate in changes.check_gates(gates, counts, None)]
+        self.assertEqual(passed, [True, False, True, True, False, False])
+
+    def test_gates_without_a_pair_are_not_met(self):
+        gates = {"newly_failed": 0, "worse_share": 1, "mean_difference_mm": 1}
+
+        def passed(now, before):
+            found, _ = changes.changes_of(now, before)
+            return [gate["passed"] for gate in changes.check_gates(gates, changes.counts_of(now), found)]
+
+        self.assertEqual(passed([row(0, "pass", 1, "new")], [row(0, "pass", 1, "old")]), [True, False, False])
+        self.assertEqual(passed([row(0, "pass", 1)], [row(1, "pass", 1)]), [False, False, False])
+
+    def test_sessions_that_lost_their_result_with_other_inputs_are_counted(self):
+        before = [row(i, "pass", 1, "old") for i in range(3)]
+        now = [row(0, "no result", None, "new"), row(1, "look", 1, "new"), row(2, "no result", None, "old")]
+        found, pairs = changes.changes_of(now, before)
+        self.assertEqual((found["other_inputs"], found["with_other_inputs"]), (2, ["c0000/s0", "c0000/s1"]))
+        self.assertEqual(found["newly_failed"], ["c0000/s0", "c0001/s0"])
+        self.assertEqual(found["lost_with_other_inputs"], ["c0000/s0"])
+        self.assertEqual(pairs, [])
+        gates = changes.check_gates({"newly_failed": 1}, changes.counts_of(now), found)
+        self.assertEqual([(gate["value"], gate["passed"]) for gate in gates], [(2, False)])
+
+    def test_sessions_that_miss_their_gates_count_where_no_gate_says_how_many_may(self):
+        counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 1), row(2, "look", 1)])
+        self.assertEqual((counts["pass"], counts["look"], counts["gate"]), (1, 1, 1))
+        self.assertEqual(changes.sessions_beyond_gates(counts, []), 1)
+        gates = changes.check_gates({"gate_share": 0.5}, counts, None)
+        self.assertEqual(changes.sessions_beyond_gates(counts, gates), 0)
+
+    def test_less_than_a_micrometre_is_the_same(self):
+        now = [row(0, "pass", 1.0005), row(1, "pass", 0.9995), row(2, "pass", 1.002)]
+        found, _ = changes.changes_of(now, [row(i, "pass", 1) for i in range(3)])
+        self.assertEqual([found[key] for key in ("better", "worse", "same")], [0, 1, 2])
+
+    def test_students_quantile_is_that_of_tables(self):
+        for freedoms, quantile in ((19, 2.093), (50, 2.0086), (100, 1.984)):
+            self.assertAlmostEqual(changes.student_975(freedoms), quantile, delta=0.001)
+
+    def test_refuses_gates_that_it_does_not_know(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "gates.yaml"
+            for text, problem in (
+                ("gates: {no_result: 0}", "should begin with format"),
+                ("format: vlp-archive-gates/1\n", "should hold"),
+                ("format: vlp-archive-gates/1\ngates: {}\n", "should hold"),
+                ("format: vlp-archive-gates/1\ngates: {odd: 1}\n", "gate 'odd' is unknown"),
+                ("format: vlp-archive-gates/1\ngates: {mean_mm: .inf}\n", "should be a number"),
+                ("format: vlp-archive-gates/1\ngates: {mean_mm: true}\n", "should be a number"),
+                ("format: vlp-archive-gates/1\ngates: {worse_share: 7}\n", "a share from 0 to 1, not 7"),
+                ("format: vlp-archive-gates/1\ngates: {mean_mm: -1}\n", "should be 0 or more, not -1"),
+                ("format: [", "is not YAML"),
+            ):
+                file.write_text(text)
+                with self.assertRaisesRegex(ValueError, problem):
+                    changes.read_gates(file)
+
+
+class Diff(unittest.TestCase):
+    def test_names_what_differs_and_nothing_else(self):
+        def result(verdict, focal, mean, warnings, parts):
+            step = {"name": "check", "warnings": warnings}
+            metrics = [{"name": "mean_mm", "step": "evaluate", "value": mean}]
+            metrics += [{"name": "rms_px", "step": "lens", "value": 1}]
+            session = {"metrics": metrics, "steps": [step], "version": "1"}
+            session["calibration"] = {"focal_px": focal, "lens_model": "x"}
+            return {"verdict": verdict, "reason": "", "parts": parts}, session
+
+        before = result("pass", [260, 261], 0.2, [], {"lamps.yaml": "a", "check": "b"})
+        now = result("look", [260, 261.5], 0.3, ["the residuals; they show"], {"lamps.yaml": "c", "check": "b"})
+        said = "\n".join(diff.lines_of(before, now))
+        for words in ("verdict     pass -> look", "inputs      lamps.yaml\n", "1 -> 1 (the same)", "2 of 4 differ"):
+            self.assertIn(words, said)
+        self.assertIn("  evaluate mean_mm: 0.2 -> 0.3 (+0.1)", said)
+        self.assertIn("  calibration focal_px y: 261 -> 261.5 (+0.5)", said)
+        self.assertIn("  + check: the residuals; they show", said)
+        self.assertEqual(len(said.splitlines()), 7)
+
+    def test_of_a_row_without_parts_says_only_whether_inputs_are_the_same(self):
+        now = {"inputs": "a", "parts": {"lamps.yaml": "c", "check": "b"}}
+        self.assertEqual(diff.changed_inputs({"inputs": "a"}, now), "the same")
+        self.assertEqual(diff.changed_inputs({"inputs": "b"}, now), "others, not known which")
+        self.assertEqual(diff.changed_inputs({"inputs": "b", "parts": {"check": "b"}}, now), "lamps.yaml")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,170 @@
+#!/usr/bin/python3
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cameras and lamps over time, by made-up fleets of known truth."""
+import unittest
+import unittest.mock
+
+import parts  # noqa: F401
+import changes
+import dates
+import fleet
+import made_up_fleet
+import outcome
+import schema_check
+import summary
+from made_up_fleet import Fleet
+
+
+def fleet_rows(made_up):
+    rows, lamps = [], []
+    for camera, session, result in made_up.all():
+        named = {"camera": camera, "session": session, "date": dates.date_in(session), "room": ""}
+        rows.append(dict.fromkeys(outcome.ALL, "") | named | outcome.calibration_of(result))
+        lamps += summary.lamps_of(rows[-1])
+    return rows, lamps
+
+
+class OverTime(unittest.TestCase):
+    # Of 20 cameras with 10 sessions each in a year: 0.1 % of the focal length, 0.02 degrees of tilt, 0.3 px.
+    DRIFTS = {
+        3: {"focal": (0.26, 0.26)},
+        8: {"zenith": (0.02, 0), "rotation_center": (0.0908, 0)},
+        15: {"center": (0.3, 0), "rotation_center": (0.3, 0)},
+    }
+    MOVED = [(0, 2, 150, complex(0.8, 0.6)), (1, 5, 240, complex(-3, 4))]
+
+    def test_finds_what_drifts_and_which_lamps_were_moved_and_when(self):
+        fleets, found_cameras, false = 20, 0, 0
+        for seed in range(fleets):
+            made_up = Fleet(seed, drifts=self.DRIFTS, moved=self.MOVED)
+            found = fleet.fleet_of(*fleet_rows(made_up))
+            cameras = {alarm["camera"] for alarm in found["cameras"]}
+            found_cameras += len(cameras & {"camera-03", "camera-08", "camera-15"})
+            lamps = [(lamp["map"][0], lamp["lamp"]) for lamp in found["lamps"]]
+            false += bool(cameras - {"camera-03", "camera-08", "camera-15"}) or sorted(lamps) != [("0", 2), ("1", 5)]
+            for room, lamp, day, moved in self.MOVED:
+                one = next(one for one in found["lamps"] if (one["map"][0], one["lamp"]) == (str(room), lamp))
+                self.assertLess(one["before"]["date"], made_up.date(day), (seed, lamp))
+                self.assertGreaterEqual(one["since"]["date"], made_up.date(day), (seed, lamp))
+                self.assertLess(abs(complex(*one["moved_mm"]) - moved), 5 * sum(one["sd_mm"]), (seed, lamp))
+        self.assertGreaterEqual(found_cameras, 3 * fleets - 7)  # of 600 cameras 39 are missed, nearly all tilts
+        self.assertLessEqual(false, 4)  # 1 is expected at most
+
+    def test_says_how_large_a_change_is_found(self):
+        fleets = 40
+        least = fleet.fleet_of(*fleet_rows(Fleet(0)))["least_found"]
+        self.assertEqual(set(least), {*made_up_fleet.SDS, "lamps"})
+        over_a_year = least["center"]["drift"] * 199 / 180  # a camera's sessions are not all of it
+        by_mm = least["lamps"]["step"]
+        drifts = steps = moved = 0
+        for seed in range(2000, 2000 + fleets):
+            changes_of_it = {"drifts": {4: {"center": (over_a_year, 0)}}, "broken": {9: (5, {"center": (0, least["center"]["step"])})}}
+            found = fleet.fleet_of(*fleet_rows(Fleet(seed, **changes_of_it, moved=[(0, 4, 182, complex(0, by_mm))])))
+            called = {alarm["camera"] for alarm in found["cameras"]}
+            drifts += "camera-04" in called
+            steps += "camera-09" in called
+            moved += any(lamp["lamp"] == 4 for lamp in found["lamps"])
+        for number in (drifts, steps, moved):
+            self.assertGreaterEqual(number, 33, (drifts, steps, moved))  # 38 are expected, less 3.6 sigma
+
+    def test_says_of_a_camera_that_broke_between_which_sessions(self):
+        for seed in range(5):
+            made_up = Fleet(seed, broken={7: (6, {"center": (0.4, -0.3)})})
+            alarm = fleet.fleet_of(*fleet_rows(made_up))["cameras"][0]
+            first = alarm["changes"][0]
+            self.assertEqual((alarm["camera"], first["kind"]), ("camera-07", "step"))
+            self.assertEqual(fleet.kind_of(first["figure"]), "center")
+            dates_of_both = [made_up.date(made_up.day(7, session)) for session in (5, 6)]
+            self.assertEqual([first["before"]["date"], first["since"]["date"]], dates_of_both)
+
+    def test_is_as_the_schema_says(self):
+        made_up = Fleet(0, drifts=self.DRIFTS, moved=self.MOVED, broken={7: (6, {"center": (0.4, -0.3)})})
+        document = {"format": "vlp-archive-changes/1", "changes": None, "gates": [], "passed": True}
+        document |= {"counts": changes.counts_of([]), "fleet": fleet.fleet_of(*fleet_rows(made_up))}
+        alarms = [one["kind"] for alarm in document["fleet"]["cameras"] for one in alarm["changes"]]
+        self.assertEqual((set(alarms), len(document["fleet"]["lamps"])), ({"step", "drift"}, 2))
+        self.assertEqual(schema_check.problems_of(schema_check.validator_of("changes"), document), [])
+
+    def test_tells_a_drift_from_a_step(self):
+        for seed in range(5):
+            found = fleet.fleet_of(*fleet_rows(Fleet(seed, drifts={3: {"focal": (0.5, 0.5)}})))["cameras"][0]
+            self.assertEqual((found["camera"], found["changes"][0]["kind"]), ("camera-03", "drift"))
+            self.assertAlmostEqual(found["changes"][0]["change"], 0.5 * 0.95, delta=5 * found["changes"][0]["sd"])
+
+    def test_gives_false_alarms_no_oftener_than_stated(self):
+        fleets = 40
+        for honest in (True, False):
+            alarms = 0
+            for seed in range(1000, 1000 + fleets):
+                found = fleet.fleet_of(*fleet_rows(Fleet(seed, honest=honest)))
+                alarms += bool(found["cameras"] or found["lamps"])
+            self.assertLessEqual(alarms, 6, honest)  # 2 are expected at most; more than 6 in 1 of 200 such tests
+
+    def test_states_by_how_much_sessions_differ_more_than_they_say(self):
+        factors = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=60)))["factors"]
+        for name, (_, _, factor) in made_up_fleet.SDS.items():
+            self.assertAlmostEqual(factors[name] / factor, 1.05, delta=0.12)
+
+    def test_a_session_without_a_lever_arm_is_not_held_against_the_others(self):
+        rows, lamps = fleet_rows(Fleet(1))
+        for without in ({}, {"lever_arm_x_mm": "", "lever_arm_y_mm": ""}):
+            one = rows[14]
+            rows[14] = one | without | {"zenith_x_deg": "9", "sd_zenith_x_deg": "0.0001", "rotation_center_y_px": "9"}
+            cameras = [alarm["camera"] for alarm in fleet.fleet_of(rows, lamps)["cameras"]]
+            self.assertEqual(cameras, [] if without else ["camera-01"])
+            rows[14] = one
+
+    def test_of_too_few_sessions_says_nothing(self):
+        found = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=2, sessions=3, broken={0: (1, {"center": (9, 9)})})))
+        self.assertEqual((found["cameras"], found["lamps"], set(found["factors"].values())), ([], [], {None}))
+        self.assertEqual(fleet.fleet_of([], [])["cameras"], [])
+
+    def test_a_room_whose_sessions_see_too_few_lamps_takes_nothing_off(self):
+        rows, lamps = fleet_rows(Fleet(1))
+        expected = fleet.fleet_of(rows, lamps)["factors"]["lamps"]
+        self.assertIsNotNone(expected)
+        few = [lamps[0] | {"room": f"room {i}"} for i in range(1000)]
+        self.assertEqual(fleet.fleet_of(rows, lamps + few)["factors"]["lamps"], expected)
+
+    def test_sessions_without_a_date_put_all_in_the_order_of_names(self):
+        rows = [{"camera": "c", "session": f"s{i}", "date": f"2026-01-{20 - i}"} for i in (2, 0, 1)]
+        self.assertEqual([row["session"] for row in fleet.in_order(rows)], ["s2", "s1", "s0"])
+        rows[0]["date"] = ""
+        self.assertEqual([row["session"] for row in fleet.in_order(rows)], ["s0", "s1", "s2"])
+        self.assertEqual(fleet.times_of(fleet.in_order(rows)), [0, 1, 2])
+
+    def test_a_change_is_of_the_kind_that_its_p_is_of(self):
+        series = [(value, 1.0) for value in (0, 0, 0, 6, 6, 6)]
+        rows = [{"camera": "c", "session": f"s{i}", "date": ""} for i in range(6)]
+        for tests, kind in (({"step": 5, "drift": 1}, "step"), ({"step": 50000, "drift": 1}, "drift")):
+            found = fleet.change_of(rows, series, tests)
+            self.assertEqual(found["kind"], kind)
+            self.assertAlmostEqual(found["p"], 2 * tests[kind] * fleet.p_of(found["change"] / found["sd"]))
+
+    def test_steps_and_drifts_are_those_of_least_squares(self):
+        series = [(1.0, 0.5), (2.0, 1.0), (4.0, 0.25)]
+        (first, first_sd), (last, last_sd) = fleet.steps(series)
+        self.assertAlmostEqual(first, (2 * 1 + 4 * 16) / 17 - 1)
+        self.assertAlmostEqual(first_sd, (1 / 4 + 1 / 17) ** 0.5)
+        self.assertAlmostEqual(last, 4 - (1 * 4 + 2 * 1) / 5)
+        self.assertAlmostEqual(last_sd, (1 / 5 + 1 / 16) ** 0.5)
+        change, sd = fleet.drift([0, 5, 20], [(1 + 0.3 * time, 0.1) for time in (0, 5, 20)])
+        self.assertAlmostEqual(change, 6)
+        middle = 25 / 3
+        self.assertAlmostEqual(sd, 0.1 * 20 / sum((time - middle) ** 2 for time in (0, 5, 20)) ** 0.5)
+        self.assertIsNone(fleet.drift([3, 3], [(1, 1), (2, 1)]))
+
+    def test_a_lamp_that_moved_explains_what_the_others_show(self):
+        made_up = Fleet(1, moved=[(0, 2, 150, complex(3, -4))])
+        made_up.chance = unittest.mock.Mock(gauss=lambda mean, sd: mean, uniform=lambda low, high: 1)
+        room = fleet.rooms_of(fleet_rows(made_up)[1])[0]
+        _, lamp, k, change, _ = room.largest(1)
+        self.assertEqual(lamp, 2)
+        self.assertAlmostEqual(abs(change - complex(3, -4)), 0, places=4)
+        room.take_off(lamp, room.series[lamp][k][0], change)
+        self.assertLess(room.largest(1)[0], 1e-3)
+
+
+if __name__ == "__main__":
+    unittest.main()

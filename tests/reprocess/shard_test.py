@@ -1,0 +1,166 @@
+#!/usr/bin/python3
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""A shard's job: keys, results that appear whole, former ones."""
+import json
+import os
+import tempfile
+import unittest
+import unittest.mock
+from pathlib import Path
+
+import parts  # noqa: F401
+import files
+import outcome
+import shard
+
+
+class Shard(unittest.TestCase):
+    def test_key_is_of_inputs_programs_and_options(self):
+        run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "bin": "/bin"}
+        keys = [shard.key_of("i", run), shard.key_of("j", run), shard.key_of("i", run | {"bin": "/other"})]
+        keys += [shard.key_of("i", run | {name: "x"}) for name in ("toolbox", "camera", "session_gates_digest")]
+        self.assertEqual(keys[0], keys[2])
+        self.assertEqual(len(set(keys)), 5)
+
+    def test_a_session_whose_publishing_was_interrupted_is_whole_the_next_time(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            session = {"camera": "c", "session": "s", "verdict": "pass"}
+            work = Path("work")
+            (work / "c/s").mkdir(parents=True)
+            for file in outcome.KEPT:
+                (work / "c/s" / file).write_text(file)
+            former = Path("sessions/c/s")
+            former.mkdir(parents=True)
+            for step in ("write_whole", "place_of"):  # fails there, then goes through
+                with unittest.mock.patch.object(shard, step, side_effect=KeyboardInterrupt):
+                    self.assertRaises(KeyboardInterrupt, shard.publish, session, work)
+            shard.publish(session, work)
+            found = sorted(str(file.relative_to(former)) for file in former.rglob("*") if file.is_file())
+            self.assertEqual(found, sorted([*outcome.KEPT.values(), "row.json"]))
+
+    def test_digests_of_what_looks_the_same_are_not_taken_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "archive": folder, "version": "1"}
+            for name, text in (("c/1", "one"), ("c/2", "two")):
+                (Path(name) / "boards").mkdir(parents=True)
+                (Path(name) / "boards/0.png").write_text(text)
+            made = []
+
+            def calibrate(run, name, work, lock):
+                (work / name).mkdir(parents=True)
+                made.append(name)
+                return {"camera": "c", "session": name[-1], "verdict": "pass"}, "0.5"
+
+            def reprocess(**glances):
+                digested, made[:] = [], []
+                digests = lambda session: digested.append(session.name) or files.input_digests(session)
+                glances = {f"c/{name[1:]}": glance for name, glance in glances.items()}
+                with unittest.mock.patch.multiple(shard, calibrate=calibrate, input_digests=digests):
+                    rows = shard.reprocess(run, "7", glances, None, 0)
+                files.write_whole(".state/rows/7.csv", files.table(outcome.ALL, rows))
+                self.assertEqual([row["glance"] for row in rows], list(glances.values()))
+                return digested, [name[-1] for name in made]
+
+            self.assertEqual(reprocess(s1="a", s2="b"), (["1", "2"], ["1", "2"]))
+            self.assertEqual(reprocess(s1="a", s2="b"), ([], []))
+            self.assertEqual(reprocess(s1="a", s2="c"), (["2"], []))  # touched
+            Path("c/2/boards/0.png").write_text("three")
+            self.assertEqual(reprocess(s1="a", s2="d"), (["2"], ["2"]))
+            (Path("sessions/c/1/row.json")).unlink()
+            self.assertEqual(reprocess(s1="a", s2="d"), (["1"], ["1"]))
+            run["toolbox"] = "u"
+            self.assertEqual(reprocess(s1="a", s2="d"), (["1", "2"], ["1", "2"]))
+
+    def test_former_results_stay_by_their_keys_so_many(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            work = Path("work")
+            (work / "c/s").mkdir(parents=True)
+
+            def publish(key, keep, verdict="pass"):
+                (work / "c/s/session.json").unlink(missing_ok=True)  # another file, as programs write
+                (work / "c/s/session.json").write_text(key)
+                shard.publish({"camera": "c", "session": "s", "verdict": verdict, "key": key * 4}, work, keep)
+                for age, file in enumerate(sorted(Path(".").rglob("row.json"), key=lambda file: file.stat().st_mtime_ns)):
+                    os.utime(file, ns=(age, age))  # that of one tick are told apart
+                return sorted(path.name for path in Path("former").rglob("*") if path.is_dir() and path.name.endswith("key"))
+
+            self.assertEqual(publish("1key", 2), [])
+            self.assertEqual(publish("2key", 2, "no result"), ["1key1key1key"])
+            self.assertEqual(publish("3key", 2), ["1key1key1key", "2key2key2key"])
+            self.assertFalse(Path("failed/c/s").exists())
+            self.assertEqual(publish("4key", 2), ["2key2key2key", "3key3key3key"])
+            self.assertEqual(Path("former/c/s/3key3key3key/session.json").read_text(), "3key")
+            self.assertEqual(Path("sessions/c/s/session.json").read_text(), "4key")
+            self.assertEqual(publish("5key", 0), [])
+            self.assertEqual(publish("6key", 1, "crashed"), ["5key5key5key"])
+            self.assertEqual(publish("7key", 1), ["5key5key5key"])  # a crash does not push it out
+            self.assertEqual(publish("8key", 1), ["7key7key7key"])
+            self.assertEqual(publish("8key", 1), ["8key8key8key"])  # the same again
+
+    def test_a_former_result_outlasts_a_kill_at_any_moment(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            work = Path("work")
+            (work / "c/s").mkdir(parents=True)
+
+            def publish(key):
+                (work / "c/s/session.json").unlink(missing_ok=True)
+                (work / "c/s/session.json").write_text(key)
+                shard.publish({"camera": "c", "session": "s", "verdict": "pass", "key": key}, work, 1)
+
+            def killed_after(moves):
+                """The process ends after so many renamings."""
+                rename, left = Path.rename, [moves]
+
+                def once_more(path, target):
+                    if left[0] == 0:
+                        raise KeyboardInterrupt
+                    left[0] -= 1
+                    return rename(path, target)
+
+                return unittest.mock.patch.object(Path, "rename", once_more)
+
+            publish("first")
+            for moves in range(5):
+                key = f"key {moves}"
+                there = {file.read_text() for file in Path("sessions").rglob("session.json")}
+                try:
+                    with killed_after(moves):
+                        publish(key)
+                except KeyboardInterrupt:
+                    kept = {file.read_text() for top in ("sessions", "former") for file in Path(top).rglob("session.json")}
+                    self.assertLessEqual(there, kept, moves)
+                    for former in Path("former/c/s").glob("*"):
+                        self.assertTrue((former / "row.json").exists(), moves)
+                    if shard.current("c/s", key) is None:
+                        publish(key)
+                kept = {file.read_text() for file in Path("former").rglob("session.json")}
+                self.assertLessEqual(there, kept, moves)
+                self.assertEqual(Path("sessions/c/s/session.json").read_text(), key)
+            publish("last")
+            self.assertEqual([file.read_text() for file in Path("former").rglob("session.json")], [key])
+
+    def test_a_former_result_whose_row_cannot_be_read_is_replaced(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            work, place = Path("work"), Path("sessions/c/s")
+            for unreadable in ("", "{"):
+                (work / "c/s").mkdir(parents=True, exist_ok=True)
+                place.mkdir(parents=True, exist_ok=True)
+                (place / "row.json").write_text(unreadable)
+                shard.publish({"camera": "c", "session": "s", "verdict": "pass", "key": "k"}, work, 1)
+                self.assertEqual(json.loads((place / "row.json").read_text())["key"], "k")
+                self.assertFalse(Path("former/c/s").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
