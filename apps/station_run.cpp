@@ -105,7 +105,7 @@ void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
   unit.refuse_images_of_others([&spool, camera = unit.camera_id()](const std::string& sha256) {
     return spool.owner_of(sha256, camera);
   });
-  unit.distrust(golden_state(config).problem);
+  unit.distrust(golden_problem(config));
 }
 
 /// Throws GateNotMet or Undetermined, by the verdict.
@@ -129,10 +129,9 @@ void add_folders(Unit& unit, const fs::path& folder) {
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }
 
-/// The record of a unit that ends now. A golden unit that failed meanwhile spoils it.
+/// The record of a unit that ends now. A golden unit that failed or became due meanwhile spoils it.
 RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions& options) {
-  const GoldenState golden = golden_state(unit.config());
-  if (golden.failed) unit.distrust(golden.problem);
+  if (unit.distrusted().empty()) unit.distrust(golden_problem(unit.config()));
   RunRecord record = record_of(unit, run, kProgram);
   record.operator_name = options.operator_name;
   record.shift = options.shift;
