@@ -315,7 +315,8 @@ void show_run(const StationRecordsOptions& options) {
   }
   fmt::print("images     {}, {} used\n", record.images.size(), used);
   for (const RunEvent& event : record.events) {
-    say(fmt::format("{:<11} {} {}\n", event.what, event.utc(), event.text));
+    const std::string who = event.who.empty() ? "" : event.who + ": ";
+    say(fmt::format("{:<11} {} {}{}\n", event.what, event.utc(), who, event.text));
   }
 }
 
@@ -439,6 +440,18 @@ void show_capability(const StationRecordsOptions& options) {
         fmt::format("{} {:.4g}", kind.asked == Direction::at_least ? ">=" : "<=", gate.value_or(0)),
         index(found->cpk), index(found->ppk));
   }
+void verify_records(const StationRecordsOptions& options) {
+  Known known(options);
+  const TrailCheck found = known.all().check(options.noted);
+  for (const std::string& problem : found.problems) say(fmt::format("{}\n", problem));
+  fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
+  if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
+  if (found.problems.empty()) return;
+  throw GateNotMet(fmt::format(
+      "the records are not as they were kept: {}{}", found.problems.front(),
+      found.problems.size() == 1 ? "" : fmt::format(", and {} more", found.problems.size() - 1)));
+}
+
   if (rows.empty()) {
     throw Undetermined(
         "no figure with a gate has two values that differ, of runs that were judged");

@@ -15,6 +15,8 @@ struct StationRecordsOptions {
   std::string station, records;
   RunFilter filter;
   std::string run, figure, output;
+  /// Of verify-records: the last digest of an earlier one; may be empty.
+  std::string noted;
   /// Of clean: delete, instead of telling what would be.
   bool remove = false;
   /// Of a control chart.
@@ -36,6 +38,9 @@ void write_certificate(const StationRecordsOptions& options);
 void clean_up(const StationRecordsOptions& options);
 /// vlp-station export: CSV, a line for each run, or JSON with all there is.
 void export_runs(const StationRecordsOptions& options);
+/// vlp-station verify-records: whether all records are as they were kept, by their trail. Throws
+/// GateNotMet when they are not.
+void verify_records(const StationRecordsOptions& options);
 /// vlp-station trend: a figure over the runs, with a control chart's limits and rules, also as a
 /// picture; of units of the station that passed, unless the filter says otherwise. Throws
 /// GateNotMet for an alarm.

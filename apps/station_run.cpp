@@ -57,7 +57,7 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
   std::optional<HookLock> lock;
   if (config.hook) {
     lock.emplace(spool.folder(), record.run);
-    record.events.push_back(hook_wanted(*config.hook));
+    record.events.push_back(hook_wanted(*config.hook, record.operator_name));
   }
   // Killed in between, the golden unit is due rather too early than too late.
   const bool golden_passed = record.kind == "golden" && record.passed();

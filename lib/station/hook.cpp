@@ -169,8 +169,9 @@ const RunEvent* last_of(const RunRecord& record, const char* what) {
 
 }  // namespace
 
-RunEvent hook_wanted(const Hook& hook) {
-  return new_event(kHookWanted, printable(fmt::format("{}", fmt::join(hook.command, " "))));
+RunEvent hook_wanted(const Hook& hook, const std::string& operator_name) {
+  return new_event(kHookWanted, printable(fmt::format("{}", fmt::join(hook.command, " "))),
+                   operator_name);
 }
 
 RunEvent run_hook(const Hook& hook, const RunRecord& record) {

@@ -12,7 +12,7 @@ namespace vlp {
 
 /// The trail's entry that a run's hook is to be run, which is kept together with the run: a hook
 /// that never came to its end is known by it.
-RunEvent hook_wanted(const Hook& hook);
+RunEvent hook_wanted(const Hook& hook, const std::string& operator_name);
 
 /// Runs the hook with run_json() of the run on its stdin. Whatever becomes of it is what the event
 /// tells: kHookDone with the last line that it wrote, kHookFailed with exit code, signal or time

@@ -121,7 +121,7 @@ TEST_F(HookTest, IsOpenUntilItIsDone) {
   RunRecord run = judged_run();
   EXPECT_FALSE(hook_is_open(run));
   EXPECT_EQ(hook_problem(run), "");
-  run.events.push_back(hook_wanted({{"label", "it"}, {}, 1}));
+  run.events.push_back(hook_wanted({{"label", "it"}, {}, 1}, "Ann"));
   EXPECT_EQ(run.events.back().text, "label it");
   EXPECT_TRUE(hook_is_open(run));
   EXPECT_EQ(hook_problem(run), "was not run to its end");
@@ -146,3 +146,4 @@ TEST_F(HookTest, OfARunIsRunByOneProgram) {
 
 }  // namespace
 }  // namespace vlp
+  EXPECT_THAT(run.events.back().who, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
