@@ -216,11 +216,20 @@ int main(int argc, char** argv) {
   auto* study = vlp::add_records(app, "study",
                                  "What measuring adds to a figure: repeatability and "
                                  "reproducibility (%GRR, ndc) of units that "
-                                 "were run as often on each station",
+                                 "were run as often on each station; with --reference bias and "
+                                 "linearity",
                                  records);
   study->add_option("figure", records.figure, which)->required();
   study->add_option("--units", records.units, "Its cameras (default: those with two runs or more)")
       ->option_text("ID ...");
+  study
+      ->add_option("--reference", records.references,
+                   "Units whose figure is known from elsewhere, and what it is: bias and linearity "
+                   "of the station")
+      ->option_text("UNIT=VALUE ...")
+      ->excludes("--units");
+  study->add_option("-o,--output", records.output, "Draw the bias, .png or .svg")
+      ->needs("--reference");
   return vlp::run_app(app, argc, argv, [&] {
     if (app.got_subcommand("run")) {
       if (run.camera_id.empty()) {
@@ -236,10 +245,10 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("restore")) vlp::restore_run(records);
     if (app.got_subcommand("certificate")) vlp::write_certificate(records);
     if (app.got_subcommand("clean")) vlp::clean_up(records);
+    if (app.got_subcommand("verify-records")) vlp::verify_records(records);
     if (app.got_subcommand("export")) vlp::export_runs(records);
     if (app.got_subcommand("trend")) vlp::show_trend(records);
     if (app.got_subcommand("capability")) vlp::show_capability(records);
     if (app.got_subcommand("study")) vlp::show_study(records);
   });
 }
-    if (app.got_subcommand("verify-records")) vlp::verify_records(records);
