@@ -38,8 +38,8 @@ void note(const StationConfig& config, const RunRecord& record) {
 }
 
 /// Runs the hook of a kept run and keeps what became of it. A verdict is a verdict without it.
-void call_hook(const Hook& hook, RunRecord& record, Spool& spool) {
-  record.events.push_back(run_hook(hook, record));
+void call_hook(const Hook& hook, RunRecord& record, const HookLock& lock, Spool& spool) {
+  record.events.push_back(run_hook(hook, record, lock));
   try {
     spool.keep(record);
   } catch (const InputError& error) {
@@ -84,7 +84,7 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
   }
   spool.deliver();
   if (config.hook) {
-    call_hook(*config.hook, record, spool);
+    call_hook(*config.hook, record, *lock, spool);
     terminal.print(hook_lines(record));
   }
   terminal.print(spool_lines(spool.state()));
@@ -224,9 +224,14 @@ void run_hooks(const StationRunOptions& options) {
   for (const std::string& run : runs) {
     const HookLock lock(spool.folder(), run);
     auto record = spool.find(run);
-    // Another program may be at it, or have done it meanwhile.
-    if (!lock.held() || !record || !hook_is_open(*record)) continue;
-    call_hook(*config.hook, *record, spool);
+    // Another program may have done it meanwhile.
+    if (!record || !hook_is_open(*record)) continue;
+    if (!lock.held()) {
+      fmt::print("{}\n", printable(fmt::format("{} {} {}: is being run", run, record->camera,
+                                               record->verdict)));
+      continue;
+    }
+    call_hook(*config.hook, *record, lock, spool);
     const std::string problem = hook_problem(*record);
     if (!problem.empty()) ++failed;
     fmt::print("{}\n", printable(fmt::format("{} {} {}: {}", run, record->camera, record->verdict,
