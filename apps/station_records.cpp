@@ -6,9 +6,11 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <tuple>
 #include <utility>
 
@@ -16,6 +18,7 @@
 #include "captures/printable.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "station/bias_study.h"
 #include "station/capability.h"
 #include "station/certificate.h"
 #include "station/control_chart.h"
@@ -236,12 +239,75 @@ std::vector<StudyValue> study_values(const std::vector<TrendPoint>& points,
   return values;
 }
 
-/// The study, or why these values are none, as Undetermined.
-MeasurementStudy study_of(const std::vector<StudyValue>& values) {
+/// What a study gives, or why these values are none, as Undetermined.
+template <typename Study>
+auto determined(const Study& study) {
   try {
-    return measurement_study(values);
+    return study();
   } catch (const std::invalid_argument& error) {
     throw Undetermined(error.what());
+  }
+}
+
+/// UNIT=VALUE, by unit.
+std::map<std::string, double> references_of(const std::vector<std::string>& texts) {
+  std::map<std::string, double> references;
+  for (const std::string& text : texts) {
+    const auto at = text.find('=');
+    std::istringstream number(at == std::string::npos ? "" : text.substr(at + 1));
+    double value = 0;
+    if (at == 0 || !(number >> value) || !number.eof() || !std::isfinite(value)) {
+      throw std::invalid_argument("--reference: should be UNIT=VALUE, not " + text);
+    }
+    if (!references.emplace(text.substr(0, at), value).second) {
+      throw std::invalid_argument("--reference: " + text.substr(0, at) + " stands twice");
+    }
+  }
+  return references;
+}
+
+std::string words_of(const TestedEstimate& estimate) {
+  return fmt::format("{:>12.4g}{:>12.3g}{:>9.2f}{:>9.4f}   {:.4g} to {:.4g}", estimate.value,
+                     estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high);
+}
+
+/// Bias and linearity of a station against reference units.
+void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
+  const auto references = references_of(options.references);
+  Known known(options);
+  const auto points = judged(known.all(), options.figure, comparable(options));
+  check_one_station(points, options);
+  std::vector<std::string> units;
+  for (const auto& [unit, reference] : references) units.push_back(unit);
+  std::vector<ReferenceValue> values;
+  for (const auto& [unit, station, value] : study_values(points, units)) {
+    values.push_back({unit, references.at(unit), value});
+  }
+  const BiasStudy study = determined([&] { return bias_study(values); });
+  if (!options.output.empty()) draw_bias(options.output, options.figure, values, study);
+  constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}\n";
+  say(fmt::format("{}: bias against {} reference units, {}\n\n", options.figure, study.units.size(),
+                  std::string_view(kind.unit).empty() ? "a share" : kind.unit));
+  say(fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
+  for (const UnitBias& unit : study.units) {
+    say(fmt::format("{:<20}{:>10.4g}{:>6}{}{}\n", unit.unit, unit.reference, unit.count,
+                    words_of(unit.bias), unit.bias.shows() ? "   shows" : ""));
+  }
+  const auto line = [](const char* name, const TestedEstimate& estimate) {
+    fmt::print("{:<36}{}{}\n", name, words_of(estimate), estimate.shows() ? "   shows" : "");
+  };
+  line("all", study.all);
+  if (!study.linearity) return;
+  const Linearity& linearity = *study.linearity;
+  fmt::print("\nbias = intercept + slope x reference\n");
+  line("slope", linearity.slope);
+  line("intercept", linearity.intercept);
+  fmt::print("residual sd {:.4g}, R^2 {:.1f} %\n\n{:<20}{:>10}{:>18}   95 % band\n",
+             linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
+  for (const UnitBias& unit : study.units) {
+    const double at = linearity.bias_at(unit.reference), half = linearity.band_at(unit.reference);
+    say(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}\n", unit.unit, unit.reference,
+                    at, at - half, at + half, std::abs(at) > half ? "   without 0" : ""));
   }
 }
 
@@ -315,7 +381,8 @@ void show_run(const StationRecordsOptions& options) {
   }
   fmt::print("images     {}, {} used\n", record.images.size(), used);
   for (const RunEvent& event : record.events) {
-    say(fmt::format("{:<11} {} {}\n", event.what, event.utc(), event.text));
+    const std::string who = event.who.empty() ? "" : event.who + ": ";
+    say(fmt::format("{:<11} {} {}{}\n", event.what, event.utc(), who, event.text));
   }
 }
 
@@ -371,6 +438,18 @@ void clean_up(const StationRecordsOptions& options) {
   if (done == found.expired.size()) return;
   throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
                                        found.expired.size() - done, found.expired.size()));
+}
+
+void verify_records(const StationRecordsOptions& options) {
+  Known known(options);
+  const TrailCheck found = known.all().check(options.noted);
+  for (const std::string& problem : found.problems) say(fmt::format("{}\n", problem));
+  fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
+  if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
+  if (found.problems.empty()) return;
+  throw GateNotMet(fmt::format(
+      "the records are not as they were kept: {}{}", found.problems.front(),
+      found.problems.size() == 1 ? "" : fmt::format(", and {} more", found.problems.size() - 1)));
 }
 
 void export_runs(const StationRecordsOptions& options) {
@@ -450,12 +529,14 @@ void show_capability(const StationRecordsOptions& options) {
 
 void show_study(const StationRecordsOptions& options) {
   const MetricKind kind = figure_of(options);
+  if (!options.references.empty()) return show_bias(kind, options);
   Known known(options);
   Records& records = known.all();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
   const auto points = judged(records, options.figure, asked(filter));
-  const MeasurementStudy study = study_of(study_values(points, options.units));
+  const auto values = study_values(points, options.units);
+  const MeasurementStudy study = determined([&] { return measurement_study(values); });
   const auto gate = gate_of(options.figure, options, records, points);
   say(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}\n\n", options.figure,
                   study.units, study.stations, study.repeats, study.mean, kind.unit));

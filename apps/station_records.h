@@ -15,12 +15,16 @@ struct StationRecordsOptions {
   std::string station, records;
   RunFilter filter;
   std::string run, figure, output;
+  /// Of verify-records: the last digest of an earlier one; may be empty.
+  std::string noted;
   /// Of clean: delete, instead of telling what would be.
   bool remove = false;
   /// Of a control chart.
   std::vector<std::string> rules{"western-electric"};
   /// Of a study: its units; those with two runs or more when there is none.
   std::vector<std::string> units;
+  /// Or its reference units, as UNIT=VALUE.
+  std::vector<std::string> references;
 };
 
 /// vlp-station list: a line for each run.
@@ -34,6 +38,9 @@ void write_certificate(const StationRecordsOptions& options);
 /// vlp-station clean: what of the station's runs is kept no longer, deleted when that is asked for,
 /// which the runs' events tell. Records stay.
 void clean_up(const StationRecordsOptions& options);
+/// vlp-station verify-records: whether all records are as they were kept, by their trail. Throws
+/// GateNotMet when they are not.
+void verify_records(const StationRecordsOptions& options);
 /// vlp-station export: CSV, a line for each run, or JSON with all there is.
 void export_runs(const StationRecordsOptions& options);
 /// vlp-station trend: a figure over the runs, with a control chart's limits and rules, also as a
@@ -43,7 +50,7 @@ void show_trend(const StationRecordsOptions& options);
 /// vlp-station capability: how the figures that have gates scatter, compared with them.
 void show_capability(const StationRecordsOptions& options);
 /// vlp-station study: what measuring adds to a figure, of units that were measured several times on
-/// each of the stations.
+/// each of the stations; of reference units, bias and linearity.
 void show_study(const StationRecordsOptions& options);
 
 }  // namespace vlp

@@ -38,8 +38,8 @@ void note(const StationConfig& config, const RunRecord& record) {
 }
 
 /// Runs the hook of a kept run and keeps what became of it. A verdict is a verdict without it.
-void call_hook(const Hook& hook, RunRecord& record, Spool& spool) {
-  record.events.push_back(run_hook(hook, record));
+void call_hook(const Hook& hook, RunRecord& record, const HookLock& lock, Spool& spool) {
+  record.events.push_back(run_hook(hook, record, lock));
   try {
     spool.keep(record);
   } catch (const InputError& error) {
@@ -57,7 +57,7 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
   std::optional<HookLock> lock;
   if (config.hook) {
     lock.emplace(spool.folder(), record.run);
-    record.events.push_back(hook_wanted(*config.hook));
+    record.events.push_back(hook_wanted(*config.hook, record.operator_name));
   }
   // Killed in between, the golden unit is due rather too early than too late.
   const bool golden_passed = record.kind == "golden" && record.passed();
@@ -84,7 +84,7 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
   }
   spool.deliver();
   if (config.hook) {
-    call_hook(*config.hook, record, spool);
+    call_hook(*config.hook, record, *lock, spool);
     terminal.print(hook_lines(record));
   }
   terminal.print(spool_lines(spool.state()));
@@ -105,7 +105,7 @@ void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
   unit.refuse_images_of_others([&spool, camera = unit.camera_id()](const std::string& sha256) {
     return spool.owner_of(sha256, camera);
   });
-  unit.distrust(golden_state(config).problem);
+  unit.distrust(golden_problem(config));
 }
 
 /// Throws GateNotMet or Undetermined, by the verdict.
@@ -129,10 +129,9 @@ void add_folders(Unit& unit, const fs::path& folder) {
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }
 
-/// The record of a unit that ends now. A golden unit that failed meanwhile spoils it.
+/// The record of a unit that ends now. A golden unit that failed or became due meanwhile spoils it.
 RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions& options) {
-  const GoldenState golden = golden_state(unit.config());
-  if (golden.failed) unit.distrust(golden.problem);
+  if (unit.distrusted().empty()) unit.distrust(golden_problem(unit.config()));
   RunRecord record = record_of(unit, run, kProgram);
   record.operator_name = options.operator_name;
   record.shift = options.shift;
@@ -225,9 +224,14 @@ void run_hooks(const StationRunOptions& options) {
   for (const std::string& run : runs) {
     const HookLock lock(spool.folder(), run);
     auto record = spool.find(run);
-    // Another program may be at it, or have done it meanwhile.
-    if (!lock.held() || !record || !hook_is_open(*record)) continue;
-    call_hook(*config.hook, *record, spool);
+    // Another program may have done it meanwhile.
+    if (!record || !hook_is_open(*record)) continue;
+    if (!lock.held()) {
+      fmt::print("{}\n", printable(fmt::format("{} {} {}: is being run", run, record->camera,
+                                               record->verdict)));
+      continue;
+    }
+    call_hook(*config.hook, *record, lock, spool);
     const std::string problem = hook_problem(*record);
     if (!problem.empty()) ++failed;
     fmt::print("{}\n", printable(fmt::format("{} {} {}: {}", run, record->camera, record->verdict,

@@ -20,6 +20,7 @@
 
 #include "app.h"
 #include "captures/printable.h"
+#include "rig/input_error.h"
 #include "station/golden_due.h"
 #include "terminal.h"
 
@@ -51,7 +52,7 @@ bool begin_shift(std::string& operator_name, std::string& shift, Terminal& termi
 /// The next unit's id, or the golden unit's, as a scanner types it, one that the station takes;
 /// nothing for `q` and at the end of the input.
 std::optional<std::string> next_serial(const StationConfig& config, Terminal& terminal) {
-  const std::string golden = golden_state(config).problem;
+  const std::string golden = golden_problem(config);
   std::string problem;
   for (;;) {
     std::vector<ScreenLine> prompt;
@@ -118,12 +119,16 @@ int exit_code_of(const std::vector<std::string>& command) {
 }  // namespace
 
 void run_shift(StationRunOptions options) {
-  const StationConfig config = read_station(options.station);
+  StationConfig config = read_station(options.station);
   Terminal terminal;
   std::map<int, int> ends;  // by exit code
   int units = 0;
   const bool begun = begin_shift(options.operator_name, options.shift, terminal);
   while (begun) {
+    try {
+      config = read_station(options.station);  // as each unit does
+    } catch (const InputError&) {              // the unit tells why
+    }
     const auto serial = next_serial(config, terminal);
     if (!serial) break;
     options.camera_id = *serial;

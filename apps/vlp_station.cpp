@@ -94,13 +94,20 @@ const CLI::Validator kUtc(
     },
     "");
 
-/// What the commands on records share.
-CLI::App* add_records(CLI::App& app, const char* name, const char* what,
-                      StationRecordsOptions& options) {
+/// Where records are.
+CLI::App* add_where(CLI::App& app, const char* name, const char* what,
+                    StationRecordsOptions& options) {
   CLI::App* command = app.add_subcommand(name, what);
   command->add_option("--station", options.station, "The station, station.yaml");
   command->add_option("--records", options.records,
                       "Or its records: a file of SQLite, or postgresql://USER@HOST/NAME");
+  return command;
+}
+
+/// What the commands on records share.
+CLI::App* add_records(CLI::App& app, const char* name, const char* what,
+                      StationRecordsOptions& options) {
+  CLI::App* command = add_where(app, name, what, options);
   command->add_option("--camera-id", options.filter.camera, "Only of this camera");
   command->add_option("--of-station", options.filter.station,
                       "Only of the station of this name, or any");
@@ -133,7 +140,8 @@ int main(int argc, char** argv) {
       "'study'\n"
       "tell of the records, 'restore' writes a run's files again, 'certificate' a page for who "
       "gets the\n"
-      "unit. Runs wait in the station's 'spool' while the records cannot be reached; 'hook' runs "
+      "unit; 'verify-records' finds what was changed in the records. Runs wait in the station's "
+      "'spool' while the records cannot be reached; 'hook' runs "
       "the\n"
       "station's hook again where it failed, 'clean' deletes what is kept no longer.\n"
       "vlp-station COMMAND --help tells more.\n\n"
@@ -174,6 +182,14 @@ int main(int argc, char** argv) {
       "clean", "What of the runs is kept no longer ('keep' in station.yaml); records stay");
   clean->add_option("--station", records.station, "The station, station.yaml")->required();
   clean->add_flag("--delete", records.remove, "Delete it (default: only tell)");
+  CLI::App* verify_records = vlp::add_where(
+      app, "verify-records",
+      "Whether the records are as they were kept: what was changed, removed or added by hand, by "
+      "name; exit code 1 when there is any",
+      records);
+  verify_records->add_option("--noted", records.noted,
+                             "The last digest that an earlier verify-records told: the trail has "
+                             "to have it still");
   auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
   exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
   constexpr const char* which = "Which: rms_px, check_mean_mm, ...";
@@ -200,11 +216,20 @@ int main(int argc, char** argv) {
   auto* study = vlp::add_records(app, "study",
                                  "What measuring adds to a figure: repeatability and "
                                  "reproducibility (%GRR, ndc) of units that "
-                                 "were run as often on each station",
+                                 "were run as often on each station; with --reference bias and "
+                                 "linearity",
                                  records);
   study->add_option("figure", records.figure, which)->required();
   study->add_option("--units", records.units, "Its cameras (default: those with two runs or more)")
       ->option_text("ID ...");
+  study
+      ->add_option("--reference", records.references,
+                   "Units whose figure is known from elsewhere, and what it is: bias and linearity "
+                   "of the station")
+      ->option_text("UNIT=VALUE ...")
+      ->excludes("--units");
+  study->add_option("-o,--output", records.output, "Draw the bias, .png or .svg")
+      ->needs("--reference");
   return vlp::run_app(app, argc, argv, [&] {
     if (app.got_subcommand("run")) {
       if (run.camera_id.empty()) {
@@ -220,6 +245,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("restore")) vlp::restore_run(records);
     if (app.got_subcommand("certificate")) vlp::write_certificate(records);
     if (app.got_subcommand("clean")) vlp::clean_up(records);
+    if (app.got_subcommand("verify-records")) vlp::verify_records(records);
     if (app.got_subcommand("export")) vlp::export_runs(records);
     if (app.got_subcommand("trend")) vlp::show_trend(records);
     if (app.got_subcommand("capability")) vlp::show_capability(records);

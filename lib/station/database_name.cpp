@@ -58,12 +58,6 @@ bool is_of_keywords(const std::string& where) {
          where.find("dbname=") != std::string::npos;
 }
 
-std::string name_of_machine() {
-  constexpr std::size_t longest = 256;
-  std::array<char, longest> name{};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
-}
-
 /// Whether libpq reaches a host through a socket or a loop, without a network.
 bool is_here(const std::string& host) {
   return host.empty() || host.front() == '/' || host.front() == '@' || host == "localhost" ||
@@ -71,6 +65,12 @@ bool is_here(const std::string& host) {
 }
 
 }  // namespace
+
+std::string name_of_machine() {
+  constexpr std::size_t longest = 256;
+  std::array<char, longest> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
 
 bool is_server(const std::string& where) { return where.find(kScheme) != std::string::npos; }
 

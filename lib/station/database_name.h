@@ -14,6 +14,9 @@ bool is_server(const std::string& where);
 /// could be misread as another: a '@', ':', '/' or '?' in user or password is %40, %3A, %2F or %3F.
 std::string name_of_database(const std::string& where);
 
+/// This machine's; empty when it has none.
+std::string name_of_machine();
+
 /// What tells databases apart, also for programs on other machines that share a folder: a file by
 /// its machine and its whole path, MACHINE:/var/lib/vlp/records.db; a server by host, address
 /// (hostaddr), port and database, or service, as libpq takes them, the environment's and its own

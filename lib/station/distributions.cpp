@@ -88,4 +88,15 @@ double f_upper_tail(double x, double dof_above, double dof_below) {
   return regularized_beta(dof_below / 2, dof_above / 2, dof_below / (dof_below + dof_above * x));
 }
 
+double t_two_tails(double t, double dof) { return f_upper_tail(t * t, 1, dof); }
+
+double t_quantile(double both_tails, double dof) {
+  double low = 0, high = 1;
+  while (t_two_tails(high, dof) > both_tails) high *= 2;
+  for (double middle = high / 2; middle > low && middle < high; middle = (low + high) / 2) {
+    (t_two_tails(middle, dof) > both_tails ? low : high) = middle;
+  }
+  return high;
+}
+
 }  // namespace vlp

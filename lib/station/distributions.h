@@ -13,4 +13,10 @@ double chi_square_quantile(double probability, double dof);
 /// P(X > x) of Fisher's F: the regularized incomplete beta function (NIST DLMF 8.17.22).
 double f_upper_tail(double x, double dof_above, double dof_below);
 
+/// P(|T| > |t|) of Student's t, whose square is F(1, dof).
+double t_two_tails(double t, double dof);
+/// Its inverse, to rounding: the t > 0 beyond which, on both sides, lies so much. Precondition: 0 <
+/// both_tails < 1.
+double t_quantile(double both_tails, double dof);
+
 }  // namespace vlp

@@ -73,7 +73,8 @@ nlohmann::ordered_json json_of(const RunRecord& run) {
   json["images"] = std::move(images);
   json["events"] = nlohmann::ordered_json::array();
   for (const RunEvent& event : run.events) {
-    json["events"].push_back({{"event", event.event}, {"what", event.what}, {"text", event.text}});
+    json["events"].push_back(
+        {{"event", event.event}, {"what", event.what}, {"text", event.text}, {"who", event.who}});
   }
   return json;
 }

@@ -29,10 +29,9 @@ fs::path note_of(const StationConfig& config) {
 }
 
 /// Of a note that is no whole one.
-GoldenState damaged(const std::string& why) {
-  return {
-      true,
-      fmt::format("what the golden unit said is not known ({}): 'vlp-station verify' is due", why)};
+std::string damaged(const std::string& why) {
+  return fmt::format("what the golden unit said is not known ({}): 'vlp-station verify' is due",
+                     why);
 }
 
 /// An earlier PASS must not stand where this run could not be noted: without a note it is due.
@@ -43,13 +42,13 @@ void forget(const fs::path& file) {
 
 }  // namespace
 
-GoldenState golden_state(const StationConfig& config) {
+std::string golden_problem(const StationConfig& config) {
   constexpr const char* verify = "'vlp-station verify' is due";
-  if (!config.verify_due) return {};
+  if (!config.verify_due) return "";
   const fs::path file = note_of(config);
   std::error_code none;
   if (fs::status(file, none).type() == fs::file_type::not_found) {
-    return {true, fmt::format("the golden unit was not measured here yet: {}", verify)};
+    return fmt::format("the golden unit was not measured here yet: {}", verify);
   }
   constexpr std::size_t most_bytes = 1 << 24;
   std::string text;
@@ -58,30 +57,39 @@ GoldenState golden_state(const StationConfig& config) {
   } catch (const InputError& error) {
     return damaged(error.what());
   }
-  std::istringstream words(text);
-  std::string run, verdict, ended_utc;
-  words >> run >> verdict >> ended_utc;
+  std::istringstream words(text.substr(0, text.find('\n')));
+  std::string run, verdict, ended_utc, config_sha256;
+  words >> run >> verdict >> ended_utc >> config_sha256;
   const bool failed = verdict == name_of(Verdict::fail);
   if ((!failed && verdict != name_of(Verdict::pass)) || ended_utc.empty()) {
     return damaged(file.string() + " is damaged");
   }
   if (failed) {
-    return {true,
-            fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify)};
+    return fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify);
+  }
+  if (config_sha256.empty()) {  // an older program's note
+    return fmt::format("with which lamp map the golden unit was measured is not known (run {}): {}",
+                       run, verify);
+  }
+  if (config_sha256 != config.sha256) {
+    return fmt::format(
+        "station.yaml or a file that it names was changed since the golden unit was measured (run "
+        "{}): {}",
+        run, verify);
   }
   constexpr double second_per_hour = 3600;
   const double age_h = seconds_since(ended_utc) / second_per_hour;
   const auto& due = *config.verify_due;
   if (due.hours && !(age_h >= 0 && age_h <= *due.hours)) {
-    return {false, fmt::format("the golden unit was measured {} (run {}), not within {:g} h: {}",
-                               ended_utc, run, *due.hours, verify)};
+    return fmt::format("the golden unit was measured {} (run {}), not within {:g} h: {}", ended_utc,
+                       run, *due.hours, verify);
   }
   const auto units = std::count(text.begin(), text.end(), '\n') - 1;
   if (due.units && units >= *due.units) {
-    return {false, fmt::format("{} units since the golden unit was measured (run {}): {}", units,
-                               run, verify)};
+    return fmt::format("{} units since the golden unit was measured (run {}): {}", units, run,
+                       verify);
   }
-  return {};
+  return "";
 }
 
 void note_for_golden(const StationConfig& config, const RunRecord& record) {
@@ -90,8 +98,8 @@ void note_for_golden(const StationConfig& config, const RunRecord& record) {
   make_folder(config.spool);
   if (record.kind == "golden") {
     try {
-      return write_file(file,
-                        fmt::format("{} {} {}\n", record.run, record.verdict, record.ended_utc));
+      return write_file(file, fmt::format("{} {} {} {}\n", record.run, record.verdict,
+                                          record.ended_utc, record.config_sha256));
     } catch (const InputError&) {
       forget(file);
       throw;

@@ -9,25 +9,18 @@
 
 namespace vlp {
 
-/// What the golden unit says of a station now.
-struct GoldenState {
-  /// It was measured last, and failed, or nothing is known of it: that spoils units that were begun
-  /// before, too.
-  bool failed = false;
-  /// Why no unit may pass: it failed, is due (StationConfig::verify_due), or was never measured
-  /// here; empty when nothing is due.
-  std::string problem = {};
-};
-
-/// Of what note_for_golden() has noted in the station's spool, whatever the records say, which may
-/// be away. A clock that was set back makes it due, a damaged note too.
-GoldenState golden_state(const StationConfig& config);
+/// Why no unit may pass now, for people: the golden unit failed, is due
+/// (StationConfig::verify_due), was measured with another station.yaml, or another file that it
+/// names, or never here; empty when units may. Of what note_for_golden() has noted in the station's
+/// spool, whatever the records say, which may be away. A clock that was set back makes it due, a
+/// damaged note too.
+std::string golden_problem(const StationConfig& config);
 
 /// Notes a run: of the golden unit that it passed or failed, of a unit that was judged that it is
 /// one more. An INVALID run is neither. File .golden-DIGEST of the station's name: run, verdict and
-/// end of the golden unit, then a line for each unit since. Throws InputError when it
-/// cannot be noted; then there is no note any more, and the golden unit is due. Without
-/// `verify_due` nothing is noted.
+/// end of the golden unit and the digest of the station's files, then a line for each unit since.
+/// Throws InputError when it cannot be noted; then there is no note any more, and the golden unit
+/// is due. Without `verify_due` nothing is noted.
 void note_for_golden(const StationConfig& config, const RunRecord& record);
 
 }  // namespace vlp

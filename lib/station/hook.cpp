@@ -8,6 +8,7 @@
 #include <spawn.h>
 #include <sys/file.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -17,7 +18,10 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <optional>
+#include <sstream>
 #include <system_error>
 #include <thread>
 #include <vector>
@@ -45,6 +49,54 @@ class Descriptor {
 
  private:
   int number_;
+};
+
+/// The processes whose parent is this one. Where /proc is not to be read there are none.
+std::vector<pid_t> children() {
+  std::vector<pid_t> found;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc", none)) {
+    const std::string name = entry.path().filename().string();
+    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
+    std::string stat;
+    std::getline(std::ifstream(entry.path() / "stat"), stat);
+    // PID (NAME) STATE PARENT, where the name may hold anything.
+    std::istringstream after_name(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
+    std::string state;
+    pid_t parent = 0;
+    if (after_name >> state >> parent && parent == ::getpid()) found.push_back(std::stoi(name));
+  }
+  return found;
+}
+
+/// While it is there, what a process leaves behind comes to this one, and not to init, so that
+/// nothing that a hook has started gets away from its time limit, whatever group or session it
+/// makes for itself.
+class Adoption {
+ public:
+  Adoption() : before_(children()) { ::prctl(PR_SET_CHILD_SUBREAPER, 1); }
+  ~Adoption() { ::prctl(PR_SET_CHILD_SUBREAPER, 0); }
+  Adoption(const Adoption&) = delete;
+  Adoption& operator=(const Adoption&) = delete;
+
+  /// Kills those that came, and what comes when they die.
+  void kill_all() const {
+    constexpr int tries = 100;
+    for (int i = 0; i < tries; ++i) {
+      bool any = false;
+      for (const pid_t child : children()) {
+        if (std::find(before_.begin(), before_.end(), child) != before_.end()) continue;
+        any = true;
+        ::kill(child, SIGKILL);
+        ::waitpid(child, nullptr, WNOHANG);
+      }
+      if (!any) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+
+ private:
+  std::vector<pid_t> before_;
 };
 
 /// What a process of its own group writes, and how it ends.
@@ -115,9 +167,9 @@ int file_with(const std::string& text) {
   return file;
 }
 
-/// Starts it in a group of its own, with no descriptors and signals of this program; an errno when
-/// it could not be.
-int start(const Hook& hook, int input, int output, pid_t& id) {
+/// Starts it in a group of its own, with no descriptors but the lock's and no signals of this
+/// program; an errno when it could not be.
+int start(const Hook& hook, int input, int output, int lock, pid_t& id) {
   posix_spawn_file_actions_t actions;
   posix_spawnattr_t attributes;
   ::posix_spawn_file_actions_init(&actions);
@@ -125,7 +177,9 @@ int start(const Hook& hook, int input, int output, pid_t& id) {
   ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
   ::posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
-  ::posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
+  int first_closed = STDERR_FILENO + 1;
+  if (lock >= 0) ::posix_spawn_file_actions_adddup2(&actions, lock, first_closed++);
+  ::posix_spawn_file_actions_addclosefrom_np(&actions, first_closed);
   ::posix_spawn_file_actions_addchdir_np(&actions, hook.folder.c_str());
   ::posix_spawnattr_setflags(
       &attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
@@ -169,11 +223,12 @@ const RunEvent* last_of(const RunRecord& record, const char* what) {
 
 }  // namespace
 
-RunEvent hook_wanted(const Hook& hook) {
-  return new_event(kHookWanted, printable(fmt::format("{}", fmt::join(hook.command, " "))));
+RunEvent hook_wanted(const Hook& hook, const std::string& operator_name) {
+  return new_event(kHookWanted, printable(fmt::format("{}", fmt::join(hook.command, " "))),
+                   operator_name);
 }
 
-RunEvent run_hook(const Hook& hook, const RunRecord& record) {
+RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
   std::array<int, 2> pipe{};
   const Descriptor input(file_with(run_json(record)));
   if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
@@ -184,7 +239,9 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record) {
   ::fcntl(from.get(), F_SETFL, O_NONBLOCK);
   Process process{0, from.get()};
   std::signal(SIGCHLD, SIG_DFL);  // who inherited that it is ignored never hears how it ended
-  if (const int error = start(hook, input.get(), to.get(), process.id); error != 0) {
+  const Adoption adoption;
+  if (const int error = start(hook, input.get(), to.get(), lock.descriptor(), process.id);
+      error != 0) {
     return failed(hook.command.front() +
                   " cannot be started: " + std::generic_category().message(error));
   }
@@ -195,6 +252,7 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record) {
   } catch (const std::system_error& error) {
     return failed("how it ended is not known: " + error.code().message());
   }
+  if (!status) adoption.kill_all();
   const std::string line = last_line(process.written);
   if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return new_event(kHookDone, line);
   std::string why;

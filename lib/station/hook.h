@@ -12,13 +12,7 @@ namespace vlp {
 
 /// The trail's entry that a run's hook is to be run, which is kept together with the run: a hook
 /// that never came to its end is known by it.
-RunEvent hook_wanted(const Hook& hook);
-
-/// Runs the hook with run_json() of the run on its stdin. Whatever becomes of it is what the event
-/// tells: kHookDone with the last line that it wrote, kHookFailed with exit code, signal or time
-/// limit before that line, or why it could not be started. Takes no longer than the time limit.
-/// Sets SIGCHLD to its default.
-RunEvent run_hook(const Hook& hook, const RunRecord& record);
+RunEvent hook_wanted(const Hook& hook, const std::string& operator_name);
 
 /// Whether a hook was wanted for a run and has not been done.
 bool hook_is_open(const RunRecord& record);
@@ -36,11 +30,21 @@ class HookLock {
 
   /// Whether no other program runs it now.
   bool held() const { return held_; }
+  /// Who has it holds the lock; negative where there is none.
+  int descriptor() const { return descriptor_; }
 
  private:
   std::filesystem::path file_;
   int descriptor_ = -1;
   bool held_ = true;
 };
+
+/// Runs the hook with run_json() of the run on its stdin. Whatever becomes of it is what the event
+/// tells: kHookDone with the last line that it wrote, kHookFailed with exit code, signal or time
+/// limit before that line, or why it could not be started. Takes no longer than the time limit, at
+/// which it is killed with all that it has started, those that left its group too, unless they run
+/// as another user. It has the lock's descriptor, 3: when this program is killed, nobody else runs
+/// the hook before it has ended. Sets SIGCHLD to its default.
+RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock);
 
 }  // namespace vlp

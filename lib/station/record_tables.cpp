@@ -10,13 +10,15 @@
 #include <vector>
 
 #include "station/run_record.h"
+#include "station/trail.h"
 
 namespace vlp {
 namespace {
 
 /// Version 2: a figure has its unit. Version 3: images are found by their digest; a verdict can be
 /// INVALID. Version 4: guard bands. Version 5: events, operator and shift.
-constexpr int kSchema = 5;
+/// Version 6: who of events; the trail.
+constexpr int kSchema = 6;
 
 constexpr const char* kFigures =  // gate: no limit is no gate; guard_k: none is no guard band
     "CREATE TABLE IF NOT EXISTS figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
@@ -36,9 +38,14 @@ constexpr const char* kImagesByDigest =
 constexpr const char* kEvents =
     "CREATE TABLE IF NOT EXISTS events (event VARCHAR(64) PRIMARY KEY, "
     "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
-    "text TEXT NOT NULL)";
+    "text TEXT NOT NULL, who TEXT NOT NULL DEFAULT '')";
 
 constexpr const char* kEventsByRun = "CREATE INDEX IF NOT EXISTS events_by_run ON events (run)";
+
+/// Refers to no run, so that it tells of one that was removed.
+constexpr const char* kTrail =
+    "CREATE TABLE IF NOT EXISTS trail (number BIGINT PRIMARY KEY, run VARCHAR(64) NOT NULL, "
+    "event VARCHAR(64) NOT NULL, content TEXT NOT NULL, digest TEXT NOT NULL)";
 
 std::vector<std::string> tables() {
   std::string runs = "CREATE TABLE IF NOT EXISTS runs (run VARCHAR(64) PRIMARY KEY";
@@ -52,6 +59,7 @@ std::vector<std::string> tables() {
           kImages,
           kEvents,
           kEventsByRun,
+          kTrail,
           "CREATE INDEX IF NOT EXISTS runs_by_camera ON runs (camera)",
           kImagesByDigest};
 }
@@ -81,16 +89,28 @@ void from_3_to_4(soci::session& sql) {
   sql << "ALTER TABLE figures ADD COLUMN guard_k DOUBLE PRECISION";
 }
 
+constexpr const char* kEventsOfVersion5 =
+    "CREATE TABLE IF NOT EXISTS events (event VARCHAR(64) PRIMARY KEY, "
+    "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
+    "text TEXT NOT NULL)";
+
 /// An older program would bring runs here without their events, and take them from the spool.
 void from_4_to_5(soci::session& sql) {
-  sql << kEvents;
+  sql << kEventsOfVersion5;
   sql << kEventsByRun;
   sql << "ALTER TABLE runs ADD COLUMN operator_name TEXT NOT NULL DEFAULT ''";
   sql << "ALTER TABLE runs ADD COLUMN shift TEXT NOT NULL DEFAULT ''";
 }
 
+/// An older program would keep runs without an entry in the trail.
+void from_5_to_6(soci::session& sql) {
+  sql << "ALTER TABLE events ADD COLUMN who TEXT NOT NULL DEFAULT ''";
+  sql << kTrail;
+}
+constexpr int kFirstWithTrail = 6;
+
 /// From each version to the next; the first is of version 1.
-constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4, from_4_to_5};
+constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4, from_4_to_5, from_5_to_6};
 static_assert(kMigrations.size() + 1 == kSchema);
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
@@ -130,6 +150,8 @@ void make_or_migrate(soci::session& sql) {
   for (int version = found; version < kSchema; ++version) {
     kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
   }
+  // When all columns are there.
+  if (found < kFirstWithTrail) append_all(sql);
   if (found < kSchema) sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchema);
   transaction.commit();
 }

@@ -21,6 +21,7 @@
 #include "rig/input_error.h"
 #include "station/database_name.h"
 #include "station/record_tables.h"
+#include "station/run_rows.h"
 
 namespace vlp {
 namespace {
@@ -32,6 +33,9 @@ void set_up(soci::session& sql, int patience_s) {
     // Before this program gives up, so that the server says what it waits for.
     constexpr int of_patience_ms = 900;
     sql << "SET lock_timeout TO " + std::to_string(patience_s * of_patience_ms);
+    // One that stands still holds the trail for no longer than others wait for it.
+    sql << "SET idle_in_transaction_session_timeout TO " +
+               std::to_string(patience_s * of_patience_ms);
     // What is committed is on the disk, whatever the server is told to do otherwise.
     sql << "SET synchronous_commit TO on";
     return;
@@ -210,23 +214,6 @@ constexpr int kManyRows = 10;
 /// The same; an hour, where the patience is not said, for an index of all images there are.
 constexpr int kAllTables = 360;
 
-/// The texts of a run; nothing when it is not kept.
-std::optional<RunRecord> texts_of(soci::session& sql, const std::string& run) {
-  RunRecord record;
-  soci::statement select(sql);
-  std::string columns;
-  for (const auto& [name, text, label, in_csv] : run_fields()) {
-    columns.append(columns.empty() ? "" : ", ").append(name);
-    select.exchange(soci::into(record.*text));
-  }
-  select.exchange(soci::use(run, "key"));
-  select.alloc();
-  select.prepare("SELECT " + columns + " FROM runs WHERE run = :key");
-  select.define_and_bind();
-  if (!select.execute(true)) return std::nullopt;
-  return record;
-}
-
 bool same_texts(const RunRecord& a, const RunRecord& b) {
   const auto fields = run_fields();
   return std::all_of(fields.begin(), fields.end(),
@@ -263,11 +250,16 @@ void put_images(soci::session& sql, const RunRecord& record, Watch& watch) {
   }
 }
 
+/// Those that are not kept yet, and their entries in the trail.
 void put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
-  for (const auto& [event, what, text] : record.events) {
-    sql << "INSERT INTO events (event, run, what, text) VALUES (:event, :run, :what, :text) "
-           "ON CONFLICT (event) DO NOTHING",
-        soci::use(event), soci::use(record.run), soci::use(what), soci::use(text);
+  for (const RunEvent& event : record.events) {
+    soci::statement insert =
+        (sql.prepare << "INSERT INTO events (event, run, what, text, who) VALUES (:event, :run, "
+                        ":what, :text, :who) ON CONFLICT (event) DO NOTHING",
+         soci::use(event.event), soci::use(record.run), soci::use(event.what),
+         soci::use(event.text), soci::use(event.who));
+    insert.execute(true);
+    if (insert.get_affected_rows() > 0) append_event(sql, record.run, event);
     watch.heard();
   }
 }
@@ -340,7 +332,9 @@ void Records::keep(const RunRecord& record) {
   database_->run([&](Watch& watch) {
     soci::session& sql = database_->sql;
     soci::transaction transaction(sql);
-    // Writes first, so that it waits for others before it has read anything.
+    // First, so that it waits for others before it has read or locked anything else.
+    lock_trail(sql);
+    watch.heard();
     soci::statement insert(sql);
     std::string columns, places;
     for (const auto& [name, text, label, in_csv] : run_fields()) {
@@ -357,7 +351,9 @@ void Records::keep(const RunRecord& record) {
     if (insert.get_affected_rows() > 0) {
       put_figures(sql, record, watch);
       put_images(sql, record, watch);
-    } else if (const auto kept = texts_of(sql, record.run); !kept || !same_texts(*kept, record)) {
+      append_run(sql, record.run);
+    } else if (const auto kept = texts_of_run(sql, record.run);
+               !kept || !same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);
     }
     put_events(sql, record, watch);
@@ -368,7 +364,7 @@ void Records::keep(const RunRecord& record) {
 void Records::check_writable() {
   database_->run([&](Watch&) {
     soci::transaction transaction(database_->sql);
-    database_->sql << "UPDATE vlp_schema SET version = version";
+    lock_trail(database_->sql);
     transaction.rollback();
   });
 }
@@ -449,48 +445,23 @@ std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilte
 }
 
 std::optional<RunRecord> Records::find(const std::string& run) {
-  return database_->run([&](Watch&) -> std::optional<RunRecord> {
-    soci::session& sql = database_->sql;
-    std::optional<RunRecord> found = texts_of(sql, run);
-    if (!found) return found;
-    CheckedMetric figure;
-    double value = 0, gate = 0;
-    GuardBand guard{};
-    int at_least = 0;
-    soci::indicator has_value = soci::i_null, has_gate = soci::i_null, has_u = soci::i_null,
-                    has_k = soci::i_null;
-    soci::statement figures =
-        (sql.prepare
-             << "SELECT name, value, gate, at_least, unit, uncertainty, guard_k FROM figures "
-                "WHERE run = :run ORDER BY place",
-         soci::into(figure.name), soci::into(value, has_value), soci::into(gate, has_gate),
-         soci::into(at_least), soci::into(figure.unit),
-         soci::into(guard.standard_uncertainty, has_u), soci::into(guard.k, has_k), soci::use(run));
-    figures.execute();
-    while (figures.fetch()) {
-      figure.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
-      figure.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
-      figure.asked = at_least != 0 ? Direction::at_least : Direction::at_most;
-      const bool guarded = has_u == soci::i_ok && has_k == soci::i_ok;
-      figure.guard = guarded ? std::optional(guard) : std::nullopt;
-      found->figures.push_back(figure);
-    }
-    RunRecord::Image image;
-    soci::statement images =
-        (sql.prepare << "SELECT step, image, sha256, refused FROM images WHERE run = :run ORDER "
-                        "BY step, image",
-         soci::into(image.step), soci::into(image.name), soci::into(image.sha256),
-         soci::into(image.refused), soci::use(run));
-    images.execute();
-    while (images.fetch()) found->images.push_back(image);
-    RunEvent event;
-    soci::statement events =
-        (sql.prepare << "SELECT event, what, text FROM events WHERE run = :run ORDER BY event",
-         soci::into(event.event), soci::into(event.what), soci::into(event.text), soci::use(run));
-    events.execute();
-    while (events.fetch()) found->events.push_back(event);
-    return found;
-  });
+  return database_->run([&](Watch&) { return rows_of_run(database_->sql, run); });
+}
+
+TrailCheck Records::check(const std::string& noted) {
+  return database_->run(
+      [&](Watch& watch) {
+        soci::session& sql = database_->sql;
+        soci::transaction transaction(sql);
+        // Of one moment, whatever others keep meanwhile; a transaction of SQLite is.
+        if (sql.get_backend_name() == "postgresql") {
+          sql << "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ";
+        }
+        TrailCheck found = check_trail(sql, noted, [&] { watch.heard(); });
+        transaction.rollback();
+        return found;
+      },
+      kManyRows);
 }
 
 }  // namespace vlp

@@ -11,6 +11,7 @@
 
 #include "rig/input_error.h"
 #include "station/run_record.h"
+#include "station/trail.h"
 
 namespace vlp {
 
@@ -55,7 +56,8 @@ class RecordsAway : public InputError {
 /// The records of one or more stations in a database: a file of SQLite, or PostgreSQL by a
 /// connection string postgresql://... Tables are made when they are not there, those of an earlier
 /// version brought up to date; of a later one they are refused. Any number of programs may use it
-/// at once: each run is written in one transaction, which waits for another's. What is kept is on
+/// at once: each run is written in one transaction, which waits for another's, with its entries in
+/// the trail (trail.h). What is kept is on
 /// the disk. A connection that was lost is made again. All throw InputError that names the
 /// database, but no password; it is RecordsAway when the server cannot be reached, or answers but
 /// refuses the connection (a wrong password, no such database, no TLS), which it says, the file
@@ -87,6 +89,9 @@ class Records {
   /// From the first to the last.
   std::vector<RunSummary> list(const RunFilter& filter);
   std::vector<TrendPoint> trend(const std::string& figure, const RunFilter& filter);
+  /// Whether all that is kept is as it was kept, by the trail (trail.h). `noted`: the last digest
+  /// of an earlier check, which the trail has to have still, or empty.
+  TrailCheck check(const std::string& noted);
 
  private:
   struct Database;

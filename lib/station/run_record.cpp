@@ -4,6 +4,7 @@
 
 #include <ceres/version.h>
 #include <fmt/core.h>
+#include <pwd.h>
 #include <unistd.h>
 
 #include <Eigen/Core>
@@ -20,6 +21,7 @@
 #include "captures/digest.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "station/database_name.h"
 
 namespace vlp {
 namespace {
@@ -33,6 +35,13 @@ std::string utc_of(std::time_t time, const char* format) {
 
 std::string utc(const char* format) {
   return utc_of(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now()), format);
+}
+
+/// The account that runs this program, and its machine.
+std::string account() {
+  const passwd* user = ::getpwuid(::geteuid());
+  return fmt::format("{}@{}", user != nullptr ? user->pw_name : std::to_string(::geteuid()),
+                     name_of_machine());
 }
 
 }  // namespace
@@ -67,7 +76,8 @@ std::string begun_utc(const std::string& run) {
 
 std::string RunEvent::utc() const { return begun_utc(event.substr(0, event.find('.')) + "Z"); }
 
-RunEvent new_event(const std::string& what, const std::string& text) {
+RunEvent new_event(const std::string& what, const std::string& text,
+                   const std::string& operator_name) {
   std::random_device random;
   using std::chrono::microseconds;
   const auto now = std::chrono::time_point_cast<microseconds>(std::chrono::system_clock::now());
@@ -75,7 +85,8 @@ RunEvent new_event(const std::string& what, const std::string& text) {
   const auto part = now.time_since_epoch().count() % of_a_second;
   return {utc_of(std::chrono::system_clock::to_time_t(now), "%Y%m%dT%H%M%S") +
               fmt::format(".{:06d}Z-{:08x}", part, random()),
-          what, text};
+          what, text,
+          operator_name.empty() ? account() : fmt::format("{} ({})", operator_name, account())};
 }
 
 double seconds_since(const std::string& utc) {

@@ -17,8 +17,10 @@ struct RunEvent {
   std::string event;
   /// One of those below.
   std::string what;
-  /// For people.
+  /// Why, or what came of it, for people.
   std::string text;
+  /// Who: the operator, where it was said, and the account and machine of the program.
+  std::string who = {};
 
   /// As 2026-11-21T13:45:01Z.
   std::string utc() const;
@@ -27,8 +29,9 @@ inline constexpr const char *kHookWanted = "hook wanted", *kHookDone = "hook don
                             *kHookFailed = "hook failed", *kImagesDeleted = "images deleted",
                             *kResultsDeleted = "results deleted";
 
-/// One of now.
-RunEvent new_event(const std::string& what, const std::string& text);
+/// One of now, by this program's account, as "Ann (vlp@station-7)" where an operator is known.
+RunEvent new_event(const std::string& what, const std::string& text,
+                   const std::string& operator_name = "");
 
 /// All that is kept of a run.
 struct RunRecord {

@@ -65,7 +65,7 @@ SpooledRun run_from(const Json& json) {
   }
   for (const Json& event : json.value("events", Json::array())) {
     run.events.push_back({event.at("event").get<std::string>(), event.at("what").get<std::string>(),
-                          event.at("text").get<std::string>()});
+                          event.at("text").get<std::string>(), event.value("who", std::string())});
   }
   return spooled;
 }
@@ -147,8 +147,10 @@ std::string text_of_run(const SpooledRun& spooled) {
   }
   json["events"] = Json::array();
   for (const RunEvent& event : run.events) {
-    json["events"].push_back(
-        {{"event", event.event}, {"what", event.what}, {"text", printable(event.text)}});
+    json["events"].push_back({{"event", event.event},
+                              {"what", event.what},
+                              {"text", printable(event.text)},
+                              {"who", printable(event.who)}});
   }
   constexpr int indent = 1;
   return json.dump(indent) + "\n";

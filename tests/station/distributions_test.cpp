@@ -53,5 +53,26 @@ TEST(FisherF, HasThoseOfAnotherProgram) {
   EXPECT_EQ(f_upper_tail(0, 3, 4), 1);
 }
 
+/// The table of NIST/SEMATECH e-Handbook of Statistical Methods, 1.3.6.7.2, and of 58 degrees of
+/// freedom AIAG's MSA, 4th ed.
+TEST(StudentT, HasThePublishedQuantiles) {
+  constexpr double printed = 5e-4;
+  EXPECT_NEAR(t_quantile(0.05, 1), 12.706, printed);
+  EXPECT_NEAR(t_quantile(0.05, 10), 2.228, printed);
+  EXPECT_NEAR(t_quantile(0.01, 10), 3.169, printed);
+  EXPECT_NEAR(t_quantile(0.05, 14), 2.145, printed);
+  EXPECT_NEAR(t_quantile(0.05, 58), 2.00172, 5e-6);
+  EXPECT_NEAR(t_quantile(0.05, 100), 1.984, printed);
+}
+
+/// Of one degree of freedom it is Cauchy's.
+TEST(StudentT, IsExactWhereItIsSimple) {
+  const double pi = std::acos(-1);
+  for (const double t : {0.0, 1e-3, 0.5, -2.0, 40.0}) {
+    EXPECT_NEAR(t_two_tails(t, 1), 1 - 2 / pi * std::atan(std::abs(t)), 1e-13);
+  }
+  EXPECT_NEAR(t_two_tails(t_quantile(0.3, 7.5), 7.5), 0.3, 1e-13);
+}
+
 }  // namespace
 }  // namespace vlp

@@ -41,6 +41,7 @@ class GoldenDue : public testing::Test {
   GoldenDue() {
     config.station = "a/station";
     config.spool = folder / "spool";
+    config.sha256 = "aa";
     config.verify_due = VerifyDue{24, 2};
   }
   void note(const std::string& kind, const std::string& verdict,
@@ -50,9 +51,10 @@ class GoldenDue : public testing::Test {
     run.kind = kind;
     run.verdict = verdict;
     run.ended_utc = ended_utc;
+    run.config_sha256 = config.sha256;
     note_for_golden(config, run);
   }
-  std::string problem() const { return golden_state(config).problem; }
+  std::string problem() const { return golden_problem(config); }
 
   TemporaryFolder folder;
   StationConfig config;
@@ -93,12 +95,27 @@ TEST_F(GoldenDue, AfterSoManyHours) {
 
 TEST_F(GoldenDue, AfterItFailed) {
   note("golden", "PASS");
-  EXPECT_FALSE(golden_state(config).failed);
   note("golden", "FAIL");
-  EXPECT_TRUE(golden_state(config).failed);
   EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): mend the station"));
   note("golden", "INVALID");
-  EXPECT_TRUE(golden_state(config).failed);
+  EXPECT_THAT(problem(), StartsWith("the golden unit failed"));
+}
+
+/// With another lamp map it measured another station.
+TEST_F(GoldenDue, AfterTheStationWasChanged) {
+  note("golden", "PASS");
+  ASSERT_EQ(problem(), "");
+  config.sha256 = "bb";
+  EXPECT_EQ(problem(),
+            "station.yaml or a file that it names was changed since the golden unit was measured "
+            "(run RUN): 'vlp-station verify' is due");
+  note("unit", "FAIL");
+  EXPECT_THAT(problem(), StartsWith("station.yaml or a file"));
+  config.sha256 = "aa";
+  EXPECT_EQ(problem(), "") << "as it was again";
+  config.sha256 = "bb";
+  note("golden", "PASS");
+  EXPECT_EQ(problem(), "");
 }
 
 /// No earlier PASS stands where a later run could not be noted.
@@ -111,7 +128,6 @@ TEST_F(GoldenDue, WhenARunCannotBeNoted) {
       EXPECT_THROW(note(kind, "FAIL"), InputError) << kind;
     }
     EXPECT_THAT(problem(), HasSubstr("not measured here yet")) << kind;
-    EXPECT_TRUE(golden_state(config).failed) << kind;
   }
 }
 
@@ -124,9 +140,12 @@ TEST_F(GoldenDue, WhenItsNoteIsDamaged) {
        {"", "RUN", "RUN PASS\n", "RUN PASS 2026-01-01T00:00:00Z", "RUN PASS "}) {
     folder.file(name, text);
     EXPECT_THAT(problem(), StartsWith("what the golden unit said is not known")) << text;
-    EXPECT_TRUE(golden_state(config).failed);
   }
-  folder.file(name, "RUN PASS " + now_utc() + "\nunit\nun");
+  folder.file(name, "RUN PASS " + now_utc() + "\n");  // an older program's
+  EXPECT_EQ(problem(),
+            "with which lamp map the golden unit was measured is not known (run RUN): 'vlp-station "
+            "verify' is due");
+  folder.file(name, "RUN PASS " + now_utc() + " aa\nunit\nun");
   EXPECT_THAT(problem(), HasSubstr("is the file cut short?"));
   std::filesystem::remove(file);
   std::filesystem::create_directory(file);

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <fcntl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -12,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "rig/child_process.h"
 #include "station/export_runs.h"
 #include "support/temporary_folder.h"
 
@@ -37,7 +39,8 @@ class HookTest : public testing::Test {
  protected:
   RunEvent run(const std::string& script, double time_limit_s = 20) {
     const auto begun = std::chrono::steady_clock::now();
-    RunEvent event = run_hook({{"sh", "-c", script}, folder / ".", time_limit_s}, judged_run());
+    RunEvent event = run_hook({{"sh", "-c", script}, folder / ".", time_limit_s}, judged_run(),
+                              HookLock(folder / ".", judged_run().run));
     took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     return event;
   }
@@ -70,7 +73,8 @@ TEST_F(HookTest, FailsInWords) {
             "exit code 3: the printer is out of labels");
   EXPECT_EQ(run("kill -9 $$").text, "ended by signal 9");
   EXPECT_EQ(run("printf '\\033[31m\\377'; exit 1").text, "exit code 1: \\x1b[31m\\xff");
-  const RunEvent missing = run_hook({{"/nowhere/label"}, folder / ".", 1}, judged_run());
+  const RunEvent missing = run_hook({{"/nowhere/label"}, folder / ".", 1}, judged_run(),
+                                    HookLock(folder / ".", judged_run().run));
   EXPECT_EQ(missing.what, kHookFailed);
   EXPECT_THAT(missing.text, HasSubstr("/nowhere/label cannot be started: No such file"));
 }
@@ -102,6 +106,40 @@ TEST_F(HookTest, IsKilledThoughItWritesWithoutEndAndLeftItsGroup) {
   EXPECT_LT(took_s, 5);
 }
 
+TEST_F(HookTest, IsKilledWithWhatMadeASessionOfItsOwn) {
+  const RunEvent event = run(
+      "setsid sh -c 'sleep 100 & echo $! >child'; setsid sleep 100 & echo $! >other; sleep 100", 1);
+  EXPECT_EQ(event.text, "no end within 1 s, killed");
+  EXPECT_LT(took_s, 5);
+  for (const char* name : {"child", "other"}) {
+    std::string process = TemporaryFolder::content_of(folder / name);
+    ASSERT_FALSE(process.empty());
+    process.pop_back();
+    EXPECT_FALSE(std::filesystem::exists("/proc/" + process)) << name;
+  }
+}
+
+/// A station that is killed leaves its hook running: nobody runs it a second time meanwhile.
+TEST_F(HookTest, HoldsItsLockWhenItsStationIsKilled) {
+  const std::string name = judged_run().run;
+  const pid_t station = start_child([&] {
+    run_hook({{"sh", "-c", "touch begun; until [ -e end ]; do sleep 0.02; done"}, folder / ".", 20},
+             judged_run(), HookLock(folder / ".", name));
+  });
+  const auto wait_for = [](const auto& is) {
+    for (int i = 0; i < 1000 && !is(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return is();
+  };
+  ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(folder / "begun"); }));
+  ::kill(station, SIGKILL);
+  ::waitpid(station, nullptr, 0);
+  EXPECT_FALSE(HookLock(folder / ".", name).held());
+  folder.file("end", "");
+  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).held(); }));
+}
+
 /// Whoever started this program may ignore signals, and leave files open.
 TEST_F(HookTest, InheritsNoSignalsAndNoFiles) {
   std::signal(SIGCHLD, SIG_IGN);
@@ -121,8 +159,9 @@ TEST_F(HookTest, IsOpenUntilItIsDone) {
   RunRecord run = judged_run();
   EXPECT_FALSE(hook_is_open(run));
   EXPECT_EQ(hook_problem(run), "");
-  run.events.push_back(hook_wanted({{"label", "it"}, {}, 1}));
+  run.events.push_back(hook_wanted({{"label", "it"}, {}, 1}, "Ann"));
   EXPECT_EQ(run.events.back().text, "label it");
+  EXPECT_THAT(run.events.back().who, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
   EXPECT_TRUE(hook_is_open(run));
   EXPECT_EQ(hook_problem(run), "was not run to its end");
   run.events.push_back(new_event(kHookFailed, "exit code 3"));

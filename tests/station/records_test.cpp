@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "rig/child_process.h"
+#include "sample_records.h"
 #include "station/export_runs.h"
 #include "station/station_config.h"
 #include "support/postgres_server.h"
@@ -31,31 +32,6 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
-
-RunRecord sample(const std::string& run, const std::string& camera, double rms_px) {
-  RunRecord record;
-  record.run = run;
-  record.kind = "unit";
-  record.station = "station-1";
-  record.camera = camera;
-  record.begun_utc = begun_utc(run);
-  record.ended_utc = "2026-11-21T13:45:0" + run.substr(14, 1) + "Z";
-  record.verdict = rms_px < 1 ? "PASS" : "FAIL";
-  record.causes = rms_px < 1 ? "" : "it's \"blurred\": 100 %, \xc3\xbc\nsecond\n";
-  record.program = "vlp-station 0";
-  record.libraries = "none";
-  record.config_sha256 = std::string(64, 'a');
-  record.calibration = "format: vlp-calibration/1\ncamera: {id: \"it's\"}\n";
-  record.figures = check_all({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
-                             {{"rms_px", rms_px}, {"coverage", 0.75}}, unit_metrics());
-  record.images = {{"boards", "0000.png", std::string(64, 'b'), ""},
-                   {"check", "0000.png", std::string(64, 'c'), "too dark"}};
-  return record;
-}
-
-std::string run_of(int number) {
-  return "20261121T13450" + std::to_string(number % 10) + "Z-" + std::to_string(1000 + number);
-}
 
 /// A record with another text in each of its fields.
 RunRecord with_all_texts() {
@@ -97,6 +73,8 @@ void check_events(Records& records) {
   ASSERT_THAT(found->events, SizeIs(3));
   EXPECT_EQ(found->events[0].event, wanted.event);
   EXPECT_EQ(found->events[0].text, "label 'x'");
+  EXPECT_EQ(found->events[0].who, wanted.who);
+  EXPECT_THAT(wanted.who, HasSubstr("@"));
   EXPECT_EQ(found->events[1].text, "exit code 3");
   EXPECT_EQ(found->events[2].what, kHookDone);
 }
@@ -158,6 +136,10 @@ void check_records(const std::string& where) {
   EXPECT_THAT(records.trend("tilt_deg", {}), IsEmpty());
   check_all_texts(records);
   check_events(records);
+  const TrailCheck trail = records.check("");
+  EXPECT_THAT(trail.problems, IsEmpty());
+  EXPECT_EQ(trail.runs, 7U);
+  EXPECT_EQ(trail.entries, 7U + 5U) << "runs and events";
 }
 
 /// Two programs that write at the same time, the first also makes the tables.
@@ -180,31 +162,10 @@ void check_two_writers(const std::string& where) {
   Records records(where);
   const auto runs = records.list({});
   EXPECT_THAT(runs, SizeIs(2 * each));
+  const TrailCheck trail = records.check("");
+  EXPECT_THAT(trail.problems, IsEmpty());
+  EXPECT_EQ(trail.entries, 2U * each);
   for (const RunSummary& run : runs) EXPECT_THAT(records.find(run.run)->images, SizeIs(2));
-}
-
-/// The answer of a database to a client that knows nothing of Records. SQL has a statement to a
-/// line; a line that begins with "\! " is for the shell.
-std::string answer_of(const std::string& where, const std::string& sql) {
-  const TemporaryFolder folder;
-  const std::string script = folder.file("script.sql", sql).string();
-  const std::string answer = (folder / "answer").string();
-  const std::string sqlite = folder
-                                 .file("client.py", R"(import os, sqlite3, sys
-database = sqlite3.connect(sys.argv[1], isolation_level=None)
-for line in open(sys.argv[2]):
-    if line.startswith("\\! "):
-        os.system(line[3:])
-    else:
-        for row in database.execute(line):
-            print(*row, sep="|")
-)")
-                                 .string();
-  const bool is_server = where.starts_with("postgresql://");
-  const std::string client = is_server ? "psql -X -q -A -t -v ON_ERROR_STOP=1 '" + where + "' -f "
-                                       : "python3 " + sqlite + " '" + where + "' ";
-  EXPECT_EQ(std::system((client + script + " >" + answer).c_str()), 0) << sql;
-  return TemporaryFolder::content_of(answer);
 }
 
 /// Records as version 1 of their tables kept them.
@@ -244,9 +205,6 @@ std::string state_of(const std::string& where) {
                        "\nSELECT * FROM vlp_schema;\nSELECT * FROM figures ORDER BY place;\n");
 }
 
-/// Empties a database of PostgreSQL.
-const std::string kDropAll = "DROP SCHEMA public CASCADE;\nCREATE SCHEMA public;\n";
-
 /// Of a database that holds kVersion1.
 void check_migration(const std::string& where) {
   Records records(where);
@@ -270,6 +228,7 @@ void check_migration(const std::string& where) {
   EXPECT_TRUE(records.find(run_of(5))->figures[0].guard);
   EXPECT_THAT(found->events, IsEmpty());
   check_events(records);
+  EXPECT_THAT(records.check("").problems, IsEmpty());
 }
 
 /// Of a database that holds kVersion1, which another program is about to bring up to date.
@@ -307,7 +266,7 @@ void check_later_version(const std::string& where) {
   answer_of(where, "UPDATE vlp_schema SET version = 99;\n");
   const std::string before = state_of(where);
   EXPECT_THAT(refusal_of([&] { Records records(where); }),
-              HasSubstr(": holds records of version 99, this program knows those up to 5: use the "
+              HasSubstr(": holds records of version 99, this program knows those up to 6: use the "
                         "newer vlp-station that wrote them"));
   EXPECT_EQ(state_of(where), before);
 }

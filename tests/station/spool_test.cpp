@@ -17,6 +17,7 @@
 #include <sstream>
 #include <thread>
 
+#include "numbered_runs.h"
 #include "rig/child_process.h"
 #include "station/database_name.h"
 #include "station/station_config.h"
@@ -35,50 +36,6 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
-
-constexpr std::size_t kImagesOfARun = 30;
-
-/// With digests of its own.
-RunRecord numbered_run(int number) {
-  RunRecord run;
-  run.run = "20261121T134501Z-" + std::to_string(100000 + number);
-  run.kind = "unit";
-  run.station = "station-1";
-  run.camera = "camera-" + std::to_string(number);
-  run.begun_utc = begun_utc(run.run);
-  run.ended_utc = "2026-11-21T13:50:01Z";
-  run.judge({{"the lens is \"blurred\"", true}, {"second", false}});
-  run.program = "vlp-station 0";
-  run.libraries = "none";
-  run.config_sha256 = std::string(64, 'a');
-  run.calibration = "format: vlp-calibration/1\n";
-  run.figures = check_all({{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
-                          {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, unit_metrics());
-  for (std::size_t i = 0; i < kImagesOfARun; ++i) {
-    run.images.push_back({"boards", std::to_string(1000 + i) + ".png",
-                          "digest-" + std::to_string(number) + "-" + std::to_string(i), ""});
-  }
-  return run;
-}
-
-/// The names of all runs in the records; each is whole.
-std::set<std::string> whole_runs(const std::string& where) {
-  Records records(where);
-  std::set<std::string> names;
-  for (const RunSummary& run : records.list({})) {
-    const auto kept = records.find(run.run);
-    EXPECT_THAT(kept->images, SizeIs(kImagesOfARun));
-    EXPECT_THAT(kept->figures, SizeIs(3));
-    EXPECT_TRUE(names.insert(run.run).second);
-  }
-  return names;
-}
-
-double seconds_of(const std::function<void()>& action) {
-  const auto begun = std::chrono::steady_clock::now();
-  action();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-}
 
 TEST(SpooledRun, IsReadAsItWasWritten) {
   const TemporaryFolder folder;
@@ -350,69 +307,6 @@ TEST(Spool, RefusesWhatIsNoConnectionString) {
               HasSubstr("is not of the form"));
 }
 
-TEST(Spool, WaitsForALockedFileNotLong) {
-  const TemporaryFolder folder;
-  const std::string where = (folder / "records.db").string();
-  { const Records made(where); }
-  const auto locked = folder / "locked", done = folder / "done";
-  const auto client = folder.file("lock.py",
-                                  "import os, sqlite3, sys, time\n"
-                                  "database = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
-                                  "database.execute('BEGIN EXCLUSIVE')\n"
-                                  "open(sys.argv[2], 'w')\n"
-                                  "for i in range(600):\n"
-                                  "    if os.path.exists(sys.argv[3]): break\n"
-                                  "    time.sleep(0.05)\n");
-  const std::string command =
-      "python3 " + client.string() + " " + where + " " + locked.string() + " " + done.string();
-  std::thread other([&] { EXPECT_EQ(std::system(command.c_str()), 0); });
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (!fs::exists(locked) && std::chrono::steady_clock::now() < until) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  EXPECT_TRUE(fs::exists(locked));
-  Spool spool(folder / "spool", where);
-  spool.keep(numbered_run(1));
-  EXPECT_LT(seconds_of([&] { spool.deliver(); }), 15);
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), HasSubstr("locked")));
-  folder.file("done", "");
-  other.join();
-  Spool(folder / "spool", where).deliver();
-  EXPECT_THAT(whole_runs(where), SizeIs(1));
-}
-
-/// Unmounts, whatever becomes of the test.
-struct SmallDisk {
-  fs::path folder;
-  ~SmallDisk() { ::umount2(folder.c_str(), MNT_DETACH); }
-};
-
-TEST(Spool, OutlastsAFullDisk) {
-  const TemporaryFolder folder;
-  const auto small = folder / "small";
-  fs::create_directory(small);
-  if (::mount("none", small.c_str(), "tmpfs", 0, "size=128k") != 0) {
-    GTEST_SKIP() << "no small file system can be mounted here";
-  }
-  const SmallDisk disk{small};
-  const std::string where = (small / "records.db").string();
-  {
-    Spool spool(folder / "spool", where);
-    spool.prepare();
-    for (int i = 0; i < 40; ++i) spool.keep(numbered_run(i));
-    spool.deliver();
-    const std::size_t there = whole_runs(where).size();
-    EXPECT_LT(there, 40u);
-    EXPECT_THAT(spool.waiting(), SizeIs(40 - there));
-    EXPECT_THAT(spool.state(), HasSubstr("full"));
-    // Records that are full are read all the same.
-    EXPECT_EQ(spool.owner_of("digest-0-1", "b"), "camera camera-0: run " + numbered_run(0).run);
-  }
-  ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
-  Spool(folder / "spool", where).deliver();
-  EXPECT_THAT(whole_runs(where), SizeIs(40));
-}
-
 TEST(Spool, OfSeveralProgramsLosesNothing) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
@@ -437,153 +331,6 @@ TEST(Spool, OfSeveralProgramsLosesNothing) {
   spool.deliver();
   EXPECT_EQ(spool.state(), "");
   EXPECT_THAT(whole_runs(where), SizeIs(40));
-}
-
-/// A program that keeps one run after another is killed at random moments, as often as
-/// VLP_STATION_KILLS says.
-void kill_while_keeping(const TemporaryFolder& folder, const std::string& where, int kills) {
-  const auto log = folder / "kept";
-  if (const char* text = std::getenv("VLP_STATION_KILLS")) kills = std::atoi(text);
-  Random random(7);
-  for (int i = 0; i < kills; ++i) {
-    const pid_t child = start_child([&] {
-      Spool spool(folder / "spool", where);
-      spool.prepare();
-      const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-      for (int run = 1000 * i; run < 1000 * i + 1000; ++run) {
-        spool.keep(numbered_run(run));
-        const std::string line = numbered_run(run).run + "\n";  // kept, as far as anybody is told
-        if (::write(file, line.data(), line.size()) < 0) std::abort();
-        spool.deliver();
-      }
-    });
-    const int wait_us = static_cast<int>(1e6 * random.uniform(0, 0.25));
-    std::this_thread::sleep_for(std::chrono::microseconds(wait_us));
-    ::kill(child, SIGKILL);
-    int status = 0;
-    ::waitpid(child, &status, 0);
-  }
-  Spool spool(folder / "spool", where);
-  spool.prepare();
-  EXPECT_EQ(spool.state(), "");
-  const auto runs = whole_runs(where);
-  std::istringstream kept(TemporaryFolder::content_of(log));
-  int count = 0;
-  for (std::string run; std::getline(kept, run); ++count) EXPECT_TRUE(runs.contains(run)) << run;
-  EXPECT_GT(count, 0);
-  // What was killed between keeping and telling may be there, too.
-  EXPECT_LE(runs.size(), static_cast<std::size_t>(count + kills));
-}
-
-TEST(Spool, LosesNothingWhenItIsKilled) {
-  const TemporaryFolder folder;
-  kill_while_keeping(folder, (folder / "records.db").string(), 15);
-}
-
-/// A server that refuses is not away, and somebody has to do something about it; runs are kept.
-TEST(Spool, TellsARefusalFromAServerThatIsAway) {
-  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
-  const TemporaryFolder folder;
-  const PostgresServer server("right");
-  ASSERT_NE(server.uri(), "");
-  const auto state_with = [&](const std::string& password, const std::string& database, int run) {
-    Spool spool(folder / "spool",
-                "postgresql://vlp:" + password + "@" + server.address() + "/" + database);
-    spool.prepare();
-    spool.keep(numbered_run(run));
-    spool.deliver();
-    return spool.state();
-  };
-  const std::string refuses = "the server of the records answers, but refuses 'records' as it is: ";
-  const std::string wrong_password = state_with("wrong", "postgres", 1);
-  EXPECT_THAT(wrong_password, AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr(refuses),
-                                    HasSubstr("password authentication failed for user \"vlp\""),
-                                    Not(HasSubstr("wrong")), Not(HasSubstr("\n"))));
-  EXPECT_THAT(state_with("right", "nowhere", 2),
-              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr(refuses),
-                    HasSubstr("database \"nowhere\" does not exist")));
-  EXPECT_THAT(state_with("right", "postgres?sslmode=require", 3),
-              AllOf(StartsWith("kept here, 2 waiting: "), HasSubstr(refuses),
-                    HasSubstr("server does not support SSL, but SSL was required")));
-  // What waited goes there with the right password.
-  EXPECT_THAT(state_with("right", "postgres", 4), StartsWith("1 here for other records"));
-  EXPECT_THAT(whole_runs(server.uri()), SizeIs(3));
-  server.stop();
-  EXPECT_THAT(state_with("right", "postgres", 5),
-              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("cannot be reached")));
-}
-
-TEST(Spool, OutlastsItsServer) {
-  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
-  const PostgresServer server;
-  ASSERT_NE(server.uri(), "");
-  const TemporaryFolder folder;
-  const std::string where = server.uri() + "&connect_timeout=2";
-  const auto spool = [&] { return Spool(folder / "spool", where); };
-  kill_while_keeping(folder, where, 5);
-  const std::size_t before = whole_runs(where).size();
-  const auto deliver_to = [&](std::size_t count) {
-    Spool(spool()).deliver();
-    EXPECT_THAT(whole_runs(where), SizeIs(before + count));
-  };
-
-  // Stopped before the record; new units begin.
-  Spool running = spool();
-  running.prepare();
-  server.stop();
-  running.keep(numbered_run(-1));
-  running.deliver();
-  EXPECT_THAT(running.state(), AllOf(StartsWith("kept here, 1 waiting: "),
-                                     HasSubstr("server of the records cannot be reached")));
-  Spool begun = spool();
-  begun.prepare();
-  begun.keep(numbered_run(-2));
-  begun.deliver();
-  EXPECT_THAT(begun.state(), StartsWith("kept here, 2 waiting: "));
-  server.start();
-  deliver_to(2);
-
-  // Frozen, with a connection and without: nobody waits for it without a word, nor twice.
-  Spool connected = spool();
-  connected.prepare();
-  EXPECT_EQ(connected.state(), "");
-  server.freeze();
-  EXPECT_LT(seconds_of([&] { EXPECT_EQ(connected.owner_of("digest-1-1", "b"), ""); }), 8);
-  connected.keep(numbered_run(-3));
-  EXPECT_LT(seconds_of([&] { connected.deliver(); }), 1);
-  EXPECT_FALSE(connected.find("another"));
-  EXPECT_THAT(connected.away(), HasSubstr("has not answered for 2 s"));
-  EXPECT_THAT(connected.state(),
-              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("has not answered for 2 s")));
-  Spool fresh = spool();
-  EXPECT_LT(seconds_of([&] { fresh.prepare(); }), 8);
-  EXPECT_THAT(fresh.state(), StartsWith("kept here, 1 waiting: "));
-  server.thaw();
-  deliver_to(3);
-  // Once, too, while several wait.
-  Spool several = spool();
-  several.prepare();
-  server.freeze();
-  for (int i = 4; i < 10; ++i) several.keep(numbered_run(-i));
-  EXPECT_LT(seconds_of([&] { several.deliver(); }), 5);
-  EXPECT_THAT(several.state(),
-              AllOf(StartsWith("kept here, 6 waiting: "), HasSubstr("has not answered for 2 s")));
-  server.thaw();
-  deliver_to(9);
-
-  // Killed in the middle of many.
-  for (int i = 0; i < 200; ++i) fresh.keep(numbered_run(1'000'000 + i));
-  std::thread power([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(150));
-    server.stop();
-  });
-  Spool(spool()).deliver();
-  power.join();
-  const std::size_t waiting = fresh.waiting().size();
-  server.start();
-  EXPECT_GT(waiting, 0u) << "the server was stopped too late for this machine";
-  for (int i = 0; i < 5 && !fresh.waiting().empty(); ++i) Spool(spool()).deliver();
-  EXPECT_THAT(whole_runs(where), SizeIs(before + 209));
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <regex>
+
 #include "support/datasets.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
@@ -44,6 +46,25 @@ TEST_F(StationYaml, IsReadWithTheFilesThatItNames) {
   EXPECT_EQ(config.enough.dispersion_captures, 40);
   EXPECT_EQ(config.records, (folder / "records.db").string());
   EXPECT_FALSE(config.golden);
+}
+
+/// What stands there behind a '#' is right as it stands.
+TEST_F(StationYaml, ShowsWhatAShiftMayWant) {
+  folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
+  folder.file("station.yaml",
+              std::regex_replace(
+                  TemporaryFolder::content_of(folder / "station.yaml"),
+                  std::regex("\n# (golden:|verify_due:|serial_pattern:|hook:|keep:| {9})"), "\n$1"));
+  const StationConfig config = read_station(folder / "station.yaml");
+  ASSERT_TRUE(config.golden);
+  EXPECT_THAT(config.golden->gates, SizeIs(7));
+  ASSERT_TRUE(config.verify_due);
+  EXPECT_EQ(config.verify_due->units, 200);
+  EXPECT_EQ(serial_problem(config, "0001"), "");
+  EXPECT_NE(serial_problem(config, "x1"), "");
+  ASSERT_TRUE(config.hook);
+  EXPECT_THAT(config.hook->command, SizeIs(3));
+  EXPECT_EQ(config.keep.images_days, 90);
 }
 
 TEST_F(StationYaml, RefusesAnUnknownGateWithItsLine) {

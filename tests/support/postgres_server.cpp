@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <vector>
 
 namespace vlp {
@@ -55,7 +56,7 @@ int PostgresServer::as_owner(const std::string& command) const {
                          .c_str());
 }
 
-PostgresServer::PostgresServer(const std::string& password) {
+PostgresServer::PostgresServer(const std::string& password, Tls tls) : tls_(tls) {
   std::string folder = (fs::temp_directory_path() / "vlp-postgres-XXXXXX").string();
   if (::mkdtemp(folder.data()) == nullptr) return;
   folder_ = folder;
@@ -68,10 +69,28 @@ PostgresServer::PostgresServer(const std::string& password) {
     port_ = free_port();
   }
   if (as_owner("initdb " + data + auth + "--username=vlp --no-sync --encoding=UTF8") != 0) return;
+  if (tls == Tls::required && !make_certificate()) return;
   start();
   if (as_owner("pg_ctl " + data + "status") != 0) return;
   uri_ = "postgresql://vlp@/postgres?host=" + folder;
   if (port_ != 0) uri_ += "&port=" + std::to_string(port_);
+}
+
+bool PostgresServer::make_certificate() const {
+  const std::string folder = folder_.string(), key = folder + "/server.key",
+                    made = certificate().string();
+  const std::string commands =
+      "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -addext "
+      "subjectAltName=DNS:localhost -keyout '" +
+      key + "' -out '" + made + "' 2>>'" + folder + "/log' && chmod 600 '" + key + "' && " +
+      (::geteuid() == 0 ? "chown postgres '" + key + "' '" + made + "' && " : "") +
+      "sed -i 's/^host /hostssl /' '" + folder + "/data/pg_hba.conf'";
+  return std::system(commands.c_str()) == 0;
+}
+
+std::string PostgresServer::log() const {
+  std::ifstream file(folder_ / "log");
+  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 std::string PostgresServer::plain_uri() const {
@@ -86,8 +105,11 @@ void PostgresServer::stop() const {
 
 void PostgresServer::start() const {
   as_owner("pg_ctl -D '" + folder_.string() + "/data' -w -o \"-c listen_addresses=" +
-           (port_ == 0 ? "" : "127.0.0.1 -p " + std::to_string(port_)) + " -c fsync=off -k " +
-           folder_.string() + "\" start");
+           (port_ == 0 ? "" : "127.0.0.1 -p " + std::to_string(port_)) +
+           (tls_ == Tls::none ? ""
+                              : " -c ssl=on -c ssl_cert_file=" + certificate().string() +
+                                    " -c ssl_key_file=" + (folder_ / "server.key").string()) +
+           " -c fsync=off -k " + folder_.string() + "\" start");
 }
 
 void PostgresServer::signal(int number) const {

@@ -12,8 +12,10 @@ namespace vlp {
 /// only.
 class PostgresServer {
  public:
-  /// With a password it also listens to a port of 127.0.0.1, where user vlp needs it, without TLS.
-  explicit PostgresServer(const std::string& password = "");
+  enum class Tls { none, required };
+  /// With a password it also listens to a port of 127.0.0.1, where user vlp needs it, without TLS,
+  /// or with nothing else, by a certificate of its own for localhost.
+  explicit PostgresServer(const std::string& password = "", Tls tls = Tls::none);
   ~PostgresServer();
   PostgresServer(const PostgresServer&) = delete;
   PostgresServer& operator=(const PostgresServer&) = delete;
@@ -25,7 +27,12 @@ class PostgresServer {
   std::string plain_uri() const;
 
   /// 127.0.0.1:PORT, if it listens there.
-  std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+  std::string address() const { return "127.0.0.1:" + port(); }
+  std::string port() const { return std::to_string(port_); }
+  /// That by which it shows who it is.
+  std::filesystem::path certificate() const { return folder_ / "server.crt"; }
+  /// What it has said.
+  std::string log() const;
 
   /// At once, as by a power cut; and again.
   void stop() const;
@@ -35,12 +42,14 @@ class PostgresServer {
   void thaw() const;
 
  private:
+  bool make_certificate() const;
   int as_owner(const std::string& command) const;
   void signal(int number) const;
 
   std::filesystem::path folder_;
   std::string uri_;
   int port_ = 0;
+  Tls tls_ = Tls::none;
 };
 
 }  // namespace vlp

@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "station/records.h"
+#include "station/station_config.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+
+inline RunRecord sample(const std::string& run, const std::string& camera, double rms_px) {
+  RunRecord record;
+  record.run = run;
+  record.kind = "unit";
+  record.station = "station-1";
+  record.camera = camera;
+  record.begun_utc = begun_utc(run);
+  record.ended_utc = "2026-11-21T13:45:0" + run.substr(14, 1) + "Z";
+  record.verdict = rms_px < 1 ? "PASS" : "FAIL";
+  record.causes = rms_px < 1 ? "" : "it's \"blurred\": 100 %, \xc3\xbc\nsecond\n";
+  record.program = "vlp-station 0";
+  record.libraries = "none";
+  record.config_sha256 = std::string(64, 'a');
+  record.calibration = "format: vlp-calibration/1\ncamera: {id: \"it's\"}\n";
+  record.figures = check_all({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
+                             {{"rms_px", rms_px}, {"coverage", 0.75}}, unit_metrics());
+  record.images = {{"boards", "0000.png", std::string(64, 'b'), ""},
+                   {"check", "0000.png", std::string(64, 'c'), "too dark"}};
+  return record;
+}
+
+inline std::string run_of(int number) {
+  return "20261121T13450" + std::to_string(number % 10) + "Z-" + std::to_string(1000 + number);
+}
+
+/// The answer of a database to a client that knows nothing of Records. SQL has a statement to a
+/// line; a line that begins with "\! " is for the shell.
+inline std::string answer_of(const std::string& where, const std::string& sql) {
+  const TemporaryFolder folder;
+  const std::string script = folder.file("script.sql", sql).string();
+  const std::string answer = (folder / "answer").string();
+  const std::string sqlite = folder
+                                 .file("client.py", R"(import os, sqlite3, sys
+database = sqlite3.connect(sys.argv[1], isolation_level=None)
+for line in open(sys.argv[2]):
+    if line.startswith("\\! "):
+        os.system(line[3:])
+    else:
+        for row in database.execute(line):
+            print(*row, sep="|")
+)")
+                                 .string();
+  const bool is_server = where.starts_with("postgresql://");
+  const std::string client = is_server ? "psql -X -q -A -t -v ON_ERROR_STOP=1 '" + where + "' -f "
+                                       : "python3 " + sqlite + " '" + where + "' ";
+  EXPECT_EQ(std::system((client + script + " >" + answer).c_str()), 0) << sql;
+  return TemporaryFolder::content_of(answer);
+}
+
+/// Empties a database of PostgreSQL.
+inline const std::string kDropAll = "DROP SCHEMA public CASCADE;\nCREATE SCHEMA public;\n";
+
+}  // namespace vlp
