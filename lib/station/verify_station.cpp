@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "captures/in_parallel.h"
 #include "detection/image_file.h"
+#include "detection/images_in_parallel.h"
 #include "rig/input_error.h"
 #include "session/session_folder.h"
 #include "station/lamp_faults.h"
@@ -23,7 +23,7 @@ template <typename Look>
 UnitStep step_of(const fs::path& folder, int threads, const Look& look) {
   const auto files = images_in(folder);
   std::vector<UnitImage> images(files.size());
-  in_parallel(files.size(), threads, [&](std::size_t i) { images[i] = look(files[i]); });
+  images_in_parallel(files.size(), threads, [&](std::size_t i) { images[i] = look(files[i]); });
   UnitStep step;
   step.folder = folder;
   for (UnitImage& image : images) {
