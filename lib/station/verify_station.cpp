@@ -88,23 +88,9 @@ class Verification {
       for (const std::string& fault : places_) first.push_back({fault, false});
     }
     causes_.insert(causes_.begin(), first.begin(), first.end());
-    RunRecord record{.run = run,
-                     .kind = "golden",
-                     .station = config_.station,
-                     .camera = golden_.camera_id,
-                     .operator_name = "",
-                     .shift = "",
-                     .begun_utc = begun_utc(run),
-                     .ended_utc = now_utc(),
-                     .verdict = "",
-                     .causes = "",
-                     .program = program.program + " " + program.version,
-                     .libraries = library_versions(),
-                     .config_sha256 = config_.sha256,
-                     .calibration = "",
-                     .figures = figures,
-                     .images = images_,
-                     .events = {}};
+    RunRecord record = new_record("golden", config_, golden_.camera_id, run, program);
+    record.figures = figures;
+    record.images = images_;
     record.judge(causes_);
     return record;
   }
