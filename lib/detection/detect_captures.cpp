@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/detect_captures.h"
 
-#include <mutex>
 #include <utility>
 
-#include "captures/in_parallel.h"
 #include "detection/annotate.h"
 #include "detection/detect_image.h"
+#include "detection/images_in_parallel.h"
 
 namespace vlp {
 namespace {
@@ -43,13 +42,9 @@ CaptureDetections detect_captures(const LampDetector& detector,
                                   const DetectRun& run,
                                   const std::function<void(std::size_t done)>& progress) {
   std::vector<CaptureOutcome> outcomes(images.size());
-  std::mutex counting;
-  std::size_t done = 0;
-  in_parallel(images.size(), run.threads, [&](std::size_t i) {
-    outcomes[i] = outcome_of(detector, images[i], run);
-    const std::lock_guard lock(counting);
-    progress(++done);
-  });
+  images_in_parallel(
+      images.size(), run.threads,
+      [&](std::size_t i) { outcomes[i] = outcome_of(detector, images[i], run); }, progress);
 
   CaptureDetections result;
   result.images = static_cast<int>(images.size());

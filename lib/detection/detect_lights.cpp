@@ -2,26 +2,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/detect_lights.h"
 
-#include <mutex>
-
-#include "captures/in_parallel.h"
+#include "detection/images_in_parallel.h"
 
 namespace vlp {
+
 std::vector<ImageLights> detect_lights(const LampDetector& detector,
                                        std::span<const std::filesystem::path> images,
                                        const std::optional<std::array<int, 2>>& imager_px,
                                        int threads,
                                        const std::function<void(std::size_t done)>& progress) {
   std::vector<ImageLights> found(images.size());
-  std::mutex counting;
-  std::size_t done = 0;
-  in_parallel(images.size(), threads, [&](std::size_t i) {
-    found[i] = detect_image(detector, images[i], imager_px);
-    found[i].image.release();
-    for (Light& light : found[i].lights) light.outline = {};
-    const std::lock_guard lock(counting);
-    progress(++done);
-  });
+  images_in_parallel(
+      images.size(), threads,
+      [&](std::size_t i) {
+        found[i] = detect_image(detector, images[i], imager_px);
+        found[i].image.release();
+        for (Light& light : found[i].lights) light.outline = {};
+      },
+      progress);
   return found;
 }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "geometry/angles.h"
+#include "geometry/normal_equations.h"
 #include "geometry/plane.h"
 
 namespace vlp {
@@ -102,55 +103,6 @@ BodyState moved(const BodyState& from, const BodyVector& step) {
   motion.inclination.pitch_rad += step[kBodyPitch];
   return next;
 }
-
-/// Normal equations of a size that the compiler knows, in plain loops: Eigen's own products of
-/// matrices of 9 x 9 are no faster and take it minutes to compile.
-template <std::size_t n>
-struct Normal {
-  std::array<std::array<double, n>, n> information{};  // the lower half
-  std::array<double, n> gradient{};
-
-  void add_row(const std::array<double, n>& row, double residual) {
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t k = 0; k <= i; ++k) information[i][k] += row[i] * row[k];
-      gradient[i] += row[i] * residual;
-    }
-  }
-};
-
-/// L of A = L L^T, with the inverses of its diagonal.
-template <std::size_t n>
-struct Cholesky {
-  std::array<std::array<double, n>, n> lower;
-  std::array<double, n> inverse_diagonal;
-  bool is_positive = true;
-
-  explicit Cholesky(const Normal<n>& normal) : lower(normal.information) {
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t k = 0; k <= i; ++k) {
-        double sum = lower[i][k];
-        for (std::size_t m = 0; m < k; ++m) sum -= lower[i][m] * lower[k][m];
-        if (k < i) {
-          lower[i][k] = sum * inverse_diagonal[k];
-        } else {
-          is_positive = is_positive && sum > 0;
-          inverse_diagonal[i] = 1 / std::sqrt(sum);
-        }
-      }
-    }
-  }
-  std::array<double, n> solve(std::array<double, n> x) const {
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t k = 0; k < i; ++k) x[i] -= lower[i][k] * x[k];
-      x[i] *= inverse_diagonal[i];
-    }
-    for (std::size_t i = n; i-- > 0;) {
-      for (std::size_t k = i + 1; k < n; ++k) x[i] -= lower[k][i] * x[k];
-      x[i] *= inverse_diagonal[i];
-    }
-    return x;
-  }
-};
 
 /// How heavy the priors weigh: 1 / sd of each state, zero for those that are as given.
 BodyVector weights_of(const BodyPrior& prior) {
@@ -252,9 +204,7 @@ BodyFix finished(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
   fix.redundancy = 2 * lamps - static_cast<double>(S::kCount);
   constexpr auto indices = S::indices();
   for (std::size_t i = 0; i < S::kCount; ++i) {
-    std::array<double, S::kCount> column{};
-    column[i] = 1;
-    column = factor.solve(column);
+    const auto column = factor.inverse_column(i);
     const double weight = weights[indices[i]];
     fix.redundancy += weight * weight * column[i];
     for (std::size_t k = 0; k < S::kCount; ++k) {

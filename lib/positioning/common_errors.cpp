@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "positioning/common_errors.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include <utility>
 
 #include "geometry/plane.h"
+#include "geometry/symmetric.h"
 #include "rig/calibration_error.h"
 
 namespace vlp {
@@ -39,15 +38,15 @@ Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, 
   const Eigen::VectorXd sd = columns.middleRows(first, size).diagonal().cwiseMax(0).cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
-      inverse_sd.asDiagonal() * columns.middleRows(first, size) * inverse_sd.asDiagonal());
+  const auto eigen = symmetric_eigen(Eigen::MatrixXd(
+      inverse_sd.asDiagonal() * columns.middleRows(first, size) * inverse_sd.asDiagonal()));
   constexpr double rounding = 1e-12;
-  const Eigen::ArrayXd values = eigen.eigenvalues();
+  const Eigen::ArrayXd values = eigen.values;
   const Eigen::VectorXd whitening =
       (values > rounding * static_cast<double>(size))
           .select(values.max(1e-300).rsqrt(), Eigen::ArrayXd::Zero(size));
   const Eigen::MatrixXd root =
-      columns * inverse_sd.asDiagonal() * eigen.eigenvectors() * whitening.asDiagonal();
+      columns * inverse_sd.asDiagonal() * eigen.vectors * whitening.asDiagonal();
   Eigen::MatrixXd known = root * root.transpose();
   known.middleRows(first, size) = columns.transpose();
   known.middleCols(first, size) = columns;
@@ -320,9 +319,9 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
       information += weighted * jacobian;
       gradient += weighted * residual;
     });
-    const Eigen::LDLT<Eigen::Matrix4d> factor(information);
-    const Eigen::Vector4d step = factor.solve(gradient);
-    const Eigen::Matrix4d state_covariance = factor.solve(Eigen::Matrix4d::Identity());
+    const auto state_covariance = inverse_of_positive(information);
+    if (!state_covariance) return {};
+    const Eigen::Vector4d step = *state_covariance * gradient;
     double chi_squared = 0, worst = 0;
     std::size_t worst_lamp = 0;
     each([&](std::size_t i, const Eigen::Matrix2d& covariance, const auto& jacobian,
@@ -330,7 +329,7 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
       const Eigen::Vector2d r = residual - jacobian * step;
       chi_squared += r.dot(covariance.inverse() * r);
       const Eigen::Matrix2d of_residual =
-          covariance - jacobian * state_covariance * jacobian.transpose();
+          covariance - jacobian * *state_covariance * jacobian.transpose();
       const double drop = r.dot(of_residual.inverse() * r);
       if (!(of_residual.determinant() > 0) || drop <= worst) return;
       worst = drop;

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "positioning/error_budget.h"
 
-#include <Eigen/Cholesky>
-
+#include "geometry/symmetric.h"
 #include "positioning/sighting.h"
 
 namespace vlp {
@@ -55,16 +54,14 @@ std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m
     const Matrix43 lamp_gradient = transposed * d_pixel_d_lamp(*row);
     lamp_map_gradient += lamp_gradient * lamp_gradient.transpose();
   }
-  const Eigen::LLT<Eigen::Matrix4d> factor(information);
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  const Eigen::Matrix4d inverse = factor.solve(Eigen::Matrix4d::Identity());
-  if (!inverse.allFinite()) return std::nullopt;
-  const Matrix42 by_center = sources.center_px * inverse * center_gradient;
-  const Matrix42 by_tilt = sources.tilt_rad * inverse * tilt_gradient;
+  const auto inverse = inverse_of_positive(information);
+  if (!inverse) return std::nullopt;
+  const Matrix42 by_center = sources.center_px * *inverse * center_gradient;
+  const Matrix42 by_tilt = sources.tilt_rad * *inverse * tilt_gradient;
   return ErrorBudget{
-      sources.noise_px * sources.noise_px * inverse, by_center * by_center.transpose(),
+      sources.noise_px * sources.noise_px * *inverse, by_center * by_center.transpose(),
       by_tilt * by_tilt.transpose(),
-      sources.lamp_map_m * sources.lamp_map_m * inverse * lamp_map_gradient * inverse};
+      sources.lamp_map_m * sources.lamp_map_m * *inverse * lamp_map_gradient * *inverse};
 }
 
 }  // namespace vlp

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "positioning/unit_errors.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "geometry/symmetric.h"
 #include "positioning/correction.h"
 #include "positioning/lamps_in_view.h"
 
@@ -43,16 +43,14 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
     const Eigen::Matrix<double, 2, 4> by_state = d_pixel_d_z * seen.d_z_d_state / noise_px;
     information += by_state.transpose() * by_state;
   }
-  const Eigen::LLT<Eigen::Matrix4d> factor(information);
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  const Eigen::Matrix4d noise = factor.solve(Eigen::Matrix4d::Identity());
-  if (!noise.allFinite()) return std::nullopt;
+  const auto noise = inverse_of_positive(information);
+  if (!noise) return std::nullopt;
   const CommonErrors::Gain gain =
-      whole_.gain_of(sightings, lamps, {level, noise}, lens_, Eigen::Matrix3d::Identity());
+      whole_.gain_of(sightings, lamps, {level, *noise}, lens_, Eigen::Matrix3d::Identity());
   const auto part = [&](CommonPart of) {
     return parts_[static_cast<std::size_t>(of)].covariance_of(gain);
   };
-  return UnitBudget{noise, part(CommonPart::lens), part(CommonPart::zenith),
+  return UnitBudget{*noise, part(CommonPart::lens), part(CommonPart::zenith),
                     part(CommonPart::offset), part(CommonPart::lamps)};
 }
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "rig/calibration.h"
+#include "rig/calibration_text.h"
 #include "rig/file.h"
 #include "rig/yaml_writer.h"
 
@@ -153,7 +153,7 @@ void emit_history(YAML::Emitter& out, const std::vector<HistoryEntry>& history) 
 
 }  // namespace
 
-void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {
+std::string calibration_text(const Calibration& calibration) {
   YAML::Emitter out;
   out << YAML::BeginMap;
   emit_word(out, "format", "vlp-calibration/1");
@@ -166,7 +166,11 @@ void write_calibration(const std::filesystem::path& file, const Calibration& cal
   }
   emit_camera(out, calibration.camera);
   out << YAML::EndMap << YAML::Newline;
-  write_file(file, out.c_str());
+  return out.c_str();
+}
+
+void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {
+  write_file(file, calibration_text(calibration));
 }
 
 }  // namespace vlp

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <opencv2/core/utility.hpp>
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
@@ -225,7 +224,6 @@ std::vector<fs::path> image_files(const std::vector<std::string>& names) {
 }
 
 SeenBoards see_boards(const BoardImages& input, const StepProgress& progress) {
-  cv::setNumThreads(1);  // the images themselves go in parallel
   const BoardDetector detector(input.board);
   FoundBoards found = detect_boards(
       detector, input.images, input.threads, corner_cache(input.cache, input.board),

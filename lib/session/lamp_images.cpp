@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core/utility.hpp>
 #include <utility>
 
 #include "detection/detect_captures.h"
@@ -186,7 +185,6 @@ SeenLamps see_lamps(const LampImages& input, const StepProgress& progress) {
     classifier = classifier_for(input, camera, seen.warnings);
   }
   const auto images = images_in(input.folder);
-  cv::setNumThreads(1);  // the images themselves go in parallel
   DetectRun run{input.threads};
   run.max_mpx = input.max_mpx;
   std::optional<Readout> stated = input.readout;

@@ -4,7 +4,6 @@
 
 #include <fmt/core.h>
 
-#include <opencv2/core/utility.hpp>
 #include <utility>
 
 #include "detection/image_file.h"
@@ -36,7 +35,6 @@ SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps
     images.push_back(images_in(folder));
     all.insert(all.end(), images.back().begin(), images.back().end());
   }
-  cv::setNumThreads(1);  // the images themselves go in parallel
   seen.camera.readout = readout_of(all, stated, seen);
   const LampDetector detector(lamps, seen.camera);
   std::size_t before = 0;

@@ -11,7 +11,6 @@
 #include <array>
 #include <chrono>
 #include <ctime>
-#include <filesystem>
 #include <limits>
 #include <opencv2/core/utility.hpp>
 #include <random>
@@ -19,9 +18,7 @@
 
 #include "calibration/intrinsics/mrcal_files.h"
 #include "captures/digest.h"
-#include "rig/file.h"
-#include "rig/input_error.h"
-#include "station/database_name.h"
+#include "rig/calibration_text.h"
 
 namespace vlp {
 namespace {
@@ -105,27 +102,6 @@ std::string library_versions() {
                      EIGEN_MINOR_VERSION);
 }
 
-std::string calibration_text(const Calibration& calibration) {
-  namespace fs = std::filesystem;
-  std::string folder = (fs::temp_directory_path() / "vlp-station-XXXXXX").string();
-  if (::mkdtemp(folder.data()) == nullptr) {
-    throw InputError(folder, "cannot be made: no room for temporary files");
-  }
-  const fs::path file = fs::path(folder) / "calibration.yaml";
-  constexpr std::size_t most_bytes = 1 << 20;
-  std::string text;
-  std::error_code ignored;
-  try {
-    write_calibration(file, calibration);
-    text = read_text_file(file, most_bytes);
-  } catch (...) {
-    fs::remove_all(folder, ignored);
-    throw;
-  }
-  fs::remove_all(folder, ignored);
-  return text;
-}
-
 std::span<const RunField> run_fields() {
   static constexpr std::array fields{
       RunField{"run", &RunRecord::run, "run"},
@@ -145,25 +121,27 @@ std::span<const RunField> run_fields() {
   return fields;
 }
 
+RunRecord new_record(const char* kind, const StationConfig& config, const std::string& camera,
+                     const std::string& run, const ProgramVersion& program) {
+  RunRecord record;
+  record.run = run;
+  record.kind = kind;
+  record.station = config.station;
+  record.camera = camera;
+  record.begun_utc = begun_utc(run);
+  record.ended_utc = now_utc();
+  record.program = program.program + " " + program.version;
+  record.libraries = library_versions();
+  record.config_sha256 = config.sha256;
+  return record;
+}
+
 RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program) {
-  const auto calibration = unit.calibration();
-  RunRecord record{.run = run,
-                   .kind = "unit",
-                   .station = unit.config().station,
-                   .camera = unit.camera_id(),
-                   .operator_name = "",
-                   .shift = "",
-                   .begun_utc = begun_utc(run),
-                   .ended_utc = now_utc(),
-                   .verdict = "",
-                   .causes = "",
-                   .program = program.program + " " + program.version,
-                   .libraries = library_versions(),
-                   .config_sha256 = unit.config().sha256,
-                   .calibration = calibration ? calibration_text(*calibration) : "",
-                   .figures = unit.figures(),
-                   .images = {},
-                   .events = {}};
+  RunRecord record = new_record("unit", unit.config(), unit.camera_id(), run, program);
+  if (const auto calibration = unit.calibration()) {
+    record.calibration = calibration_text(*calibration);
+  }
+  record.figures = unit.figures();
   record.judge(unit.causes());
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {

@@ -84,7 +84,7 @@ struct RunField {
 };
 
 /// All texts of a record, in order. A new one is a member of RunRecord, a line in run_fields(),
-/// what fills it in record_of() and verify_station(), and a migration in record_tables.cpp.
+/// what fills it, new_record() or the program, and a migration in record_tables.cpp.
 std::span<const RunField> run_fields();
 
 /// A name for a run that begins now: the time and 16 random hexadecimal digits,
@@ -96,13 +96,15 @@ std::string now_utc();
 /// Since a UTC as 2026-11-21T13:45:01Z; below 0 for one to come, NaN for what is none.
 double seconds_since(const std::string& utc);
 
+/// What is alike in the record of a unit and of a golden one that ends now: all but the verdict,
+/// what it rests on, and who measured.
+RunRecord new_record(const char* kind, const StationConfig& config, const std::string& camera,
+                     const std::string& run, const ProgramVersion& program);
+
 /// The record of a unit that ends now.
 RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program);
 
 /// OpenCV, Ceres, mrcal and so on, each with its version.
 std::string library_versions();
-
-/// The text of a calibration as write_calibration() writes it.
-std::string calibration_text(const Calibration& calibration);
 
 }  // namespace vlp

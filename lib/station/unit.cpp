@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/unit.h"
 
-#include <opencv2/core/utility.hpp>
 #include <utility>
 
 #include "station/lamp_faults.h"
@@ -14,9 +13,7 @@ Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion pr
       camera_id_(std::move(camera_id)),
       program_(std::move(program)),
       threads_(threads),
-      boards_(std::make_unique<BoardDetector>(config.board)) {
-  cv::setNumThreads(1);  // the images themselves go in parallel
-}
+      boards_(std::make_unique<BoardDetector>(config.board)) {}
 Unit::~Unit() = default;
 
 void Unit::reread(StationStep step) {

@@ -4,7 +4,7 @@
 #include <tuple>
 #include <utility>
 
-#include "captures/in_parallel.h"
+#include "detection/images_in_parallel.h"
 #include "station/unit.h"
 
 namespace vlp {
@@ -37,7 +37,7 @@ void Unit::look(StationStep step, const std::vector<fs::path>& files) {
   if (step != StationStep::boards) {
     lamps.emplace(config_.lamps, detector_camera(*calibration_before(step)));
   }
-  in_parallel(files.size(), threads_, [&](std::size_t i) {
+  images_in_parallel(files.size(), threads_, [&](std::size_t i) {
     images[i] = lamps ? look_at_lamps(files[i], config_, *lamps)
                       : look_at_board(files[i], config_, *boards_);
   });

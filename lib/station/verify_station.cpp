@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "captures/in_parallel.h"
 #include "detection/image_file.h"
+#include "detection/images_in_parallel.h"
 #include "rig/input_error.h"
 #include "session/session_folder.h"
 #include "station/lamp_faults.h"
@@ -23,7 +23,7 @@ template <typename Look>
 UnitStep step_of(const fs::path& folder, int threads, const Look& look) {
   const auto files = images_in(folder);
   std::vector<UnitImage> images(files.size());
-  in_parallel(files.size(), threads, [&](std::size_t i) { images[i] = look(files[i]); });
+  images_in_parallel(files.size(), threads, [&](std::size_t i) { images[i] = look(files[i]); });
   UnitStep step;
   step.folder = folder;
   for (UnitImage& image : images) {
@@ -88,23 +88,9 @@ class Verification {
       for (const std::string& fault : places_) first.push_back({fault, false});
     }
     causes_.insert(causes_.begin(), first.begin(), first.end());
-    RunRecord record{.run = run,
-                     .kind = "golden",
-                     .station = config_.station,
-                     .camera = golden_.camera_id,
-                     .operator_name = "",
-                     .shift = "",
-                     .begun_utc = begun_utc(run),
-                     .ended_utc = now_utc(),
-                     .verdict = "",
-                     .causes = "",
-                     .program = program.program + " " + program.version,
-                     .libraries = library_versions(),
-                     .config_sha256 = config_.sha256,
-                     .calibration = "",
-                     .figures = figures,
-                     .images = images_,
-                     .events = {}};
+    RunRecord record = new_record("golden", config_, golden_.camera_id, run, program);
+    record.figures = figures;
+    record.images = images_;
     record.judge(causes_);
     return record;
   }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <random>
 
+#include "rig/calibration_text.h"
 #include "rig/samples.h"
 
 namespace vlp {
@@ -35,6 +36,7 @@ TEST(Calibration, IsWrittenByteForByteInTheFormat) {
   const TemporaryFolder folder;
   write_calibration(folder / "calibration.yaml", sample_calibration());
   EXPECT_EQ(folder.content_of(folder / "calibration.yaml"), kCalibrationYaml);
+  EXPECT_EQ(calibration_text(sample_calibration()), kCalibrationYaml);
 }
 
 TEST(Calibration, MayHaveItsPartsInAnyOrder) {

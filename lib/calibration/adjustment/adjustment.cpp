@@ -16,6 +16,7 @@
 
 #include "calibration/adjustment/adjustment_problem.h"
 #include "geometry/median.h"
+#include "geometry/symmetric.h"
 #include "positioning/consistent_fix.h"
 #include "positioning/frame_fix.h"
 #include "positioning/lean.h"
@@ -428,10 +429,8 @@ std::string undetermined_by(const AdjustmentProblem& problem, const Eigen::Matri
                             double height_m, const AdjustmentLimits& limits, bool& has_lever_arm) {
   const AdjustmentLayout& at = problem.layout();
   const auto sd_of = [&](Eigen::Index first) {
-    return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(
-                         Eigen::Matrix2d(covariance.block<2, 2>(first, first)))
-                         .eigenvalues()
-                         .maxCoeff());
+    const Eigen::Matrix2d both = covariance.block<2, 2>(first, first);
+    return std::sqrt(symmetric_eigen(both).values.maxCoeff());
   };
   const bool zenith = sd_of(at.zenith) <= limits.zenith_rad;
   has_lever_arm = problem.has_lever_arm && sd_of(at.lever_arm) <= limits.lever_arm_share * height_m;
@@ -610,14 +609,14 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
 
   const Eigen::VectorXd u = state.segment(at.lens, at.lens_size);
   if (at.lens_size > 0) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> told(
-        Eigen::MatrixXd::Identity(at.lens_size, at.lens_size) -
-        covariance.block(at.lens, at.lens, at.lens_size, at.lens_size));
+    const auto told = symmetric_eigen(
+        Eigen::MatrixXd(Eigen::MatrixXd::Identity(at.lens_size, at.lens_size) -
+                        covariance.block(at.lens, at.lens, at.lens_size, at.lens_size)));
     for (Eigen::Index i = 0; i < at.lens_size; ++i) {
       constexpr double something = 1e-3;
-      if (!(told.eigenvalues()[i] > something)) continue;
-      const double along = told.eigenvectors().col(i).dot(u);
-      result.lens_chi_squared += along * along / told.eigenvalues()[i];
+      if (!(told.values[i] > something)) continue;
+      const double along = told.vectors.col(i).dot(u);
+      result.lens_chi_squared += along * along / told.values[i];
       ++result.lens_freedom;
     }
     const double n = result.lens_freedom, t = 3.719;  // one in ten thousand

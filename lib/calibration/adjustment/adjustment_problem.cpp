@@ -5,11 +5,12 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
+
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -59,15 +60,15 @@ LensFreedom::LensFreedom(const std::vector<double>& intrinsics,
   const Eigen::VectorXd sd = covariance->diagonal().cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(sd.size()));
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse_sd.asDiagonal() * *covariance *
-                                                             inverse_sd.asDiagonal());
+  const auto eigen = symmetric_eigen(
+      Eigen::MatrixXd(inverse_sd.asDiagonal() * *covariance * inverse_sd.asDiagonal()));
   constexpr double rounding = 1e-12;
-  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const Eigen::VectorXd& values = eigen.values;
   Eigen::Index kept = 0;
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     kept += values[i] > rounding * values[values.size() - 1] ? 1 : 0;
   }
-  directions = sd.asDiagonal() * eigen.eigenvectors().rightCols(kept) *
+  directions = sd.asDiagonal() * eigen.vectors.rightCols(kept) *
                values.tail(kept).cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 

@@ -3,11 +3,11 @@
 #include "calibration/levelling/lamp_bundle.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 
 #include "calibration/levelling/lamp_equations.h"
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -35,12 +35,10 @@ std::optional<Eigen::MatrixXd> covariance_of(const SharedEquations& shared,
       (free.cwiseAbs2().transpose() * shared.undiminished).cwiseSqrt().cwiseInverse();
   if (!scale.allFinite()) return std::nullopt;
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues().minCoeff() > rounding)) {
-    return std::nullopt;
-  }
-  const Eigen::MatrixXd directions = free * scale.asDiagonal() * eigen.eigenvectors() *
-                                     eigen.eigenvalues().cwiseInverse().cwiseSqrt().asDiagonal();
+  const auto eigen = symmetric_eigen(scaled);
+  if (!(eigen.values.minCoeff() > rounding)) return std::nullopt;
+  const Eigen::MatrixXd directions = free * scale.asDiagonal() * eigen.vectors *
+                                     eigen.values.cwiseInverse().cwiseSqrt().asDiagonal();
   return directions * directions.transpose();
 }
 

@@ -4,10 +4,9 @@
 
 #include <algorithm>
 #include <exception>
-#include <mutex>
 #include <utility>
 
-#include "captures/in_parallel.h"
+#include "detection/images_in_parallel.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -50,13 +49,10 @@ FoundBoards detect_boards(const BoardDetector& detector,
                           const BoardCache& cache,
                           const std::function<void(std::size_t done)>& progress, double max_mpx) {
   std::vector<ViewOutcome> outcomes(images.size());
-  std::mutex counting;
-  std::size_t done = 0;
-  in_parallel(images.size(), threads, [&](std::size_t i) {
-    outcomes[i] = outcome_of(detector, images[i], cache, max_mpx);
-    const std::lock_guard lock(counting);
-    progress(++done);
-  });
+  images_in_parallel(
+      images.size(), threads,
+      [&](std::size_t i) { outcomes[i] = outcome_of(detector, images[i], cache, max_mpx); },
+      progress);
   FoundBoards result;
   for (ViewOutcome& outcome : outcomes) {
     if (outcome.view) {

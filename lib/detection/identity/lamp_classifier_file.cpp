@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include "detection/identity/lamp_classifier.h"
+#include "geometry/symmetric.h"
 #include "rig/file.h"
 #include "rig/yaml_reader.h"
 #include "rig/yaml_writer.h"
@@ -37,8 +37,7 @@ Eigen::Matrix4d read_covariance(const YamlValue& value) {
   for (int row = 0; row < 4; ++row) {
     covariance.row(row) = read_features(rows[static_cast<std::size_t>(row)]).transpose();
   }
-  if (covariance != covariance.transpose() ||
-      Eigen::LLT<Eigen::Matrix4d>(covariance).info() != Eigen::Success) {
+  if (covariance != covariance.transpose() || !inverse_of_positive(covariance)) {
     throw value.error("is not a covariance: it should be symmetric and positive");
   }
   return covariance;

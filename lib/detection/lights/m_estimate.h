@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "geometry/median.h"
+#include "geometry/normal_equations.h"
 
 namespace vlp {
 
@@ -59,8 +59,7 @@ std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights,
       std::min(4 * tolerance, tukey * std::max(sigma_from_median * median, tolerance / 10));
 
   MEstimateStep<N> result{{}, {}, std::vector<bool>(weights.size()), 0, 0};
-  Eigen::Matrix<double, N, N> normal = Eigen::Matrix<double, N, N>::Zero();
-  Eigen::Matrix<double, N, 1> gradient = Eigen::Matrix<double, N, 1>::Zero();
+  Normal<std::size_t(N)> normal;
   double sum = 0, squares = 0, all = 0, psi_squares = 0, slopes = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
     const auto& [error, slope] = distances[i];
@@ -73,20 +72,23 @@ std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights,
     psi_squares += weights[i] * std::pow(inside * inside * error, 2);
     slopes += weights[i] * inside * (1 - 5 * share * share);
     squares += error * error;
-    normal += weight * slope * slope.transpose();
-    gradient += weight * error * slope;
+    normal.add_row(slope, error, weight);
     sum += weight;
     ++result.count;
   }
   if (result.count < least || !(slopes > 0)) return std::nullopt;
-  const Eigen::LDLT<Eigen::Matrix<double, N, N>> solver(normal);
-  if (!(solver.vectorD().minCoeff() > 1e-12 * solver.vectorD().maxCoeff())) return std::nullopt;
-  result.step = solver.solve(gradient);
+  const Cholesky<std::size_t(N)> factor(normal);
+  if (!factor.determines(1e-12)) return std::nullopt;
+  const auto step = factor.solve(normal.gradient);
+  std::copy(step.begin(), step.end(), result.step.begin());
   result.rms = std::sqrt(squares / result.count);
   // Of an M-estimate: the mean of psi^2 over the squared mean of its slope.
   const double variance = psi_squares * all / (slopes * slopes) * result.count / (result.count - N);
-  result.covariance =
-      solver.solve(Eigen::Matrix<double, N, N>::Identity()) * (variance * sum / result.count);
+  for (int i = 0; i < N; ++i) {
+    const auto column = factor.inverse_column(std::size_t(i));
+    std::copy(column.begin(), column.end(), result.covariance.col(i).begin());
+  }
+  result.covariance *= variance * sum / result.count;
   return result;
 }
 

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/lights/rectangle.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -14,6 +13,7 @@
 
 #include "detection/lights/straight_edge.h"
 #include "geometry/angles.h"
+#include "geometry/symmetric.h"
 #include "rig/detection.h"
 
 namespace vlp {
@@ -124,9 +124,9 @@ Sides through(const std::vector<Eigen::Vector2d>& points, Sides sides, double wi
     for (const Eigen::Vector2d& point : of_sides[i]) {
       spread += (point - mean) * (point - mean).transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(spread);
-    Eigen::Vector2d way = axes.eigenvectors().col(1);
-    const double length = std::sqrt(axes.eigenvalues()[1] / double(of_sides[i].size()) * 12);
+    const auto axes = symmetric_eigen(spread);
+    Eigen::Vector2d way = axes.vectors.col(1);
+    const double length = std::sqrt(axes.values[1] / double(of_sides[i].size()) * 12);
     if (length < least_spread * (sides[i].to - sides[i].from).norm()) continue;
     if (way.dot(before[i].way()) < 0) way = -way;
     sides[i] = {mean - way * length / 2, mean + way * length / 2};

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/lights/robust_ellipse.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +9,7 @@
 
 #include "detection/lights/m_estimate.h"
 #include "detection/lights/robust_circle.h"
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -66,11 +66,13 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
     fit.inliers = std::move(better->inliers);
     fit.count = better->count;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(Eigen::Matrix2d(ellipse.conic));
-  const double most = axes.eigenvalues().maxCoeff(), least = axes.eigenvalues().minCoeff();
+  const auto axes = symmetric_eigen(Eigen::Matrix2d(ellipse.conic));
+  const double least = axes.values[0], most = axes.values[1];
   if (!(least * most_axis_ratio * most_axis_ratio > most)) return std::nullopt;
   fit.center = circle->circle.center + unit * ellipse.center;
-  fit.rim_from_circle = unit * axes.operatorInverseSqrt();
+  const Eigen::Vector2d semi_axes = axes.values.cwiseInverse().cwiseSqrt();
+  fit.rim_from_circle =
+      unit * Matrix2(axes.vectors * semi_axes.asDiagonal() * axes.vectors.transpose());
   return fit;
 }
 

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/lights/straight_edge.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <numbers>
 
 #include "detection/lights/m_estimate.h"
+#include "geometry/normal_equations.h"
 
 namespace vlp {
 namespace {
@@ -211,35 +211,43 @@ CurveDistance<N> expected(const Model<N>& model, std::size_t which, double lengt
 template <int N>
 std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vector<Sample>& samples,
                                           const std::vector<bool>& inliers, double length_px) {
-  using Vector = Eigen::Matrix<double, N, 1>;
-  Eigen::Matrix<double, N, N> normal = Eigen::Matrix<double, N, N>::Zero();
-  Eigen::Matrix<double, N, N> scatter = normal;
+  Normal<std::size_t(N)> normal;
   double count = 0;
-  std::map<int, std::pair<Vector, double>> of_lines;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!inliers[i]) continue;
+    normal.add_row(model.residual(samples[i]).slope, 0);
+    ++count;
+  }
+  for (const std::size_t which : {std::size_t(0), std::size_t(1)}) {
+    normal.add_row(expected(model, which, length_px).slope, 0);
+  }
+  const Cholesky<std::size_t(N)> factor(normal);
+  if (!factor.determines(1e-12) || !(count > N)) return std::nullopt;
+  const auto from = factor.inverse_column(kFrom), to = factor.inverse_column(kTo);
+  const auto ends_moved_by = [&](const Eigen::Matrix<double, N, 1>& pull) {
+    Eigen::Vector2d moved(0, 0);
+    for (std::size_t i = 0; i < N; ++i) {
+      moved += pull[Eigen::Index(i)] * Eigen::Vector2d(from[i], to[i]);
+    }
+    return moved;
+  };
+  Matrix2 covariance = Matrix2::Zero();
+  std::map<int, std::pair<Eigen::Vector2d, double>> of_lines;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!inliers[i]) continue;
     double with_level = 0;
     const auto [error, slope] = model.residual(samples[i], &with_level);
-    normal += slope * slope.transpose();
-    scatter += error * error * slope * slope.transpose();
-    ++count;
-    auto& [pull, sd] = of_lines.try_emplace(samples[i].line, Vector::Zero(), 0).first->second;
-    pull += slope * with_level;
+    const Eigen::Vector2d moved = ends_moved_by(slope);
+    covariance += error * error * moved * moved.transpose();
+    auto& [by_level, sd] =
+        of_lines.try_emplace(samples[i].line, Eigen::Vector2d(0, 0), 0).first->second;
+    by_level += with_level * moved;
     sd = samples[i].lit.sd;
   }
-  for (const std::size_t which : {std::size_t(0), std::size_t(1)}) {
-    const auto slope = expected(model, which, length_px).slope;
-    normal += slope * slope.transpose();
-  }
-  const Eigen::LDLT<Eigen::Matrix<double, N, N>> solver(normal);
-  if (!(solver.vectorD().minCoeff() > 1e-12 * solver.vectorD().maxCoeff())) return std::nullopt;
-  if (!(count > N)) return std::nullopt;
-  const Eigen::Matrix<double, N, N> inverse = solver.solve(Eigen::Matrix<double, N, N>::Identity());
-  Matrix2 covariance =
-      (inverse * scatter * inverse).template topLeftCorner<2, 2>() * (count / (count - N));
-  for (const auto& [line, pulled] : of_lines) {
-    const Vector moved = solver.solve(pulled.first) * pulled.second;
-    covariance += moved.template head<2>() * moved.template head<2>().transpose();
+  covariance *= count / (count - N);
+  for (const auto& [line, of_line] : of_lines) {
+    const Eigen::Vector2d moved = of_line.first * of_line.second;
+    covariance += moved * moved.transpose();
   }
   return covariance;
 }

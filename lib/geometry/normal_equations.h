@@ -1,0 +1,81 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+/// Normal equations of least squares, of a size that the compiler knows, in plain loops: Eigen's
+/// own products and decompositions of matrices of 9 x 9 are no faster and take it minutes to
+/// compile.
+namespace vlp {
+
+template <std::size_t n>
+struct Normal {
+  std::array<std::array<double, n>, n> information{};  // the lower half
+  std::array<double, n> gradient{};
+
+  /// `row`: the derivative of the residual, an array or a vector of Eigen's.
+  template <typename Row>
+  void add_row(const Row& row, double residual, double weight = 1) {
+    const double* const slope = row.data();
+    for (std::size_t i = 0; i < n; ++i) {
+      const double weighted = weight * slope[i];
+      for (std::size_t k = 0; k <= i; ++k) information[i][k] += weighted * slope[k];
+      gradient[i] += weighted * residual;
+    }
+  }
+};
+
+/// L of A = L L^T, with the inverses of its diagonal.
+template <std::size_t n>
+struct Cholesky {
+  std::array<std::array<double, n>, n> lower;
+  std::array<double, n> inverse_diagonal;
+  bool is_positive = true;
+
+  explicit Cholesky(const Normal<n>& normal) : lower(normal.information) {
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k <= i; ++k) {
+        double sum = lower[i][k];
+        for (std::size_t m = 0; m < k; ++m) sum -= lower[i][m] * lower[k][m];
+        if (k < i) {
+          lower[i][k] = sum * inverse_diagonal[k];
+        } else {
+          is_positive = is_positive && sum > 0;
+          inverse_diagonal[i] = 1 / std::sqrt(sum);
+        }
+      }
+    }
+  }
+
+  /// Whether every unknown is told by more than `share` of what the best told one is, by the
+  /// information that each adds to those before it.
+  bool determines(double share) const {
+    const auto [least, most] =
+        std::minmax_element(inverse_diagonal.begin(), inverse_diagonal.end());
+    return is_positive && *least * *least > share * *most * *most;
+  }
+
+  std::array<double, n> solve(std::array<double, n> x) const {
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < i; ++k) x[i] -= lower[i][k] * x[k];
+      x[i] *= inverse_diagonal[i];
+    }
+    for (std::size_t i = n; i-- > 0;) {
+      for (std::size_t k = i + 1; k < n; ++k) x[i] -= lower[k][i] * x[k];
+      x[i] *= inverse_diagonal[i];
+    }
+    return x;
+  }
+
+  std::array<double, n> inverse_column(std::size_t i) const {
+    std::array<double, n> unit{};
+    unit[i] = 1;
+    return solve(unit);
+  }
+};
+
+}  // namespace vlp

@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/symmetric.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <limits>
+
+namespace vlp {
+namespace {
+
+template <int N>
+SymmetricEigen<N> decomposed(const Eigen::Matrix<double, N, N>& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> solver(matrix);
+  if (solver.info() == Eigen::Success) return {solver.eigenvalues(), solver.eigenvectors()};
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  return {Eigen::Matrix<double, N, 1>::Constant(matrix.rows(), nan),
+          Eigen::Matrix<double, N, N>::Constant(matrix.rows(), matrix.cols(), nan)};
+}
+
+}  // namespace
+
+SymmetricEigen<2> symmetric_eigen(const Eigen::Matrix2d& matrix) { return decomposed(matrix); }
+
+SymmetricEigen<Eigen::Dynamic> symmetric_eigen(const Eigen::MatrixXd& matrix) {
+  return decomposed(matrix);
+}
+
+std::optional<Eigen::Matrix4d> inverse_of_positive(const Eigen::Matrix4d& matrix) {
+  const Eigen::LLT<Eigen::Matrix4d> factor(matrix);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  const Eigen::Matrix4d inverse = factor.solve(Eigen::Matrix4d::Identity());
+  if (!inverse.allFinite()) return std::nullopt;
+  return inverse;
+}
+
+}  // namespace vlp

@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/normal_equations.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+#include "support/near.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kUnknowns = 5;
+using Vector = Eigen::Matrix<double, kUnknowns, 1>;
+using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+
+TEST(NormalEquations, GiveTheStepOfWeightedLeastSquares) {
+  Random random(11);
+  Normal<kUnknowns> normal;
+  Matrix information = Matrix::Zero();
+  Vector gradient = Vector::Zero();
+  for (int i = 0; i < 20; ++i) {
+    Vector row;
+    for (double& one : row) one = random.uniform(-1, 1);
+    const double residual = random.uniform(-1, 1), weight = random.uniform(0.1, 2);
+    normal.add_row(row, residual, weight);
+    information += weight * row * row.transpose();
+    gradient += weight * residual * row;
+  }
+  const Cholesky<kUnknowns> factor(normal);
+  ASSERT_TRUE(factor.determines(1e-3));
+  const auto step = factor.solve(normal.gradient);
+  EXPECT_THAT(Vector(Vector::Map(step.data())),
+              IsNear(Vector(information.inverse() * gradient), 1e-12));
+  Matrix inverse;
+  for (std::size_t i = 0; i < kUnknowns; ++i) {
+    inverse.col(Eigen::Index(i)) = Vector::Map(factor.inverse_column(i).data());
+  }
+  EXPECT_THAT(inverse, IsNear(Matrix(information.inverse()), 1e-12));
+}
+
+TEST(NormalEquations, SayWhatTheyDoNotDetermine) {
+  Normal<2> normal;
+  normal.add_row(std::array{1.0, 1.0}, 0);
+  EXPECT_FALSE(Cholesky<2>(normal).determines(1e-12));  // only the sum is told
+  normal.add_row(std::array{1e-7, 0.0}, 0);
+  EXPECT_FALSE(Cholesky<2>(normal).determines(1e-12));
+  normal.add_row(std::array{1e-3, 0.0}, 0);
+  EXPECT_TRUE(Cholesky<2>(normal).determines(1e-12));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/symmetric.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <limits>
+
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+TEST(SymmetricEigen, GivesTheMatrixBackFromAscendingValues) {
+  Eigen::Matrix2d two;
+  two << 5, 2, 2, 3;
+  Eigen::MatrixXd four(4, 4);
+  four << 4, 1, 0, -1, 1, 3, 2, 0, 0, 2, 5, 1, -1, 0, 1, 2;
+  const auto expect_same = [](const auto& eigen, const auto& matrix) {
+    for (Eigen::Index i = 1; i < eigen.values.size(); ++i) {
+      EXPECT_LT(eigen.values[i - 1], eigen.values[i]);
+    }
+    EXPECT_THAT(
+        Eigen::MatrixXd(eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose()),
+        IsNear(Eigen::MatrixXd(matrix), 1e-14));
+  };
+  expect_same(symmetric_eigen(two), two);
+  expect_same(symmetric_eigen(four), four);
+}
+
+TEST(SymmetricEigen, IsNoNumberOfWhatIsNone) {
+  const Eigen::MatrixXd none =
+      Eigen::MatrixXd::Constant(3, 3, std::numeric_limits<double>::quiet_NaN());
+  EXPECT_FALSE(symmetric_eigen(none).values.minCoeff() > 0);
+  EXPECT_EQ(symmetric_eigen(none).vectors.cols(), 3);
+}
+
+TEST(InverseOfPositive, IsTheInverseOrNothing) {
+  Eigen::Matrix4d positive;
+  positive << 4, 1, 0, -1, 1, 3, 2, 0, 0, 2, 5, 1, -1, 0, 1, 2;
+  const auto inverse = inverse_of_positive(positive);
+  ASSERT_TRUE(inverse);
+  EXPECT_THAT(Eigen::Matrix4d(*inverse * positive),
+              IsNear(Eigen::Matrix4d(Eigen::Matrix4d::Identity()), 1e-14));
+
+  Eigen::Matrix4d indefinite = positive;
+  indefinite(2, 2) = -1;
+  EXPECT_FALSE(inverse_of_positive(indefinite));
+  EXPECT_FALSE(inverse_of_positive(Eigen::Matrix4d::Zero()));
+  EXPECT_FALSE(inverse_of_positive(1e-310 * Eigen::Matrix4d::Identity()));  // 1 / it overflows
+}
+
+}  // namespace
+}  // namespace vlp
