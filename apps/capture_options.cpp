@@ -14,6 +14,7 @@
 #include "camera/lens_model.h"
 #include "detection/image_file.h"
 #include "detection/lights/lights_table.h"
+#include "geometry/angles.h"
 #include "progress.h"
 #include "step_outcome.h"
 
@@ -67,6 +68,27 @@ void add_detect_options(CLI::App& app, CaptureOptions& options) {
   add_max_mpx_option(app, options.max_mpx);
   app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
+}
+
+std::optional<KnownMotion> MotionOptions::motion() const {
+  constexpr double fastest_deg_per_s = 180;  // that robots turn
+  if (!max_speed_m_per_s) return std::nullopt;
+  return KnownMotion::up_to(*max_speed_m_per_s,
+                            rad_from_deg(max_yaw_rate_deg_per_s.value_or(fastest_deg_per_s)));
+}
+
+void add_motion_options(CLI::App& app, MotionOptions& options, const char* help) {
+  app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s, help)->check(finite_positive());
+  app.add_option("--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
+                 "With --max-speed-m-per-s: it turns so fast at most (default: 180); 0: not at all")
+      ->check(finite_not_negative())
+      ->needs("--max-speed-m-per-s");
+}
+
+void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_deg_per_s) {
+  app.add_option("--yaw-rate-sd-deg-per-s", yaw_rate_sd_deg_per_s,
+                 "Standard deviation of yaw_rate_rad_per_s in captures.csv (default: as it says)")
+      ->check(finite_not_negative());
 }
 
 std::vector<std::string> inputs_of(const CaptureOptions& options) {

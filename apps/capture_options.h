@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app.h"
+#include "positioning/positioner.h"
 #include "session/lamp_images.h"
 #include "session/rotation_step.h"
 
@@ -56,6 +57,20 @@ void add_max_mpx_option(CLI::App& app, double& max_mpx);
 
 /// Adds --classifier, --annotate, --readout, --exposure-s, --max-mpx and --threads.
 void add_detect_options(CLI::App& app, CaptureOptions& options);
+
+/// How cameras move while their images are read.
+struct MotionOptions {
+  std::optional<double> max_speed_m_per_s, max_yaw_rate_deg_per_s;
+
+  /// Nothing: they stand.
+  std::optional<KnownMotion> motion() const;
+};
+
+/// Adds --max-speed-m-per-s, with this help, and --max-yaw-rate-deg-per-s.
+void add_motion_options(CLI::App& app, MotionOptions& options, const char* help);
+
+/// Adds --yaw-rate-sd-deg-per-s, of captures.csv.
+void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_deg_per_s);
 
 /// What the result depends on: captures, lamp map, calibration, classifier; an empty name is an
 /// input that was not given.

@@ -4,15 +4,29 @@
 
 #include <fmt/core.h>
 
+#include <filesystem>
+
 #include "app.h"
 #include "capture_options.h"
+#include "captures/captures_table.h"
+#include "geometry/angles.h"
 #include "history.h"
 #include "print_rotation.h"
+#include "session/capture_motion.h"
 #include "session/rotation_step.h"
 #include "step_outcome.h"
 
 namespace vlp {
 namespace {
+
+namespace fs = std::filesystem;
+
+/// Empty where there is none.
+fs::path captures_file(const CaptureOptions& images, const LevelOptions& options) {
+  if (!options.captures.empty()) return options.captures;
+  const fs::path beside = fs::path(images.images) / "captures.csv";
+  return fs::is_directory(images.images) && fs::exists(beside) ? beside : fs::path();
+}
 
 void print_corrections(const Levelling& result) {
   fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "moved by x y z (mm)", "sd (mm)");
@@ -36,12 +50,20 @@ void report(const Levelling& result, const Camera& camera) {
 }  // namespace
 
 void rotate_by_lamps(const CLI::App& app, const CaptureOptions& images,
-                     const std::string& refined_map) {
-  const std::vector<std::string> inputs = inputs_of(images);
+                     const LevelOptions& options) {
+  const std::string& refined_map = options.refined_map;
+  const fs::path captures = captures_file(images, options);
+  std::vector<std::string> inputs = inputs_of(images);
+  inputs.push_back(captures.string());
   check_output(images.output, inputs);
   check_further_output("--refine-map", refined_map, images.output, inputs);
-  const LampCaptures input = read_captures_of(images);
+  LampCaptures input = read_captures_of(images);
   check_lamps(input.frames, input.lamps, input.lamps_file);
+  input.motions =
+      motions_of(input.frames, captures.empty() ? CapturesTable() : read_captures(captures),
+                 options.motion.motion(), rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0)));
+  // A table that tells of no motion is no part of the result.
+  if (input.motions.empty()) inputs.pop_back();
   const LevellingResult result =
       solve_levelling(input, !refined_map.empty(), history_entry(app, inputs));
   tell(result);

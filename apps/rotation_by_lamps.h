@@ -2,15 +2,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "capture_options.h"
 
 namespace vlp {
 
+/// What --method lamps takes besides captures.
+struct LevelOptions {
+  /// Empty when the lamp map stays.
+  std::string refined_map;
+  /// captures.csv; empty: that of the folder, if it is there.
+  std::string captures;
+  MotionOptions motion;
+  std::optional<double> yaw_rate_sd_deg_per_s;
+};
+
 /// vlp-rotation --method lamps: levels the camera from captures taken anywhere
-/// (calibration/levelling.h). `refined_map` is empty when the lamp map stays.
+/// (calibration/levelling.h).
 void rotate_by_lamps(const CLI::App& app, const CaptureOptions& images,
-                     const std::string& refined_map);
+                     const LevelOptions& options);
 
 }  // namespace vlp

@@ -32,6 +32,8 @@ struct Options {
   std::vector<std::string> sets, turns;
   std::string refined_map;
   std::optional<double> map_sd_m, place_sd_m, lens_sd_px;
+  MotionOptions motion;
+  std::optional<double> yaw_rate_sd_deg_per_s;
 };
 
 /// A folder of images, or a table, and the captures.csv in its folder.
@@ -140,6 +142,8 @@ void run(const CLI::App& app, const Options& options) {
   input.map_sd_m = options.map_sd_m;
   input.place_sd_m = options.place_sd_m;
   input.lens_sd_px = options.lens_sd_px;
+  input.motion = options.motion.motion();
+  input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
   input.refine_map = !options.refined_map.empty();
   for (const std::string& set : options.sets) {
     input.sets.push_back(read_set(options, set, false, input.lamps, input.calibration));
@@ -171,7 +175,8 @@ int main(int argc, char** argv) {
       "covariance, from any sets of captures: turns on a spot, known places, drives, heights.\n"
       "captures.csv in a set's folder tells what is known: spot (captures of one name were taken\n"
       "turning on one spot), x_m, y_m, z_m with place (camera or axis: whose place it is) and\n"
-      "place_sd_m. A set called rotation is a turn on the spot.\n\n"
+      "place_sd_m; vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s with velocity_sd_m_per_s (of the\n"
+      "camera, in its level frame). A set called rotation is a turn on the spot.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-adjust datasets/example/detections.csv \\\n"
       "    --turn datasets/example/turning.csv \\\n"
@@ -209,6 +214,11 @@ int main(int argc, char** argv) {
                  "is then estimated (default: it is exact)")
       ->check(vlp::finite_positive())
       ->check(CLI::Range(1e-3, 1e3));  // px: less is exact, more no lens at all
+  vlp::add_motion_options(
+      app, options.motion,
+      "The camera drives, so fast at most: its velocity is estimated in each capture (default: as "
+      "captures.csv says, or else it stands)");
+  vlp::add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
   vlp::add_detect_options(app, options.images);
   return vlp::run_app(app, argc, argv, [&] {
     if (options.sets.empty() && options.turns.empty()) {

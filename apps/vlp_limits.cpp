@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <string>
 #include <string_view>
@@ -13,12 +14,14 @@
 #include <vector>
 
 #include "app.h"
+#include "capture_options.h"
 #include "captures/csv_writer.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"
 #include "positioning/floor_summary.h"
 #include "report/plots/floor_plot.h"
 #include "rig/input_error.h"
+#include "session/capture_motion.h"
 #include "session/locate_step.h"
 
 namespace vlp {
@@ -30,6 +33,8 @@ struct Options {
   double yaw_deg = 0;
   double noise_px = 0, center_px = 0, tilt_deg = 0, lamp_map_mm = 0;
   bool stated = false;
+  MotionOptions motion;
+  double lean_sd_deg = 0;
   double step_m = 0.05;
   std::vector<double> floor_m;  // x_min x_max y_min y_max
 };
@@ -58,11 +63,17 @@ void write_map(const std::string& file, const FloorLimits& limits) {
   csv.save();
 }
 
+std::string title_of(const Options& options) {
+  std::string title = fmt::format("Camera at {} m, yaw {} deg", options.height_m, options.yaw_deg);
+  if (const auto& speed = options.motion.max_speed_m_per_s) {
+    title += fmt::format(", up to {} m/s", *speed);
+  }
+  if (options.lean_sd_deg > 0) title += fmt::format(", lean to {} deg", options.lean_sd_deg);
+  return title;
+}
+
 void draw_map(const Options& options, const FloorLimits& limits, const LampMap& lamps) {
-  FloorPlot plot{fmt::format("Camera at {} m, yaw {} deg", options.height_m, options.yaw_deg),
-                 "horizontal standard deviation (mm)",
-                 options.step_m,
-                 {}};
+  FloorPlot plot{title_of(options), "horizontal standard deviation (mm)", options.step_m, {}};
   for (const FloorLimits::Place& place : limits.places) {
     plot.places.push_back({place.camera.position_m.head<2>(), {}});
     if (place.parts.empty()) continue;
@@ -73,6 +84,8 @@ void draw_map(const Options& options, const FloorLimits& limits, const LampMap& 
 
 /// What makes a source smaller.
 std::string_view remedy_of(std::string_view key) {
+  if (key == "motion") return "odometry, or a faster read-out";
+  if (key == "lean") return "an inclination sensor, or a camera that is held level";
   if (key == "lens") return "more views of the board, or vlp-adjust, which corrects the lens";
   if (key == "zenith") return "more captures of the turn, or vlp-adjust with known places";
   if (key == "offset") return "more captures at the known place, or vlp-adjust instead";
@@ -80,9 +93,12 @@ std::string_view remedy_of(std::string_view key) {
   return "more lamps in view, larger in the image, or the mean of several captures";
 }
 
-void print_summary(const FloorSummary& summary, std::size_t places) {
-  fmt::print("places      {}, two lamps or more in view at {}\n\n", places,
-             summary.places_with_fix);
+void print_summary(const FloorSummary& summary, const FloorLimits& limits, bool is_free) {
+  const auto in_view =
+      std::count_if(limits.places.begin(), limits.places.end(),
+                    [](const FloorLimits::Place& place) { return place.lamps > 1; });
+  fmt::print("places      {}, two lamps or more in view at {}{}\n\n", limits.places.size(), in_view,
+             is_free ? fmt::format(", a fix at {}", summary.places_with_fix) : "");
   fmt::print("{:11} {:>21} {:>21} {:>21}\n", "one sigma", "horizontal (mm)", "height (mm)",
              "yaw (deg)");
   fmt::print("{:11}", "source");
@@ -130,16 +146,30 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
   return unit;
 }
 
+/// What is not known of motion and lean.
+BodyPrior prior_of(const Options& options, const Camera& camera) {
+  BodyPrior prior;
+  if (const auto motion = options.motion.motion()) {
+    check_row_time(camera);
+    prior.velocity_sd_m_per_s = motion->velocity_sd_m_per_s;
+    prior.yaw_rate_sd_rad_per_s = motion->yaw_rate_sd_rad_per_s;
+  }
+  prior.inclination_sd_rad = rad_from_deg(options.lean_sd_deg);
+  return prior;
+}
+
 FloorLimits limits_of(const Options& options, const LampMap& lamps, const FloorGrid& grid) {
   const Calibration calibration = read_calibration(options.calibration);
+  const BodyPrior prior = prior_of(options, calibration.camera);
   const double yaw_rad = rad_from_deg(options.yaw_deg);
   if (options.stated) {
     return floor_limits(stated_errors(options, lamps, calibration), grid, options.height_m, yaw_rad,
-                        options.noise_px);
+                        options.noise_px, prior);
   }
   return floor_limits(lamps, calibration.camera, grid, options.height_m, yaw_rad,
                       {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
-                       1e-3 * options.lamp_map_mm});
+                       1e-3 * options.lamp_map_mm},
+                      prior);
 }
 
 void run(const Options& options) {
@@ -155,6 +185,15 @@ void run(const Options& options) {
   }
   const FloorLimits limits = limits_of(options, lamps, grid);
   const auto summary = summarize(limits);
+  const bool is_free = options.motion.max_speed_m_per_s || options.lean_sd_deg > 0;
+  if (!summary && is_free && std::any_of(limits.places.begin(), limits.places.end(), [](auto& one) {
+        return one.lamps > 1;
+      })) {
+    throw Undetermined(
+        "the lamps in view tell motion and lean nowhere on this floor: a lean that is not known "
+        "needs four lamps, or three that leave one place only; lower the camera, widen the lens, "
+        "add lamps, or state what is known (--lean-sd-deg, --max-speed-m-per-s)");
+  }
   if (!summary) {
     throw Undetermined(
         "two lamps are in view nowhere on this floor: is it under the lamps, and the camera below "
@@ -162,7 +201,7 @@ void run(const Options& options) {
   }
   if (!options.map.empty()) write_map(options.map, limits);
   if (!options.picture.empty()) draw_map(options, limits, lamps);
-  print_summary(*summary, limits.places.size());
+  print_summary(*summary, limits, is_free);
   if (options.stated) print_advice(*summary);
 }
 
@@ -208,6 +247,14 @@ int main(int argc, char** argv) {
       ->excludes(center)
       ->excludes(tilt)
       ->excludes(lamp_map);
+  vlp::add_motion_options(app, options.motion,
+                          "What it costs that the camera may drive, so fast at most, and that its "
+                          "velocity is estimated "
+                          "(default: it stands; odometry good to S m/s: twice S)");
+  app.add_option("--lean-sd-deg", options.lean_sd_deg,
+                 "What it costs that roll and pitch are known to this standard deviation, and "
+                 "estimated; 90: not at all (default: known)")
+      ->check(vlp::finite_not_negative());
   app.add_option("--yaw-deg", options.yaw_deg, "Yaw of the camera (default 0)")
       ->check(vlp::finite());
   app.add_option("--floor-m", options.floor_m,

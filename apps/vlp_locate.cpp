@@ -39,13 +39,11 @@ struct Options {
   std::optional<double> inclination_sigma_deg;
   std::optional<std::array<double, 4>> camera_on_robot;
   bool one_lamp = false;
-  std::optional<double> max_speed_m_per_s, max_yaw_rate_deg_per_s, yaw_rate_sd_deg_per_s;
+  MotionOptions motion;
+  std::optional<double> yaw_rate_sd_deg_per_s;
   std::optional<double> lean_sd_deg, height_sd_m;
   int frames_together = 1;
 };
-
-/// Faster than robots turn.
-constexpr double kMaxYawRate_deg_per_s = 180;
 
 void set_sigma(std::vector<Frame>& frames, double sigma_px) {
   for (Frame& frame : frames) {
@@ -70,7 +68,7 @@ CapturesTable captures_of(const Options& options) {
                        [&](const auto& capture) { return has(capture.second); });
   };
   if (options.frames_together > 1) {
-    if (!options.max_speed_m_per_s &&
+    if (!options.motion.max_speed_m_per_s &&
         !some([](const Capture& one) { return one.velocity_m_per_s.has_value(); })) {
       throw std::invalid_argument(
           "--frames needs --max-speed-m-per-s, or velocities in captures.csv");
@@ -119,11 +117,7 @@ void run(const Options& options) {
   }
   input.inclination_sigma_rad = rad_from_deg(options.inclination_sigma_deg.value_or(0));
   input.one_lamp = options.one_lamp;
-  if (options.max_speed_m_per_s) {
-    input.motion = KnownMotion::up_to(
-        *options.max_speed_m_per_s,
-        rad_from_deg(options.max_yaw_rate_deg_per_s.value_or(kMaxYawRate_deg_per_s)));
-  }
+  input.motion = options.motion.motion();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
   input.lean_sd_rad = rad_from_deg(options.lean_sd_deg.value_or(0));
   input.height_sd_m = options.height_sd_m;
@@ -167,17 +161,11 @@ void add_options(CLI::App& app, Options& options) {
       ->option_text("X_M Y_M Z_M YAW_DEG");
   app.add_flag("--one-lamp", options.one_lamp,
                "Where one lamp is seen, take z_m and yaw_rad from captures.csv");
-  app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s,
-                 "The camera drives, so fast at most: its velocity is estimated from each image "
-                 "(default: as captures.csv says, or else it stands)")
-      ->check(finite_positive());
-  app.add_option("--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
-                 "With --max-speed-m-per-s: it turns so fast at most (default: 180); 0: not at all")
-      ->check(finite_not_negative())
-      ->needs("--max-speed-m-per-s");
-  app.add_option("--yaw-rate-sd-deg-per-s", options.yaw_rate_sd_deg_per_s,
-                 "Standard deviation of yaw_rate_rad_per_s in captures.csv (default: as it says)")
-      ->check(finite_not_negative());
+  add_motion_options(
+      app, options.motion,
+      "The camera drives, so fast at most: its velocity is estimated from each image (default: as "
+      "captures.csv says, or else it stands)");
+  add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
   app.add_option(
          "--lean-sd-deg", options.lean_sd_deg,
          "The camera leans by an unknown angle, of this standard deviation about level: roll "

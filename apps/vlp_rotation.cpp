@@ -16,17 +16,20 @@ namespace {
 
 struct Options {
   CaptureOptions images;
-  std::string plot, refined_map;
+  std::string plot;
+  LevelOptions level;
   std::string method = "axis";
 };
 
 void run(const CLI::App& app, const Options& options) {
   if (options.method == "lamps") {
     if (!options.plot.empty()) throw std::invalid_argument("--plot is of a turn on the spot");
-    return rotate_by_lamps(app, options.images, options.refined_map);
+    return rotate_by_lamps(app, options.images, options.level);
   }
-  if (!options.refined_map.empty()) {
-    throw std::invalid_argument("--refine-map needs --method lamps");
+  for (const char* of_lamps : {"--refine-map", "--captures", "--max-speed-m-per-s",
+                               "--max-yaw-rate-deg-per-s", "--yaw-rate-sd-deg-per-s"}) {
+    if (app.count(of_lamps) == 0) continue;
+    throw std::invalid_argument(std::string(of_lamps) + " needs --method lamps");
   }
   rotate_on_spot(app, options.images, options.method, options.plot);
 }
@@ -64,10 +67,19 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"axis", "joint", "circle", "lamps"}))
       ->option_text("axis|joint|circle|lamps");
   app.add_option(
-         "--refine-map", options.refined_map,
+         "--refine-map", options.level.refined_map,
          "With --method lamps: correct the lamp map, too, and write it to this file; place, "
          "turn about the vertical and size of the map as a whole stay")
       ->option_text("FILE");
+  app.add_option("--captures", options.level.captures,
+                 "With --method lamps: captures.csv: image, vx_m_per_s, vy_m_per_s, "
+                 "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry, in the level camera); "
+                 "default: captures.csv in the folder");
+  vlp::add_motion_options(
+      app, options.level.motion,
+      "With --method lamps: the camera drives, so fast at most: its velocity is estimated from "
+      "each image (default: as captures.csv says, or else it stands)");
+  vlp::add_yaw_rate_sd_option(app, options.level.yaw_rate_sd_deg_per_s);
   app.add_option("--plot", options.plot,
                  "Where to draw lamps, circles, rotation centre and principal point, .png or .svg");
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });

@@ -251,6 +251,30 @@ CommonErrors::Gain CommonErrors::gain_of(std::span<const Sighting> sightings,
   return gain;
 }
 
+CommonErrors::BodyGain CommonErrors::gain_of(std::span<const BodySighting> sightings,
+                                             std::span<const std::size_t> lamps,
+                                             const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                             const Lens& lens,
+                                             const Eigen::Matrix3d& body_from_base) const {
+  const PosedBody body(fix.state);
+  BodyGain whole(shared());
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const BodySighting& seen = sightings[i];
+    const auto d_q = body.d_lamp_in_body(seen.lamp_m, seen.time_s);
+    const Eigen::Matrix<double, 2, 3> d_pixel =
+        d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
+    const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state = d_pixel.lazyProduct(d_q);
+    const Eigen::Matrix<double, kBodyStates, 2> gain =
+        fix.covariance.lazyProduct(d_pixel_d_state.transpose());
+    const Eigen::Matrix<double, 2, 3> d_pixel_d_ray = seen.whitened_pixel_from_ray * body_from_base;
+    const Eigen::Matrix<double, kBodyStates, 3> by_ray = gain * d_pixel_d_ray;
+    whole.by_shared.noalias() +=
+        by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens));
+    whole.add(lamps[i], gain * d_pixel_d_state.leftCols<3>());
+  }
+  return whole;
+}
+
 template <int States>
 Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::covariance_of(
     const GainOf<States>& gain) const {

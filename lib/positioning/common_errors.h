@@ -13,6 +13,7 @@
 #include "../geometry/types.h"
 #include "../rig/calibration.h"
 #include "../rig/lamp_map.h"
+#include "body_fix.h"
 #include "camera_mount.h"
 #include "correction.h"
 #include "fix.h"
@@ -98,6 +99,11 @@ class CommonErrors {
   Gain gain_of(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
                const PoseEstimate& camera, const Lens& lens,
                const Eigen::Matrix3d& level_from_base) const;
+  /// Of a body with the camera at `arm_m`: the gain of its pixels, in standard deviations, is that
+  /// of its least squares (fix_body).
+  BodyGain gain_of(std::span<const BodySighting> sightings, std::span<const std::size_t> lamps,
+                   const Eigen::Vector3d& arm_m, const BodyFix& fix, const Lens& lens,
+                   const Eigen::Matrix3d& body_from_base) const;
   /// G C G', of one or the other.
   template <int States>
   Eigen::Matrix<double, States, States, Eigen::DontAlign> covariance_of(

@@ -3,6 +3,7 @@
 #include "positioning/error_budget.h"
 
 #include "geometry/symmetric.h"
+#include "positioning/body_limit.h"
 #include "positioning/sighting.h"
 
 namespace vlp {
@@ -62,6 +63,40 @@ std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m
       sources.noise_px * sources.noise_px * *inverse, by_center * by_center.transpose(),
       by_tilt * by_tilt.transpose(),
       sources.lamp_map_m * sources.lamp_map_m * *inverse * lamp_map_gradient * *inverse};
+}
+
+std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
+                                        const Pose& level, const ErrorSources& sources,
+                                        const BodyPrior& prior,
+                                        const std::optional<RowClock>& row_clock) {
+  const auto limit = body_limit(lamps_m, lens, Eigen::Matrix3d::Identity(), level, sources.noise_px,
+                                prior, row_clock);
+  if (!limit) return std::nullopt;
+  const PosedBody body(limit->fix.state);
+  const Eigen::Matrix<double, 4, kBodyStates> covariance = limit->fix.covariance.topRows<4>();
+  Matrix42 by_center = Matrix42::Zero(), by_tilt = Matrix42::Zero();
+  Eigen::Matrix4d of_lamps = Eigen::Matrix4d::Zero();
+  for (const BodySighting& seen : limit->frame.span()) {
+    const Eigen::Vector3d in_body = body.lamp_in_body(seen.lamp_m, seen.time_s);
+    const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state =
+        d_whitened_pixel_d_lamp(seen, in_body) * body.d_lamp_in_body(seen.lamp_m, seen.time_s);
+    const Matrix42 gain = covariance * d_pixel_d_state.transpose();
+    by_center += gain / sources.noise_px;
+    Eigen::Matrix<double, 3, 2> d_ray_d_tilt;
+    const Eigen::Vector3d& ray = seen.ray;
+    d_ray_d_tilt << 0, ray.z(), -ray.z(), 0, ray.y(), -ray.x();
+    by_tilt += gain * seen.whitened_pixel_from_ray * d_ray_d_tilt;
+    const Matrix43 by_lamp = gain * d_pixel_d_state.leftCols<3>();
+    of_lamps += by_lamp * by_lamp.transpose();
+  }
+  by_center *= sources.center_px;
+  by_tilt *= sources.tilt_rad;
+  return ErrorBudget{limit->noise,
+                     by_center * by_center.transpose(),
+                     by_tilt * by_tilt.transpose(),
+                     sources.lamp_map_m * sources.lamp_map_m * of_lamps,
+                     limit->motion,
+                     limit->lean};
 }
 
 }  // namespace vlp

@@ -9,6 +9,8 @@
 #include "../camera/lens.h"
 #include "../geometry/frames.h"
 #include "../geometry/types.h"
+#include "body_fix.h"
+#include "row_clock.h"
 
 namespace vlp {
 
@@ -36,8 +38,11 @@ struct ErrorBudget {
   Matrix4 center;
   Matrix4 tilt;
   Matrix4 lamp_map;
+  /// What the pixels' noise does on top of `noise` because the camera may move, and then because it
+  /// may lean (BodyLimit); zero for one of which both are known.
+  Matrix4 motion = Matrix4::Zero(), lean = Matrix4::Zero();
 
-  Matrix4 total() const { return noise + center + tilt + lamp_map; }
+  Matrix4 total() const { return noise + center + tilt + lamp_map + motion + lean; }
 };
 
 /// The error budget of a fix at `level`, the pose of a level camera that sees `lamps_m` (positions
@@ -46,5 +51,14 @@ struct ErrorBudget {
 /// do not determine a fix.
 std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
                                         const Pose& level, const ErrorSources& sources);
+
+/// The same of one that may move and lean, of which `prior` knows so much; its mean is at rest and
+/// level. What lamps and prior do not determine (fix_body_frame) has no budget, either. A tilt that
+/// is estimated hardly suffers from an error of the calibrated one. Precondition: a row clock where
+/// the prior lets it move.
+std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
+                                        const Pose& level, const ErrorSources& sources,
+                                        const BodyPrior& prior,
+                                        const std::optional<RowClock>& row_clock);
 
 }  // namespace vlp

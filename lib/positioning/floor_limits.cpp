@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "camera/lens.h"
+#include "positioning/body_limit.h"
 #include "positioning/lamps_in_view.h"
 
 namespace vlp {
@@ -48,6 +49,25 @@ std::vector<Eigen::Vector3d> places_of(const LampMap& map, const std::vector<std
   return places_m;
 }
 
+using Source = FloorLimits::Source;
+constexpr Source kLampMap{"lamp map", "lamp_map"};
+
+/// What is of each image alone.
+std::vector<Source> sources_of(const BodyPrior& prior) {
+  std::vector<Source> sources{{"noise", "noise"}};
+  if (may_move(prior)) sources.push_back({"motion", "motion"});
+  if (prior.inclination_sd_rad > 0) sources.push_back({"lean", "lean"});
+  return sources;
+}
+
+template <typename Budget>
+std::vector<Matrix4> parts_of_image(const Budget& budget, const BodyPrior& prior) {
+  std::vector<Matrix4> parts{budget.noise};
+  if (may_move(prior)) parts.push_back(budget.motion);
+  if (prior.inclination_sd_rad > 0) parts.push_back(budget.lean);
+  return parts;
+}
+
 }  // namespace
 
 FloorGrid floor_under(const LampMap& map, double step_m) {
@@ -75,33 +95,44 @@ Matrix4 FloorLimits::Place::total() const {
 }
 
 FloorLimits floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
-                         double z_m, double yaw_rad, const ErrorSources& sources) {
+                         double z_m, double yaw_rad, const ErrorSources& sources,
+                         const BodyPrior& prior) {
   const Lens lens(camera.lens_model, camera.intrinsics);
-  FloorLimits limits{
-      {{"noise", "noise"}, {"centre", "center"}, {"tilt", "tilt"}, {"lamp map", "lamp_map"}},
-      places_on(grid, z_m, yaw_rad)};
+  const auto row_clock = row_clock_of(camera);
+  FloorLimits limits{sources_of(prior), places_on(grid, z_m, yaw_rad)};
+  for (const auto& source : {Source{"centre", "center"}, {"tilt", "tilt"}, kLampMap}) {
+    limits.sources.push_back(source);
+  }
   for (FloorLimits::Place& place : limits.places) {
     const auto lamps =
         lamps_in_view(map, lens, camera.imager_px, Eigen::Matrix3d::Identity(), place.camera);
     place.lamps = static_cast<int>(lamps.size());
-    const auto budget = error_budget(places_of(map, lamps), lens, place.camera, sources);
-    if (budget) place.parts = {budget->noise, budget->center, budget->tilt, budget->lamp_map};
+    const auto lamps_m = places_of(map, lamps);
+    const auto budget = is_free(prior)
+                            ? error_budget(lamps_m, lens, place.camera, sources, prior, row_clock)
+                            : error_budget(lamps_m, lens, place.camera, sources);
+    if (!budget) continue;
+    place.parts = parts_of_image(*budget, prior);
+    place.parts.insert(place.parts.end(), {budget->center, budget->tilt, budget->lamp_map});
   }
   return limits;
 }
 
 FloorLimits floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m, double yaw_rad,
-                         double noise_px) {
-  FloorLimits limits{{{"noise", "noise"}, {"lens", "lens"}, {"zenith", "zenith"}},
-                     places_on(grid, z_m, yaw_rad)};
+                         double noise_px, const BodyPrior& prior) {
+  FloorLimits limits{sources_of(prior), places_on(grid, z_m, yaw_rad)};
+  limits.sources.push_back({"lens", "lens"});
+  limits.sources.push_back({"zenith", "zenith"});
   if (unit.has_offset()) limits.sources.push_back({"offset", "offset"});
-  limits.sources.push_back({"lamp map", "lamp_map"});
+  limits.sources.push_back(kLampMap);
   for (FloorLimits::Place& place : limits.places) {
     const auto lamps = unit.lamps_seen_from(place.camera);
     place.lamps = static_cast<int>(lamps.size());
-    const auto budget = unit.budget(place.camera, lamps, noise_px);
+    const auto budget = is_free(prior) ? unit.budget(place.camera, lamps, noise_px, prior)
+                                       : unit.budget(place.camera, lamps, noise_px);
     if (!budget) continue;
-    place.parts = {budget->noise, budget->lens, budget->zenith};
+    place.parts = parts_of_image(*budget, prior);
+    place.parts.insert(place.parts.end(), {budget->lens, budget->zenith});
     if (unit.has_offset()) place.parts.push_back(budget->offset);
     place.parts.push_back(budget->lamp_map);
   }

@@ -38,7 +38,8 @@ struct FloorLimits {
     Pose camera;
     /// Lamps that are seen whole.
     int lamps;
-    /// Covariances of (X, Y, Z, yaw), one a source; empty where fewer than two lamps are seen.
+    /// Covariances of (X, Y, Z, yaw), one a source; empty where fewer than two lamps are seen, or
+    /// they do not tell what else is to be estimated.
     std::vector<Matrix4> parts;
 
     Matrix4 total() const;
@@ -52,14 +53,17 @@ std::vector<Eigen::Vector3d> visible_lamps(const LampMap& map, const Camera& cam
                                            const Pose& pose);
 
 /// The error budget at every place of the grid, for a level camera at height `z_m` and one yaw:
-/// noise, centre, tilt, lamp map. Throws std::invalid_argument when the grid has a step that is not
-/// positive, no extent or more than ten million places, or the intrinsics are not the lens model's.
+/// noise, centre, tilt, lamp map; after the noise motion and lean, where the prior, whose mean is
+/// at rest and level, lets the camera move or lean. Throws std::invalid_argument when the grid has
+/// a step that is not positive, no extent or more than ten million places, or the intrinsics are
+/// not the lens model's. Precondition: the camera has row time and read-out where it may move.
 FloorLimits floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
-                         double z_m, double yaw_rad, const ErrorSources& sources);
+                         double z_m, double yaw_rad, const ErrorSources& sources,
+                         const BodyPrior& prior = {});
 
 /// The same from what calibration and lamp map state of themselves, for this camera, which leans as
-/// it does: noise, lens, zenith, offset where there is one, lamp map.
+/// it does: noise, motion, lean, lens, zenith, offset where there is one, lamp map.
 FloorLimits floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m, double yaw_rad,
-                         double noise_px);
+                         double noise_px, const BodyPrior& prior = {});
 
 }  // namespace vlp

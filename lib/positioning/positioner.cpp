@@ -16,7 +16,9 @@
 #include "positioning/camera_mount.h"
 #include "positioning/common_errors.h"
 #include "positioning/frame_fix.h"
+#include "positioning/known_motion.h"
 #include "positioning/one_lamp_fix.h"
+#include "positioning/row_clock.h"
 #include "positioning/sighting.h"
 
 namespace vlp {
@@ -81,11 +83,6 @@ double distance_to_nearest(const std::vector<Lamp>& lamps, const Lamp& lamp) {
     nearest_m = std::min(nearest_m, (other.position_m - lamp.position_m).head<2>().norm());
   }
   return nearest_m;
-}
-
-bool moves(const KnownMotion& motion) {
-  return !motion.velocity_m_per_s.isZero(0) || motion.yaw_rate_rad_per_s != 0 ||
-         motion.velocity_sd_m_per_s > 0 || motion.yaw_rate_sd_rad_per_s > 0;
 }
 
 /// Whether more is to be estimated than a pose, or the lamps are not seen from one place.
@@ -163,16 +160,6 @@ class Positioner::Impl {
   std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
                                  std::span<const EarlierFrame> earlier) const;
 
-  /// When a pixel is read, from the middle row (or column) of the image.
-  struct Shutter {
-    double row_time_s, middle_row;
-    Readout readout;
-
-    double time_s(const Eigen::Vector2d& pixel) const {
-      return row_time_s * ((readout == Readout::rows ? pixel.y() : pixel.x()) - middle_row);
-    }
-  };
-
   std::vector<Lamp> lamps_;        // in the order of their ids, their places from origin_m_
   std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
   Lens lens_;
@@ -185,7 +172,7 @@ class Positioner::Impl {
   double max_residual_share_;
   double unstated_sigma_px_;
   /// Nothing when the calibration lacks the row time or the read-out.
-  std::optional<Shutter> shutter_;
+  std::optional<RowClock> row_clock_;
 };
 
 Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
@@ -199,12 +186,8 @@ Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
       body_from_base_(rotation_about_z(mount_ ? mount_->yaw_in_robot_rad : 0)),
       body_from_camera_(body_from_base_ * base_from_camera_),
       max_residual_share_(options.max_residual_share),
-      unstated_sigma_px_(options.unstated_sigma_px) {
-  const Camera& camera = calibration.camera;
-  if (camera.row_time_s && camera.readout) {
-    const int rows = camera.imager_px[*camera.readout == Readout::rows ? 1 : 0];
-    shutter_ = {*camera.row_time_s, (rows - 1) / 2.0, *camera.readout};
-  }
+      unstated_sigma_px_(options.unstated_sigma_px),
+      row_clock_(row_clock_of(calibration.camera)) {
   for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
   for (const Lamp& lamp : lamps_) nearest_m_.push_back(distance_to_nearest(lamps_, lamp));
   if (mount_ &&
@@ -288,28 +271,13 @@ Matrix4 Positioner::Impl::common_covariance(const SightedFrame& frame,
       common_.gain_of(frame.span(), {lamps.data(), frame.size}, camera, lens_, level_from_base));
 }
 
-/// The gain of the pixels, in standard deviations, is that of the body's least squares.
 BodyCovariance Positioner::Impl::common_covariance(const BodyFrame& frame,
                                                    const Eigen::Vector3d& arm_m,
                                                    const BodyFix& fix) const {
-  const PosedBody body(fix.state);
-  CommonErrors::BodyGain whole(common_.shared());
-  for (std::size_t i = 0; i < frame.size; ++i) {
-    const BodySighting& seen = frame.sightings[i];
-    const auto d_q = body.d_lamp_in_body(seen.lamp_m, seen.time_s);
-    const Eigen::Matrix<double, 2, 3> d_pixel =
-        d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
-    const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state = d_pixel.lazyProduct(d_q);
-    const Eigen::Matrix<double, kBodyStates, 2> gain =
-        fix.covariance.lazyProduct(d_pixel_d_state.transpose());
-    const Eigen::Matrix<double, 2, 3> d_pixel_d_ray =
-        seen.whitened_pixel_from_ray * body_from_base_;
-    const Eigen::Matrix<double, kBodyStates, 3> by_ray = gain * d_pixel_d_ray;
-    whole.by_shared.noalias() +=
-        by_ray.lazyProduct(common_.effect_on_ray(body_from_base_.transpose() * seen.ray, lens_));
-    whole.add(index_of(frame.ids[i]), gain * d_pixel_d_state.leftCols<3>());
-  }
-  return common_.covariance_of(whole);
+  std::array<std::size_t, max_lamps> lamps;
+  for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = index_of(frame.ids[i]);
+  return common_.covariance_of(common_.gain_of(frame.span(), {lamps.data(), frame.size}, arm_m, fix,
+                                               lens_, body_from_base_));
 }
 
 FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
@@ -339,7 +307,7 @@ FixStatus Positioner::Impl::sight_from_body(std::span<const Detection> detection
     const auto whitened =
         whitened_pixel_from_ray(direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
     if (!whitened) return FixStatus::outside_lens;
-    const double read_s = shutter_ ? shutter_->time_s(detection.pixel) : 0;
+    const double read_s = row_clock_ ? row_clock_->time_s(detection.pixel) : 0;
     frame.sightings[frame.size] = {lamp.position_m, direction.normalized(), *whitened, sigma_px,
                                    time_s + read_s};
     return FixStatus::ok;
@@ -351,7 +319,7 @@ std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> dete
                                                  const Sensors& sensors,
                                                  std::span<const EarlierFrame> earlier) const {
   const KnownMotion motion = sensors.motion.value_or(KnownMotion());
-  if (moves(motion) && !shutter_) return refused(FixStatus::row_time_unknown, 0);
+  if (moves(motion) && !row_clock_) return refused(FixStatus::row_time_unknown, 0);
   BodyPrior prior{{motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
                    sensors.inclination.value_or(Inclination{0, 0})},
                   motion.velocity_sd_m_per_s,

@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 
 #include "geometry/symmetric.h"
+#include "positioning/body_limit.h"
 #include "positioning/correction.h"
 #include "positioning/lamps_in_view.h"
 
@@ -52,6 +53,29 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
   };
   return UnitBudget{*noise, part(CommonPart::lens), part(CommonPart::zenith),
                     part(CommonPart::offset), part(CommonPart::lamps)};
+}
+
+std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const std::size_t> lamps,
+                                             double noise_px, const BodyPrior& prior) const {
+  std::vector<Eigen::Vector3d> lamps_m;
+  lamps_m.reserve(lamps.size());
+  for (const std::size_t lamp : lamps) lamps_m.push_back(map_.lamps[lamp].position_m);
+  const auto limit =
+      body_limit(lamps_m, lens_, camera_from_level_, level, noise_px, prior, row_clock_of(camera_));
+  if (!limit) return std::nullopt;
+  const CommonErrors::BodyGain gain =
+      whole_.gain_of(limit->frame.span(), lamps, Eigen::Vector3d::Zero(), limit->fix, lens_,
+                     Eigen::Matrix3d::Identity());
+  const auto part = [&](CommonPart of) {
+    return Matrix4(parts_[static_cast<std::size_t>(of)].covariance_of(gain).topLeftCorner<4, 4>());
+  };
+  return UnitBudget{limit->noise,
+                    part(CommonPart::lens),
+                    part(CommonPart::zenith),
+                    part(CommonPart::offset),
+                    part(CommonPart::lamps),
+                    limit->motion,
+                    limit->lean};
 }
 
 }  // namespace vlp

@@ -14,6 +14,7 @@
 #include "../geometry/types.h"
 #include "../rig/calibration.h"
 #include "../rig/lamp_map.h"
+#include "body_fix.h"
 #include "common_errors.h"
 
 namespace vlp {
@@ -22,9 +23,12 @@ namespace vlp {
 /// alone, and each part of what all fixes of the unit have in common (CommonErrors::only).
 struct UnitBudget {
   Matrix4 noise, lens, zenith, offset, lamp_map;
+  /// Of each image, too: what comes on top of `noise` because the camera may move, and then because
+  /// it may lean (BodyLimit).
+  Matrix4 motion = Matrix4::Zero(), lean = Matrix4::Zero();
 
   Matrix4 common() const { return lens + zenith + offset + lamp_map; }
-  Matrix4 total() const { return noise + common(); }
+  Matrix4 total() const { return noise + motion + lean + common(); }
 };
 
 /// What a calibrated camera's fixes are worth before it takes one: the pixels' noise, and what
@@ -47,6 +51,10 @@ class UnitErrors {
   /// not see, or lamps that do not determine a fix.
   std::optional<UnitBudget> budget(const Pose& level, std::span<const std::size_t> lamps,
                                    double noise_px) const;
+  /// The same of a camera that may move and lean, as error_budget() has it. Precondition: the
+  /// calibration knows its row clock, where the prior lets it move.
+  std::optional<UnitBudget> budget(const Pose& level, std::span<const std::size_t> lamps,
+                                   double noise_px, const BodyPrior& prior) const;
 
  private:
   LampMap map_;

@@ -12,8 +12,10 @@
 #include "calibration/rotation/rotation_fit.h"
 #include "calibration/rotation/spot_captures.h"
 #include "geometry/angles.h"
+#include "positioning/known_motion.h"
 #include "rig/input_error.h"
 #include "rig/stage.h"
+#include "session/capture_motion.h"
 #include "session/rotation_step.h"
 
 namespace vlp {
@@ -89,6 +91,9 @@ AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& re
         capture.spot = set.name + "/" + spot->second;
       }
       capture.place = place_of(known, set, input, without_sd);
+      capture.motion =
+          motion_of(known, input.motion, input.yaw_rate_sd_rad_per_s).value_or(KnownMotion());
+      if (moves(capture.motion)) check_row_time(input.calibration.camera);
       all.captures.push_back(std::move(capture));
     }
     if (without_sd > 0) {

@@ -33,6 +33,10 @@ struct AdjustStepInput {
   std::optional<double> map_sd_m, place_sd_m;
   /// Of a lens that states none: stated_lens_covariance(); without it such a lens is exact.
   std::optional<double> lens_sd_px = {};
+  /// How cameras move, and turn, whose captures.csv has no velocity; the latter's standard
+  /// deviation of the yaw rate (motion_of()).
+  std::optional<KnownMotion> motion = {};
+  double yaw_rate_sd_rad_per_s = 0;
   /// The covariance that is kept is that of the refined map, else that of the map as surveyed.
   bool refine_map = false;
 };
@@ -45,7 +49,8 @@ struct AdjustStepResult : StepResult {
 /// lever_arm_mm. undetermined, wrong_map. Warns of lamps that have moved, of places and of a lens
 /// that the captures contradict, of residuals that sigma_px does not explain. Throws InputError
 /// when a lamp or a place states no standard deviation, when the lens states one and lens_sd_px
-/// does, too, or the calibration is adjusted already.
+/// does, too, or the calibration is adjusted already; std::invalid_argument when a camera moves
+/// whose calibration lacks row_time_s or readout.
 AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry);
 
 }  // namespace vlp

@@ -15,27 +15,15 @@
 #include "captures/outside_image.h"
 #include "geometry/median.h"
 #include "positioning/correction.h"
+#include "positioning/known_motion.h"
 #include "positioning/lean.h"
 #include "positioning/residual_noise.h"
 #include "rig/find_lamp.h"
+#include "session/capture_motion.h"
 #include "session/lamp_offsets.h"
 
 namespace vlp {
 namespace {
-
-std::optional<KnownMotion> motion_of(const Capture& capture, const LocateInput& input) {
-  if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return input.motion;
-  KnownMotion motion = input.motion.value_or(KnownMotion());
-  if (capture.velocity_m_per_s) {
-    motion.velocity_m_per_s = *capture.velocity_m_per_s;
-    motion.velocity_sd_m_per_s = capture.velocity_sd_m_per_s.value_or(0);
-  }
-  if (capture.yaw_rate_rad_per_s) {
-    motion.yaw_rate_rad_per_s = *capture.yaw_rate_rad_per_s;
-    motion.yaw_rate_sd_rad_per_s = input.yaw_rate_sd_rad_per_s;
-  }
-  return motion;
-}
 
 Sensors sensors_of(const std::string& image, const LocateInput& input) {
   Sensors sensors;
@@ -44,7 +32,7 @@ Sensors sensors_of(const std::string& image, const LocateInput& input) {
   const auto entry = input.captures.find(image);
   if (entry == input.captures.end()) return sensors;
   const Capture& capture = entry->second;
-  sensors.motion = motion_of(capture, input);
+  sensors.motion = motion_of(capture, input.motion, input.yaw_rate_sd_rad_per_s);
   sensors.time_s = capture.time_s;
   if (capture.inclination) {
     sensors.inclination = capture.inclination;
@@ -116,23 +104,14 @@ std::vector<Fix> locate_all(const LocateInput& input, const PositionerOptions& h
   return fixes;
 }
 
-/// Motion wants to know when each row is read.
-void check_row_time(const LocateInput& input) {
-  const Camera& camera = input.calibration.camera;
-  const bool moves = input.motion ||
-                     std::any_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-                       const auto entry = input.captures.find(frame.image);
-                       if (entry == input.captures.end()) return false;
-                       const Capture& capture = entry->second;
-                       return (capture.velocity_m_per_s && !capture.velocity_m_per_s->isZero(0)) ||
-                              capture.velocity_sd_m_per_s.value_or(0) > 0 ||
-                              capture.yaw_rate_rad_per_s.value_or(0) != 0;
-                     });
-  if (moves && !(camera.row_time_s && camera.readout)) {
-    throw std::invalid_argument(
-        "a camera that moves needs row_time_s and readout in its calibration: vlp-intrinsics takes "
-        "--row-time-s and --readout");
-  }
+void check_motion(const LocateInput& input) {
+  const bool motion =
+      input.motion ||
+      std::any_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
+        const auto known = sensors_of(frame.image, input).motion;
+        return known && moves(*known);
+      });
+  if (motion) check_row_time(input.calibration.camera);
 }
 
 bool states_sigma(const Frame& frame) {
@@ -345,7 +324,7 @@ std::string words_of_lamps_elsewhere(int lamps) {
 }
 
 LocateResult locate_frames(const LocateInput& input) {
-  check_row_time(input);
+  check_motion(input);
   LocateResult result;
   PositionerOptions how = input.how;
   result.fixes = locate_all(input, how);

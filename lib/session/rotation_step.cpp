@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <utility>
@@ -13,9 +14,11 @@
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/turning_axis.h"
 #include "geometry/angles.h"
+#include "positioning/known_motion.h"
 #include "report/plots/calibration_plots.h"
 #include "rig/calibration_error.h"
 #include "rig/stage.h"
+#include "session/capture_motion.h"
 #include "session/lamp_images.h"
 
 namespace vlp {
@@ -198,6 +201,10 @@ LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, Hist
   if (doubts_map(input, alone, result)) return result;
   LevellingOptions options;
   options.refine_map = refine_map;
+  options.motions = input.motions;
+  if (std::any_of(input.motions.begin(), input.motions.end(), moves)) {
+    check_row_time(input.calibration.camera);
+  }
   const auto levelled = [&](const Camera& camera) {
     return level_by_lamps(input.frames, input.lamps, camera, options);
   };

@@ -19,6 +19,8 @@ struct LampCaptures {
   LampMap lamps;
   std::filesystem::path lamps_file;
   Calibration calibration;
+  /// How the camera moves in each of the frames; empty: it stands.
+  std::vector<KnownMotion> motions = {};
 };
 
 /// Without rotation centre and dispersion.
@@ -54,7 +56,8 @@ struct LevellingResult : StepResult {
 };
 
 /// Tilt, and on request the lamp map, from captures taken anywhere (calibration/levelling).
-/// Metrics: tilt_deg. wrong_map, undetermined.
+/// Metrics: tilt_deg. wrong_map, undetermined. Throws std::invalid_argument when a camera moves
+/// whose calibration lacks row_time_s or readout.
 LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry);
 
 }  // namespace vlp

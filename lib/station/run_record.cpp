@@ -19,6 +19,7 @@
 #include "calibration/intrinsics/mrcal_files.h"
 #include "captures/digest.h"
 #include "rig/calibration_text.h"
+#include "station/database_name.h"
 
 namespace vlp {
 namespace {

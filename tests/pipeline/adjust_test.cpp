@@ -8,6 +8,7 @@
 #include "calibration/adjustment/adjustment.h"
 #include "captures/csv_reader.h"
 #include "captures/detections_table.h"
+#include "support/body_rig.h"
 #include "support/program.h"
 #include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"
@@ -89,6 +90,40 @@ TEST_F(Adjust, CalibratesRefinesTheMapAndTellsFixesWhatTheyAreWorth) {
   const CsvTable fixes(folder / "fixes.csv");
   EXPECT_GT(fixes.number(0, fixes.required("sd_x_m")),
             fixes.number(0, fixes.required("noise_sd_x_m")));
+}
+
+/// Turns that do not stop for their captures: 60 degrees a second, 9 degrees an image.
+TEST_F(Adjust, TakesTurnsThatDoNotStop) {
+  const double rate_rad_per_s = 1;
+  BodyRig body{rig.map, rolling_calibration(), {}, {}};
+  body.calibration.rotation_center = rig.calibration.rotation_center;
+  rig.calibration.camera = body.calibration.camera;
+  Random random(1);
+  captures = "image,spot,yaw_rate_rad_per_s\n";
+  std::string standing = captures;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const double yaw_rad = 2 * std::numbers::pi * static_cast<double>(i % 8) / 8;
+    const Eigen::Vector3d axis_m(0.4 * static_cast<double>(i / 8), 0.1, i / 8 == 1 ? 0.2 : 0);
+    body.body.pose = {axis_m + rotation_about_z(yaw_rad) * Eigen::Vector3d(0.009, 0, 0), yaw_rad};
+    body.body.motion = {{0, 0.009 * rate_rad_per_s}, rate_rad_per_s, {0, 0}};
+    frames[i].detections = with_noise(seen_from(body, 0.05), random);
+    const std::string spot = frames[i].image + ",s" + std::to_string(i / 8);
+    captures += spot + ",1\n";
+    standing += spot + ",0\n";
+  }
+  const auto result = adjust("--map-sd-m 0.0001");
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const RotationCenter found = *read_calibration(folder / "adjusted.yaml").rotation_center;
+  EXPECT_LT((found.zenith_in_camera - body.calibration.rotation_center->zenith_in_camera).norm(),
+            5e-4);
+  EXPECT_LT((*found.lever_arm_m - Eigen::Vector2d(0.009, 0)).norm(), 5e-4);
+  EXPECT_THAT(result.errors, testing::Not(HasSubstr("times what sigma_px lets expect")));
+  captures = standing;
+  EXPECT_THAT(adjust("--map-sd-m 0.0001").errors, HasSubstr("times what sigma_px lets expect"));
+  rig.calibration.camera.row_time_s.reset();
+  const auto refused = adjust("--map-sd-m 0.0001 --max-speed-m-per-s 1");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.errors, HasSubstr("a camera that moves needs row_time_s and readout"));
 }
 
 TEST_F(Adjust, WantsToKnowWhatTheSurveyIsWorth) {

@@ -16,6 +16,7 @@ namespace vlp {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 const std::string kLimits = "vlp-limits --lamps " VLP_SOURCE_DIR
@@ -49,6 +50,57 @@ TEST(Limits, WritesTheMapAsATableAndAPicture) {
     EXPECT_EQ(map.number(row, map.required("center_m")), 0);
   }
   EXPECT_THAT(TemporaryFolder::content_of(folder / "map.png"), StartsWith("\x89PNG"));
+}
+
+TEST(Limits, ShowWhatMotionAndLeanCost) {
+  const TemporaryFolder folder;
+  const auto map_of = [&](const std::string& options) {
+    const auto result = run_program(kLimits + "--floor-m -0.2 0.2 0 0.1 --step-m 0.1 --map " +
+                                    (folder / "map.csv").string() + options);
+    EXPECT_EQ(result.exit_code, 0) << result.errors;
+    return std::pair(result.output, CsvTable(folder / "map.csv"));
+  };
+  const auto [output, map] =
+      map_of(" --max-speed-m-per-s 2 --lean-sd-deg 90 --picture " + (folder / "map.svg").string());
+  for (const char* row : {"\nmotion ", "\nlean ", ", a fix at "}) {
+    EXPECT_THAT(output, HasSubstr(row));
+  }
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "map.svg"),
+              HasSubstr("up to 2 m/s, lean to 90 deg"));
+  const auto [standing_output, standing] = map_of("");
+  EXPECT_THAT(standing_output, Not(HasSubstr("motion")));
+  ASSERT_EQ(map.rows(), standing.rows());
+  int with_fix = 0;
+  for (std::size_t row = 0; row < map.rows(); ++row) {
+    EXPECT_EQ(map.number(row, map.required("lamps")),
+              standing.number(row, standing.required("lamps")));
+    if (map.text(row, map.required("noise_m")).empty()) continue;
+    ++with_fix;
+    const double noise_m = map.number(row, map.required("noise_m"));
+    EXPECT_NEAR(noise_m, standing.number(row, standing.required("noise_m")), 1e-3 * noise_m);
+    EXPECT_NEAR(map.number(row, map.required("horizontal_m")),
+                std::hypot(noise_m, map.number(row, map.required("motion_m")),
+                           map.number(row, map.required("lean_m"))),
+                1e-5 * noise_m);
+    EXPECT_GT(map.number(row, map.required("lean_m")), noise_m);
+  }
+  EXPECT_GT(with_fix, 0);
+}
+
+TEST(Limits, OfACameraThatDrivesWantItsRowTime) {
+  const TemporaryFolder folder;
+  Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
+  write_calibration(folder / "camera.yaml", calibration);
+  write_lamp_map(folder / "lamps.yaml", lamp_map_of({{-0.5, 0, 1.6}, {0.5, 0, 1.6}}));
+  const std::string two_lamps = "vlp-limits --lamps " + (folder / "lamps.yaml").string() +
+                                " --calibration " + (folder / "camera.yaml").string() +
+                                " --height-m 0 --noise-px 0.1 --step-m 0.5 ";
+  const auto result = run_program(two_lamps + "--max-speed-m-per-s 2");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("a camera that moves needs row_time_s and readout"));
+  const auto leaning = run_program(two_lamps + "--lean-sd-deg 90");
+  EXPECT_EQ(leaning.exit_code, 3);
+  EXPECT_THAT(leaning.errors, HasSubstr("the lamps in view tell motion and lean nowhere"));
 }
 
 /// A calibration of the tests' rig that states its zenith, and a map that states its survey.
@@ -110,7 +162,7 @@ TEST_F(StatedLimits, TellOfLampsThatTheMapHasElsewhere) {
   lamps = rig.map;
   calibration.adjustment = rig.calibration.adjustment;
   calibration.adjustment->sets = {"turn"};
-  EXPECT_THAT(run("--stated").errors, testing::Not(HasSubstr("elsewhere")));
+  EXPECT_THAT(run("--stated").errors, Not(HasSubstr("elsewhere")));
   lamps.lamps[2].position_m.x() += 0.01;
   lamps.lamps[2].sd_m = 0.002;
   const auto result = run("--stated");
@@ -165,6 +217,8 @@ TEST(Limits, EndsWithTwoOnBadUsage) {
   EXPECT_EQ(run_program(kLimits + "--tilt-deg nan").exit_code, 2);
   EXPECT_EQ(run_program(kLimits + "--height-m inf").exit_code, 2);
   EXPECT_EQ(run_program(kLimits + "--picture a.bmp").exit_code, 2);
+  EXPECT_EQ(run_program(kLimits + "--lean-sd-deg -1").exit_code, 2);
+  EXPECT_EQ(run_program(kLimits + "--max-yaw-rate-deg-per-s 10").exit_code, 2);
   EXPECT_EQ(run_program("vlp-limits --lamps a --calibration b --height-m 0").exit_code, 2);
 }
 

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "positioning/positioner.h"
+#include "support/body_rig.h"
 #include "support/near.h"
 #include "support/scatter.h"
 #include "support/synthetic_rig.h"
@@ -136,6 +137,153 @@ TEST(ErrorBudget, NeedsTwoLampsInFrontOfTheLens) {
   EXPECT_FALSE(error_budget({lamps_m.data(), 1}, lens, {{0, 0, 0}, 0}, noise));
   EXPECT_FALSE(error_budget(lamps_m, lens, {{0, 0, 2.5}, 0}, noise));
   EXPECT_TRUE(error_budget(lamps_m, lens, {{0, 0, 0}, 0}, noise));
+}
+
+/// Of a camera that stands level and that nobody told so: what it may do, one or all.
+struct MayDo {
+  bool drive, turn, lean;
+};
+
+class BodyBudget : public testing::TestWithParam<MayDo> {
+ protected:
+  static constexpr double kNoise_px = 0.1;
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.1, -0.05, 0.05}, 0.7}, {}}, {}};
+  ErrorSources sources{kNoise_px, 0.5, 0.002, 0.001};
+
+  static BodyPrior prior(const MayDo& may) {
+    BodyPrior prior;
+    prior.velocity_sd_m_per_s = may.drive ? 1 : 0;
+    prior.yaw_rate_sd_rad_per_s = may.turn ? 1.5 : 0;
+    prior.inclination_sd_rad = may.lean ? 0.1 : 0;
+    return prior;
+  }
+  Sensors sensors() const {
+    const BodyPrior known = prior(GetParam());
+    Sensors sensors;
+    sensors.motion = {{0, 0}, 0, known.velocity_sd_m_per_s, known.yaw_rate_sd_rad_per_s};
+    sensors.inclination_sigma_rad = known.inclination_sd_rad;
+    return sensors;
+  }
+  std::optional<ErrorBudget> budget(const BodyPrior& prior) const {
+    const Camera& camera = rig.calibration.camera;
+    return error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
+                        rig.body.pose, sources, prior, row_clock_of(camera));
+  }
+  Eigen::Vector4d fix_of(const BodyRig& with, const std::vector<Detection>& detections) const {
+    const Fix fix = with.positioner().locate(detections, sensors());
+    EXPECT_TRUE(fix.ok());
+    Eigen::Vector4d state;
+    state << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
+    return state;
+  }
+  /// Of a fix with an error of `step` one way and the other, per step.
+  template <typename With>
+  Eigen::Vector4d per_step(double step, const With& with) const {
+    return (with(step) - with(-step)) / (2 * step);
+  }
+  static void expect_like(const Matrix4& found, const Eigen::Matrix4d& expected, double share) {
+    const Eigen::Vector4d sd = expected.diagonal().cwiseMax(1e-20).cwiseSqrt();
+    EXPECT_LT((found - expected).cwiseQuotient(sd * sd.transpose()).cwiseAbs().maxCoeff(), share)
+        << found << "\n\n"
+        << expected;
+  }
+};
+
+TEST_P(BodyBudget, IsWhatItsFixesState) {
+  const Fix fix = rig.positioner().locate(seen_from(rig, kNoise_px), sensors());
+  ASSERT_TRUE(fix.ok());
+  const auto found = budget(prior(GetParam()));
+  ASSERT_TRUE(found);
+  expect_like(found->noise + found->motion + found->lean, fix.noise_covariance, 1e-6);
+  const auto& [drive, turn, lean] = GetParam();
+  EXPECT_EQ(found->motion.diagonal().minCoeff() > 0, drive || turn);
+  EXPECT_EQ(found->lean.diagonal().maxCoeff() > 1e-12, lean);
+  EXPECT_THAT(found->total(), IsNear(Matrix4(found->noise + found->motion + found->lean +
+                                             found->center + found->tilt + found->lamp_map),
+                                     1e-15));
+}
+
+/// Errors that fixes are given, one at a time, are what the budget says of them.
+TEST_P(BodyBudget, IsWhatErrorsDoToItsFixes) {
+  const auto found = budget(prior(GetParam()));
+  const auto exact = seen_from(rig, kNoise_px);
+  Eigen::Matrix4d by_center = Eigen::Matrix4d::Zero(), by_tilt = by_center, by_lamps = by_center;
+  for (const int axis : {0, 1}) {
+    const Eigen::Vector4d shift = per_step(0.01, [&](double step_px) {
+      auto shifted = exact;
+      for (Detection& detection : shifted) detection.pixel[axis] += step_px;
+      return fix_of(rig, shifted);
+    });
+    by_center += std::pow(sources.center_px, 2) * shift * shift.transpose();
+    const Eigen::Vector4d turn = per_step(1e-4, [&](double step_rad) {
+      BodyRig leaning = rig;
+      leaning.calibration.rotation_center =
+          tilted_by(rig.calibration.camera, step_rad, axis * M_PI / 2);
+      return fix_of(leaning, exact);
+    });
+    by_tilt += std::pow(sources.tilt_rad, 2) * turn * turn.transpose();
+  }
+  for (std::size_t lamp = 0; lamp < rig.map.lamps.size(); ++lamp) {
+    for (const int axis : {0, 1, 2}) {
+      const Eigen::Vector4d move = per_step(1e-4, [&](double step_m) {
+        BodyRig wrong = rig;
+        wrong.map.lamps[lamp].position_m[axis] += step_m;
+        return fix_of(wrong, exact);
+      });
+      by_lamps += std::pow(sources.lamp_map_m, 2) * move * move.transpose();
+    }
+  }
+  // What is of second order in the steps. Two causes move four states: yaw and height hardly.
+  const Eigen::Vector4d scale = found->total().diagonal().cwiseSqrt();
+  const auto relative = [&](const Eigen::Matrix4d& difference) {
+    return difference.cwiseQuotient(scale * scale.transpose()).cwiseAbs().maxCoeff();
+  };
+  EXPECT_LT(relative(found->center - by_center), 1e-3);
+  EXPECT_LT(relative(found->tilt - by_tilt), 1e-3);
+  EXPECT_LT(relative(found->lamp_map - by_lamps), 1e-3);
+}
+
+std::string name_of_what_it_may(const testing::TestParamInfo<MayDo>& one) {
+  const auto& [drive, turn, lean] = one.param;
+  return std::string(drive ? "Drive" : "") + (turn ? "Turn" : "") + (lean ? "Lean" : "");
+}
+
+INSTANTIATE_TEST_SUITE_P(OfOneThatMay, BodyBudget,
+                         testing::Values(MayDo{true, false, false}, MayDo{false, true, false},
+                                         MayDo{true, true, false}, MayDo{false, false, true},
+                                         MayDo{true, false, true}, MayDo{true, true, true}),
+                         name_of_what_it_may);
+
+class BodyBudgets : public BodyBudget {};
+
+TEST_F(BodyBudgets, OfOneThatHardlyMayAreThoseOfOneThatStands) {
+  BodyPrior prior;
+  prior.velocity_sd_m_per_s = prior.inclination_sd_rad = 1e-7;
+  const auto found = budget(prior);
+  const Camera& camera = rig.calibration.camera;
+  const auto standing = error_budget(
+      positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics), rig.body.pose, sources);
+  ASSERT_TRUE(found && standing);
+  expect_like(found->noise, standing->noise, 1e-6);
+  expect_like(found->total(), standing->total(), 1e-6);
+}
+
+/// One that nobody knows is estimated, whatever the calibration says of it.
+TEST_F(BodyBudgets, OfAnUnknownLeanHaveNoPartOfTheTilt) {
+  const auto known = budget(prior({true, false, false}));
+  const auto unknown = budget(prior({true, false, true}));
+  ASSERT_TRUE(known && unknown);
+  EXPECT_LT(unknown->tilt(0, 0), 0.01 * known->tilt(0, 0));
+}
+
+TEST_F(BodyBudgets, NeedLampsThatTellTheLean) {
+  BodyPrior in_hand;
+  in_hand.inclination_sd_rad = 1.6;
+  rig.map.lamps.resize(2);
+  EXPECT_TRUE(budget(prior({true, true, false})));
+  EXPECT_FALSE(budget(in_hand));
+  rig.map = lamp_map_of({{-0.6, 0.2, 1.6}, {0, 0.2, 1.6}, {0.6, 0.2, 1.6}});
+  EXPECT_FALSE(budget(in_hand));
 }
 
 }  // namespace

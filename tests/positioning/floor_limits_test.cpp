@@ -61,6 +61,38 @@ TEST(FloorLimits, CoverTheGridRowByRow) {
   }
 }
 
+TEST(FloorLimits, OfACameraThatMayMoveHavePartsForIt) {
+  Camera camera = pinhole_camera();
+  camera.row_time_s = 3e-5;
+  camera.readout = Readout::rows;
+  BodyPrior prior;
+  prior.velocity_sd_m_per_s = 1;
+  prior.inclination_sd_rad = 2;
+  const FloorGrid grid{-1.5, 1.5, -0.3, 0.3, 0.3};
+  const auto standing = floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
+  const auto limits = floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);
+  ASSERT_EQ(limits.sources.size(), 6);
+  EXPECT_EQ(limits.sources[1].key, "motion");
+  EXPECT_EQ(limits.sources[2].key, "lean");
+  int with_fix = 0, without = 0;
+  for (std::size_t i = 0; i < limits.places.size(); ++i) {
+    const auto& place = limits.places[i];
+    EXPECT_EQ(place.lamps, standing.places[i].lamps);
+    if (place.parts.empty()) {
+      EXPECT_LT(place.lamps, 4);
+      ++without;
+      continue;
+    }
+    ++with_fix;
+    ASSERT_EQ(place.parts.size(), 6);
+    // What more is to be estimated comes on top.
+    EXPECT_THAT(place.parts[0], IsNear(standing.places[i].parts[0], 1e-12));
+    EXPECT_GT(place.total()(0, 0), standing.places[i].total()(0, 0));
+  }
+  EXPECT_GT(with_fix, 0);
+  EXPECT_GT(without, 0) << "some see too few lamps for a lean";
+}
+
 TEST(FloorLimits, HaveNoBudgetWhereNoLampsAreSeen) {
   const auto limits =
       floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);

@@ -78,6 +78,36 @@ TEST_P(OfAUnit, AddsUpToWhatItsFixesState) {
   EXPECT_EQ(budget.total(), Matrix4(budget.noise + budget.common()));
 }
 
+/// The same of one that may drive, turn and lean.
+TEST_P(OfAUnit, ThatMayMoveAddsUpToWhatItsFixesState) {
+  StatedRig rig = GetParam();
+  rig.calibration.camera.row_time_s = 55e-6;
+  rig.calibration.camera.readout = Readout::rows;
+  Sensors sensors;
+  sensors.motion = KnownMotion::up_to(2, 1);
+  sensors.inclination_sigma_rad = 0.1;
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections_of(rig), sensors);
+  ASSERT_TRUE(fix.ok());
+  ASSERT_EQ(fix.lamps, 8);
+  BodyPrior prior;
+  prior.velocity_sd_m_per_s = 1;
+  prior.yaw_rate_sd_rad_per_s = 0.5;
+  prior.inclination_sd_rad = 0.1;
+  const auto budget =
+      UnitErrors(rig.map, rig.calibration).budget(rig.camera, all_lamps(), kNoise_px, prior);
+  ASSERT_TRUE(budget);
+  const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
+  const Eigen::Matrix4d scale = sd * sd.transpose();
+  constexpr double stopped = 1e-6;
+  const auto differ = [&](const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
+    return (a - b).cwiseQuotient(scale).cwiseAbs().maxCoeff();
+  };
+  EXPECT_LT(differ(budget->noise + budget->motion + budget->lean, fix.noise_covariance), stopped);
+  EXPECT_LT(differ(budget->common(), fix.estimate.covariance - fix.noise_covariance), stopped);
+  EXPECT_LT(differ(budget->total(), fix.estimate.covariance), stopped);
+  EXPECT_GT(budget->lean(0, 0), budget->noise(0, 0)) << "a lean that is not known is dear";
+}
+
 TEST_P(OfAUnit, TakesItsCovarianceApartToRounding) {
   const StatedRig& rig = GetParam();
   const UnitErrors unit(rig.map, rig.calibration);

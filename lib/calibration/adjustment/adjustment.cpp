@@ -20,6 +20,7 @@
 #include "positioning/consistent_fix.h"
 #include "positioning/frame_fix.h"
 #include "positioning/lean.h"
+#include "positioning/row_clock.h"
 #include "rig/calibration_error.h"
 #include "rig/find_lamp.h"
 
@@ -96,6 +97,7 @@ Assembled assemble(const AdjustmentInput& input) {
   AdjustmentProblem& problem = all.problem;
   const AdjustmentLayout& layout = problem.layout();
   const Lens lens(camera.lens_model, camera.intrinsics);
+  const auto row_clock = row_clock_of(camera);
   std::vector<Eigen::Vector3d> lamps_m;
   for (const Lamp& lamp : input.lamps.lamps) {
     lamps_m.emplace_back(lamp.position_m - all.origin_m);
@@ -134,7 +136,8 @@ Assembled assemble(const AdjustmentInput& input) {
       if (!(level.z() > 0)) continue;
       const double sigma_px = detection.sigma_px.value_or(1);
       if (!detection.sigma_px) all.noise_is_stated = false;
-      seen.push_back({problem.captures.size(), index, detection.pixel, sigma_px});
+      seen.push_back({problem.captures.size(), index, detection.pixel, sigma_px,
+                      row_clock ? row_clock->time_s(detection.pixel) : 0});
       lamps.push_back(index);
       sightings.push_back(
           {lamps_m[index], level.hnormalized(), Eigen::Matrix2d(lens.focal_px().asDiagonal()), 1});
@@ -154,7 +157,7 @@ Assembled assemble(const AdjustmentInput& input) {
       problem.has_lever_arm = true;
     }
     const std::size_t index = problem.captures.size();
-    problem.add_capture({spot, lean.level_from_base.transpose(), 0}, *pose);
+    problem.add_capture({spot, lean.level_from_base.transpose(), capture.motion}, *pose);
     for (const auto& sighting : seen) {
       problem.sightings.push_back(sighting);
       all.lamp_seen[sighting.lamp] = true;
@@ -376,6 +379,7 @@ Noise noise_of(const Assembled& all, const Eigen::MatrixXd& covariance) {
     if (used[k] == 0) continue;
     const auto& spot = problem.captures[k].spot;
     freedom -= std::min(spot ? 1 : 4, 2 * used[k]);
+    freedom -= problem.told_of_motion(k);
     if (spot) spot_used[*spot] = true;
   }
   freedom -= static_cast<double>(at.lens_size) -

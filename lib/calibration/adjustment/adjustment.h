@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "captures/captures_table.h"
+#include "positioning/positioner.h"
 #include "rig/calibration.h"
 #include "rig/detection.h"
 #include "rig/lamp_map.h"
@@ -16,9 +17,12 @@
 /// One adjustment of all that captures share: least squares over every capture at once. A capture k
 /// whose camera stands at S with yaw g sees lamp P at
 ///   project(camera_from_level(zenith) (Rz(-g) (P - S)); intrinsics),
-/// and where it turns on a spot about the axis A, S = A + Rz(g) e.
+/// and where it turns on a spot about the axis A, S = A + Rz(g) e. Of a camera that drives with u
+/// and turns with w a lamp that is read at t after the middle of the image is where, in place of
+/// Rz(-g) (P - S), there is Rz(-w t) (Rz(-g) (P - S) - u t); on a spot it turns, too.
 ///   unknown  zenith, lever arm e, the lamps' places, the lens as far as its covariance lets it,
-///            an axis A a spot, and a pose (on a spot: a yaw) a capture;
+///            an axis A a spot, and a pose (on a spot: a yaw) a capture, with u and w where they
+///            are not known exactly;
 ///   known    the lamps' centres with their sigma_px, the survey of the lamps with its sd_m, the
 ///            lens with its covariance, places of the camera or of the axis with their sd.
 namespace vlp {
@@ -41,6 +45,8 @@ struct AdjustmentCapture {
   /// Captures of one name turn about one axis at one height; empty: the capture stands by itself.
   std::string spot = {};
   std::optional<KnownPlace> place = {};
+  /// Of the camera; on a spot the yaw rate alone. Wants the camera's row time and read-out.
+  KnownMotion motion = {};
 };
 
 struct AdjustmentInput {

@@ -16,19 +16,30 @@ namespace vlp {
 namespace {
 
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
-using Matrix34 = Eigen::Matrix<double, 3, 4>;
+using OwnMatrix = Eigen::Matrix<double, 7, 7>;
+using OwnVector = Eigen::Matrix<double, 7, 1>;
 
-/// Where the camera of a capture stands, and its yaw; from the state.
+/// Where the camera of a capture stands, its yaw, and how it moves; from the state.
 struct Placed {
   Eigen::Vector3d position_m;
   double cosine, sine;
-  /// Rz(-g) (P - A) - e on a spot, Rz(-g) (P - S) elsewhere.
-  Eigen::Vector3d level_of(const Eigen::Vector3d& lamp_m, const Eigen::Vector2d& arm_m) const {
+  Eigen::Vector2d velocity_m_per_s;
+  double yaw_rate_rad_per_s;
+
+  /// Rz(-g) (P - A) on a spot, Rz(-g) (P - S) elsewhere.
+  Eigen::Vector3d still_of(const Eigen::Vector3d& lamp_m) const {
     const Eigen::Vector3d w = lamp_m - position_m;
-    return {cosine * w.x() + sine * w.y() - arm_m.x(), cosine * w.y() - sine * w.x() - arm_m.y(),
-            w.z()};
+    return {cosine * w.x() + sine * w.y(), cosine * w.y() - sine * w.x(), w.z()};
   }
 };
+
+/// Rz(-angle).
+Eigen::Matrix3d turned_back(double angle_rad) {
+  const double c = std::cos(angle_rad), s = std::sin(angle_rad);
+  Eigen::Matrix3d turn;
+  turn << c, s, 0, -s, c, 0, 0, 0, 1;
+  return turn;
+}
 
 }  // namespace
 
@@ -88,9 +99,15 @@ void AdjustmentProblem::add_capture(const Capture& capture, const Pose& start) {
   Capture added = capture;
   added.own = state_.size();
   captures.push_back(added);
-  state_.conservativeResize(state_.size() + (capture.spot ? 1 : 4));
+  state_.conservativeResize(state_.size() + capture.size());
   if (!capture.spot) state_.segment<3>(added.own) = start.position_m;
-  state_[state_.size() - 1] = start.yaw_rad;
+  Eigen::Index next = added.own + capture.pose_size();
+  state_[next - 1] = start.yaw_rad;
+  if (capture.velocity_is_free()) {
+    state_.segment<2>(next) = capture.motion.velocity_m_per_s;
+    next += 2;
+  }
+  if (capture.yaw_rate_is_free()) state_[next] = capture.motion.yaw_rate_rad_per_s;
 }
 
 std::vector<double> AdjustmentProblem::intrinsics() const {
@@ -113,9 +130,18 @@ namespace {
 
 Placed placed(const Eigen::VectorXd& state, const AdjustmentLayout& layout,
               const AdjustmentProblem::Capture& capture) {
-  const double yaw_rad = state[capture.own + (capture.spot ? 0 : 3)];
+  const Eigen::Index motion = capture.own + capture.pose_size();
+  const double yaw_rad = state[motion - 1];
   const Eigen::Index position = capture.spot ? layout.spot(*capture.spot) : capture.own;
-  return {state.segment<3>(position), std::cos(yaw_rad), std::sin(yaw_rad)};
+  Placed camera{state.segment<3>(position), std::cos(yaw_rad), std::sin(yaw_rad),
+                capture.motion.velocity_m_per_s, capture.motion.yaw_rate_rad_per_s};
+  // An axis stands.
+  if (capture.spot) camera.velocity_m_per_s.setZero();
+  if (capture.velocity_is_free()) camera.velocity_m_per_s = state.segment<2>(motion);
+  if (capture.yaw_rate_is_free()) {
+    camera.yaw_rate_rad_per_s = state[capture.own + capture.size() - 1];
+  }
+  return camera;
 }
 
 }  // namespace
@@ -126,8 +152,14 @@ std::optional<AdjustmentProblem::Linearized> AdjustmentProblem::linearize(const 
   const Placed camera = placed(state_, layout_, capture);
   const Eigen::Vector2d arm_m =
       capture.spot ? Eigen::Vector2d(state_.segment<2>(layout_.lever_arm)) : Eigen::Vector2d(0, 0);
-  const Eigen::Vector3d level =
-      camera.level_of(state_.segment<3>(layout_.lamp(sighting.lamp)), arm_m);
+  const double time_s = sighting.time_s;
+  const Eigen::Vector3d still = camera.still_of(state_.segment<3>(layout_.lamp(sighting.lamp)));
+  const Eigen::Matrix3d read_from_still = turned_back(camera.yaw_rate_rad_per_s * time_s);
+  Eigen::Vector3d turned = still;
+  turned.head<2>() -= camera.velocity_m_per_s * time_s;
+  turned = (read_from_still * turned).eval();
+  Eigen::Vector3d level = turned;
+  level.head<2>() -= arm_m;
   const ZenithTurn turn =
       turn_by_zenith(state_.segment<2>(layout_.zenith), capture.base_from_level * level);
   const auto seen = lens.project_with_jacobians(turn.x_in_camera);
@@ -142,17 +174,55 @@ std::optional<AdjustmentProblem::Linearized> AdjustmentProblem::linearize(const 
   at.by_lens = -weight * seen->d_pixel_d_parameters * freedom_.directions;
   at.by_zenith = by_camera * turn.by_zenith;
   at.by_lever_arm = -by_level.leftCols<2>();
-  at.by_lamp = by_level * level_from_world;
+  const Matrix23 by_still = by_level * read_from_still;
+  at.by_lamp = by_still * level_from_world;
   at.by_spot = -at.by_lamp;
-  const Eigen::Vector2d turned = level.head<2>() + arm_m;
-  const Eigen::Vector2d by_yaw = by_level * Eigen::Vector3d(turned.y(), -turned.x(), 0);
-  at.by_own.setZero();
-  if (capture.spot) {
-    at.by_own.col(0) = by_yaw;
-  } else {
-    at.by_own << at.by_spot, by_yaw;
+  at.by_own.resize(2, capture.size());
+  Eigen::Index next = capture.pose_size();
+  if (!capture.spot) at.by_own.leftCols<3>() = at.by_spot;
+  at.by_own.col(next - 1) = by_still * Eigen::Vector3d(still.y(), -still.x(), 0);
+  if (capture.velocity_is_free()) {
+    at.by_own.middleCols<2>(next) = -time_s * by_still.leftCols<2>();
+    next += 2;
+  }
+  if (capture.yaw_rate_is_free()) {
+    at.by_own.col(next) = time_s * (by_level * Eigen::Vector3d(turned.y(), -turned.x(), 0));
   }
   return at;
+}
+
+AdjustmentProblem::MotionPrior AdjustmentProblem::motion_prior(const Capture& capture) const {
+  const Eigen::Index size = capture.motion_size();
+  MotionPrior prior{state_.segment(capture.own + capture.pose_size(), size), Eigen::VectorXd(size)};
+  const KnownMotion& known = capture.motion;
+  if (capture.velocity_is_free()) {
+    prior.deviations.head<2>() -= known.velocity_m_per_s;
+    prior.weights.head<2>().setConstant(1 / known.velocity_sd_m_per_s);
+  }
+  if (capture.yaw_rate_is_free()) {
+    prior.deviations[size - 1] -= known.yaw_rate_rad_per_s;
+    prior.weights[size - 1] = 1 / known.yaw_rate_sd_rad_per_s;
+  }
+  prior.deviations = prior.deviations.cwiseProduct(prior.weights).eval();
+  return prior;
+}
+
+double AdjustmentProblem::told_of_motion(std::size_t index) const {
+  const Capture& capture = captures[index];
+  const auto lens = this->lens();
+  const Eigen::Index size = capture.motion_size();
+  if (size == 0 || !lens) return 0;
+  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(capture.size(), capture.size());
+  for (const Sighting& sighting : sightings) {
+    if (!sighting.used || sighting.capture != index) continue;
+    const auto at = linearize(sighting, *lens);
+    if (at) own += at->by_own.transpose() * at->by_own;
+  }
+  const Eigen::VectorXd weights = motion_prior(capture).weights;
+  own.diagonal().tail(size) += weights.cwiseAbs2();
+  const Eigen::MatrixXd covariance =
+      own.ldlt().solve(Eigen::MatrixXd::Identity(capture.size(), capture.size()));
+  return static_cast<double>(size) - covariance.diagonal().tail(size).dot(weights.cwiseAbs2());
 }
 
 Eigen::Vector3d AdjustmentProblem::place_of(const PlaceSighting& place) const {
@@ -224,7 +294,8 @@ struct AdjustmentCosts {
       set_num_residuals(2);
       on_spot_ = problem.captures[sighting.capture].spot.has_value();
       auto& sizes = *mutable_parameter_block_sizes();
-      sizes = on_spot_ ? std::vector<int32_t>{1, 3, 2, 2, 3} : std::vector<int32_t>{4, 2, 3};
+      const auto own = static_cast<int32_t>(problem.captures[sighting.capture].size());
+      sizes = on_spot_ ? std::vector<int32_t>{own, 3, 2, 2, 3} : std::vector<int32_t>{own, 2, 3};
       const auto lens_size = static_cast<int32_t>(problem.layout().lens_size);
       if (lens_size > 0) sizes.push_back(lens_size);
     }
@@ -235,7 +306,7 @@ struct AdjustmentCosts {
       Eigen::Map<Eigen::Vector2d>(residuals, 2) = at->residual;
       if (jacobians == nullptr) return true;
       int block = 0;
-      copy(jacobians, block, at->by_own.leftCols(on_spot_ ? 1 : 4));
+      copy(jacobians, block, at->by_own);
       if (on_spot_) {
         copy(jacobians, block, at->by_spot);
         copy(jacobians, block, at->by_lever_arm);
@@ -277,6 +348,30 @@ struct AdjustmentCosts {
     double weight_;
   };
 
+  /// What is known of a capture's motion. Block: the capture's own.
+  class Moved : public ceres::CostFunction {
+   public:
+    Moved(const AdjustmentProblem& problem, const AdjustmentProblem::Capture& capture)
+        : problem_(problem), capture_(capture) {
+      set_num_residuals(static_cast<int>(capture.motion_size()));
+      mutable_parameter_block_sizes()->push_back(static_cast<int32_t>(capture.size()));
+    }
+    bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
+      const auto [deviations, weights] = problem_.motion_prior(capture_);
+      Eigen::Map<Eigen::VectorXd>(residuals, deviations.size()) = deviations;
+      if (jacobians == nullptr) return true;
+      Eigen::MatrixXd by_own = Eigen::MatrixXd::Zero(weights.size(), capture_.size());
+      by_own.rightCols(weights.size()) = weights.asDiagonal();
+      int block = 0;
+      copy(jacobians, block, by_own);
+      return true;
+    }
+
+   private:
+    const AdjustmentProblem& problem_;
+    const AdjustmentProblem::Capture& capture_;
+  };
+
   /// Blocks: the capture's own, [spot], [lever arm].
   class Stood : public ceres::CostFunction {
    public:
@@ -285,7 +380,9 @@ struct AdjustmentCosts {
       set_num_residuals(static_cast<int>(place.size));
       auto& sizes = *mutable_parameter_block_sizes();
       on_spot_ = problem.captures[place.capture].spot.has_value();
-      sizes = on_spot_ ? std::vector<int32_t>{1, 3} : std::vector<int32_t>{4};
+      own_ = problem.captures[place.capture].size();
+      sizes = {static_cast<int32_t>(own_)};
+      if (on_spot_) sizes.push_back(3);
       if (turns_the_arm(problem, place)) sizes.push_back(2);
     }
     bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
@@ -298,14 +395,11 @@ struct AdjustmentCosts {
       const auto rows = [&](const Eigen::MatrixXd& values) -> Eigen::MatrixXd {
         return values.topRows(place_.size) / place_.sd_m;
       };
-      if (on_spot_) {
-        copy(jacobians, block, rows(at.by_yaw));
-        copy(jacobians, block, rows(Eigen::Matrix3d::Identity()));
-      } else {
-        Matrix34 by_own;
-        by_own << Eigen::Matrix3d::Identity(), at.by_yaw;
-        copy(jacobians, block, rows(by_own));
-      }
+      Eigen::MatrixXd by_own = Eigen::MatrixXd::Zero(3, own_);
+      by_own.col(on_spot_ ? 0 : 3) = at.by_yaw;
+      if (!on_spot_) by_own.leftCols<3>().setIdentity();
+      copy(jacobians, block, rows(by_own));
+      if (on_spot_) copy(jacobians, block, rows(Eigen::Matrix3d::Identity()));
       if (turns_the_arm(problem_, place_)) copy(jacobians, block, rows(at.by_arm));
       return true;
     }
@@ -314,6 +408,7 @@ struct AdjustmentCosts {
     const AdjustmentProblem& problem_;
     const AdjustmentProblem::PlaceSighting& place_;
     bool on_spot_;
+    Eigen::Index own_;
   };
 
   static bool solve(AdjustmentProblem& problem, bool robust) {
@@ -346,7 +441,7 @@ struct AdjustmentCosts {
     for (const auto& sighting : problem.sightings) {
       if (!sighting.used) continue;
       const auto& capture = problem.captures[sighting.capture];
-      std::vector<double*> blocks{add(capture.own, capture.spot ? 1 : 4, 0)};
+      std::vector<double*> blocks{add(capture.own, capture.size(), 0)};
       if (capture.spot) {
         blocks.push_back(add(layout.spot(*capture.spot), 3, 1));
         blocks.push_back(add(layout.lever_arm, 2, 1));
@@ -376,6 +471,10 @@ struct AdjustmentCosts {
       if (turns_the_arm(problem, place)) blocks.push_back(add(layout.lever_arm, 2, 1));
       ceres.AddResidualBlock(new Stood(problem, place), loss(), blocks);
     }
+    for (const auto& capture : problem.captures) {
+      if (capture.motion_size() == 0 || !ceres.HasParameterBlock(state + capture.own)) continue;
+      ceres.AddResidualBlock(new Moved(problem, capture), nullptr, state + capture.own);
+    }
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_SCHUR;
     options.linear_solver_ordering = order;
@@ -397,14 +496,14 @@ namespace {
 
 /// A capture's own unknowns and what they are mixed with, to be eliminated.
 struct OwnBlock {
-  Eigen::Matrix4d own = Eigen::Matrix4d::Zero();
+  OwnMatrix own = OwnMatrix::Zero();
   std::vector<Eigen::Index> columns;
-  std::vector<Eigen::Vector4d> mixed;
+  std::vector<OwnVector> mixed;
 
   void add(const Eigen::MatrixXd& by_own, Eigen::Index first, const Eigen::MatrixXd& by_shared) {
     const Eigen::MatrixXd product = by_own.transpose() * by_shared;
     for (Eigen::Index i = 0; i < product.cols(); ++i) {
-      Eigen::Vector4d column = Eigen::Vector4d::Zero();
+      OwnVector column = OwnVector::Zero();
       column.head(product.rows()) = product.col(i);
       const auto place = std::find(columns.begin(), columns.end(), first + i);
       if (place == columns.end()) {
@@ -460,7 +559,7 @@ Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
       parts.emplace_back(at.lever_arm, seen->by_lever_arm);
       parts.emplace_back(at.spot(*capture.spot), seen->by_spot);
     }
-    const Eigen::MatrixXd by_own = seen->by_own.leftCols(capture.spot ? 1 : 4);
+    const Eigen::MatrixXd by_own = seen->by_own;
     add_information(parts, information);
     OwnBlock& block = own[sighting.capture];
     block.own.topLeftCorner(by_own.cols(), by_own.cols()) += by_own.transpose() * by_own;
@@ -492,14 +591,17 @@ Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
   }
   for (std::size_t k = 0; k < captures.size(); ++k) {
     const OwnBlock& block = own[k];
-    const Eigen::Index size = captures[k].spot ? 1 : 4, n = std::ssize(block.columns);
+    const Eigen::Index size = captures[k].size(), n = std::ssize(block.columns);
     if (n == 0) continue;
+    OwnMatrix known = block.own;
+    const Eigen::VectorXd weights = motion_prior(captures[k]).weights;
+    known.diagonal().segment(captures[k].pose_size(), weights.size()) += weights.cwiseAbs2();
     Eigen::MatrixXd mixed(size, n);
     for (Eigen::Index i = 0; i < n; ++i) {
       mixed.col(i) = block.mixed[static_cast<std::size_t>(i)].head(size);
     }
     const Eigen::MatrixXd taken =
-        mixed.transpose() * block.own.topLeftCorner(size, size).ldlt().solve(mixed);
+        mixed.transpose() * known.topLeftCorner(size, size).ldlt().solve(mixed);
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j < n; ++j) {
         information(block.columns[static_cast<std::size_t>(i)],

@@ -9,6 +9,7 @@
 
 #include "camera/lens.h"
 #include "geometry/frames.h"
+#include "positioning/positioner.h"
 #include "rig/calibration.h"
 
 /// The least-squares problem behind adjust_captures(): its unknowns in one vector, its residuals
@@ -46,6 +47,8 @@ class AdjustmentProblem {
     std::size_t capture, lamp;
     Eigen::Vector2d pixel;
     double sigma_px;
+    /// When it is read.
+    double time_s;
     bool used = true;
   };
   struct Capture {
@@ -53,8 +56,19 @@ class AdjustmentProblem {
     std::optional<std::size_t> spot;
     /// From the level frame to that of the robot's inclination.
     Eigen::Matrix3d base_from_level;
-    /// Where its own unknowns stand: (X, Y, Z, yaw), or, on a spot, the yaw.
-    Eigen::Index own;
+    /// Of the camera; on a spot the yaw rate alone.
+    KnownMotion motion = {};
+    /// Where its own unknowns stand: (X, Y, Z, yaw), or, on a spot, the yaw; then, as far as they
+    /// are not known, the velocity and the yaw rate.
+    Eigen::Index own = 0;
+
+    bool velocity_is_free() const { return !spot && motion.velocity_sd_m_per_s > 0; }
+    bool yaw_rate_is_free() const { return motion.yaw_rate_sd_rad_per_s > 0; }
+    Eigen::Index pose_size() const { return spot ? 1 : 4; }
+    Eigen::Index motion_size() const {
+      return (velocity_is_free() ? 2 : 0) + (yaw_rate_is_free() ? 1 : 0);
+    }
+    Eigen::Index size() const { return pose_size() + motion_size(); }
   };
   struct LampPrior {
     Eigen::Vector3d surveyed_m;
@@ -102,13 +116,23 @@ class AdjustmentProblem {
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 16> by_lens;
     Eigen::Matrix2d by_zenith, by_lever_arm;
     Eigen::Matrix<double, 2, 3> by_lamp, by_spot;
-    /// The first column alone on a spot: the yaw.
-    Eigen::Matrix<double, 2, 4> by_own;
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 7> by_own;
   };
   std::optional<Linearized> linearize(const Sighting& sighting, const Lens& lens) const;
 
   /// Of the camera (or of the axis it turns about) in the capture.
   Eigen::Vector3d place_of(const PlaceSighting& place) const;
+
+  /// What is known of a capture's motion, where it is not known exactly: the state less it, in
+  /// standard deviations, and one over these.
+  struct MotionPrior {
+    Eigen::VectorXd deviations, weights;
+  };
+  MotionPrior motion_prior(const Capture& capture) const;
+
+  /// How many unknowns of a capture's motion its sightings determine, where what is known does not:
+  /// of each one less its variance over that which was known before.
+  double told_of_motion(std::size_t capture) const;
 
   /// The lens that the state stands for; nothing where that is none.
   std::optional<Lens> lens() const;

@@ -21,6 +21,7 @@ double chi_squared(const LampBundle& bundle) {
     for (const Seen& seen : capture.seen) {
       sum += whitened_residual(bundle, capture, seen).squaredNorm();
     }
+    sum += motion_deviations(capture).squaredNorm();
   }
   return sum;
 }
@@ -42,9 +43,24 @@ std::optional<Eigen::MatrixXd> covariance_of(const SharedEquations& shared,
   return directions * directions.transpose();
 }
 
+/// How many unknowns of motions the sightings determine, where what is known does not: of each one
+/// less its variance over that which was known before.
+double told_of_motions(const LampBundle& bundle, const std::vector<OwnEquations>& own) {
+  double told = 0;
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    const OwnVector weights = motion_weights(bundle.captures[k]);
+    if (weights.size() == 0) continue;
+    const Eigen::Index size = 4 + weights.size();
+    const OwnMatrix covariance = own[k].own.solve(OwnMatrix::Identity(size, size));
+    told += static_cast<double>(weights.size()) -
+            covariance.diagonal().tail(weights.size()).dot(weights.cwiseAbs2());
+  }
+  return told;
+}
+
 struct Step {
   Eigen::VectorXd shared;
-  std::vector<Eigen::Vector4d> own;
+  std::vector<OwnVector> own;
 
   double largest() const {
     double largest = shared.cwiseAbs().maxCoeff();
@@ -68,9 +84,7 @@ LampBundle moved(const LampBundle& bundle, const Step& step) {
     next.lamps_m[i] += step.shared.segment<3>(static_cast<Eigen::Index>(2 + 3 * i));
   }
   for (std::size_t k = 0; k < next.captures.size(); ++k) {
-    LevelPose& camera = next.captures[k].camera;
-    camera = LevelPose(camera.position_m + step.own[k].head<3>(),
-                       times(camera.heading, {1, step.own[k][3]}).normalized());
+    next.captures[k] = moved(bundle.captures[k], step.own[k]);
   }
   return next;
 }
@@ -80,7 +94,7 @@ LampBundle moved(const LampBundle& bundle, const Step& step) {
 Eigen::Vector2d whitened_residual(const LampBundle& bundle, const Capture& capture,
                                   const Seen& seen) {
   const Eigen::Vector3d x =
-      bundle.level_from_camera.transpose() * x_in_level(capture.camera, bundle.lamps_m[seen.lamp]);
+      bundle.level_from_camera.transpose() * x_in_level(capture, seen, bundle.lamps_m[seen.lamp]);
   if (!(x.z() > 0)) return Eigen::Vector2d::Constant(std::nan(""));
   return seen.whitening * (seen.z_in_camera - x.head<2>() / x.z());
 }
@@ -89,7 +103,7 @@ std::optional<BundleFit> adjust(LampBundle& bundle, const Eigen::MatrixXd& free)
   constexpr int max_iterations = 50;
   constexpr double small_step = 1e-10;  // metres and radians: far below any noise
   constexpr double rounding = 1e-12;    // of the sum of squares, near the minimum
-  BundleFit fit{chi_squared(bundle), static_cast<int>(-free.cols()), {}};
+  BundleFit fit{chi_squared(bundle), static_cast<int>(-free.cols()), 0, {}};
   if (!std::isfinite(fit.chi_squared)) return std::nullopt;
   for (const Capture& capture : bundle.captures) {
     fit.degrees_of_freedom += 2 * static_cast<int>(capture.seen.size()) - 4;
@@ -125,6 +139,7 @@ std::optional<BundleFit> adjust(LampBundle& bundle, const Eigen::MatrixXd& free)
       if (helps || largest <= small_step) {
         if (largest > small_step) break;
         fit.covariance = *covariance;
+        fit.redundancy = fit.degrees_of_freedom - told_of_motions(bundle, own);
         return fit;
       }
     }

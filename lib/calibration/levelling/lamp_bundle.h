@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "geometry/types.h"
+#include "positioning/positioner.h"
 #include "positioning/sighting.h"
 
 namespace vlp {
@@ -16,7 +17,10 @@ namespace vlp {
 /// adjustment. A capture k with the level pose (S_k, g_k) sees lamp P_i in the camera at
 ///   z_ik = (x/z, y/z)  of  level_from_camera^T Rz(-g_k) (P_i - S_k),
 /// so that every capture has four unknowns of its own, and all share the tilt (the rotation of
-/// the level frame about its x and y axes; about z it is the yaw) and the lamps.
+/// the level frame about its x and y axes; about z it is the yaw) and the lamps. Of a camera that
+/// drives with u and turns with w the lamp is read at t after the middle of the image, and is then
+///   level_from_camera^T Rz(-w t) (Rz(-g_k) (P_i - S_k) - u t);
+/// what is not known of u and w is the capture's own, too, with what is known for a prior.
 struct LampBundle {
   struct Seen {
     /// Index into lamps_m.
@@ -25,10 +29,16 @@ struct LampBundle {
     Eigen::Vector2d z_in_camera;
     /// Takes residuals of z to standard deviations.
     Matrix2 whitening;
+    /// When it is read.
+    double time_s;
   };
   struct Capture {
     LevelPose camera;
     std::vector<Seen> seen;
+    /// What is known of u and w, and what they are taken to be.
+    KnownMotion known = {};
+    Eigen::Vector2d velocity_m_per_s = known.velocity_m_per_s;
+    double yaw_rate_rad_per_s = known.yaw_rate_rad_per_s;
   };
 
   Eigen::Matrix3d level_from_camera;
@@ -41,10 +51,12 @@ Eigen::Vector2d whitened_residual(const LampBundle& bundle, const LampBundle::Ca
                                   const LampBundle::Seen& seen);
 
 struct BundleFit {
-  /// Sum of the squared whitened residuals.
+  /// Sum of the squared whitened residuals, those of motions that are known in part among them.
   double chi_squared;
-  /// Measurements less unknowns.
+  /// Measurements, such motions among them, less unknowns.
   int degrees_of_freedom;
+  /// Those of the sightings alone: less by what they tell of motions. The same where all is known.
+  double redundancy;
   /// Of (tilt about x and y, then x, y, z of each lamp) when the whitened residuals have unit
   /// variance; zero along what `free` holds.
   Eigen::MatrixXd covariance;

@@ -11,15 +11,31 @@
 /// The normal equations of a LampBundle, capture by capture.
 namespace vlp {
 
-/// x of a lamp in the level frame of a capture.
-Eigen::Vector3d x_in_level(const LevelPose& camera, const Eigen::Vector3d& lamp_m);
+/// Of a capture: (S, g), then, as far as they are not known, the velocity and the yaw rate.
+using OwnVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 7, 1>;
+using OwnMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 7, 7>;
+
+Eigen::Index own_unknowns(const LampBundle::Capture& capture);
+
+/// Velocity and yaw rate less what is known of them, in standard deviations; none for those that
+/// are known.
+OwnVector motion_deviations(const LampBundle::Capture& capture);
+/// One over those standard deviations.
+OwnVector motion_weights(const LampBundle::Capture& capture);
+
+/// The capture with its own unknowns moved.
+LampBundle::Capture moved(const LampBundle::Capture& capture, const OwnVector& step);
+
+/// x of a lamp in the level frame of a capture, when it is read.
+Eigen::Vector3d x_in_level(const LampBundle::Capture& capture, const LampBundle::Seen& seen,
+                           const Eigen::Vector3d& lamp_m);
 
 /// Of one capture: its own unknowns x and the shared ones s that it touches,
 ///   own dx + mixed ds = own_gradient.
 struct OwnEquations {
-  Eigen::LLT<Eigen::Matrix4d> own;
-  Eigen::Matrix<double, 4, Eigen::Dynamic> mixed;
-  Eigen::Vector4d own_gradient;
+  Eigen::LLT<OwnMatrix> own;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 7> mixed;
+  OwnVector own_gradient;
 };
 
 /// What is left for the shared unknowns, and what it would be if the poses were known.

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/levelling/lamp_equations.h"
 #include "calibration/levelling/levelling_checks.h"
 #include "calibration/levelling/levelling_rounds.h"
 #include "calibration/levelling/measured_lamps.h"
 #include "camera/lens.h"
+#include "geometry/plane.h"
 #include "positioning/weighted_fix.h"
 
 namespace vlp {
@@ -22,7 +24,7 @@ double square_px(const Lens& lens, const Eigen::Vector2d& z, const Eigen::Vector
   return lens.focal_px().cwiseProduct(z - expected).squaredNorm();
 }
 
-double residual_px(const LampBundle& bundle, const Lens& lens, int degrees_of_freedom) {
+double residual_px(const LampBundle& bundle, const Lens& lens, double degrees_of_freedom) {
   double sum = 0;
   for (const Capture& capture : bundle.captures) {
     for (const Seen& seen : capture.seen) {
@@ -34,6 +36,17 @@ double residual_px(const LampBundle& bundle, const Lens& lens, int degrees_of_fr
   return std::sqrt(sum / degrees_of_freedom);
 }
 
+/// Where a camera that stands there would see the lamp as this one does.
+Eigen::Vector3d where_seen(const Capture& capture, const Seen& seen,
+                           const Eigen::Vector3d& lamp_m) {
+  if (capture.velocity_m_per_s.isZero(0) && capture.yaw_rate_rad_per_s == 0) return lamp_m;
+  const Eigen::Vector3d level = x_in_level(capture, seen, lamp_m);
+  Eigen::Vector3d seen_m = lamp_m;
+  seen_m.head<2>() =
+      capture.camera.position_m.head<2>() + times(capture.camera.heading, level.head<2>());
+  return seen_m;
+}
+
 /// Of the same detections if the camera were level and the map as it was.
 double residual_before_px(const LampBundle& bundle, const std::vector<Eigen::Vector3d>& lamps_m,
                           const Lens& lens) {
@@ -42,7 +55,8 @@ double residual_before_px(const LampBundle& bundle, const std::vector<Eigen::Vec
   for (const Capture& capture : bundle.captures) {
     sightings.clear();
     for (const Seen& seen : capture.seen) {
-      sightings.push_back({lamps_m[seen.lamp], seen.z_in_camera, seen.whitening, 1});
+      sightings.push_back(
+          {where_seen(capture, seen, lamps_m[seen.lamp]), seen.z_in_camera, seen.whitening, 1});
     }
     const auto fix = fix_weighted(sightings, capture.camera.pose());
     if (!fix) continue;
@@ -107,16 +121,18 @@ Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, cons
   for (const Lamp& lamp : map.lamps) mean_m += lamp.position_m - map.lamps.front().position_m;
   mean_m = map.lamps.front().position_m + mean_m / static_cast<double>(map.lamps.size());
   for (const Lamp& lamp : map.lamps) lamps_m.emplace_back(lamp.position_m - mean_m);
-  std::vector<std::vector<Seen>> measured;
-  for (const Frame& frame : frames) {
-    auto seen = measured_lamps(frame.detections, map, lens);
+  const auto row_clock = row_clock_of(camera);
+  std::vector<MeasuredCapture> measured;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    auto seen = measured_lamps(frames[i].detections, map, lens, row_clock);
     if (!seen) {
       ++result.captures_rejected;
     } else if (seen->size() < 3) {
       ++result.captures_of_few_lamps;
     } else {
       result.detections_rejected += static_cast<int>(seen->size());
-      measured.push_back(std::move(*seen));
+      measured.push_back(
+          {std::move(*seen), options.motions.empty() ? KnownMotion() : options.motions[i]});
     }
   }
 
@@ -136,7 +152,7 @@ Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, cons
   const Eigen::MatrixXd covariance = fit->covariance * (stated ? std::max(excess, 1.0) : excess);
   if (stated) result.excess = std::sqrt(excess);
   result.center = center_of(bundle.level_from_camera, covariance.topLeftCorner<2, 2>(), lens);
-  result.residual_px = residual_px(bundle, lens, fit->degrees_of_freedom);
+  result.residual_px = residual_px(bundle, lens, fit->redundancy);
   result.residual_before_px = residual_before_px(bundle, lamps_m, lens);
   if (options.refine_map) report_lamps(result, bundle, map, lamps_m, covariance);
   result.undetermined = too_loose(result, covariance.topLeftCorner<2, 2>(), options);

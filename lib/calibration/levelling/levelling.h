@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
+#include "positioning/positioner.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 
@@ -21,6 +22,9 @@ struct LevellingOptions {
   /// A tilt of the lamps as a whole is told from the camera's by captures at different yaws, the
   /// distance of a lamp by captures at different places. Lamps that are not seen stay.
   bool refine_map = false;
+  /// How the camera moves in each of the frames; empty: it stands. What is not known of it is
+  /// estimated with the capture's pose. Wants the camera's row time and read-out.
+  std::vector<KnownMotion> motions = {};
   /// A standard deviation of the zenith per axis, and of a lamp's correction per axis, beyond
   /// which the captures do not determine it.
   double max_sd_rad = 0.02;

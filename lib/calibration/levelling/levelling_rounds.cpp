@@ -17,14 +17,12 @@ namespace {
 using Capture = LampBundle::Capture;
 using Seen = LampBundle::Seen;
 
-/// What there is of one capture; empty when it is of no use.
-using Measured = std::vector<std::vector<Seen>>;
-
-LampBundle place(const Measured& measured, const std::vector<Eigen::Vector3d>& lamps_m,
+LampBundle place(const std::vector<MeasuredCapture>& measured,
+                 const std::vector<Eigen::Vector3d>& lamps_m,
                  const Eigen::Matrix3d& level_from_camera) {
   LampBundle bundle{level_from_camera, lamps_m, {}};
-  for (const auto& seen : measured) {
-    if (auto capture = placed_capture(seen, lamps_m, level_from_camera)) {
+  for (const MeasuredCapture& one : measured) {
+    if (auto capture = placed_capture(one, lamps_m, level_from_camera)) {
       bundle.captures.push_back(std::move(*capture));
     }
   }
@@ -55,7 +53,7 @@ bool take_out_worst(LampBundle& bundle, const BundleFit& fit) {
     }
   }
   const double median_of_unit_noise = 2 * std::log(2.0);
-  const double share_left = fit.degrees_of_freedom / (2.0 * static_cast<double>(squares.size()));
+  const double share_left = fit.redundancy / (2.0 * static_cast<double>(squares.size()));
   const double variance = upper_median(std::move(squares)) / (median_of_unit_noise * share_left);
   const double limit = limit_sigmas * limit_sigmas * std::max(variance, rounding * rounding);
   bool any = false;
@@ -89,9 +87,8 @@ LevellingSolution solve(LampBundle bundle, const LampMap& map, bool refine_map) 
 
 }  // namespace
 
-LevellingSolution solve_in_rounds(const std::vector<std::vector<Seen>>& measured,
-                                  const LampMap& map, const std::vector<Eigen::Vector3d>& lamps_m,
-                                  bool refine_map) {
+LevellingSolution solve_in_rounds(const std::vector<MeasuredCapture>& measured, const LampMap& map,
+                                  const std::vector<Eigen::Vector3d>& lamps_m, bool refine_map) {
   constexpr int max_rounds = 6;
   LevellingSolution solution{{Eigen::Matrix3d::Identity(), lamps_m, {}}, {}};
   std::size_t detections = 0;

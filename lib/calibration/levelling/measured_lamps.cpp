@@ -28,8 +28,9 @@ double distance_to_nearest(const std::vector<Eigen::Vector3d>& lamps_m, std::siz
 
 }  // namespace
 
-std::optional<std::vector<LampBundle::Seen>> measured_lamps(std::span<const Detection> detections,
-                                                            const LampMap& map, const Lens& lens) {
+std::optional<std::vector<LampBundle::Seen>> measured_lamps(
+    std::span<const Detection> detections, const LampMap& map, const Lens& lens,
+    const std::optional<RowClock>& row_clock) {
   std::vector<LampBundle::Seen> measured;
   measured.reserve(detections.size());
   for (const Detection& detection : detections) {
@@ -47,15 +48,16 @@ std::optional<std::vector<LampBundle::Seen>> measured_lamps(std::span<const Dete
         ray->direction.z();
     Matrix2 whitening = lens.focal_px().asDiagonal();
     if (detection.sigma_px) whitening = d_z_d_pixel.inverse() / *detection.sigma_px;
-    measured.push_back({index, z, whitening});
+    measured.push_back({index, z, whitening, row_clock ? row_clock->time_s(detection.pixel) : 0});
   }
   if (measured.size() > kMaxSightings) return std::nullopt;
   return measured;
 }
 
-std::optional<LampBundle::Capture> placed_capture(const std::vector<LampBundle::Seen>& seen,
+std::optional<LampBundle::Capture> placed_capture(const MeasuredCapture& measured,
                                                   const std::vector<Eigen::Vector3d>& lamps_m,
                                                   const Eigen::Matrix3d& level_from_camera) {
+  const std::vector<LampBundle::Seen>& seen = measured.seen;
   SightedFrame frame;
   // What the stated noise does not explain may be the tilt that is sought.
   frame.noise_is_stated = false;
@@ -70,7 +72,7 @@ std::optional<LampBundle::Capture> placed_capture(const std::vector<LampBundle::
   if (frame.size < 3) return std::nullopt;
   const auto [status, fix] = fix_frame(frame, kMaxResidualShare);
   if (status != FixStatus::ok || frame.size < 3) return std::nullopt;
-  LampBundle::Capture capture{LevelPose(fix.pose), {}};
+  LampBundle::Capture capture{LevelPose(fix.pose), {}, measured.motion};
   capture.seen.reserve(frame.size);
   for (std::size_t i = 0; i < frame.size; ++i) {
     capture.seen.push_back(seen[static_cast<std::size_t>(frame.ids[i])]);

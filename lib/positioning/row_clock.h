@@ -1,0 +1,29 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "../rig/calibration.h"
+
+namespace vlp {
+
+/// When a pixel is read, from the middle row (or column) of the image.
+struct RowClock {
+  double row_time_s, middle_row;
+  Readout readout;
+
+  double time_s(const Eigen::Vector2d& pixel) const {
+    return row_time_s * ((readout == Readout::rows ? pixel.y() : pixel.x()) - middle_row);
+  }
+};
+
+/// Nothing when the camera's row time or read-out is not known.
+inline std::optional<RowClock> row_clock_of(const Camera& camera) {
+  if (!camera.row_time_s || !camera.readout) return std::nullopt;
+  const int rows = camera.imager_px[*camera.readout == Readout::rows ? 1 : 0];
+  return RowClock{*camera.row_time_s, (rows - 1) / 2.0, *camera.readout};
+}
+
+}  // namespace vlp

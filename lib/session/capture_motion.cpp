@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/capture_motion.h"
+
+#include <stdexcept>
+
+#include "positioning/known_motion.h"
+
+namespace vlp {
+
+std::optional<KnownMotion> motion_of(const Capture& capture,
+                                     const std::optional<KnownMotion>& otherwise,
+                                     double yaw_rate_sd_rad_per_s) {
+  if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return otherwise;
+  KnownMotion motion = otherwise.value_or(KnownMotion());
+  if (capture.velocity_m_per_s) {
+    motion.velocity_m_per_s = *capture.velocity_m_per_s;
+    motion.velocity_sd_m_per_s = capture.velocity_sd_m_per_s.value_or(0);
+  }
+  if (capture.yaw_rate_rad_per_s) {
+    motion.yaw_rate_rad_per_s = *capture.yaw_rate_rad_per_s;
+    motion.yaw_rate_sd_rad_per_s = yaw_rate_sd_rad_per_s;
+  }
+  return motion;
+}
+
+std::vector<KnownMotion> motions_of(std::span<const Frame> frames, const CapturesTable& captures,
+                                    const std::optional<KnownMotion>& otherwise,
+                                    double yaw_rate_sd_rad_per_s) {
+  std::vector<KnownMotion> motions;
+  motions.reserve(frames.size());
+  bool any = false;
+  for (const Frame& frame : frames) {
+    const auto entry = captures.find(frame.image);
+    const auto known = entry == captures.end()
+                           ? otherwise
+                           : motion_of(entry->second, otherwise, yaw_rate_sd_rad_per_s);
+    motions.push_back(known.value_or(KnownMotion()));
+    any = any || moves(motions.back());
+  }
+  if (!any) motions.clear();
+  return motions;
+}
+
+void check_row_time(const Camera& camera) {
+  if (camera.row_time_s && camera.readout) return;
+  throw std::invalid_argument(
+      "a camera that moves needs row_time_s and readout in its calibration: vlp-intrinsics takes "
+      "--row-time-s and --readout");
+}
+
+}  // namespace vlp
