@@ -31,6 +31,23 @@ double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d
   return wall + (1 - wall) * std::exp2(-ratio * ratio);
 }
 
+/// Of the chips around a place on the disc; those further away add less than 1e-3.
+double share_of_chips(const Chips& chips, double radius_m, const Eigen::Vector2d& at_m) {
+  constexpr double widths = 1.6;
+  const Eigen::Array2d first = ((at_m.array() - widths * chips.width_m) / chips.pitch_m).ceil();
+  const Eigen::Array2d last = ((at_m.array() + widths * chips.width_m) / chips.pitch_m).floor();
+  double sum = 0;
+  for (double row = first.y(); row <= last.y(); ++row) {
+    for (double column = first.x(); column <= last.x(); ++column) {
+      const Eigen::Vector2d chip_m = chips.pitch_m * Eigen::Vector2d(column, row);
+      if (chip_m.norm() > radius_m) continue;
+      const double ratio = 2 * (at_m - chip_m).norm() / chips.width_m;
+      sum += std::exp2(-ratio * ratio);
+    }
+  }
+  return chips.share * sum;
+}
+
 double share_around(const Halo& halo, double radius_m, const Eigen::Vector2d& at_m) {
   const double lengths = std::max(0.0, at_m.norm() - radius_m) / halo.length_m;
   return lengths < kHaloLengths ? halo.share * std::exp(-lengths) : 0;
@@ -67,6 +84,7 @@ void add_downlight(const PixelRays& rays, const PixelWindow& window,
       if (!at_m.allFinite()) continue;
       double share = 0;
       if (glow.recess) share += part * share_inside(*glow.recess, radius_m, eye_m, at_m);
+      if (glow.chips) share += part * share_of_chips(*glow.chips, radius_m, at_m);
       if (glow.halo) share += (1 - part) * share_around(*glow.halo, radius_m, at_m);
       image(row, column) += static_cast<float>(glow.radiance_e_per_s * share);
     }

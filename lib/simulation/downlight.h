@@ -10,9 +10,9 @@ namespace vlp {
 /// How far from its centre a glow gives light, its halo included.
 double reach_m(const Glow& glow);
 
-/// Adds to each pixel of the window, which is all of `image`, the radiance of a glow with a recess
-/// or a halo. How much of a pixel is inside the rim is exact (add_shape); what recess and halo give
-/// there is taken at the pixel's middle, so they should vary little within a pixel.
+/// Adds to each pixel of the window, which is all of `image`, the radiance of a glow with a recess,
+/// chips or a halo. How much of a pixel is inside the rim is exact (add_shape); what recess, chips
+/// and halo give there is taken at the pixel's middle, so they should vary little within a pixel.
 void add_downlight(const PixelRays& rays, const PixelWindow& window,
                    const TargetFromCamera& glow_from_camera, const Glow& glow, cv::Mat1f& image);
 

@@ -39,12 +39,21 @@ void add_bloom(const Bloom& bloom, float full_well_e, cv::Mat1f& electrons) {
   electrons += bloom.share * excess;
 }
 
+void filter(const Bayer& bayer, cv::Mat1f& electrons) {
+  for (int line = 0; line < electrons.rows; ++line) {
+    for (int place = 0; place < electrons.cols; ++place) {
+      electrons(line, place) *= static_cast<float>(passed_share(bayer, line, place));
+    }
+  }
+}
+
 }  // namespace
 
 cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
                const std::optional<Picture>& picture) {
   cv::RNG random(seed);
   cv::Mat1f electrons = mean_electrons.clone();
+  if (picture && picture->bayer) filter(*picture->bayer, electrons);
   if (sensor.shot_noise) {
     for (float& value : electrons) value = poisson(value, random);
   }
@@ -63,8 +72,18 @@ cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint6
   }
   cv::Mat1f levels;
   electrons.convertTo(levels, CV_32F, sensor.gain_dn_per_e, sensor.black_level_dn);
-  develop(*picture, sensor, levels);
-  levels.convertTo(image, type);
+  if (!picture->bayer) {
+    develop(*picture, sensor, levels);
+    levels.convertTo(image, type);
+    return image;
+  }
+  // The converter rounds before anybody fills in colours.
+  for (float& level : levels) level = std::clamp(std::round(level), 0.F, float(white_dn(sensor)));
+  auto colours = colours_of(*picture->bayer, sensor, levels);
+  for (cv::Mat1f& colour : colours) develop(*picture, sensor, colour);
+  cv::Mat colour_image;
+  cv::merge(colours, colour_image);
+  colour_image.convertTo(image, type);
   return image;
 }
 

@@ -10,8 +10,9 @@
 namespace vlp {
 
 /// What a sensor makes of the mean number of electrons of each pixel (see Sensor): shot noise
-/// (Poisson), overflow with bloom, read noise (normal), gain, black level, the tone curve and
-/// sharpening of a picture, rounding, and the limits of 8 or 16 bits. The result is 8- or 16-bit.
+/// (Poisson), overflow with bloom, read noise (normal), gain, black level, the colour filters, tone
+/// curve and sharpening of a picture, rounding, and the limits of 8 or 16 bits. The result is 8- or
+/// 16-bit, and in three colours, blue first, behind colour filters.
 /// The same seed gives the same image.
 cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
                const std::optional<Picture>& picture = {});

@@ -91,7 +91,7 @@ class LampFrame {
     if (glow.rectangle) return draw(panel_of(glow), glow.radiance_e_per_s, window, target);
     const Eigen::Isometry3d glow_from_world(Eigen::Translation3d(-glow.position_m));
     const TargetFromCamera glow_from_camera = target_from_camera(glow_from_world);
-    if (glow.recess || glow.halo) {
+    if (glow.recess || glow.chips || glow.halo) {
       add_downlight(rays_, window, glow_from_camera, glow, target);
       return;
     }

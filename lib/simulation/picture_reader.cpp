@@ -21,6 +21,15 @@ Picture read_picture(YamlMap map, const Sensor& sensor) {
     picture.jpeg_quality = quality->integer_within(1, 100);
     if (sensor.bits != 8) throw quality->error("JPEG has 8 bits: set sensor.bits to 8");
   }
+  if (const auto bayer = map.optional("bayer")) {
+    YamlMap keys = bayer->map();
+    const auto share = [&](const char* key) {
+      return keys.required(key).number_within(0.05, 2, "(of what green filters pass)");
+    };
+    const double red_share = share("red_share");
+    picture.bayer = Bayer{red_share, share("blue_share")};
+    keys.finish();
+  }
   map.finish();
   return picture;
 }

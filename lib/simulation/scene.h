@@ -48,10 +48,20 @@ struct Halo {
   double length_m;
 };
 
+/// LED chips on a square grid behind a diffuser, which shine through: of each chip within the disc,
+/// its centre c, the radiance at p is more by
+///   radiance share 2^-((2 |p - c| / width)^2).
+/// Rows and columns of the grid are pitch apart, along x and y of the world, and a chip is in the
+/// disc's middle.
+struct Chips {
+  double share;
+  double pitch_m, width_m;
+};
+
 /// A horizontal disc of light. Its radiance at the distance r of its centre is
 ///   radiance (1 - (1 - edge_share) (2 r / diameter)^2),
-/// or that of its recess, of which the disc is the rim. Or a rectangle that is lit evenly, and has
-/// nothing of what a disc has.
+/// and its chips add to it; or that of its recess, of which the disc is the rim. Or a rectangle
+/// that is lit evenly, and has nothing of what a disc has.
 struct Glow {
   Eigen::Vector3d position_m;
   double diameter_m;
@@ -60,6 +70,7 @@ struct Glow {
   std::optional<Recess> recess = {};
   std::optional<Halo> halo = {};
   std::optional<LampRectangle> rectangle = {};
+  std::optional<Chips> chips = {};
 };
 
 /// A lamp of the lamp map: a glow that a square wave switches.
@@ -130,7 +141,16 @@ struct Sharpening {
   double radius_px;
 };
 
-/// What a camera makes of the sensor's levels before they are rounded, in this order:
+/// A mosaic of colour filters over the pixels: lines of red and green, then of green and blue, from
+/// the first pixel on (RGGB). Red and blue filters pass so much of the light as green ones do. The
+/// camera fills in each colour by the mean of the nearest pixels that have it, and divides it by
+/// what its filter passes.
+struct Bayer {
+  double red_share, blue_share;
+};
+
+/// What a camera makes of the sensor's levels before they are rounded, in this order: colour, of
+/// its filters;
 ///   v = white ((level - black level) / (white - black level))^(1 / gamma), from 0 to white;
 /// sharpening; rounding; JPEG. Without a picture the levels are as the sensor has them.
 struct Picture {
@@ -138,6 +158,7 @@ struct Picture {
   std::optional<Sharpening> sharpening;
   /// 1 to 100, as libjpeg has it, of images of 8 bits; PNG without it.
   std::optional<int> jpeg_quality;
+  std::optional<Bayer> bayer = {};
 };
 
 /// How the camera sits on what carries it and turns about a vertical axis. It leans by a tilt that

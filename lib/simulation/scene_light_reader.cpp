@@ -31,6 +31,21 @@ Recess read_recess(YamlMap map, const Glow& rim) {
   return recess;
 }
 
+Chips read_chips(YamlMap map, const Glow& disc) {
+  Chips chips;
+  chips.share = read_share(map, "share");
+  const YamlValue pitch = map.required("pitch_m");
+  chips.pitch_m = pitch.number_within(1e-3, 10, "m");
+  if (chips.pitch_m > disc.diameter_m) throw pitch.error("is larger than the disc, diameter_m");
+  const YamlValue width = map.required("width_m");
+  chips.width_m = width.number_within(1e-4, 10, "m");
+  if (chips.width_m > 2 * chips.pitch_m) {
+    throw width.error("is more than twice pitch_m: such chips are an even disc");
+  }
+  map.finish();
+  return chips;
+}
+
 }  // namespace
 
 Glow read_glow(YamlMap& map, const Room& room, const std::optional<LampRectangle>& rectangle) {
@@ -52,6 +67,7 @@ void read_profile(YamlMap& map, Glow& glow) {
   } else {
     glow.edge_share =
         map.required("edge_share").number_within(0, 2, "(of the radiance at the centre)");
+    if (const auto chips = map.optional("chips")) glow.chips = read_chips(chips->map(), glow);
   }
   if (const auto halo = map.optional("halo")) {
     YamlMap keys = halo->map();

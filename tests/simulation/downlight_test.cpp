@@ -111,6 +111,25 @@ TEST_F(Downlight, FlickersWithItsHalo) {
   EXPECT_TRUE(dark && lit);
 }
 
+TEST_F(Downlight, ShowsTheChipsBehindItsDiffuser) {
+  const Eigen::Vector3d eye_m(0.0015, 0.0015, 0.1);  // the lamp is at (399, 299)
+  const cv::Mat1f even = rendered(eye_m);
+  glow().chips = Chips{0.4, 0.03, 0.015};
+  const cv::Mat1f image = rendered(eye_m);
+  const auto more = [&](int u, int v) { return (image(v, u) - even(v, u)) / kFull; };
+  EXPECT_NEAR(more(399, 299), 0.4, 1e-4);
+  EXPECT_NEAR(more(409, 299), 0.4, 1e-4) << "the next one, 3 cm aside";
+  EXPECT_NEAR(more(399, 279), 0.4, 1e-4);
+  EXPECT_NEAR(more(404, 299), 0.4 * 2 * std::pow(2, -4), 1e-4) << "between two";
+  EXPECT_NEAR(more(404, 304), 0.4 * 4 * std::pow(2, -8), 1e-4) << "between four";
+  EXPECT_NEAR(more(439, 299), 0, 1e-6) << "no chip beyond the rim";
+  for (int v = 0; v < image.rows; v += 3) {
+    for (int u = 0; u < image.cols; u += 3) {
+      if (even(v, u) == 0) EXPECT_EQ(image(v, u), 0);
+    }
+  }
+}
+
 TEST_F(Downlight, MayBeASteadyLampBehindSomething) {
   scene_.lamps[0].glow.radiance_e_per_s = 0;
   scene_.clutter.steady_lamps = {

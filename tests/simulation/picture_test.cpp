@@ -49,6 +49,55 @@ TEST(ToneCurve, OfGammaOneIsNone) {
   EXPECT_TRUE(same(expose(noisy, electrons, 1, Picture{1, {}, {}}), expose(noisy, electrons, 1)));
 }
 
+const Picture kBayer{1, {}, {}, Bayer{0.5, 0.25}};
+
+TEST(Bayer, OfAnEvenLightIsGrey) {
+  const cv::Mat image = expose(kSensor, cv::Mat1f(20, 40, 200), 1, kBayer);
+  ASSERT_EQ(image.type(), CV_8UC3);
+  EXPECT_TRUE(same(image, cv::Mat(image.size(), CV_8UC3, cv::Scalar::all(100))));
+}
+
+TEST(Bayer, ShowsAPixelInTheColourOfItsFilter) {
+  struct Lit {
+    int line, place, colour;
+    float electrons;
+  };
+  // Half and a quarter of the light pass red and blue filters.
+  for (const auto& [line, place, colour, electrons] :
+       {Lit{10, 20, 2, 80.F}, {10, 21, 1, 80.F}, {11, 20, 1, 80.F}, {11, 21, 0, 80.F}}) {
+    cv::Mat1f light(20, 40, 0.F);
+    light(line, place) = electrons;
+    cv::Mat channels[3];
+    cv::split(expose(kSensor, light, 1, kBayer), channels);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(cv::countNonZero(channels[i]) > 0, i == colour) << line << ", " << place;
+    }
+    const cv::Mat& own = channels[colour];
+    EXPECT_EQ(own.at<std::uint8_t>(line, place), 40);
+    EXPECT_EQ(own.at<std::uint8_t>(line, place + 1), colour == 1 ? 10 : 20) << "of 4, or of 2";
+    EXPECT_EQ(own.at<std::uint8_t>(line + 1, place + 1), colour == 1 ? 0 : 10);
+  }
+}
+
+TEST(Bayer, KeepsAPlane) {
+  cv::Mat1f light(20, 40);
+  for (int line = 0; line < light.rows; ++line) {
+    for (int place = 0; place < light.cols; ++place) {
+      light(line, place) = 64 + 8 * float(line) + 4 * float(place);
+    }
+  }
+  cv::Mat channels[3];
+  cv::split(expose(kSensor, light, 1, kBayer), channels);
+  // Levels behind filters are rounded, and multiplied by up to four after.
+  for (int line = 1; line + 1 < light.rows; ++line) {
+    for (int place = 1; place + 1 < light.cols; ++place) {
+      for (const cv::Mat& channel : channels) {
+        EXPECT_NEAR(channel.at<std::uint8_t>(line, place), light(line, place) / 2, 2.1);
+      }
+    }
+  }
+}
+
 TEST(Sharpening, OvershootsAStepAsAnUnsharpMask) {
   const double amount = 0.8, radius_px = 1.5, low = 50, high = 100;
   const Picture picture{1, Sharpening{amount, radius_px}, {}};

@@ -123,6 +123,53 @@ TEST(SceneFigures, OfARecessAndAHaloAreChecked) {
             "scene.yaml:11: lamps[1].halo.length_m: 0 m is not within 0.001 and 2 m" + unit);
 }
 
+TEST(SceneFigures, OfColourFiltersAreChecked) {
+  const auto with = [](const std::string& shares) {
+    return refusal_with("jpeg_quality: 90}", "jpeg_quality: 90, bayer: {" + shares + "}}");
+  };
+  EXPECT_EQ(with("red_share: 0.6, blue_share: 0.5"), "");
+  EXPECT_THAT(with("red_share: 0, blue_share: 0.5"),
+              testing::HasSubstr("picture.bayer.red_share: 0 (of what green filters pass) is not "
+                                 "within 0.05 and 2"));
+  EXPECT_THAT(with("red_share: 0.6"), testing::HasSubstr("blue_share"));
+}
+
+TEST(SceneFigures, OfChipsAreChecked) {
+  const auto with = [](const std::string& chips) {
+    return refusal_with("edge_share: 0.8}", "edge_share: 0.8, chips: {" + chips + "}}");
+  };
+  const std::string chips = "scene.yaml:10: lamps[0].chips.";
+  EXPECT_EQ(with("share: 0.3, pitch_m: 0.03, width_m: 0.02"), "");
+  EXPECT_EQ(with("share: 3, pitch_m: 0.03, width_m: 0.02"),
+            chips +
+                "share: 3 (of the source's radiance) is not within 0 and 1 (of the source's "
+                "radiance): is it in the right unit?");
+  EXPECT_EQ(with("share: 0.3, pitch_m: 0.2, width_m: 0.02"),
+            chips + "pitch_m: is larger than the disc, diameter_m");
+  EXPECT_EQ(with("share: 0.3, pitch_m: 0.03, width_m: 0.07"),
+            chips + "width_m: is more than twice pitch_m: such chips are an even disc");
+}
+
+TEST(SceneFigures, OfARectangleAreThoseOfTheLampMap) {
+  const std::string disc =
+      "diameter_m: 0.18, frequency_hz: 1600, duty: 0.4, "
+      "radiance_e_per_s: 2.0e+8, edge_share: 0.8}";
+  const auto with = [&](const std::string& keys) {
+    return refusal_with(disc, keys + ", frequency_hz: 1600, duty: 0.4, radiance_e_per_s: 2.0e+8}");
+  };
+  const std::string shape = "shape: rectangle, size_m: [0.6, 0.3], yaw_rad: 0.1";
+  EXPECT_EQ(with(shape), "");
+  EXPECT_THAT(with(shape + ", edge_share: 1"),
+              testing::StartsWith("scene.yaml:10: lamps[0]: key 'edge_share' is unknown here"));
+  EXPECT_THAT(with(shape + ", chips: {share: 0.3, pitch_m: 0.03, width_m: 0.02}"),
+              testing::StartsWith("scene.yaml:10: lamps[0]: key 'chips' is unknown here"));
+  EXPECT_EQ(
+      with(shape + ", diameter_m: 0.2"),
+      "scene.yaml:10: lamps[0].diameter_m: is of a disc, and this lamp is a rectangle: it has "
+      "a size_m");
+  EXPECT_THAT(with("shape: rectangle, yaw_rad: 0"), testing::HasSubstr("size_m"));
+}
+
 TEST(SceneFigures, OfARecessStandInPlaceOfAnEdgeShare) {
   EXPECT_EQ(refusal_with("recess: {", "edge_share: 1, recess: {"),
             "scene.yaml:13: clutter.steady_lamps[1]: key 'edge_share' is unknown here; the keys "
