@@ -64,8 +64,9 @@ bool may_pass(const soci::soci_error& error) {
            result == SQLITE_IOERR;
   }
   const auto* server = dynamic_cast<const soci::postgresql_soci_error*>(&error);
-  constexpr const char* lock_not_available = "55P03";
-  return server != nullptr && server->sqlstate() == lock_not_available;
+  constexpr const char *lock_not_available = "55P03", *deadlock_detected = "40P01";
+  return server != nullptr &&
+         (server->sqlstate() == lock_not_available || server->sqlstate() == deadlock_detected);
 }
 
 /// Ends a connection on which nothing was heard for so long: libpq waits for the answer of a server
@@ -250,8 +251,9 @@ void put_images(soci::session& sql, const RunRecord& record, Watch& watch) {
   }
 }
 
-/// Those that are not kept yet, and their entries in the trail.
-void put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
+/// Those that are not kept yet; what they add to the trail.
+std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
+  std::vector<TrailContent> added;
   for (const RunEvent& event : record.events) {
     soci::statement insert =
         (sql.prepare << "INSERT INTO events (event, run, what, text, who) VALUES (:event, :run, "
@@ -259,9 +261,10 @@ void put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
          soci::use(event.event), soci::use(record.run), soci::use(event.what),
          soci::use(event.text), soci::use(event.who));
     insert.execute(true);
-    if (insert.get_affected_rows() > 0) append_event(sql, record.run, event);
+    if (insert.get_affected_rows() > 0) added.push_back(content_of_event(record.run, event));
     watch.heard();
   }
+  return added;
 }
 
 std::string condition(const RunFilter& filter) {
@@ -332,9 +335,7 @@ void Records::keep(const RunRecord& record) {
   database_->run([&](Watch& watch) {
     soci::session& sql = database_->sql;
     soci::transaction transaction(sql);
-    // First, so that it waits for others before it has read or locked anything else.
-    lock_trail(sql);
-    watch.heard();
+    // Writes first, so that it waits for others before it has read anything.
     soci::statement insert(sql);
     std::string columns, places;
     for (const auto& [name, text, label, in_csv] : run_fields()) {
@@ -351,12 +352,15 @@ void Records::keep(const RunRecord& record) {
     if (insert.get_affected_rows() > 0) {
       put_figures(sql, record, watch);
       put_images(sql, record, watch);
-      append_run(sql, record.run);
+      added.push_back(content_of_run(sql, record.run));
+    std::vector<TrailContent> added;
     } else if (const auto kept = texts_of_run(sql, record.run);
                !kept || !same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);
     }
-    put_events(sql, record, watch);
+    for (TrailContent& event : put_events(sql, record, watch)) added.push_back(std::move(event));
+    // Last: all stations that share the records wait for it.
+    append_to_trail(sql, added);
     transaction.commit();
   });
 }
