@@ -267,6 +267,10 @@ std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record
   return added;
 }
 
+/// Of a run of a query.
+const std::string kNotVoided =
+    "NOT EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = 'voided')";
+
 std::string condition(const RunFilter& filter) {
   std::string text = "WHERE 1 = 1";
   if (!filter.camera.empty()) text += " AND runs.camera = :camera";
@@ -349,11 +353,11 @@ void Records::keep(const RunRecord& record) {
     insert.define_and_bind();
     insert.execute(true);
     watch.heard();
+    std::vector<TrailContent> added;
     if (insert.get_affected_rows() > 0) {
       put_figures(sql, record, watch);
       put_images(sql, record, watch);
       added.push_back(content_of_run(sql, record.run));
-    std::vector<TrailContent> added;
     } else if (const auto kept = texts_of_run(sql, record.run);
                !kept || !same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);
@@ -378,7 +382,8 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
     std::string camera, run;
     database_->sql << "SELECT runs.camera, runs.run FROM images JOIN runs ON runs.run = images.run "
                       "WHERE images.sha256 = :sha256 AND images.refused = '' AND runs.camera <> "
-                      ":camera ORDER BY runs.run LIMIT 1",
+                      ":camera AND " +
+                          kNotVoided + " ORDER BY runs.run LIMIT 1",
         soci::into(camera), soci::into(run), soci::use(sha256), soci::use(other_than_camera);
     return run.empty() ? std::string() : "camera " + camera + ": run " + run;
   });
@@ -420,13 +425,15 @@ std::vector<std::string> Records::with_open_hook(const std::string& station) {
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
   using Line = RunSummary;
   const std::string query =
-      "SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
+      "SELECT run, kind, station, camera, ended_utc, verdict, causes, COALESCE((SELECT "
+      "MIN(events.text) FROM events WHERE events.run = runs.run AND events.what = 'voided'), '') "
+      "FROM runs " +
       condition(filter) + " ORDER BY ended_utc, run";
   return database_->run(
       [&](Watch&) {
         return rows_of<Line>(database_->sql, query, filter, "",
                              {&Line::run, &Line::kind, &Line::station, &Line::camera,
-                              &Line::ended_utc, &Line::verdict, &Line::causes});
+                              &Line::ended_utc, &Line::verdict, &Line::causes, &Line::voided});
       },
       kManyRows);
 }
@@ -436,7 +443,7 @@ std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilte
   const std::string query =
       "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
       "FROM runs JOIN figures ON figures.run = runs.run " +
-      condition(filter) +
+      condition(filter) + " AND " + kNotVoided +
       " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, runs.run";
   return database_->run(
       [&](Watch&) {
