@@ -24,6 +24,7 @@
 #include "station/control_chart.h"
 #include "station/database_name.h"
 #include "station/export_runs.h"
+#include "station/golden_due.h"
 #include "station/measurement_study.h"
 #include "station/publish_run.h"
 #include "station/retention.h"
@@ -116,11 +117,13 @@ std::vector<RunSummary> runs_of(Known& known, const RunFilter& filter) {
   const std::vector<RunRecord> waiting = known.waiting();
   if (known.records) runs = known.records->list(filter);
   for (const RunRecord& run : waiting) {
-    const bool there = std::any_of(runs.begin(), runs.end(),
-                                   [&](const RunSummary& other) { return other.run == run.run; });
-    if (there || !passes(run, filter)) continue;
+    const RunEvent* event = voided(run);
+    const auto there = std::find_if(runs.begin(), runs.end(),
+                                    [&](const RunSummary& other) { return other.run == run.run; });
+    if (there != runs.end() && event != nullptr) there->voided = event->text;
+    if (there != runs.end() || !passes(run, filter)) continue;
     runs.push_back({run.run, run.kind, run.station, run.camera, run.ended_utc, run.verdict,
-                    "(waits here) " + run.causes});
+                    "(waits here) " + run.causes, event == nullptr ? "" : event->text});
   }
   std::stable_sort(runs.begin(), runs.end(), [](const RunSummary& a, const RunSummary& b) {
     return std::tie(a.ended_utc, a.run) < std::tie(b.ended_utc, b.run);
@@ -335,16 +338,23 @@ void list_runs(const StationRecordsOptions& options) {
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}\n";
   say(fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
   for (const RunSummary& run : runs) {
-    say(fmt::format(line, run.run, run.ended_utc, run.verdict, run.kind, run.station, run.camera,
-                    run.causes.substr(0, run.causes.find('\n'))));
+    const bool counts = run.voided.empty();
+    say(fmt::format(line, run.run, run.ended_utc, counts ? run.verdict : "VOID", run.kind,
+                    run.station, run.camera,
+                    counts ? run.causes.substr(0, run.causes.find('\n'))
+                           : "was " + run.verdict + ": " + run.voided));
   }
   const auto count = [&](Verdict verdict, const std::string& kind) {
     return std::count_if(runs.begin(), runs.end(), [&](const RunSummary& run) {
-      return run.verdict == name_of(verdict) && (kind == kAny || run.kind == kind);
+      return run.voided.empty() && run.verdict == name_of(verdict) &&
+             (kind == kAny || run.kind == kind);
     });
   };
   fmt::print("\n{} runs, {} passed, {} failed, {} invalid", runs.size(), count(Verdict::pass, kAny),
              count(Verdict::fail, kAny), count(Verdict::invalid, kAny));
+  const auto void_runs = std::count_if(runs.begin(), runs.end(),
+                                       [](const RunSummary& run) { return !run.voided.empty(); });
+  if (void_runs > 0) fmt::print(", {} voided", void_runs);
   // Of the units that were judged.
   const auto passed = count(Verdict::pass, "unit"), judged = passed + count(Verdict::fail, "unit");
   constexpr double percent = 100;
@@ -390,8 +400,8 @@ void restore_run(const StationRecordsOptions& options) {
   const std::filesystem::path results = results_of(options);
   Known known(options);
   const RunRecord record = run_of(known, options);
-  const std::string contradiction = contradiction_of(record);
-  if (!contradiction.empty()) throw InputError(record.run, contradiction);
+  const std::string no_verdict = why_no_verdict(record);
+  if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
   say(fmt::format("{}\n", publish_run(record, {}, results).string()));
 }
 
@@ -438,6 +448,28 @@ void clean_up(const StationRecordsOptions& options) {
   if (done == found.expired.size()) return;
   throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
                                        found.expired.size() - done, found.expired.size()));
+}
+
+void void_run(const StationRecordsOptions& options) {
+  Known known(options);
+  RunRecord record = run_of(known, options);
+  if (const RunEvent* event = voided(record)) {
+    throw std::invalid_argument(
+        fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text));
+  }
+  record.events.push_back(
+      new_event(kVoided, printable(options.reason), printable(options.operator_name)));
+  if (known.spool) {
+    known.spool->keep(record);
+    const StationConfig config = read_station(options.station);
+    if (record.kind == "golden" && record.station == config.station) {
+      forget_golden(config, record.run);
+    }
+    known.spool->deliver();
+  } else {
+    known.all().keep(record);
+  }
+  say(fmt::format("{} {} {}: voided\n", record.run, record.camera, record.verdict));
 }
 
 void verify_records(const StationRecordsOptions& options) {

@@ -15,6 +15,8 @@ struct StationRecordsOptions {
   std::string station, records;
   RunFilter filter;
   std::string run, figure, output;
+  /// Of void: who, and why.
+  std::string operator_name, reason;
   /// Of verify-records: the last digest of an earlier one; may be empty.
   std::string noted;
   /// Of clean: delete, instead of telling what would be.
@@ -38,6 +40,8 @@ void write_certificate(const StationRecordsOptions& options);
 /// vlp-station clean: what of the station's runs is kept no longer, deleted when that is asked for,
 /// which the runs' events tell. Records stay.
 void clean_up(const StationRecordsOptions& options);
+/// vlp-station void: a run counts no more, in no yield, trend or study, which its events tell.
+void void_run(const StationRecordsOptions& options);
 /// vlp-station verify-records: whether all records are as they were kept, by their trail. Throws
 /// GateNotMet when they are not.
 void verify_records(const StationRecordsOptions& options);

@@ -140,9 +140,10 @@ int main(int argc, char** argv) {
       "'study'\n"
       "tell of the records, 'restore' writes a run's files again, 'certificate' a page for who "
       "gets the\n"
-      "unit; 'verify-records' finds what was changed in the records. Runs wait in the station's "
-      "'spool' while the records cannot be reached; 'hook' runs "
-      "the\n"
+      "unit; 'void' takes a run out of all that is counted, 'verify-records' finds what was "
+      "changed in\n"
+      "the records. Runs wait in the station's 'spool' while the records cannot be reached; 'hook' "
+      "runs the\n"
       "station's hook again where it failed, 'clean' deletes what is kept no longer.\n"
       "vlp-station COMMAND --help tells more.\n\n"
       "Example, from the project's folder:\n"
@@ -190,6 +191,14 @@ int main(int argc, char** argv) {
   verify_records->add_option("--noted", records.noted,
                              "The last digest that an earlier verify-records told: the trail has "
                              "to have it still");
+  CLI::App* voided = vlp::add_where(
+      app, "void",
+      "A run counts no more: in no yield, trend or study; it stays in the records, with who voided "
+      "it and why, and is done again",
+      records);
+  voided->add_option("run", records.run, "Name of the run")->required();
+  voided->add_option("--operator", records.operator_name, "Who")->required();
+  voided->add_option("--reason", records.reason, "Why")->required();
   auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
   exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
   constexpr const char* which = "Which: rms_px, check_mean_mm, ...";
@@ -245,6 +254,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("restore")) vlp::restore_run(records);
     if (app.got_subcommand("certificate")) vlp::write_certificate(records);
     if (app.got_subcommand("clean")) vlp::clean_up(records);
+    if (app.got_subcommand("void")) vlp::void_run(records);
     if (app.got_subcommand("verify-records")) vlp::verify_records(records);
     if (app.got_subcommand("export")) vlp::export_runs(records);
     if (app.got_subcommand("trend")) vlp::show_trend(records);

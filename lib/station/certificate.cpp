@@ -184,8 +184,8 @@ void check_certifiable(const RunRecord& record) {
     return InputError(record.run, why + ": it has no certificate");
   };
   if (record.kind != "unit") throw none("is of the golden unit, by which a station is measured");
-  const std::string contradiction = contradiction_of(record);
-  if (!contradiction.empty()) throw none(contradiction);
+  const std::string no_verdict = why_no_verdict(record);
+  if (!no_verdict.empty()) throw none(no_verdict);
   if (record.invalid()) throw none("was not judged (" + record.first_cause() + ")");
   if (record.calibration.empty()) throw none("came to no calibration");
 }

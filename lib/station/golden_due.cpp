@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <fstream>
 #include <sstream>
 #include <system_error>
 
@@ -113,6 +114,12 @@ void note_for_golden(const StationConfig& config, const RunRecord& record) {
   if (written) return;
   forget(file);
   throw InputError(file, "cannot be written");
+}
+
+void forget_golden(const StationConfig& config, const std::string& run) {
+  std::string noted;
+  std::ifstream(note_of(config)) >> noted;
+  if (noted == run) forget(note_of(config));
 }
 
 }  // namespace vlp

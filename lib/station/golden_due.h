@@ -23,4 +23,7 @@ std::string golden_problem(const StationConfig& config);
 /// is due. Without `verify_due` nothing is noted.
 void note_for_golden(const StationConfig& config, const RunRecord& record);
 
+/// Of a golden run that counts no more: when it is the one that is noted, the golden unit is due.
+void forget_golden(const StationConfig& config, const std::string& run);
+
 }  // namespace vlp

@@ -64,8 +64,9 @@ bool may_pass(const soci::soci_error& error) {
            result == SQLITE_IOERR;
   }
   const auto* server = dynamic_cast<const soci::postgresql_soci_error*>(&error);
-  constexpr const char* lock_not_available = "55P03";
-  return server != nullptr && server->sqlstate() == lock_not_available;
+  constexpr const char *lock_not_available = "55P03", *deadlock_detected = "40P01";
+  return server != nullptr &&
+         (server->sqlstate() == lock_not_available || server->sqlstate() == deadlock_detected);
 }
 
 /// Ends a connection on which nothing was heard for so long: libpq waits for the answer of a server
@@ -250,8 +251,9 @@ void put_images(soci::session& sql, const RunRecord& record, Watch& watch) {
   }
 }
 
-/// Those that are not kept yet, and their entries in the trail.
-void put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
+/// Those that are not kept yet; what they add to the trail.
+std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
+  std::vector<TrailContent> added;
   for (const RunEvent& event : record.events) {
     soci::statement insert =
         (sql.prepare << "INSERT INTO events (event, run, what, text, who) VALUES (:event, :run, "
@@ -259,10 +261,15 @@ void put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
          soci::use(event.event), soci::use(record.run), soci::use(event.what),
          soci::use(event.text), soci::use(event.who));
     insert.execute(true);
-    if (insert.get_affected_rows() > 0) append_event(sql, record.run, event);
+    if (insert.get_affected_rows() > 0) added.push_back(content_of_event(record.run, event));
     watch.heard();
   }
+  return added;
 }
+
+/// Of a run of a query.
+const std::string kNotVoided =
+    "NOT EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = 'voided')";
 
 std::string condition(const RunFilter& filter) {
   std::string text = "WHERE 1 = 1";
@@ -332,9 +339,7 @@ void Records::keep(const RunRecord& record) {
   database_->run([&](Watch& watch) {
     soci::session& sql = database_->sql;
     soci::transaction transaction(sql);
-    // First, so that it waits for others before it has read or locked anything else.
-    lock_trail(sql);
-    watch.heard();
+    // Writes first, so that it waits for others before it has read anything.
     soci::statement insert(sql);
     std::string columns, places;
     for (const auto& [name, text, label, in_csv] : run_fields()) {
@@ -348,15 +353,18 @@ void Records::keep(const RunRecord& record) {
     insert.define_and_bind();
     insert.execute(true);
     watch.heard();
+    std::vector<TrailContent> added;
     if (insert.get_affected_rows() > 0) {
       put_figures(sql, record, watch);
       put_images(sql, record, watch);
-      append_run(sql, record.run);
+      added.push_back(content_of_run(sql, record.run));
     } else if (const auto kept = texts_of_run(sql, record.run);
                !kept || !same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);
     }
-    put_events(sql, record, watch);
+    for (TrailContent& event : put_events(sql, record, watch)) added.push_back(std::move(event));
+    // Last: all stations that share the records wait for it.
+    append_to_trail(sql, added);
     transaction.commit();
   });
 }
@@ -374,7 +382,8 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
     std::string camera, run;
     database_->sql << "SELECT runs.camera, runs.run FROM images JOIN runs ON runs.run = images.run "
                       "WHERE images.sha256 = :sha256 AND images.refused = '' AND runs.camera <> "
-                      ":camera ORDER BY runs.run LIMIT 1",
+                      ":camera AND " +
+                          kNotVoided + " ORDER BY runs.run LIMIT 1",
         soci::into(camera), soci::into(run), soci::use(sha256), soci::use(other_than_camera);
     return run.empty() ? std::string() : "camera " + camera + ": run " + run;
   });
@@ -416,13 +425,15 @@ std::vector<std::string> Records::with_open_hook(const std::string& station) {
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
   using Line = RunSummary;
   const std::string query =
-      "SELECT run, kind, station, camera, ended_utc, verdict, causes FROM runs " +
+      "SELECT run, kind, station, camera, ended_utc, verdict, causes, COALESCE((SELECT "
+      "MIN(events.text) FROM events WHERE events.run = runs.run AND events.what = 'voided'), '') "
+      "FROM runs " +
       condition(filter) + " ORDER BY ended_utc, run";
   return database_->run(
       [&](Watch&) {
         return rows_of<Line>(database_->sql, query, filter, "",
                              {&Line::run, &Line::kind, &Line::station, &Line::camera,
-                              &Line::ended_utc, &Line::verdict, &Line::causes});
+                              &Line::ended_utc, &Line::verdict, &Line::causes, &Line::voided});
       },
       kManyRows);
 }
@@ -432,7 +443,7 @@ std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilte
   const std::string query =
       "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
       "FROM runs JOIN figures ON figures.run = runs.run " +
-      condition(filter) +
+      condition(filter) + " AND " + kNotVoided +
       " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, runs.run";
   return database_->run(
       [&](Watch&) {

@@ -27,6 +27,8 @@ struct RunFilter {
 /// A run as it is listed.
 struct RunSummary {
   std::string run, kind, station, camera, ended_utc, verdict, causes;
+  /// Why it was voided; empty when it was not.
+  std::string voided = {};
 };
 
 /// A figure of one run.
@@ -77,8 +79,8 @@ class Records {
   std::optional<RunRecord> find(const std::string& run);
   /// Throws InputError when no run could be kept now.
   void check_writable();
-  /// "camera 0001: run RUN" of the first run of another camera that uses an image of this digest;
-  /// empty when there is none.
+  /// "camera 0001: run RUN" of the first run of another camera, not voided, that uses an image of
+  /// this digest; empty when there is none.
   std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
   /// The first judged run of a golden unit that uses an image of this digest; empty when there is
   /// none.
@@ -88,6 +90,7 @@ class Records {
   std::vector<std::string> with_open_hook(const std::string& station);
   /// From the first to the last.
   std::vector<RunSummary> list(const RunFilter& filter);
+  /// Without runs that were voided.
   std::vector<TrendPoint> trend(const std::string& figure, const RunFilter& filter);
   /// Whether all that is kept is as it was kept, by the trail (trail.h). `noted`: the last digest
   /// of an earlier check, which the trail has to have still, or empty.

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <ctime>
@@ -50,7 +51,16 @@ void RunRecord::judge(const std::vector<Cause>& why) {
   for (const Cause& cause : why) causes.append(cause.text).append("\n");
 }
 
-std::string contradiction_of(const RunRecord& record) {
+const RunEvent* voided(const RunRecord& record) {
+  const auto event = std::find_if(record.events.begin(), record.events.end(),
+                                  [](const RunEvent& each) { return each.what == kVoided; });
+  return event == record.events.end() ? nullptr : &*event;
+}
+
+std::string why_no_verdict(const RunRecord& record) {
+  if (const RunEvent* event = voided(record)) {
+    return fmt::format("was voided by {}: {}", event->who, event->text);
+  }
   if (!record.passed()) return "";
   constexpr const char* words = "the record says PASS, but {}: it was changed by hand";
   if (!record.causes.empty()) return fmt::format(words, "names a cause");

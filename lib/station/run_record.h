@@ -27,7 +27,7 @@ struct RunEvent {
 };
 inline constexpr const char *kHookWanted = "hook wanted", *kHookDone = "hook done",
                             *kHookFailed = "hook failed", *kImagesDeleted = "images deleted",
-                            *kResultsDeleted = "results deleted";
+                            *kResultsDeleted = "results deleted", *kVoided = "voided";
 
 /// One of now, by this program's account, as "Ann (vlp@station-7)" where an operator is known.
 RunEvent new_event(const std::string& what, const std::string& text,
@@ -69,9 +69,13 @@ struct RunRecord {
   void judge(const std::vector<Cause>& why);
 };
 
-/// What cannot be in a record as it was written: PASS though a gate is not met, or for a cause.
-/// Somebody has changed it. Empty otherwise.
-std::string contradiction_of(const RunRecord& record);
+/// The event that voided a run; null when it was not.
+const RunEvent* voided(const RunRecord& record);
+
+/// Why the verdict of a record is none: the run was voided, or it says what cannot be in one as it
+/// was written, PASS though a gate is not met, or for a cause, so that somebody has changed it.
+/// Empty when it is one.
+std::string why_no_verdict(const RunRecord& record);
 
 /// A text of a record: a column of the table of runs and a key of their JSON.
 struct RunField {

@@ -370,7 +370,7 @@ std::string Spool::owner_of(const std::string& sha256, const std::string& other_
   read();
   for (const auto& [file, spooled] : known_) {
     const RunRecord& run = spooled.run;
-    if (run.camera != other_than_camera && uses(run, sha256)) {
+    if (run.camera != other_than_camera && uses(run, sha256) && voided(run) == nullptr) {
       return "camera " + run.camera + ": run " + run.run;
     }
   }

@@ -129,8 +129,8 @@ std::vector<ScreenLine> hook_lines(const RunRecord& record) {
 }
 
 std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
-  const std::string contradiction = contradiction_of(record);
-  const bool passed = record.passed() && contradiction.empty();
+  const std::string no_verdict = why_no_verdict(record);
+  const bool passed = record.passed() && no_verdict.empty();
   const Tone tone = passed ? Tone::good : Tone::bad;
   std::vector<ScreenLine> lines{
       {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
@@ -149,17 +149,17 @@ std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
   for (std::string cause; std::getline(causes, cause);) {
     add_wrapped(lines, "Cause", cause, Tone::bad);
   }
-  if (!contradiction.empty()) add_wrapped(lines, "Cause", contradiction, Tone::bad);
+  if (!no_verdict.empty()) add_wrapped(lines, "Cause", no_verdict, Tone::bad);
   // Last, so that it stands on a terminal of 24 lines, too.
   lines.push_back({""});
   const std::span<const char* const> banner = passed             ? std::span(kPass)
                                               : record.invalid() ? std::span(kInvalid)
                                                                  : std::span(kFail);
-  if (contradiction.empty()) {
+  if (no_verdict.empty()) {
     for (const char* row : banner) lines.push_back({row, tone});
   }
   lines.push_back({""});
-  const std::string word = contradiction.empty() ? record.verdict : "NO VERDICT";
+  const std::string word = no_verdict.empty() ? record.verdict : "NO VERDICT";
   lines.push_back(
       {fmt::format("{}   camera {}   {}", word, record.camera, record.station).substr(0, kColumns),
        Tone::heading});

@@ -30,7 +30,7 @@ class Digested {
 
 /// Without its events, which have entries of their own. A text that is empty is left out: one that
 /// a later version of the tables adds changes nothing.
-std::string content_of(const RunRecord& run) {
+std::string digest_of(const RunRecord& run) {
   Digested content;
   for (const RunField& field : run_fields()) {
     if ((run.*field.text).empty()) continue;
@@ -64,7 +64,7 @@ std::string content_of(const RunRecord& run) {
   return content.sha256();
 }
 
-std::string content_of(const std::string& run, const RunEvent& event) {
+std::string digest_of(const std::string& run, const RunEvent& event) {
   Digested content;
   for (const std::string* text : {&run, &event.event, &event.what, &event.who, &event.text}) {
     content.add(*text);
@@ -85,20 +85,6 @@ std::string digest_of(const Entry& entry, const std::string& before) {
     digest.add(*text);
   }
   return digest.sha256();
-}
-
-void append(soci::session& sql, const std::string& run, const std::string& event,
-            const std::string& content) {
-  Entry entry{0, run, event, content, ""};
-  std::string before;
-  sql << "SELECT number, digest FROM trail ORDER BY number DESC LIMIT 1", soci::into(entry.number),
-      soci::into(before);
-  ++entry.number;
-  entry.digest = digest_of(entry, before);
-  sql << "INSERT INTO trail (number, run, event, content, digest) VALUES (:number, :run, :event, "
-         ":content, :digest)",
-      soci::use(entry.number), soci::use(entry.run), soci::use(entry.event),
-      soci::use(entry.content), soci::use(entry.digest);
 }
 
 std::vector<Entry> entries_of(soci::session& sql) {
@@ -189,21 +175,40 @@ class Contents {
 
 void lock_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
-void append_run(soci::session& sql, const std::string& run) {
+TrailContent content_of_run(soci::session& sql, const std::string& run) {
   // As the database has it: it may keep a number in another way than it was given.
-  append(sql, run, "", content_of(rows_of_run(sql, run).value()));
+  return {run, "", digest_of(rows_of_run(sql, run).value())};
 }
 
-void append_event(soci::session& sql, const std::string& run, const RunEvent& event) {
-  append(sql, run, event.event, content_of(run, event));
+TrailContent content_of_event(const std::string& run, const RunEvent& event) {
+  return {run, event.event, digest_of(run, event)};
+}
+
+void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents) {
+  if (contents.empty()) return;
+  lock_trail(sql);
+  Entry last;
+  sql << "SELECT number, digest FROM trail ORDER BY number DESC LIMIT 1", soci::into(last.number),
+      soci::into(last.digest);
+  for (const auto& [run, event, content] : contents) {
+    Entry entry{last.number + 1, run, event, content, ""};
+    entry.digest = digest_of(entry, last.digest);
+    sql << "INSERT INTO trail (number, run, event, content, digest) VALUES (:number, :run, :event, "
+           ":content, :digest)",
+        soci::use(entry.number), soci::use(entry.run), soci::use(entry.event),
+        soci::use(entry.content), soci::use(entry.digest);
+    last = entry;
+  }
 }
 
 void append_all(soci::session& sql) {
+  std::vector<TrailContent> contents;
   for (const std::string& run : names_of_runs(sql)) {
-    append_run(sql, run);
+    contents.push_back(content_of_run(sql, run));
     const RunRecord kept = rows_of_run(sql, run).value();
-    for (const RunEvent& event : kept.events) append_event(sql, run, event);
+    for (const RunEvent& event : kept.events) contents.push_back(content_of_event(run, event));
   }
+  append_to_trail(sql, contents);
 }
 
 TrailCheck check_trail(soci::session& sql, const std::string& noted,
@@ -218,9 +223,9 @@ TrailCheck check_trail(soci::session& sql, const std::string& noted,
   for (const std::string& name : names_of_runs(sql)) {
     const RunRecord run = rows_of_run(sql, name).value();
     ++check.runs;
-    contents.check(name, "", content_of(run));
+    contents.check(name, "", digest_of(run));
     for (const RunEvent& event : run.events) {
-      contents.check(name, event.event, content_of(name, event));
+      contents.check(name, event.event, digest_of(name, event));
     }
     heard();
   }

@@ -22,11 +22,18 @@ namespace vlp {
 /// longer fits. Only who takes entries from the end, with what they are of, or writes all of them
 /// anew, changes no digest that is there: an earlier last digest, noted elsewhere, tells of that.
 
-/// What the trail's end is for: one program at a time goes on with it, until its transaction ends.
+/// What an entry is to be of: a run that is kept, or an event of it, and the digest of all of it.
+struct TrailContent {
+  std::string run, event, content;
+};
+TrailContent content_of_run(soci::session& sql, const std::string& run);
+TrailContent content_of_event(const std::string& run, const RunEvent& event);
+
+/// From here to the end of its transaction this program alone goes on with the trail. What is
+/// slow is done before.
 void lock_trail(soci::session& sql);
-/// Adds the entry of a run that is kept, or of an event of it. Precondition: lock_trail().
-void append_run(soci::session& sql, const std::string& run);
-void append_event(soci::session& sql, const std::string& run, const RunEvent& event);
+/// Adds entries, behind those of all other programs: locks the trail.
+void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents);
 /// Adds entries of all runs there are, of an earlier version that had no trail.
 void append_all(soci::session& sql);
 

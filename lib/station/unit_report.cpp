@@ -13,13 +13,13 @@ namespace {
 
 ReportVerdict box_of(const RunRecord& record) {
   using Look = ReportVerdict::Look;
-  const std::string contradiction = contradiction_of(record);
+  const std::string no_verdict = why_no_verdict(record);
   ReportVerdict verdict{record.verdict,
                         record.passed()    ? Look::pass
                         : record.invalid() ? Look::none
                                            : Look::fail,
                         {}};
-  if (!contradiction.empty()) verdict = {"NO VERDICT", Look::none, {contradiction}};
+  if (!no_verdict.empty()) verdict = {"NO VERDICT", Look::none, {no_verdict}};
   std::istringstream causes(record.causes);
   for (std::string cause; std::getline(causes, cause);) verdict.causes.push_back(cause);
   return verdict;

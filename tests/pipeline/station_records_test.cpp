@@ -80,6 +80,32 @@ TEST_F(StationRecords, FindsWhatWasChangedInItsRecords) {
                                             "20[^ ]+ was changed, and 1 more\n"));
 }
 
+/// What should not count, by whom and why.
+TEST_F(StationRecords, VoidsARun) {
+  prepare("0001");
+  ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
+  const std::string listed = records("list").output;
+  const std::string name = listed.substr(listed.find("\n20") + 1, 33);
+  EXPECT_EQ(records("void " + name + " --operator Ann").exit_code, 2) << "no reason";
+  const std::string voiding = "void " + name + " --operator Ann --reason 'wrong serial'";
+  const auto done = records(voiding);
+  EXPECT_EQ(done.exit_code, 0) << done.errors;
+  EXPECT_EQ(done.output, name + " 0001 INVALID: voided\n");
+  EXPECT_THAT(
+      records(voiding).errors,
+      ContainsRegex("run " + name + " was voided before, by Ann [(].*@.*[)]: wrong serial"));
+  EXPECT_THAT(records("list").output,
+              AllOf(ContainsRegex(" VOID +unit .* was INVALID: wrong serial\n"),
+                    HasSubstr("1 runs, 0 passed, 0 failed, 0 invalid, 1 voided\n")));
+  EXPECT_THAT(
+      records("show").output,
+      AllOf(HasSubstr("Cause    was voided by Ann ("), HasSubstr("NO VERDICT   camera 0001"),
+            ContainsRegex("voided +20[0-9TZ:-]+ Ann [(].*: wrong serial\n")));
+  EXPECT_THAT(records("restore " + name).errors, HasSubstr("was voided by Ann"));
+  EXPECT_THAT(records("certificate " + name).errors, HasSubstr("it has no certificate"));
+  EXPECT_THAT(records("verify-records").output, HasSubstr("1 runs, 2 entries in the trail\n"));
+}
+
 /// The recipe of apps/README.md, with SQLite and with PostgreSQL.
 TEST_F(StationRecords, IsRestoredFromABackup) {
   const std::string backup = (folder / "backup").string(), here = (folder / "station").string();

@@ -152,6 +152,15 @@ TEST_F(GoldenDue, WhenItsNoteIsDamaged) {
   EXPECT_THAT(problem(), HasSubstr("what the golden unit said is not known"));
 }
 
+TEST_F(GoldenDue, AfterItsRunWasVoided) {
+  note("golden", "PASS");
+  forget_golden(config, "another");
+  EXPECT_EQ(problem(), "");
+  forget_golden(config, "RUN");
+  EXPECT_THAT(problem(), HasSubstr("not measured here yet"));
+  forget_golden(config, "RUN");
+}
+
 TEST_F(GoldenDue, IsNothingWithoutTheKey) {
   config.verify_due.reset();
   note("golden", "FAIL");

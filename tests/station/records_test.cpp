@@ -79,6 +79,23 @@ void check_events(Records& records) {
   EXPECT_EQ(found->events[2].what, kHookDone);
 }
 
+/// A run that is voided stays, and counts in nothing. Of check_records().
+void check_voided(Records& records) {
+  const std::size_t before = records.trend("rms_px", {}).size();
+  RunRecord run = sample(run_of(0), "a", 0);
+  run.events = {new_event(kVoided, "wrong serial", "Ann")};
+  records.keep(run);
+  const auto found = records.find(run.run);
+  ASSERT_TRUE(found);
+  EXPECT_THAT(why_no_verdict(*found),
+              testing::MatchesRegex("was voided by Ann [(].*@.*: wrong serial"));
+  EXPECT_THAT(records.trend("rms_px", {}), SizeIs(before - 1));
+  EXPECT_EQ(records.list({})[0].run, run.run);
+  EXPECT_EQ(records.list({})[0].voided, "wrong serial");
+  EXPECT_EQ(records.list({})[1].voided, "");
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), "camera a: run " + run_of(1));
+}
+
 /// What holds in every database.
 void check_records(const std::string& where) {
   Records records(where);
@@ -136,10 +153,11 @@ void check_records(const std::string& where) {
   EXPECT_THAT(records.trend("tilt_deg", {}), IsEmpty());
   check_all_texts(records);
   check_events(records);
+  check_voided(records);
   const TrailCheck trail = records.check("");
   EXPECT_THAT(trail.problems, IsEmpty());
   EXPECT_EQ(trail.runs, 7U);
-  EXPECT_EQ(trail.entries, 7U + 5U) << "runs and events";
+  EXPECT_EQ(trail.entries, 7U + 6U) << "runs and events";
 }
 
 /// Two programs that write at the same time, the first also makes the tables.

@@ -158,7 +158,7 @@ TEST_F(UnitTest, HasAReportOfItsVerdict) {
   EXPECT_EQ(page.find("coverage: share"), page.rfind("coverage: share"));
   // Changed in the database by hand.
   record.figures[1].value = 0.5;
-  EXPECT_THAT(contradiction_of(record), HasSubstr("rms_px is 0.5 px, at most 0.3 px is asked for"));
+  EXPECT_THAT(why_no_verdict(record), HasSubstr("rms_px is 0.5 px, at most 0.3 px is asked for"));
   EXPECT_THAT(unit_report(record, "", {}),
               AllOf(HasSubstr("NO VERDICT</strong><p>the record says PASS, but rms_px"),
                     Not(HasSubstr("<strong>PASS"))));
