@@ -256,7 +256,7 @@ auto determined(const Study& study) {
 std::map<std::string, double> references_of(const std::vector<std::string>& texts) {
   std::map<std::string, double> references;
   for (const std::string& text : texts) {
-    const auto at = text.find('=');
+    const auto at = text.rfind('=');
     std::istringstream number(at == std::string::npos ? "" : text.substr(at + 1));
     double value = 0;
     if (at == 0 || !(number >> value) || !number.eof() || !std::isfinite(value)) {
@@ -287,7 +287,6 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
     values.push_back({unit, references.at(unit), value});
   }
   const BiasStudy study = determined([&] { return bias_study(values); });
-  if (!options.output.empty()) draw_bias(options.output, options.figure, values, study);
   constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}\n";
   say(fmt::format("{}: bias against {} reference units, {}\n\n", options.figure, study.units.size(),
                   std::string_view(kind.unit).empty() ? "a share" : kind.unit));
@@ -300,18 +299,20 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
     fmt::print("{:<36}{}{}\n", name, words_of(estimate), estimate.shows() ? "   shows" : "");
   };
   line("all", study.all);
-  if (!study.linearity) return;
-  const Linearity& linearity = *study.linearity;
-  fmt::print("\nbias = intercept + slope x reference\n");
-  line("slope", linearity.slope);
-  line("intercept", linearity.intercept);
-  fmt::print("residual sd {:.4g}, R^2 {:.1f} %\n\n{:<20}{:>10}{:>18}   95 % band\n",
-             linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
-  for (const UnitBias& unit : study.units) {
-    const double at = linearity.bias_at(unit.reference), half = linearity.band_at(unit.reference);
-    say(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}\n", unit.unit, unit.reference,
-                    at, at - half, at + half, std::abs(at) > half ? "   without 0" : ""));
+  if (study.linearity) {
+    const Linearity& linearity = *study.linearity;
+    fmt::print("\nbias = intercept + slope x reference\n");
+    line("slope", linearity.slope);
+    line("intercept", linearity.intercept);
+    fmt::print("residual sd {:.4g}, R^2 {:.1f} %\n\n{:<20}{:>10}{:>18}   95 % band\n",
+               linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
+    for (const UnitBias& unit : study.units) {
+      const double at = linearity.bias_at(unit.reference), half = linearity.band_at(unit.reference);
+      say(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}\n", unit.unit, unit.reference,
+                      at, at - half, at + half, std::abs(at) > half ? "   without 0" : ""));
+    }
   }
+  if (!options.output.empty()) draw_bias(options.output, options.figure, values, study);
 }
 
 /// Deletes the folder of a run; its record tells of it as soon as nothing is in it. Throws

@@ -150,7 +150,7 @@ std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
   const std::string asked = prompt.back().text;
   std::string typed;
   if (!interactive_ && ::isatty(STDIN_FILENO) == 1) {
-    for (const auto& [line, tone] : prompt) fmt::print(stderr, "{}\n", printable(line));
+    fmt::print(stderr, "{}\n", printable(asked));
   }
   for (;;) {
     prompt.back().text = asked + typed;

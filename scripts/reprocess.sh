@@ -42,7 +42,7 @@
 #                  its folders, tables and YAML files, to which an image that
 #                  is written over in place looks the same. Default: files; in
 #                  an archive of more than 10,000 sessions folders, and files
-#                  once in 7 days
+#                  once a week
 # --rebuild-catalogue  forgets what was seen: all contents are looked at again
 # --diff           says what differs between a session's result and a former
 #                  one, by its key's first letters (default: the last one), or

@@ -353,7 +353,14 @@ LocateResult locate_frames(const LocateInput& input) {
   warn_of_captures(result, input);
   tell_of_lamps_left_out(result, input);
   if (input.lamp_offsets) {
-    result.lamp_offsets = offsets_of_lamps(input.lamps, ceiling_views(input, result.fixes));
+    auto views = ceiling_views(input, result.fixes);
+    const bool several = views.size() > 1;
+    result.lamp_offsets = offsets_of_lamps(input.lamps, std::move(views));
+    if (several && result.lamp_offsets.empty()) {
+      result.notes.push_back(
+          "where the other lamps see each lamp is not told: captures do not tie all lamps "
+          "together");
+    }
   }
   result.summary = summarize(result.rows);
   if (result.summary.fixes == 0) {

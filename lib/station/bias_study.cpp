@@ -21,15 +21,9 @@ namespace {
 
 constexpr double kLevel = 0.05;
 
-double mean_of_all(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(values.size());
-}
-
 /// Sum of (x - mean x) (y - mean y).
 double products_about_means(const std::vector<double>& x, const std::vector<double>& y) {
-  const double of_x = mean_of_all(x), of_y = mean_of_all(y);
+  const double of_x = mean_of(x), of_y = mean_of(y);
   double sum = 0;
   for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - of_x) * (y[i] - of_y);
   return sum;
@@ -53,10 +47,10 @@ TestedEstimate tested(double value, double standard_error, double dof) {
 Linearity line_of(const std::vector<double>& references, const std::vector<double>& differences) {
   Linearity line;
   line.count = static_cast<double>(references.size());
-  line.mean_reference = mean_of_all(references);
+  line.mean_reference = mean_of(references);
   line.squares_of_references = products_about_means(references, references);
   const double slope = products_about_means(references, differences) / line.squares_of_references,
-               mean = mean_of_all(differences), intercept = mean - slope * line.mean_reference;
+               mean = mean_of(differences), intercept = mean - slope * line.mean_reference;
   double residuals = 0;
   for (std::size_t i = 0; i < references.size(); ++i) {
     const double fitted = mean + slope * (references[i] - line.mean_reference);
@@ -106,7 +100,7 @@ BiasStudy bias_study(const std::vector<ReferenceValue>& values) {
           fmt::format("unit {} has one run: a bias study needs two or more of each", unit));
     }
     const auto n = static_cast<double>(of_unit.size());
-    const double mean = mean_of_all(of_unit), squares = products_about_means(of_unit, of_unit),
+    const double mean = mean_of(of_unit), squares = products_about_means(of_unit, of_unit),
                  sd = std::sqrt(squares / (n - 1));
     within += squares;
     study.units.push_back({unit, reference, of_unit.size(), mean, sd,
@@ -114,7 +108,7 @@ BiasStudy bias_study(const std::vector<ReferenceValue>& values) {
   }
   const auto count = static_cast<double>(values.size());
   const double dof = count - static_cast<double>(by_unit.size());
-  study.all = tested(mean_of_all(differences), std::sqrt(within / dof / count), dof);
+  study.all = tested(mean_of(differences), std::sqrt(within / dof / count), dof);
   const bool differ = study.units.front().reference < study.units.back().reference;
   if (differ) study.linearity = line_of(references, differences);
   return study;

@@ -11,6 +11,8 @@
 #include "report/plots/gnuplot.h"
 #include "report/plots/plot_parts.h"
 
+#include "station/distributions.h"
+
 namespace vlp {
 
 namespace {
@@ -104,12 +106,8 @@ ControlChart control_chart(std::span<const double> values) {
   if (values.empty()) return chart;
   const auto count = static_cast<double>(values.size());
   double ranges = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    // From the first, so that the mean of equal values is their value to the last bit.
-    chart.mean += (values[i] - values.front()) / count;
-    if (i > 0) ranges += std::abs(values[i] - values[i - 1]);
-  }
-  chart.mean += values.front();
+  for (std::size_t i = 1; i < values.size(); ++i) ranges += std::abs(values[i] - values[i - 1]);
+  chart.mean = mean_of(values);
   chart.sigma = values.size() > 1 ? ranges / (count - 1) / d2 : 0;
   chart.lower = chart.mean - 3 * chart.sigma;
   chart.upper = chart.mean + 3 * chart.sigma;

@@ -99,4 +99,10 @@ double t_quantile(double both_tails, double dof) {
   return high;
 }
 
+double mean_of(std::span<const double> values) {
+  double above_first = 0;
+  for (const double value : values) above_first += value - values.front();
+  return values.front() + above_first / static_cast<double>(values.size());
+}
+
 }  // namespace vlp

@@ -2,7 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
+
 namespace vlp {
+
+/// Of equal values their value to the last bit. Precondition: not empty.
+double mean_of(std::span<const double> values);
 
 /// P(X <= x) of chi squared, of any positive degrees of freedom: the regularized incomplete gamma
 /// function P(dof / 2, x / 2) (NIST DLMF 8.7.1 below the mean, 8.9.2 above).

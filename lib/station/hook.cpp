@@ -9,6 +9,7 @@
 #include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -221,6 +222,14 @@ const RunEvent* last_of(const RunRecord& record, const char* what) {
   return last;
 }
 
+/// Whether the file that is open is still the one of that name.
+bool is_that(int descriptor, const std::filesystem::path& file) {
+  struct stat open {
+  }, named{};
+  return ::fstat(descriptor, &open) == 0 && ::stat(file.c_str(), &named) == 0 &&
+         open.st_dev == named.st_dev && open.st_ino == named.st_ino;
+}
+
 }  // namespace
 
 RunEvent hook_wanted(const Hook& hook, const std::string& operator_name) {
@@ -277,9 +286,16 @@ std::string hook_problem(const RunRecord& record) {
 }
 
 HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)
-    : file_(spool / (".hook-" + run)),
-      descriptor_(::open(file_.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644)) {
-  if (descriptor_ >= 0) held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0;
+    : file_(spool / (".hook-" + run)) {
+  for (;;) {
+    descriptor_ = ::open(file_.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+    if (descriptor_ < 0) return;
+    // Where the file system has no locks, no other program holds one.
+    held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    // Who held it before may have taken the file away meanwhile.
+    if (!held_ || is_that(descriptor_, file_)) return;
+    ::close(descriptor_);
+  }
 }
 
 HookLock::~HookLock() {

@@ -16,10 +16,6 @@
 namespace vlp {
 namespace {
 
-double mean_of(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
 double squares_about(const std::vector<double>& values, double center) {
   return std::accumulate(values.begin(), values.end(), 0.0, [&](double sum, double value) {
     return sum + (value - center) * (value - center);

@@ -94,6 +94,8 @@ def write_shards(archive, state, options):
 def looked_at(catalogue, look):
     if look == "files":
         return "looked at all files"
+    if not catalogue.all_files_at_ns():
+        return "looked at folders and tables, never yet at all files"
     day = time.strftime("%Y-%m-%d", time.localtime(catalogue.all_files_at_ns() / 1e9))
     return f"looked at folders and tables, at all files last on {day}"
 

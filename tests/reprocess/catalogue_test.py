@@ -120,6 +120,7 @@ class Look(unittest.TestCase):
         self.assertEqual(self.glance("folders"), said[0])
         self.assertEqual([self.looked(days) for days in (8, 9, 14)], ["files", "folders", "folders"])
         self.assertNotEqual(self.glance("folders"), said[0])  # noticed within the week
+        self.assertEqual([self.looked(days) for days in (21, 28, 35)], ["files"] * 3)  # a run once a week
         self.assertEqual(self.looked(-1), "files")  # the clock was set back
         known = catalogue.Catalogue(self.file, self.archive)
         self.assertEqual(known.look_for(catalogue.FEW_SESSIONS), "files")

@@ -190,7 +190,11 @@ TEST(BiasStudy, OfValuesWithoutScatterIsCertain) {
   EXPECT_EQ(study.all.t, std::numeric_limits<double>::infinity());
   EXPECT_EQ(study.all.low, 0.5);
   EXPECT_TRUE(study.all.shows());
-  EXPECT_EQ(bias_study(values_of_unit("a", 1.5, {1.5, 1.5})).all.p, 1);
+  // Ten times 0.9 does not sum to 9.
+  const BiasStudy none = bias_study(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
+  EXPECT_EQ(none.units[0].bias.value, 0);
+  EXPECT_EQ(none.units[0].bias.p, 1);
+  EXPECT_EQ(none.all.p, 1);
 }
 
 TEST(BiasStudy, SaysWhatIsMissing) {
