@@ -29,7 +29,7 @@ struct CeilingView {
 /// A_c: how what the camera has in common moves what it sees; G: the similarities of the floor
 /// plan, which no capture tells of. Then a lamp's offset is what the similarity that fits the
 /// others best leaves of it: its movement, exactly, when it alone was moved. What contradicts the
-/// rest by 6 standard deviations or more, as a misidentified lamp, is left out. Of lamps that two
+/// rest by 6 standard deviations or so, as a misidentified lamp, is left out. Of lamps that two
 /// captures or more see beside two others or more; none where captures do not tie all of them
 /// together, or nothing is over to tell the noise. Lamps hang much alike high.
 std::vector<LampOffset> offsets_of_lamps(const LampMap& map, std::vector<CeilingView> views);

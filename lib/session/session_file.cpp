@@ -18,7 +18,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kMillimetres = 1e3;
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 Json sd_of(const std::optional<Matrix2>& covariance, double factor) {

@@ -11,6 +11,9 @@
 
 namespace vlp {
 
+/// In a metre, of what JSON has in mm.
+inline constexpr double kMillimetres = 1e3;
+
 /// How a step ended, kept beside its outputs so that it need not be run again.
 struct KeptStep {
   /// Digest of all that the step depends on, and of what it wrote.
