@@ -81,7 +81,7 @@ TEST(Limits, ShowWhatMotionAndLeanCost) {
     EXPECT_NEAR(map.number(row, map.required("horizontal_m")),
                 std::hypot(noise_m, map.number(row, map.required("motion_m")),
                            map.number(row, map.required("lean_m"))),
-                1e-5 * noise_m);
+                1e-8);  // six digits
     EXPECT_GT(map.number(row, map.required("lean_m")), noise_m);
   }
   EXPECT_GT(with_fix, 0);

@@ -3,6 +3,7 @@
 /// A Positioner answers without allocating, without throwing, from any number of threads.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <new>
@@ -63,14 +64,22 @@ TEST(Positioner, DoesNotAllocate) {
   std::swap(swapped[0].lamp, swapped[6].lamp);
   for (Detection& detection : bad) detection.lamp = 1 + detection.lamp % 8;
   const Sensors sensors{Inclination{0.01, 0.02}, 0.001, HeightAndYaw{0, 0}};
-  Sensors in_hand;
-  in_hand.motion = KnownMotion::up_to(1, 1);
-  in_hand.inclination_sigma_rad = 1.6;
+  // Whatever is estimated of a body, from one frame and from two.
+  std::array<Sensors, 8> bodies;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    bodies[i].motion = KnownMotion::up_to(i & 1 ? 1 : 0, i & 2 ? 1 : 0);
+    bodies[i].inclination_sigma_rad = i & 4 ? 1.6 : 0;
+    bodies[i].height = KnownHeight{0, 1};
+  }
   for (const auto& detections : {good, swapped, bad, {}}) {
+    const std::array earlier{EarlierFrame{good, 0.05}};
     const long before = allocations;
     for (std::size_t count = 0; count <= detections.size(); ++count) {
       (void)positioner.locate({detections.data(), count}, sensors);
-      (void)positioner.locate({detections.data(), count}, in_hand);
+      for (const Sensors& body : bodies) {
+        (void)positioner.locate({detections.data(), count}, body);
+        (void)positioner.locate({detections.data(), count}, body, earlier);
+      }
     }
     EXPECT_EQ(allocations, before);
   }
