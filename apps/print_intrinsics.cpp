@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "camera/spline_grid.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
 
@@ -22,11 +23,15 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
     fmt::print("edges         {:.3f} px towards the dark, taken out\n",
                upper_median(solution.edge_shifts_px));
   }
-  fmt::print(
-      "focal length  {:.2f}, {:.2f} px, sd {:.2f} by noise, {:.2f} by views\n"
-      "centre        {:.2f}, {:.2f} px\n",
-      parameters[0], parameters[1], report.focal_sd_px, report.focal_sd_by_views_px, parameters[2],
-      parameters[3]);
+  fmt::print("focal length  {:.2f}, {:.2f} px", parameters[0], parameters[1]);
+  if (is_splined(solution.problem.lens_model)) {
+    fmt::print(", which {} control points make up for\n",
+               grid_of(solution.problem.lens_model).control_points());
+  } else {
+    fmt::print(", sd {:.2f} by noise, {:.2f} by views\n", report.focal_sd_px,
+               report.focal_sd_by_views_px);
+  }
+  fmt::print("centre        {:.2f}, {:.2f} px\n", parameters[2], parameters[3]);
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst, at ({:.0f}, {:.0f})\n",
              report.uncertainty_mean_px, report.uncertainty_worst_px,
              report.uncertainty_worst_at.x(), report.uncertainty_worst_at.y());

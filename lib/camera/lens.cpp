@@ -18,6 +18,19 @@ constexpr double kOnAxis = 1e-300;
 
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
+/// Where a point lies in the stereographic plane, and its derivative.
+struct Stereographic {
+  explicit Stereographic(const Eigen::Vector3d& x)
+      : norm(x.norm()), depth(norm + x.z()), plane(x.head<2>() * (2 / depth)) {}
+  Matrix23 jacobian(const Eigen::Vector3d& x) const {
+    const Eigen::Vector3d d_depth = x / norm + Eigen::Vector3d::UnitZ();
+    return 2 / depth * (Matrix23::Identity() - plane / 2 * d_depth.transpose());
+  }
+
+  double norm, depth;
+  Eigen::Vector2d plane;
+};
+
 /// d(x/z, y/z) / d(x, y, z).
 Matrix23 division_jacobian(const Eigen::Vector2d& z, double inverse_depth) {
   Matrix23 jacobian;
@@ -42,7 +55,9 @@ Lens::Lens(LensModel model, std::span<const double> parameters) : model_(model) 
   }
   focal_px_ = {parameters[0], parameters[1]};
   center_px_ = {parameters[2], parameters[3]};
-  if (model == LensModel::fisheye) {
+  if (is_splined(model)) {
+    spline_ = std::make_shared<const SplineSurface>(grid_of(model), parameters.subspan(4));
+  } else if (model == LensModel::fisheye) {
     std::copy(parameters.begin() + 4, parameters.end(), fisheye_.k.begin());
   } else {
     std::copy(parameters.begin() + 4, parameters.end(), distortion_.k.begin());
@@ -66,6 +81,10 @@ std::optional<Eigen::Vector2d> Lens::project(const Eigen::Vector3d& x_in_camera)
       return std::nullopt;
     }
     plane = x_in_camera.head<2>() * (fisheye_.distance(angle_rad) / std::max(beside, kOnAxis));
+  } else if (spline_) {
+    const Stereographic at(x_in_camera);
+    if (!(at.depth > 0) || !spline_->covers(at.plane)) return std::nullopt;
+    plane = spline_->distorted(at.plane);
   } else {
     const Eigen::Vector2d z = x_in_camera.head<2>() / x_in_camera.z();
     if (!(x_in_camera.z() > 0) || !(z.squaredNorm() <= valid_radius_squared_)) return std::nullopt;
@@ -80,17 +99,18 @@ std::optional<Lens::Projection> Lens::project_with_jacobians(
     const Eigen::Vector3d& x_in_camera) const {
   const auto pixel = project(x_in_camera);
   if (!pixel) return std::nullopt;
-  const auto columns = static_cast<Eigen::Index>(parameter_count(model_));
+  constexpr Eigen::Index core = 4;
+  const Eigen::Index columns = spline_ ? core : static_cast<Eigen::Index>(parameter_count(model_));
   Projection result{*pixel, {}, {}};
   result.d_pixel_d_parameters.resize(2, columns);
   result.d_pixel_d_parameters.leftCols<2>() =
       (*pixel - center_px_).cwiseQuotient(focal_px_).asDiagonal();
   result.d_pixel_d_parameters.middleCols<2>(2).setIdentity();
   if (model_ == LensModel::stereographic) {
-    const double norm = x_in_camera.norm(), scale = 2 / (norm + x_in_camera.z());
-    const Eigen::Vector2d plane = x_in_camera.head<2>() * scale;
-    const Eigen::Vector3d d_depth = x_in_camera / norm + Eigen::Vector3d::UnitZ();
-    result.d_pixel_d_point = scale * (Matrix23::Identity() - plane / 2 * d_depth.transpose());
+    result.d_pixel_d_point = Stereographic(x_in_camera).jacobian(x_in_camera);
+  } else if (spline_) {
+    const Stereographic at(x_in_camera);
+    result.d_pixel_d_point = (*spline_)(at.plane).d_distorted_d_u * at.jacobian(x_in_camera);
   } else if (model_ == LensModel::fisheye) {
     const Eigen::Vector2d xy = x_in_camera.head<2>();
     const double beside = xy.norm(), squared_norm = x_in_camera.squaredNorm();
@@ -113,9 +133,35 @@ std::optional<Lens::Projection> Lens::project_with_jacobians(
     const Eigen::Vector2d z = x_in_camera.head<2>() * inverse_depth;
     result.d_pixel_d_point = distortion_(z).d_distorted_d_z * division_jacobian(z, inverse_depth);
     result.d_pixel_d_parameters.rightCols(columns - 4) =
-        focal_px_.asDiagonal() * distortion_.coefficient_jacobian(z).leftCols(columns - 4);
+        focal_px_.asDiagonal() * distortion_.coefficient_jacobian(z).leftCols(columns - core);
   }
   result.d_pixel_d_point = focal_px_.asDiagonal() * result.d_pixel_d_point.eval();
+  return result;
+}
+
+std::optional<Lens::ByParameters> Lens::by_parameters(const Eigen::Vector3d& x_in_camera) const {
+  const auto projection = project_with_jacobians(x_in_camera);
+  if (!projection) return std::nullopt;
+  ByParameters result;
+  result.d_pixel = projection->d_pixel_d_parameters;
+  const Eigen::Index core = result.d_pixel.cols();
+  for (Eigen::Index i = 0; i < core; ++i) result.parameters.push_back(i);
+  if (!spline_) return result;
+  const SplineSurface::Weights at = spline_->weights(Stereographic(x_in_camera).plane);
+  const SplineGrid& grid = spline_->grid();
+  const auto width = static_cast<std::size_t>(grid.order) + 1;
+  result.d_pixel.conservativeResize(2, core + 2 * static_cast<Eigen::Index>(width * width));
+  result.d_pixel.rightCols(result.d_pixel.cols() - core).setZero();
+  for (std::size_t j = 0; j < width; ++j) {
+    for (std::size_t i = 0; i < width; ++i) {
+      const Eigen::Index point = (at.row + static_cast<Eigen::Index>(j)) * grid.nx + at.column +
+                                 static_cast<Eigen::Index>(i);
+      for (Eigen::Index k = 0; k < 2; ++k) {
+        result.d_pixel(k, std::ssize(result.parameters)) = focal_px_[k] * at.x[i] * at.y[j];
+        result.parameters.push_back(core + 2 * point + k);
+      }
+    }
+  }
   return result;
 }
 
@@ -178,6 +224,17 @@ std::optional<Lens::Ray> Lens::unproject_fisheye(const Eigen::Vector2d& plane) c
   return ray;
 }
 
+std::optional<Lens::Ray> Lens::unproject_splined(const Eigen::Vector2d& plane) const {
+  Eigen::Matrix2d d_plane_d_u;
+  const auto u = spline_->undistorted(plane, d_plane_d_u);
+  if (!u) return std::nullopt;
+  const Eigen::Matrix2d d_u_d_pixel = d_plane_d_u.inverse() * focal_px_.cwiseInverse().asDiagonal();
+  Ray ray;
+  ray.direction << *u, 1 - u->squaredNorm() / 4;
+  ray.d_direction_d_pixel << d_u_d_pixel, -u->transpose() / 2 * d_u_d_pixel;
+  return ray;
+}
+
 std::optional<Lens::Ray> Lens::unproject(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector2d plane = (pixel - center_px_).cwiseQuotient(focal_px_);
   if (!plane.allFinite()) return std::nullopt;
@@ -190,6 +247,7 @@ std::optional<Lens::Ray> Lens::unproject(const Eigen::Vector2d& pixel) const {
     return ray;
   }
   if (model_ == LensModel::fisheye) return unproject_fisheye(plane);
+  if (spline_) return unproject_splined(plane);
   if (model_ == LensModel::pinhole) {
     ray.direction << plane, 1;
     ray.d_direction_d_pixel << d_plane_d_pixel, 0, 0;

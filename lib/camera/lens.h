@@ -3,12 +3,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "distortion.h"
 #include "fisheye.h"
 #include "lens_model.h"
+#include "spline_surface.h"
 
 namespace vlp {
 
@@ -16,8 +19,9 @@ namespace vlp {
 ///   OPENCVn, PINHOLE   pixel = f * distorted(x/z, y/z) + c       (Distortion; none for PINHOLE)
 ///   STEREOGRAPHIC      pixel = f * 2 (x, y) / (|p| + z) + c
 ///   OPENCV_FISHEYE     pixel = f * d(a) (x, y) / |(x, y)| + c,  a = atan2(|(x, y)|, z)  (Fisheye)
-/// with f = (fx, fy), c = (cx, cy). All but the last are mrcal's LENSMODEL_... of the same names
-/// (mrcal documentation, "Lens models"). Built once; const and safe to share between threads.
+///   SPLINED_STEREOGRAPHIC_...  pixel = f * distorted(2 (x, y) / (|p| + z)) + c  (SplineSurface)
+/// with f = (fx, fy), c = (cx, cy). All but OPENCV_FISHEYE are mrcal's LENSMODEL_... of the same
+/// names (mrcal documentation, "Lens models"). Built once; const and safe to share between threads.
 class Lens {
  public:
   /// `parameters` in mrcal's order. Throws std::invalid_argument when their number is not
@@ -32,26 +36,37 @@ class Lens {
 
   /// The pixel of a point (any length unit but zero). Nothing for a point that the lens model
   /// does not describe: at or behind the camera's plane z = 0 (STEREOGRAPHIC, OPENCV_FISHEYE:
-  /// straight behind), beyond Distortion::valid_radius or Fisheye::valid_angle_rad, or not finite.
+  /// straight behind), beyond Distortion::valid_radius, Fisheye::valid_angle_rad or
+  /// SplineSurface::reach, or not finite.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const;
 
   struct Projection {
     Eigen::Vector2d pixel;
     Eigen::Matrix<double, 2, 3> d_pixel_d_point;
-    /// A column per parameter, in mrcal's order.
+    /// A column per parameter, in mrcal's order; of a splined lens, which has hundreds, those of
+    /// fx, fy, cx, cy alone.
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 16> d_pixel_d_parameters;
   };
-  /// As project(), with both Jacobians.
+  /// As project(), with both Jacobians. Does not allocate.
   std::optional<Projection> project_with_jacobians(const Eigen::Vector3d& x_in_camera) const;
 
+  /// The parameters that a pixel depends on, and how.
+  struct ByParameters {
+    /// In mrcal's order, ascending.
+    std::vector<Eigen::Index> parameters;
+    Eigen::Matrix2Xd d_pixel;
+  };
+  /// Of the pixel of a point that project() accepts: all of them, control points, too.
+  std::optional<ByParameters> by_parameters(const Eigen::Vector3d& x_in_camera) const;
+
   struct Ray {
-    /// Not of unit length: z = 1 but for STEREOGRAPHIC and OPENCV_FISHEYE, where z <= 1 and may be
-    /// negative.
+    /// Not of unit length: z = 1 but for STEREOGRAPHIC, OPENCV_FISHEYE and splined lenses, where
+    /// z <= 1 and may be negative.
     Eigen::Vector3d direction;
     Eigen::Matrix<double, 3, 2> d_direction_d_pixel;
   };
-  /// The ray of a pixel. OPENCVn by Newton's method with step halving, until the last step
-  /// leaves an error below 1e-12 (the Jacobian, taken before it, is good to 1e-6 of itself).
+  /// The ray of a pixel. OPENCVn and splines by Newton's method with step halving, until the last
+  /// step leaves an error below 1e-12 (the Jacobian, taken before it, is good to 1e-6 of itself).
   /// Nothing where it does not converge to a ray that project() accepts: pixels that no ray
   /// reaches, or that are not finite.
   std::optional<Ray> unproject(const Eigen::Vector2d& pixel) const;
@@ -61,6 +76,7 @@ class Lens {
                                            Eigen::Matrix2d& d_distorted_d_z) const;
 
   std::optional<Ray> unproject_fisheye(const Eigen::Vector2d& plane) const;
+  std::optional<Ray> unproject_splined(const Eigen::Vector2d& plane) const;
 
   LensModel model_;
   Eigen::Vector2d focal_px_;
@@ -69,6 +85,8 @@ class Lens {
   double valid_radius_squared_;
   Fisheye fisheye_;
   double valid_angle_rad_;
+  /// Of a splined lens only, shared between its copies.
+  std::shared_ptr<const SplineSurface> spline_;
 };
 
 }  // namespace vlp

@@ -73,7 +73,7 @@ double unlikely_chi_squared(double freedom) {
 
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
                            Correction correction)
-    : intrinsics_(std::ssize(calibration.camera.intrinsics)),
+    : intrinsics_(stated_intrinsics(calibration.camera)),
       base_from_camera_(level_from_camera(calibration, correction)),
       camera_from_base_(base_from_camera_.inverse()) {
   const bool turned = calibration.rotation_center &&
@@ -381,7 +381,7 @@ bool lack_lens(const CommonErrors& errors, const Calibration& calibration) {
 std::optional<Matrix2> whole_zenith_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
   if (!errors.stated(CommonPart::zenith) || lack_lens(errors, calibration)) return std::nullopt;
-  const Eigen::Index zenith = std::ssize(calibration.camera.intrinsics);
+  const Eigen::Index zenith = stated_intrinsics(calibration.camera);
   return Matrix2(errors.joint().block<2, 2>(zenith, zenith));
 }
 

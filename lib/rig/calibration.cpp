@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "rig/calibration_error.h"
 #include "rig/yaml_parts.h"
 
 namespace vlp {
@@ -204,7 +205,7 @@ HistoryEntry read_history_entry(YamlMap map) {
 std::vector<std::string> parameter_names(const Camera& camera, const Adjustment& adjustment) {
   constexpr std::array lens{"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2",
                             "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"};
-  std::vector<std::string> names(lens.begin(), lens.begin() + std::ssize(camera.intrinsics));
+  std::vector<std::string> names(lens.begin(), lens.begin() + stated_intrinsics(camera));
   names.insert(names.end(), {"zenith_x", "zenith_y", "lever_arm_x_m", "lever_arm_y_m"});
   for (const Adjustment::Place& lamp : adjustment.lamps) {
     const std::string prefix = "lamp_" + std::to_string(lamp.id);
@@ -226,7 +227,7 @@ Calibration read_calibration(const std::filesystem::path& file) {
   YamlMap camera_map = camera.map();
   calibration.camera = read_camera(camera_map);
   camera_map.finish();
-  const std::size_t intrinsics = calibration.camera.intrinsics.size();
+  const auto intrinsics = static_cast<std::size_t>(stated_intrinsics(calibration.camera));
   if (report) calibration.intrinsics_report = read_intrinsics_report(report->map(), intrinsics);
   if (rotation_center) {
     calibration.rotation_center = read_rotation_center(rotation_center->map(), intrinsics);

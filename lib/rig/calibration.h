@@ -42,7 +42,8 @@ struct IntrinsicsReport {
   /// Worst standard deviation of a projection over the region. Infinite where the lens has no ray;
   /// that is not written.
   std::optional<double> uncertainty_px;
-  /// Of the intrinsics, in their order.
+  /// Of the intrinsics, in their order; of a splined lens, none or of fx, fy, cx, cy alone, as
+  /// wherever errors of the intrinsics are told of below.
   std::optional<MatrixX> covariance = {};
   /// Where the lens is known, a convex polygon of three corners or more; empty: all over the image.
   std::vector<Eigen::Vector2d> region_px = {};

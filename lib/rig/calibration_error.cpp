@@ -5,6 +5,8 @@
 #include <Eigen/Geometry>
 #include <iterator>
 
+#include "camera/spline_grid.h"
+
 namespace vlp {
 namespace {
 
@@ -23,13 +25,18 @@ Eigen::Vector2d focal_px_of(const Camera& camera) {
   return {camera.intrinsics[0], camera.intrinsics[1]};
 }
 
+Eigen::Index stated_intrinsics(const Camera& camera) {
+  constexpr Eigen::Index core = 4;
+  return is_splined(camera.lens_model) ? core : std::ssize(camera.intrinsics);
+}
+
 Eigen::Vector2d zenith_point(const RotationCenter& center) {
   return center.zenith_in_camera.hnormalized();
 }
 
 Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error) {
   auto& intrinsics = calibration.camera.intrinsics;
-  Eigen::Map<Eigen::VectorXd>(intrinsics.data(), std::ssize(intrinsics)) += error;
+  Eigen::Map<Eigen::VectorXd>(intrinsics.data(), error.size()) += error;
   if (auto& center = calibration.rotation_center; center && center->lever_arm_by_intrinsics) {
     *center->lever_arm_m += *center->lever_arm_by_intrinsics * error;
     if (center->lever_arm_by_zenith && center->by_intrinsics) {

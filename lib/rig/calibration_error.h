@@ -13,11 +13,16 @@ namespace vlp {
 /// fx, fy.
 Eigen::Vector2d focal_px_of(const Camera& camera);
 
+/// How many of the intrinsics have errors that a calibration states, and steps pass on: all; of a
+/// splined lens, whose control points are known each from a few corners, fx, fy, cx, cy, which
+/// stand for the whole. What its control points lack is in IntrinsicsReport::uncertainty_px alone.
+Eigen::Index stated_intrinsics(const Camera& camera);
+
 /// The zenith's normalized point.
 Eigen::Vector2d zenith_point(const RotationCenter& center);
 
-/// With errors added to the intrinsics; the zenith stays, and center_px with it. A lever arm moves
-/// as it does with them, but for what goes with the zenith.
+/// With errors added to the stated_intrinsics(); the zenith stays, and center_px with it. A lever
+/// arm moves as it does with them, but for what goes with the zenith.
 Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
 
 /// With an error added to the zenith's normalized point, and what goes with it to the lever arm.

@@ -13,6 +13,7 @@
 #include "calibration/rotation/spot_captures.h"
 #include "geometry/angles.h"
 #include "positioning/known_motion.h"
+#include "rig/calibration_error.h"
 #include "rig/input_error.h"
 #include "rig/stage.h"
 #include "session/capture_motion.h"
@@ -185,7 +186,7 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
   Calibration calibration = input.calibration;
   calibration.camera = found.camera;
   if (calibration.intrinsics_report && calibration.intrinsics_report->covariance) {
-    const Eigen::Index n = std::ssize(found.camera.intrinsics);
+    const Eigen::Index n = stated_intrinsics(found.camera);
     calibration.intrinsics_report->covariance = adjustment.covariance.topLeftCorner(n, n);
   }
   result.calibration = with_adjustment(std::move(calibration), found.center, std::move(adjustment),

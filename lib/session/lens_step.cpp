@@ -11,6 +11,7 @@
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
+#include "camera/spline_grid.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
 #include "report/plots/calibration_plots.h"
@@ -117,13 +118,12 @@ IntrinsicsReport report_of(const LensResult& result, const IntrinsicsInput& inpu
         solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
     board_warp_m = {warp_m.x(), warp_m.y()};
   }
-  return {static_cast<int>(solution.views.size()),
-          solution.corners,
-          solution.outliers,
-          solution.rms_px,
-          board_warp_m,
-          result.report.uncertainty_worst_px,
-          covariance.allFinite() ? std::optional(covariance) : std::nullopt,
+  return {static_cast<int>(solution.views.size()), solution.corners, solution.outliers,
+          solution.rms_px, board_warp_m, result.report.uncertainty_worst_px,
+          // Of hundreds of control points it would be larger than all else, and of no use to fixes.
+          covariance.allFinite() && !is_splined(solution.problem.lens_model)
+              ? std::optional(covariance)
+              : std::nullopt,
           result.report.region_share > kWhole ? ImageRegion() : result.report.region};
 }
 
@@ -131,6 +131,28 @@ Camera camera_of(Camera camera, const BoardProblem& problem) {
   camera.imager_px = problem.imager_px;
   camera.intrinsics = problem.intrinsics;
   return camera;
+}
+
+/// What the grid of a splined lens lacks for boards that another model has; empty when it is wide
+/// enough.
+std::string words_of_grid(const SplineGrid& grid, const IntrinsicsSolution& of_other) {
+  const Lens lens = of_other.lens();
+  const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
+  const Eigen::Vector2d reach =
+      SplineSurface(grid, std::vector<double>(2 * grid.control_points())).reach();
+  Eigen::Vector2d seen(0, 0);
+  for (const Eigen::Vector2d& pixel : seen_px(of_other.problem)) {
+    const auto ray = lens.unproject(pixel);
+    if (!ray) continue;
+    const Eigen::Vector3d& x = ray->direction;
+    seen = seen.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
+  }
+  if ((seen.array() <= reach.array()).all()) return "";
+  return fmt::format(
+      "the control points of {} reach {:.0f} degrees off the axis to the sides and {:.0f} up and "
+      "down, but the board is seen {:.0f} and {:.0f} degrees off: take a larger fov_x_deg, or Ny",
+      name_of(grid), angle_deg(reach.x()), angle_deg(reach.y()), angle_deg(seen.x()),
+      angle_deg(seen.y()));
 }
 
 /// Why no lens of the model fits: the model, if another one does.
@@ -144,6 +166,8 @@ std::string why_none_fits(IntrinsicsInput input) {
     const IntrinsicsSolution solution = solve_intrinsics(input);
     if (!solution.ok() || solution.rms_px >= best_px) continue;
     best_px = solution.rms_px;
+    if (is_splined(wanted)) words = words_of_grid(grid_of(wanted), solution);
+    if (is_splined(wanted) && !words.empty()) continue;
     words = fmt::format("{} cannot be this lens, but {} fits to {:.2f} px: take --lens {}",
                         name_of(wanted), name_of(other), solution.rms_px, name_of(other));
   }
@@ -185,6 +209,13 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
     return result;
   }
   for (const auto& [view, rms_px] : solution.dropped) {
+    if (!std::isfinite(rms_px) && is_splined(camera.lens_model)) {
+      result.warnings.push_back(
+          fmt::format("{}: shows the board where {} has no control points; take a larger "
+                      "fov_x_deg, or Ny; dropped",
+                      result.images[view], name_of(camera.lens_model)));
+      continue;
+    }
     result.warnings.push_back(fmt::format(
         "{}: fits no pose that goes with the other views ({:.1f} px are left over); dropped",
         result.images[view], rms_px));

@@ -5,6 +5,8 @@
 // items_per_second counts points.
 #include <benchmark/benchmark.h>
 
+#include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -17,7 +19,26 @@ namespace {
 
 constexpr std::size_t kPoints = 1000;
 
+constexpr LensModel kSplined = splined_lens({3, 16, 14, 150});
+
+/// Equidistant.
+std::vector<double> splined_parameters(const SplineGrid& grid) {
+  std::vector<double> parameters{400, 401, 399.5, 299.5};
+  const double edge = 2 * std::tan(grid.fov_x_deg * std::numbers::pi / 720);
+  const double apart = 2 * edge / (grid.nx - grid.order);
+  for (int row = 0; row < grid.ny; ++row) {
+    for (int column = 0; column < grid.nx; ++column) {
+      const double x = apart * (column - (grid.nx - 1) / 2.0),
+                   y = apart * (row - (grid.ny - 1) / 2.0);
+      const double u = std::hypot(x, y), share = 2 * std::atan(u / 2) / u - 1;
+      parameters.insert(parameters.end(), {share * x, share * y});
+    }
+  }
+  return parameters;
+}
+
 std::vector<double> parameters_of(LensModel model) {
+  if (is_splined(model)) return splined_parameters(grid_of(model));
   std::vector<double> parameters{520,   521,  399.5, 299.5, -0.28, 0.09,  1e-4,  -2e-4,
                                  -0.01, 0.02, 0.01,  0.001, 1e-3,  -5e-4, -1e-3, 5e-4};
   parameters.resize(parameter_count(model));
@@ -84,16 +105,17 @@ void project_mrcal(benchmark::State& state, LensModel model) {
   count_points(state);
 }
 
-#define VLP_BENCHMARK_MODEL(model)                             \
-  BENCHMARK_CAPTURE(unproject_here, model, LensModel::model);  \
-  BENCHMARK_CAPTURE(unproject_mrcal, model, LensModel::model); \
-  BENCHMARK_CAPTURE(project_here, model, LensModel::model);    \
-  BENCHMARK_CAPTURE(project_mrcal, model, LensModel::model)
+#define VLP_BENCHMARK_MODEL(name, model)           \
+  BENCHMARK_CAPTURE(unproject_here, name, model);  \
+  BENCHMARK_CAPTURE(unproject_mrcal, name, model); \
+  BENCHMARK_CAPTURE(project_here, name, model);    \
+  BENCHMARK_CAPTURE(project_mrcal, name, model)
 
-VLP_BENCHMARK_MODEL(opencv4);
-VLP_BENCHMARK_MODEL(opencv5);
-VLP_BENCHMARK_MODEL(opencv8);
-VLP_BENCHMARK_MODEL(opencv12);
+VLP_BENCHMARK_MODEL(opencv4, LensModel::opencv4);
+VLP_BENCHMARK_MODEL(opencv5, LensModel::opencv5);
+VLP_BENCHMARK_MODEL(opencv8, LensModel::opencv8);
+VLP_BENCHMARK_MODEL(opencv12, LensModel::opencv12);
+VLP_BENCHMARK_MODEL(splined, kSplined);
 
 }  // namespace
 }  // namespace vlp

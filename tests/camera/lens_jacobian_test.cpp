@@ -45,21 +45,25 @@ TEST_P(LensJacobian, ByThePointIsTheDifferenceQuotient) {
 
 TEST_P(LensJacobian, ByTheParametersIsTheDifferenceQuotient) {
   const LensModel model = GetParam();
-  for_random_points(model, [model](const std::vector<double>& parameters, const Lens& lens,
-                                   const Eigen::Vector3d& point) {
-    const auto projection = lens.project_with_jacobians(point).value();
+  int points = 0;
+  for_random_points(model, [&](const std::vector<double>& parameters, const Lens& lens,
+                               const Eigen::Vector3d& point) {
+    // Hundreds of control points, each of which is a lens to be built.
+    constexpr int enough = 8;
+    if (is_splined(model) && ++points > enough) return;
+    const Eigen::Matrix2Xd jacobian = parameter_jacobian(lens, point);
     const auto pixel_with = [&](std::size_t i, double step) {
       auto changed = parameters;
       changed[i] += step;
       return Lens(model, changed).project(point).value();
     };
-    Eigen::Matrix<double, 2, Eigen::Dynamic> expected(2, parameters.size());
+    Eigen::Matrix2Xd expected(2, std::ssize(parameters));
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       expected.col(static_cast<Eigen::Index>(i)) =
           (pixel_with(i, kStep) - pixel_with(i, -kStep)) / (2 * kStep);
     }
     const double scale = 1 + expected.cwiseAbs().maxCoeff();
-    ASSERT_THAT(projection.d_pixel_d_parameters, IsNear(expected, kTolerance * scale));
+    ASSERT_THAT(jacobian, IsNear(expected, kTolerance * scale));
   });
 }
 

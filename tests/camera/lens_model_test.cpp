@@ -23,8 +23,27 @@ TEST(LensModelNames, AreReadBack) {
 }
 
 TEST(LensModelNames, AreReadExactly) {
-  for (const char* name : {"", "LENSMODEL_", "LENSMODEL_OPENCV", "LENSMODEL_OPENCV88", "OPENCV8",
-                           "lensmodel_opencv8", "LENSMODEL_OPENCV8 ", "LENSMODEL_CAHVOR"}) {
+  for (const char* name :
+       {"",
+        "LENSMODEL_",
+        "LENSMODEL_OPENCV",
+        "LENSMODEL_OPENCV88",
+        "OPENCV8",
+        "lensmodel_opencv8",
+        "LENSMODEL_OPENCV8 ",
+        "LENSMODEL_CAHVOR",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190 ",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=016_Ny=14_fov_x_deg=190",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=4_Nx=16_Ny=14_fov_x_deg=190",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=1_Nx=16_Ny=14_fov_x_deg=190",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=3_Ny=14_fov_x_deg=190",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=256_fov_x_deg=190",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=-16_Ny=14_fov_x_deg=190",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=0",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=360",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=99999999999"}) {
     EXPECT_FALSE(lens_model_from_name(name)) << name;
   }
 }
@@ -32,7 +51,21 @@ TEST(LensModelNames, AreReadExactly) {
 TEST(LensModelNames, AreAllListedForMessages) {
   EXPECT_EQ(lens_model_names(),
             "LENSMODEL_PINHOLE, LENSMODEL_STEREOGRAPHIC, LENSMODEL_OPENCV4, LENSMODEL_OPENCV5, "
-            "LENSMODEL_OPENCV8, LENSMODEL_OPENCV12, OPENCV_FISHEYE");
+            "LENSMODEL_OPENCV8, LENSMODEL_OPENCV12, OPENCV_FISHEYE, "
+            "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190 and its like");
+}
+
+TEST(LensModelNames, OfSplinedLensesAreAsManyAsTheirGrids) {
+  for (const SplineGrid& grid : {SplineGrid{2, 3, 3, 1}, SplineGrid{3, 4, 4, 359},
+                                 SplineGrid{2, 255, 255, 359}, SplineGrid{3, 30, 20, 170}}) {
+    const LensModel model = splined_lens(grid);
+    EXPECT_TRUE(is_splined(model));
+    EXPECT_EQ(grid_of(model), grid);
+    EXPECT_EQ(lens_model_from_name(name_of(model)), model);
+    EXPECT_EQ(parameter_count(model), 4U + 2U * static_cast<unsigned>(grid.nx * grid.ny));
+  }
+  EXPECT_EQ(name_of(splined_lens({3, 30, 20, 170})),
+            "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=20_fov_x_deg=170");
 }
 
 TEST(LensModelParameters, AreAsManyAsMrcals) {

@@ -88,6 +88,7 @@ TEST(Lens, SaysHowManyParametersItTakes) {
 TEST(Lens, SeesNothingBehindItButForTheWide) {
   for (const LensModel model : kEveryModel) {
     const Lens lens = plain_lens(model);
+    if (is_splined(model)) continue;  // as far as their control points go
     const bool all_round = model == LensModel::stereographic || model == LensModel::fisheye;
     for (const Vector3d& point : {Vector3d(0.1, 0.2, -1), Vector3d(1, 0, 0), Vector3d(1, 2, -1)}) {
       EXPECT_EQ(lens.project(point).has_value(), all_round) << name_of(model);

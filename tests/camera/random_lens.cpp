@@ -20,12 +20,34 @@ constexpr double kBounds[][2] = {{-0.35, 0.2},  {-0.1, 0.2},   {-2e-3, 2e-3}, {-
 
 }  // namespace
 
+std::vector<double> splined_parameters(const SplineGrid& grid, double error, Random& random) {
+  const double edge = 2 * std::tan(grid.fov_x_deg * std::numbers::pi / 720);
+  const double apart = 2 * edge / (grid.nx - grid.order);
+  std::vector<double> parameters{400, 401, 402, 297};
+  for (int row = 0; row < grid.ny; ++row) {
+    for (int column = 0; column < grid.nx; ++column) {
+      const Eigen::Vector2d u =
+          apart * Eigen::Vector2d(column - (grid.nx - 1) / 2.0, row - (grid.ny - 1) / 2.0);
+      const double norm = u.norm(), share = norm > 0 ? 2 * std::atan(norm / 2) / norm - 1 : 0;
+      const double y = random.uniform(-error, error), x = random.uniform(-error, error);
+      parameters.insert(parameters.end(), {share * u.x() + x, share * u.y() + y});
+    }
+  }
+  return parameters;
+}
+
 std::vector<double> random_parameters(LensModel model, Random& random) {
   for (;;) {
     std::vector<double> parameters(4);
     for (std::size_t i = 0; i < 4; ++i) {
       constexpr double bounds[][2] = {{300, 900}, {300, 900}, {350, 450}, {250, 350}};
       parameters[i] = random.uniform(bounds[i][0], bounds[i][1]);
+    }
+    if (is_splined(model)) {
+      constexpr double error = 0.01;  // at most a twentieth of the way to the next control point
+      const auto splined = splined_parameters(grid_of(model), error, random);
+      parameters.insert(parameters.end(), splined.begin() + 4, splined.end());
+      return parameters;
     }
     if (model == LensModel::fisheye) {
       for (const double bound : {0.05, 0.02, 0.01, 0.002}) {
@@ -57,6 +79,14 @@ std::vector<double> parameters_with(LensModel model, const std::vector<double>& 
   parameters.insert(parameters.end(), distortion.begin(), distortion.end());
   parameters.resize(parameter_count(model));
   return parameters;
+}
+
+Eigen::Matrix2Xd parameter_jacobian(const Lens& lens, const Eigen::Vector3d& x_in_camera) {
+  const auto [parameters, d_pixel] = lens.by_parameters(x_in_camera).value();
+  const auto count = static_cast<Eigen::Index>(parameter_count(lens.model()));
+  Eigen::Matrix2Xd jacobian = Eigen::Matrix2Xd::Zero(2, count);
+  jacobian(Eigen::all, parameters) = d_pixel;
+  return jacobian;
 }
 
 double angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {

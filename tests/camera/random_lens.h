@@ -16,17 +16,32 @@ namespace vlp {
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// For GoogleTest, which looks for it next to the type.
-inline void PrintTo(LensModel model, std::ostream* out) { *out << name_of(model); }
+// For GoogleTest, which looks for it next to the type; names of tests have no equals sign.
+inline void PrintTo(LensModel model, std::ostream* out) {
+  for (const char letter : name_of(model)) {
+    if (letter != '=') *out << letter;
+  }
+}
 
-inline constexpr LensModel kMrcalModels[] = {LensModel::pinhole, LensModel::stereographic,
-                                             LensModel::opencv4, LensModel::opencv5,
-                                             LensModel::opencv8, LensModel::opencv12};
+inline constexpr LensModel kCubic = splined_lens({3, 16, 14, 190}),
+                           kQuadratic = splined_lens({2, 12, 11, 160});
+inline constexpr LensModel kMrcalModels[] = {LensModel::pinhole,
+                                             LensModel::stereographic,
+                                             LensModel::opencv4,
+                                             LensModel::opencv5,
+                                             LensModel::opencv8,
+                                             LensModel::opencv12,
+                                             kCubic,
+                                             kQuadratic};
 inline constexpr LensModel kEveryModel[] = {
     LensModel::pinhole, LensModel::stereographic, LensModel::opencv4, LensModel::opencv5,
-    LensModel::opencv8, LensModel::opencv12,      LensModel::fisheye};
+    LensModel::opencv8, LensModel::opencv12,      LensModel::fisheye, kCubic,
+    kQuadratic};
 inline constexpr LensModel kOpencvModels[] = {LensModel::opencv4, LensModel::opencv5,
                                               LensModel::opencv8, LensModel::opencv12};
+
+/// Of a splined lens: equidistant, d(a) = a, with errors of its own at each control point.
+std::vector<double> splined_parameters(const SplineGrid& grid, double error, Random& random);
 
 /// A random plausible lens that is one to one up to 60 degrees off axis and a little more; the
 /// rest is for its tangential and prism terms, which valid_radius() leaves out.
@@ -44,6 +59,9 @@ std::vector<double> parameters_with(LensModel model, const std::vector<double>& 
 
 /// Without distortion.
 inline Lens plain_lens(LensModel model) { return {model, parameters_with(model, {})}; }
+
+/// d pixel / d parameters, a column for each. Precondition: the lens projects the point.
+Eigen::Matrix2Xd parameter_jacobian(const Lens& lens, const Eigen::Vector3d& x_in_camera);
 
 /// The angle between two directions of any length; exact for small ones too.
 double angle_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b);

@@ -184,5 +184,12 @@ TEST(ExactFix, WithEveryLensModel) {
   }
 }
 
+TEST(ExactFix, WithASplinedLens) {
+  SyntheticRig rig = rig_of(8, false);
+  rig.calibration.camera = splined_camera();
+  rig.camera = {{0.1, 0.1, 0}, 1};
+  expect_exact(rig);
+}
+
 }  // namespace
 }  // namespace vlp

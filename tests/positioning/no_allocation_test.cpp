@@ -88,6 +88,16 @@ TEST(Positioner, DoesNotAllocate) {
   EXPECT_EQ(allocations, before + 1) << "the counter does not count";
 }
 
+TEST(Positioner, DoesNotAllocateForASplinedLens) {
+  SyntheticRig rig = tilted_rig();
+  rig.calibration.camera = splined_camera();
+  const Positioner positioner(rig.map, rig.calibration);
+  const auto detections = seen_from(rig);
+  const long before = allocations;
+  EXPECT_TRUE(positioner.locate(detections).ok());
+  EXPECT_EQ(allocations, before);
+}
+
 TEST(CInterfaceMemory, IsNotAllocatedPerFix) {
   const SyntheticRig rig = tilted_rig();
   const TemporaryFolder folder;

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include "rig/calibration.h"
+#include "camera/spline_grid.h"
 
 #include <gmock/gmock.h>
 
@@ -136,12 +137,34 @@ TEST(Calibration, KeepsEachLensModelWithItsParameters) {
                                           {LensModel::opencv4, 8},
                                           {LensModel::opencv5, 9},
                                           {LensModel::opencv8, 12},
-                                          {LensModel::opencv12, 16}}) {
+                                          {LensModel::opencv12, 16},
+                                          {LensModel::fisheye, 8},
+                                          {splined_lens({3, 4, 5, 90}), 44}}) {
     Calibration calibration = bare_calibration();
     calibration.camera.lens_model = model;
     for (int i = 4; i < parameters; ++i) calibration.camera.intrinsics.push_back(i * -1e-3);
     expect_kept(calibration);
   }
+}
+
+TEST(Calibration, OfASplinedLensStatesErrorsOfItsCore) {
+  Calibration calibration = sample_calibration();
+  const auto first = [](const std::optional<MatrixX>& by) { return MatrixX(by->leftCols(4)); };
+  auto& report = *calibration.intrinsics_report;
+  if (report.covariance) report.covariance = MatrixX(report.covariance->topLeftCorner(4, 4));
+  auto& center = *calibration.rotation_center;
+  if (center.by_intrinsics) center.by_intrinsics = first(center.by_intrinsics);
+  if (center.lever_arm_by_intrinsics) {
+    center.lever_arm_by_intrinsics = first(center.lever_arm_by_intrinsics);
+  }
+  if (calibration.dispersion->by_intrinsics) {
+    calibration.dispersion->by_intrinsics = first(calibration.dispersion->by_intrinsics);
+  }
+  calibration.adjustment.reset();
+  std::erase_if(calibration.history, [](const auto& entry) { return entry.part == "adjustment"; });
+  calibration.camera.lens_model = splined_lens({2, 3, 3, 120});
+  calibration.camera.intrinsics.resize(parameter_count(calibration.camera.lens_model), 0.25);
+  expect_kept(calibration);
 }
 
 TEST(Calibration, KeepsTextOfAnyKind) {

@@ -3,8 +3,10 @@
 #include "support/synthetic_rig.h"
 
 #include <Eigen/LU>
+#include <cmath>
 
 #include "camera/lens.h"
+#include "camera/spline_grid.h"
 
 namespace vlp {
 
@@ -14,6 +16,17 @@ Camera synthetic_camera() {
   camera.imager_px = {800, 600};
   camera.lens_model = LensModel::opencv8;
   camera.intrinsics = {520, 522, 403, 296, -0.28, 0.09, 1e-4, -2e-4, -0.010, 0.020, 0.010, 0.001};
+  return camera;
+}
+
+Camera splined_camera() {
+  Camera camera = synthetic_camera();
+  camera.lens_model = splined_lens({3, 12, 10, 130});
+  camera.intrinsics.resize(4);
+  camera.intrinsics.resize(parameter_count(camera.lens_model));
+  for (std::size_t i = 4; i < camera.intrinsics.size(); ++i) {
+    camera.intrinsics[i] = 0.01 * std::sin(static_cast<double>(i * i));
+  }
   return camera;
 }
 

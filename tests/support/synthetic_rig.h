@@ -20,6 +20,9 @@ struct SyntheticRig {
 /// 800 x 600, 520 px, with a lens that distorts (LENSMODEL_OPENCV8).
 Camera synthetic_camera();
 
+/// Of the same size, with a splined lens of 130 degrees.
+Camera splined_camera();
+
 /// Lamps with ids 1, 2, ...
 LampMap lamp_map_of(const std::vector<Eigen::Vector3d>& positions_m);
 

@@ -89,11 +89,10 @@ Assembled assemble(const AdjustmentInput& input) {
   for (const AdjustmentCapture& capture : input.captures) {
     if (!capture.spot.empty()) spots.emplace(capture.spot, spots.size());
   }
-  Assembled all{
-      AdjustmentProblem(camera.lens_model,
-                        LensFreedom(camera.intrinsics, report ? report->covariance : std::nullopt),
-                        input.lamps.lamps.size(), spots.size()),
-      mean_of(input.lamps)};
+  Assembled all{AdjustmentProblem(camera.lens_model,
+                                  LensFreedom(camera, report ? report->covariance : std::nullopt),
+                                  input.lamps.lamps.size(), spots.size()),
+                mean_of(input.lamps)};
   AdjustmentProblem& problem = all.problem;
   const AdjustmentLayout& layout = problem.layout();
   const Lens lens(camera.lens_model, camera.intrinsics);
@@ -454,7 +453,7 @@ std::string undetermined_by(const AdjustmentProblem& problem, const Eigen::Matri
 MatrixX stated_lens_covariance(const Camera& camera, double sd_px) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   constexpr int across = 16;
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(std::ssize(camera.intrinsics));
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(stated_intrinsics(camera));
   int rays = 0;
   for (int row = 0; row < across; ++row) {
     for (int column = 0; column < across; ++column) {
@@ -552,7 +551,7 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
   }
 
   // The joint covariance: of the lens' directions that of its intrinsics, without the spots.
-  const Eigen::Index intrinsics = std::ssize(result.camera.intrinsics);
+  const Eigen::Index intrinsics = stated_intrinsics(result.camera);
   const Eigen::Index rows = intrinsics + at.spots - at.zenith;
   Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.shared);
   from_state.block(0, at.lens, intrinsics, at.lens_size) = problem.freedom().directions;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "geometry/symmetric.h"
+#include "rig/calibration_error.h"
 
 namespace vlp {
 namespace {
@@ -62,10 +63,10 @@ ZenithTurn turn_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& 
   return turn;
 }
 
-LensFreedom::LensFreedom(const std::vector<double>& intrinsics,
-                         const std::optional<MatrixX>& covariance)
-    : start(Eigen::Map<const Eigen::VectorXd>(intrinsics.data(), std::ssize(intrinsics))),
-      directions(start.size(), 0) {
+LensFreedom::LensFreedom(const Camera& camera, const std::optional<MatrixX>& covariance)
+    : start(Eigen::Map<const Eigen::VectorXd>(camera.intrinsics.data(),
+                                              std::ssize(camera.intrinsics))),
+      directions(stated_intrinsics(camera), 0) {
   if (!covariance) return;
   // Pixels and coefficients are made comparable by their standard deviations.
   const Eigen::VectorXd sd = covariance->diagonal().cwiseSqrt();
@@ -112,8 +113,10 @@ void AdjustmentProblem::add_capture(const Capture& capture, const Pose& start) {
 
 std::vector<double> AdjustmentProblem::intrinsics() const {
   std::vector<double> values(static_cast<std::size_t>(freedom_.start.size()));
-  Eigen::Map<Eigen::VectorXd>(values.data(), std::ssize(values)) =
-      freedom_.start + freedom_.directions * state_.segment(layout_.lens, layout_.lens_size);
+  Eigen::Map<Eigen::VectorXd> changed(values.data(), std::ssize(values));
+  changed = freedom_.start;
+  changed.head(freedom_.directions.rows()).noalias() +=
+      freedom_.directions * state_.segment(layout_.lens, layout_.lens_size);
   return values;
 }
 

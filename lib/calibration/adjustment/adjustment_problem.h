@@ -33,12 +33,13 @@ struct AdjustmentLayout {
 };
 
 /// The directions in which a lens may move: intrinsics = start + directions u, where u has unit
-/// covariance. Directions in which the covariance is nothing but rounding are left out.
+/// covariance; those of which errors are stated (stated_intrinsics()). Directions in which the
+/// covariance is nothing but rounding are left out.
 struct LensFreedom {
   Eigen::VectorXd start;
   Eigen::MatrixXd directions;
 
-  LensFreedom(const std::vector<double>& intrinsics, const std::optional<MatrixX>& covariance);
+  LensFreedom(const Camera& camera, const std::optional<MatrixX>& covariance);
 };
 
 class AdjustmentProblem {

@@ -226,7 +226,7 @@ Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what
   const Lens lens(problem.lens_model, problem.intrinsics);
   Linearization result;
   result.residuals_px = Eigen::VectorXd::Zero(rows);
-  result.intrinsics = 0;
+  result.first_intrinsic = 0;
   result.poses = intrinsics;
   result.scale = Eigen::VectorXd::Zero(states);
   std::vector<Eigen::Triplet<double>> entries;

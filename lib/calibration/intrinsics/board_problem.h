@@ -34,6 +34,10 @@ struct BoardProblem {
   /// more, not on a line.
   std::vector<Eigen::Vector3d> points;
   static constexpr double kUnseen = -2;
+  /// Of the corners, for which the regularization is made: of a pixel, as mrcal makes it. Of
+  /// corners that are better known its share of all squares would be the larger, and draw the lens
+  /// off.
+  double noise_px = 1;
 
   std::size_t points_of_a_board() const {
     return static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);
@@ -67,8 +71,9 @@ struct Linearization {
   Eigen::SparseMatrix<double> jacobian_transposed;
   /// State / packed state.
   Eigen::VectorXd scale;
-  /// Where in the state the intrinsics that were solved for, the poses (6 each) and the warp begin.
-  Eigen::Index intrinsics, poses;
+  /// The intrinsics come first in the state, those from `first_intrinsic` on; where the poses (6
+  /// each) begin, and the warp after them.
+  Eigen::Index first_intrinsic, poses;
 };
 Linearization linearized(const BoardProblem& problem, const SolveFor& what);
 

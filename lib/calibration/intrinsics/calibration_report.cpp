@@ -12,6 +12,7 @@
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/view_jackknife.h"
 #include "calibration/intrinsics/view_pose.h"
+#include "camera/spline_grid.h"
 
 namespace vlp {
 namespace {
@@ -32,9 +33,11 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   const ProjectionUncertainty uncertainty(solution);
   const Lens lens = solution.lens();
   const Eigen::MatrixXd by_views = covariance_by_views(solution);
+  ImageRegion region = known_region(seen_px(solution.problem), input.imager_px, lens.model());
+  // Beyond it splines are anything.
+  const ImageRegion compared = is_splined(lens.model()) ? region : ImageRegion();
   const auto expected =
-      expected_difference(lens, input.imager_px, uncertainty.intrinsics_covariance());
-  ImageRegion region = known_region(seen_px(solution.problem), input.imager_px);
+      expected_difference(lens, input.imager_px, uncertainty.intrinsics_covariance(), compared);
   const double region_share = share_of_image(region, input.imager_px);
   CalibrationReport report{std::move(region),
                            region_share,
@@ -45,12 +48,13 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
                            uncertainty.focal_sd_px(),
                            std::sqrt(by_views(0, 0)),
                            expected.rms_px,
-                           expected_difference(lens, input.imager_px, by_views).rms_px,
+                           expected_difference(lens, input.imager_px, by_views, compared).rms_px,
                            {}};
   double inside = 0;
   for (const Eigen::Vector2d& pixel : pixel_grid(input.imager_px)) {
-    // Beyond the farthest corner a fisheye may end; there it refuses pixels.
-    if (lens.model() == LensModel::fisheye && !lens.unproject(pixel)) continue;
+    // Beyond the farthest corner a fisheye may end, as splines do; there they refuse pixels.
+    const bool ends = lens.model() == LensModel::fisheye || is_splined(lens.model());
+    if (ends && !lens.unproject(pixel)) continue;
     const double sigma_px = uncertainty.worst_px(pixel);
     if (!lies_in(report.region, pixel)) {
       report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
@@ -65,13 +69,20 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   report.uncertainty_mean_px /= std::max(inside, 1.0);
   const IntrinsicsSolution even = solve_intrinsics(every_other(solution, input, 0));
   const IntrinsicsSolution odd = solve_intrinsics(every_other(solution, input, 1));
-  if (even.ok() && odd.ok()) {
-    report.halves = projection_difference(
-        even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
-          return lies_in(report.region, pixel) ? uncertainty.worst_px(pixel)
-                                               : std::numeric_limits<double>::infinity();
-        });
-  }
+  if (!even.ok() || !odd.ok()) return report;
+  // Of a splined lens, half of the views leave holes, which tell nothing of it.
+  std::vector<ProjectionUncertainty> halves;
+  if (is_splined(lens.model())) halves = {ProjectionUncertainty(even), ProjectionUncertainty(odd)};
+  constexpr double hole = 3;  // sqrt(2) is usual
+  report.halves = projection_difference(
+      even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
+        const double sigma_px = uncertainty.worst_px(pixel);
+        const bool compared = lies_in(report.region, pixel) &&
+                              std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
+                                return half.worst_px(pixel) > hole * sigma_px;
+                              });
+        return compared ? sigma_px : std::numeric_limits<double>::infinity();
+      });
   return report;
 }
 

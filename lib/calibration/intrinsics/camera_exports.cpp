@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "camera/spline_grid.h"
 #include "rig/yaml_text.h"
 
 namespace vlp {
@@ -48,7 +49,7 @@ std::string opencv_matrix(const char* name, int rows, const std::vector<double>&
 
 std::string ros_camera_info(const Camera& camera) {
   const LensModel model = camera.lens_model;
-  if (model == LensModel::stereographic || model == LensModel::opencv12) {
+  if (model == LensModel::stereographic || model == LensModel::opencv12 || is_splined(model)) {
     refuse(camera, "ROS", "LENSMODEL_OPENCV8");
   }
   const bool rational = model == LensModel::opencv8, fisheye = model == LensModel::fisheye;
@@ -88,7 +89,7 @@ std::string kalibr_camchain(const Camera& camera) {
 }
 
 std::string opencv_camera(const Camera& camera) {
-  if (camera.lens_model == LensModel::stereographic) {
+  if (camera.lens_model == LensModel::stereographic || is_splined(camera.lens_model)) {
     refuse(camera, "OpenCV", "LENSMODEL_OPENCV8");
   }
   std::string text = "%YAML:1.0\n---\nimage_width: " + std::to_string(camera.imager_px[0]);

@@ -17,7 +17,8 @@ std::string ros_camera_info(const Camera& camera);
 /// Kalibr's camchain: pinhole with radtan, for PINHOLE and OPENCV4, or with equidistant, for
 /// OPENCV_FISHEYE.
 std::string kalibr_camchain(const Camera& camera);
-/// OpenCV's FileStorage: camera_matrix and distortion_coefficients, for all but STEREOGRAPHIC.
+/// OpenCV's FileStorage: camera_matrix and distortion_coefficients, for all but STEREOGRAPHIC and
+/// splined lenses.
 /// Those of OPENCV_FISHEYE are for cv::fisheye; distortion_model says so.
 std::string opencv_camera(const Camera& camera);
 /// mrcal's .cameramodel, the camera alone, for all but OPENCV_FISHEYE.

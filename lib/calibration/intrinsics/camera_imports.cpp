@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/spline_fit.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -144,7 +145,8 @@ Camera camera_from_yaml(const YAML::Node& document) {
   return camera;
 }
 
-/// Pixels of the new lens against those of rays, and the normal equations of its parameters.
+/// Pixels of the new lens against those of rays, and the normal equations of its parameters (of a
+/// splined lens of its core).
 struct LensFit {
   double squares = 0, worst_px = 0;
   int count = 0;
@@ -155,7 +157,8 @@ struct LensFit {
 LensFit lens_fit_at(const std::vector<double>& parameters, LensModel model,
                     const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>>& rays) {
   const Lens lens(model, parameters);
-  const auto size = static_cast<Eigen::Index>(parameters.size());
+  constexpr Eigen::Index core = 4;
+  const Eigen::Index size = is_splined(model) ? core : std::ssize(parameters);
   LensFit step;
   step.normal = Eigen::MatrixXd::Zero(size, size);
   step.right = Eigen::VectorXd::Zero(size);
@@ -221,12 +224,18 @@ FittedCamera with_lens_model(const Camera& camera, LensModel model) {
   fitted.camera.lens_model = model;
   auto& parameters = fitted.camera.intrinsics;
   parameters.resize(4);
-  parameters.resize(parameter_count(model), 0);
+  parameters.resize(parameter_count(is_splined(model) ? LensModel::stereographic : model), 0);
+  if (is_splined(model)) {
+    if (camera.lens_model != LensModel::stereographic) {
+      parameters = with_lens_model(camera, LensModel::stereographic).camera.intrinsics;
+    }
+    parameters = splined_like(from, camera.imager_px, model, parameters);
+  }
   constexpr int most_steps = 200;
   constexpr double settled = 1e-12;
   double damping = 1e-3;
   LensFit at = lens_fit_at(parameters, model, rays);
-  for (int i = 0; i < most_steps && at.count > 0; ++i) {
+  for (int i = 0; i < most_steps && at.count > 0 && !is_splined(model); ++i) {
     Eigen::MatrixXd damped = at.normal;
     damped.diagonal() *= 1 + damping;
     const Eigen::VectorXd change = damped.ldlt().solve(at.right);

@@ -19,7 +19,7 @@ namespace vlp {
 Camera read_any_camera(const std::filesystem::path& file);
 
 /// A camera with a lens of another model, fitted to the pixels of the camera's rays all over the
-/// image (pixel_grid()), by least squares.
+/// image (pixel_grid(); of a splined lens splined_like()), by least squares.
 struct FittedCamera {
   Camera camera;
   /// The largest distance between the two pixels of a ray, and the share of the image whose rays

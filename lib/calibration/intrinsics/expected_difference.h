@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "calibration/intrinsics/known_region.h"
 #include "camera/lens.h"
 
 namespace vlp {
@@ -18,10 +19,11 @@ struct ExpectedDifference {
   double freedoms;
 };
 
-/// From the covariance of the intrinsics, to first order, for even weights over the image. It is
-/// less than the projection uncertainty: that counts, too, how far the camera as a whole turns
-/// against the boards, which lining two lenses up takes away.
+/// From the covariance of the intrinsics, to first order, for even weights over the image, or over
+/// a part of it where there is one. It is less than the projection uncertainty: that counts, too,
+/// how far the camera as a whole turns against the boards, which lining two lenses up takes away.
 ExpectedDifference expected_difference(const Lens& lens, const std::array<int, 2>& imager_px,
-                                       const Eigen::MatrixXd& covariance);
+                                       const Eigen::MatrixXd& covariance,
+                                       const ImageRegion& region = {});
 
 }  // namespace vlp

@@ -38,8 +38,9 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
   starts.resize(std::min(starts.size(), most_starts));
   for (const double focal_px : starts) {
     IntrinsicsSolver solver(input);
-    if (!solver.start(focal_px) || !solver.refine() || !solver.take_out_shifts() ||
-        !solver.bend() || !solver.leave_out_outliers()) {
+    if (!solver.start(focal_px) || !solver.refine() || !solver.weigh_regularization() ||
+        !solver.take_out_shifts() || !solver.bend() || !solver.weigh_regularization() ||
+        !solver.leave_out_outliers() || !solver.weigh_regularization()) {
       continue;
     }
     if (solver.all_alike()) return failure(IntrinsicsStatus::all_alike);

@@ -58,15 +58,16 @@ struct IntrinsicsSolution {
 
   bool ok() const { return status == IntrinsicsStatus::ok; }
   Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
-  /// Intrinsics, and the warp or not.
+  /// Intrinsics (of a splined lens but for the core), and the warp or not.
   SolveFor solved_for{true, true, true, false};
 };
 
 /// Solves for lens, poses and the board's warp, with no guess of the focal length:
 ///  1. a focal length of a geometric series, STEREOGRAPHIC, that fits the views' poses best;
 ///  2. STEREOGRAPHIC with every pose, and the poses again with that lens, until they stay;
-///  3. the model wanted, regularized as mrcal does it, and the poses again; views that fit no pose
-///     are dropped;
+///  3. the model wanted, regularized as mrcal does it, and the poses again (of a splined lens with
+///     the core of stage 2, and then regularized for the noise that is left, instead of a pixel,
+///     which would draw it off by more than the noise does); views that fit no pose are dropped;
 ///  4. the shift of the tags' edges taken out (edge_shifts()), and the model again, at most twice;
 ///  5. the board's warp (WarpChoice), and then the shifts of a board that bends;
 ///  6. all of it without outliers.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "calibration/intrinsics/edge_shift.h"
+#include "camera/spline_grid.h"
 
 namespace vlp {
 namespace {
@@ -44,13 +45,15 @@ bool IntrinsicsSolver::start(double focal_px) {
 bool IntrinsicsSolver::refine() {
   constexpr int rounds = 6;
   problem_.lens_model = input_.lens_model;
+  // Of a splined lens the core would move against all control points at once; mrcal keeps it, too.
+  if (is_splined(input_.lens_model)) solved_for_.core = false;
   if (input_.lens_model == LensModel::fisheye) {
     // 2 tan(a / 2) = a (1 + a^2 / 12 + ...): the same lens.
     problem_.intrinsics.insert(problem_.intrinsics.end(),
                                {1 / 12.0, 1 / 120.0, 17 / 20160.0, 31 / 362880.0});
   }
   // Zero would be a stationary point of some of them.
-  constexpr double tiny = 1e-6;
+  const double tiny = is_splined(input_.lens_model) ? 0 : 1e-6;
   problem_.intrinsics.resize(parameter_count(input_.lens_model), tiny);
   bool settled = false;
   for (int round = 0; round < rounds; ++round) {
@@ -66,6 +69,19 @@ bool IntrinsicsSolver::refine() {
     return true;
   }
   return solve(solved_for_);
+}
+
+bool IntrinsicsSolver::weigh_regularization() {
+  constexpr int rounds = 3;
+  constexpr double least_px = 0.01, settled = 0.1;
+  if (!is_splined(problem_.lens_model)) return true;
+  for (int round = 0; round < rounds; ++round) {
+    const double noise_px = std::clamp(solution().rms_px, least_px, 1.0);
+    if (std::abs(noise_px / problem_.noise_px - 1) < settled) break;
+    problem_.noise_px = noise_px;
+    if (!solve(solved_for_)) return false;
+  }
+  return true;
 }
 
 bool IntrinsicsSolver::take_out_shifts() {

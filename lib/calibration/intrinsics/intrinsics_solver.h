@@ -20,6 +20,8 @@ class IntrinsicsSolver {
   bool start(double focal_px);
   /// Stage 3.
   bool refine();
+  /// Of a splined lens, the regularization made for the noise of the corners; no stage of others.
+  bool weigh_regularization();
   /// Stage 4: what edge_shifts() finds, twice at most, until it is below 0.002 px.
   bool take_out_shifts();
   /// Stage 5: the warp of the board, if it is to be; and the shifts of a board that bends.

@@ -58,6 +58,15 @@ struct Arguments {
 
 int bytes(Eigen::Index doubles) { return static_cast<int>(doubles) * int(sizeof(double)); }
 
+/// With weights for which the corners' noise is a pixel.
+std::vector<Eigen::Vector3d> weighted_points(const BoardProblem& problem) {
+  auto points = problem.points;
+  for (Eigen::Vector3d& point : points) {
+    if (point.z() != BoardProblem::kUnseen) point.z() *= 1 / problem.noise_px;
+  }
+  return points;
+}
+
 /// mrcal 2.4 has one argument more.
 template <typename Unpack>
 void unpack(Unpack* function, double* state, const Arguments& the) {
@@ -105,14 +114,18 @@ bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what) {
   const Arguments the(problem, what);
   if (the.measurements < the.states) return false;
   Eigen::VectorXd state(the.states), residuals(the.measurements);
+  auto points = weighted_points(problem);
   const Silence silence;
   const mrcal_stats_t stats = mrcal_optimize(
       state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()),
       problem.intrinsics.data(), nullptr, reinterpret_cast<mrcal_pose_t*>(problem.poses.data()),
       nullptr, reinterpret_cast<mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, the.frames,
       0, 0, the.observations.data(), nullptr, the.frames, 0,
-      reinterpret_cast<mrcal_point3_t*>(problem.points.data()), &the.lens, problem.imager_px.data(),
+      reinterpret_cast<mrcal_point3_t*>(points.data()), &the.lens, problem.imager_px.data(),
       the.selections, &the.constants, problem.spacing_m, problem.cols, problem.rows, false, false);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].z() < 0 && problem.points[i].z() > 0) problem.points[i].z() *= -1;
+  }
   return stats.rms_reproj_error__pixels >= 0 && residuals.allFinite();
 }
 
@@ -126,6 +139,7 @@ Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& w
   std::vector<int> starts(static_cast<std::size_t>(the.measurements) + 1);
   std::vector<int> rows(static_cast<std::size_t>(entries));
   std::vector<double> values(static_cast<std::size_t>(entries));
+  const auto points = weighted_points(problem);
   cholmod_sparse jacobian{};
   jacobian.nrow = static_cast<std::size_t>(the.states);
   jacobian.ncol = static_cast<std::size_t>(the.measurements);
@@ -145,10 +159,12 @@ Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& w
       reinterpret_cast<const mrcal_pose_t*>(problem.poses.data()), nullptr,
       reinterpret_cast<const mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, the.frames, 0,
       0, the.observations.data(), nullptr, the.frames, 0,
-      reinterpret_cast<const mrcal_point3_t*>(problem.points.data()), &the.lens,
-      problem.imager_px.data(), the.selections, &the.constants, problem.spacing_m, problem.cols,
-      problem.rows, false);
+      reinterpret_cast<const mrcal_point3_t*>(points.data()), &the.lens, problem.imager_px.data(),
+      the.selections, &the.constants, problem.spacing_m, problem.cols, problem.rows, false);
   if (!done) throw std::runtime_error("mrcal_optimizer_callback failed");
+  // In pixels again, all of it.
+  residuals *= problem.noise_px;
+  for (double& value : values) value *= problem.noise_px;
   const int of_boards = mrcal_num_measurements_boards(the.frames, problem.cols, problem.rows);
   result.residuals_px = residuals.head(of_boards);
   result.regularization = residuals.tail(residuals.size() - of_boards);
@@ -156,7 +172,8 @@ Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& w
       the.states, the.measurements, starts.back(), starts.data(), rows.data(), values.data());
   result.scale.setOnes(the.states);
   unpack(mrcal_unpack_solver_state_vector, result.scale.data(), the);
-  result.intrinsics = 0;
+  constexpr Eigen::Index core = 4;
+  result.first_intrinsic = what.core ? 0 : core;
   result.poses =
       mrcal_state_index_frames(0, 1, 0, the.frames, 0, 0, the.frames, the.selections, &the.lens);
   return result;

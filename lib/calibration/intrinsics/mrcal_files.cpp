@@ -31,7 +31,10 @@ std::string optimization_inputs(const IntrinsicsSolution& solution) {
     indices.insert(indices.end(), {static_cast<std::int32_t>(i), 0, -1});
   }
   points.reserve(3 * problem.points.size());
-  for (const auto& point : problem.points) points.insert(points.end(), point.begin(), point.end());
+  for (const auto& point : problem.points) {
+    const double weight = point.z() * (1 / problem.noise_px);
+    points.insert(points.end(), {point.x(), point.y(), weight});
+  }
   const std::array<std::int32_t, 2> imager{problem.imager_px[0], problem.imager_px[1]};
 
   NumpyArchive archive;
@@ -44,7 +47,7 @@ std::string optimization_inputs(const IntrinsicsSolution& solution) {
   archive.add("calobject_warp", {2}, std::span(problem.warp_m.data(), 2));
   archive.add("imagersizes", {1, 2}, imager);
   archive.add("calibration_object_spacing", problem.spacing_m);
-  archive.add("do_optimize_intrinsics_core", true);
+  archive.add("do_optimize_intrinsics_core", solution.solved_for.core);
   archive.add("do_optimize_intrinsics_distortions", problem.intrinsics.size() > 4);
   archive.add("do_optimize_extrinsics", true);
   archive.add("do_optimize_frames", true);
@@ -63,7 +66,7 @@ std::string optimization_inputs(const IntrinsicsSolution& solution) {
 
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const ImageRegion region = known_region(seen_px(problem), problem.imager_px);
+  const ImageRegion region = known_region(seen_px(problem), problem.imager_px, problem.lens_model);
   std::string text = "{\n    'lensmodel':  '";
   text.append(name_of(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "calibration/intrinsics/rotation_vector.h"
 
@@ -26,13 +27,14 @@ double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& re
 }
 
 /// Of the whole state, packed.
-Eigen::VectorXd pull_of(const Linearization& at, double sigma_px) {
+Eigen::VectorXd pull_of(const Linearization& at, double sigma_px, double regularized_for_px) {
   constexpr double least_px = 0.01;  // coefficients that the corners leave open have no end
   const Eigen::Index corners = at.residuals_px.size(), pulls = at.regularization.size();
   if (pulls == 0) return Eigen::VectorXd::Zero(at.jacobian_transposed.rows());
   const Eigen::SparseMatrix<double> by_corners = at.jacobian_transposed.leftCols(corners);
   const Eigen::SparseMatrix<double> by_pulls = at.jacobian_transposed.rightCols(pulls);
-  const double share = std::min(1.0, std::pow(std::max(sigma_px, least_px), 2));
+  const double share =
+      std::min(1.0, std::pow(std::max(sigma_px, least_px) / regularized_for_px, 2));
   const Eigen::SparseMatrix<double> normal =
       by_corners * by_corners.transpose() + share * (by_pulls * by_pulls.transpose());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
@@ -57,7 +59,7 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
 
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
   Eigen::MatrixXd wanted = Eigen::MatrixXd::Zero(jt.rows(), intrinsics + 3);
-  wanted.block(at.intrinsics, 0, intrinsics, intrinsics).setIdentity();
+  wanted.block(0, at.first_intrinsic, at.poses, at.poses).setIdentity();
   const double share = 1 / static_cast<double>(problem.poses.size());
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     wanted.block<3, 3>(at.poses + 6 * static_cast<Eigen::Index>(i), intrinsics) =
@@ -68,20 +70,24 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
       (jt.leftCols(at.residuals_px.size()).transpose() * factor.solve(wanted)).eval();
   const double sigma_px = standard_deviation(problem, at.residuals_px);
   covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
-  intrinsics_pull_ = wanted.leftCols(intrinsics).transpose() * pull_of(at, sigma_px);
+  intrinsics_pull_ =
+      wanted.leftCols(intrinsics).transpose() * pull_of(at, sigma_px, problem.noise_px);
   determined_ = covariance_.allFinite();
 }
 
 Eigen::Matrix2d ProjectionUncertainty::covariance(const Eigen::Vector2d& pixel) const {
   const auto ray = lens_.unproject(pixel);
   const auto projection = ray ? lens_.project_with_jacobians(ray->direction) : std::nullopt;
-  if (!determined_ || !projection) {
+  const auto by = projection ? lens_.by_parameters(ray->direction) : std::nullopt;
+  if (!determined_ || !by) {
     return Eigen::Matrix2d::Identity() * std::numeric_limits<double>::infinity();
   }
-  Eigen::Matrix<double, 2, Eigen::Dynamic> gradient(2, covariance_.rows());
-  gradient << projection->d_pixel_d_parameters,
-      -projection->d_pixel_d_point * cross_matrix(ray->direction);
-  return gradient * covariance_ * gradient.transpose();
+  std::vector<Eigen::Index> states = by->parameters;
+  for (Eigen::Index i = covariance_.rows() - 3; i < covariance_.rows(); ++i) states.push_back(i);
+  Eigen::Matrix2Xd gradient(2, std::ssize(states));
+  gradient << by->d_pixel, -projection->d_pixel_d_point * cross_matrix(ray->direction);
+  const Eigen::MatrixXd of_states = covariance_(states, states);
+  return gradient * of_states * gradient.transpose();
 }
 
 double ProjectionUncertainty::worst_px(const Eigen::Vector2d& pixel) const {
@@ -98,7 +104,8 @@ Eigen::MatrixXd ProjectionUncertainty::intrinsics_covariance() const {
 }
 
 double ProjectionUncertainty::focal_sd_px() const {
-  return determined_ ? std::sqrt(covariance_(0, 0)) : std::numeric_limits<double>::infinity();
+  return determined_ && covariance_(0, 0) > 0 ? std::sqrt(covariance_(0, 0))
+                                              : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace vlp

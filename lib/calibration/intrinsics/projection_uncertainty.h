@@ -30,17 +30,19 @@ class ProjectionUncertainty {
   /// Standard deviation in the direction in which it is largest.
   double worst_px(const Eigen::Vector2d& pixel) const;
 
-  /// Of the intrinsics alone.
+  /// Of the intrinsics alone; of a splined lens with zeros for its core, which no solve moves.
   Eigen::MatrixXd intrinsics_covariance() const;
 
   /// How much further the intrinsics would be, to first order, from where mrcal's regularization
   /// draws them (coefficients to zero, the principal point to the imager's middle), were it made
-  /// for the noise s of these corners instead of a pixel's. With its residuals r
+  /// for the noise s of these corners instead of BoardProblem::noise_px, a pixel here. With its
+  /// residuals r
   ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r,  s at least 0.01 and at most 1.
   /// Zero where there is none. A standard deviation of the intrinsics that no noise explains.
   const Eigen::VectorXd& intrinsics_pull() const { return intrinsics_pull_; }
 
-  /// Of the focal length along x. Infinite when nothing is determined.
+  /// Of the focal length along x. Infinite when nothing is determined, and of a splined lens, whose
+  /// control points make up for it.
   double focal_sd_px() const;
 
  private:

@@ -58,7 +58,7 @@ Eigen::MatrixXd covariance_by_views(const IntrinsicsSolution& solution) {
   const auto views = static_cast<Eigen::Index>(solution.views.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
-  const Layout layout{intrinsics, at.poses, at.poses + 6 * boards, at.jacobian_transposed.rows()};
+  const Layout layout{at.poses, at.poses, at.poses + 6 * boards, at.jacobian_transposed.rows()};
   const Eigen::Index rows = at.residuals_px.size(), rows_of_view = rows / views;
 
   std::vector<Share> shares;
@@ -71,7 +71,7 @@ Eigen::MatrixXd covariance_by_views(const IntrinsicsSolution& solution) {
       share_of(at, layout, rows, at.jacobian_transposed.cols() - rows, 0, 0).normal;
   for (const Share& share : shares) normal += share.normal;
 
-  Eigen::MatrixXd changes(intrinsics, views);
+  Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(intrinsics, views);
   for (Eigen::Index view = 0; view < views; ++view) {
     const Share& share = shares[static_cast<std::size_t>(view)];
     const Eigen::LDLT<Eigen::MatrixXd> rest(normal - share.normal);
@@ -79,8 +79,8 @@ Eigen::MatrixXd covariance_by_views(const IntrinsicsSolution& solution) {
       return Eigen::MatrixXd::Constant(intrinsics, intrinsics,
                                        std::numeric_limits<double>::infinity());
     }
-    changes.col(view) =
-        at.scale.head(intrinsics).cwiseProduct(rest.solve(share.gradient).head(intrinsics));
+    changes.col(view).tail(at.poses) =
+        at.scale.head(at.poses).cwiseProduct(rest.solve(share.gradient).head(at.poses));
   }
   changes.colwise() -= changes.rowwise().mean().eval();
   const auto n = static_cast<double>(views);

@@ -253,7 +253,7 @@ class Derivatives : public testing::Test {
  protected:
   Camera camera = synthetic_camera();
   AdjustmentProblem problem{camera.lens_model,
-                            LensFreedom(camera.intrinsics, lens_covariance(camera, 0.1, 6)), 2, 1};
+                            LensFreedom(camera, lens_covariance(camera, 0.1, 6)), 2, 1};
 
   Derivatives() {
     const AdjustmentLayout& at = problem.layout();

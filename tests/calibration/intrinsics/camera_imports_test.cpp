@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "calibration/intrinsics/camera_exports.h"
+#include "camera/spline_grid.h"
 #include "rig/input_error.h"
 #include "support/temporary_folder.h"
 
@@ -23,6 +24,12 @@ Camera camera_of(LensModel model) {
     camera.intrinsics = {290, 291, 402, 297, 0.03, -0.012, 0.004, -0.0006};
   }
   return camera;
+}
+
+/// As of a lens of 150 degrees.
+Camera splined_camera() {
+  const LensModel model = splined_lens({3, 13, 11, 150});
+  return with_lens_model(camera_of(LensModel::fisheye), model).camera;
 }
 
 class CameraFiles : public testing::Test {
@@ -59,6 +66,34 @@ TEST_F(CameraFiles, ComeBackToTheLastDigit) {
     if (model == LensModel::opencv5 || model == LensModel::opencv8) continue;
     comes_back(camera, kalibr_camchain(camera), model);
   }
+}
+
+TEST_F(CameraFiles, OfSplinedLensesComeBackToTheLastDigit) {
+  const Camera camera = splined_camera();
+  comes_back(camera, mrcal_cameramodel(camera), camera.lens_model);
+  for (const auto& text_of : {ros_camera_info, kalibr_camchain, opencv_camera}) {
+    EXPECT_THROW(text_of(camera), std::invalid_argument);
+  }
+  std::string short_one = mrcal_cameramodel(camera);
+  short_one.replace(short_one.find("Nx=13"), 5, "Nx=14");
+  EXPECT_THAT(refusal(short_one), testing::HasSubstr("takes 312 parameters, not 290"));
+}
+
+TEST_F(CameraFiles, AreFittedToSplinedLensesAndBack) {
+  const auto wide = with_lens_model(camera_of(LensModel::fisheye), splined_lens({3, 20, 16, 190}));
+  EXPECT_LT(wide.worst_px, 0.002);
+  EXPECT_EQ(wide.share, 1);
+  // What is beyond the grid is left out.
+  const auto part = with_lens_model(camera_of(LensModel::fisheye), splined_lens({3, 14, 12, 100}));
+  EXPECT_LT(part.worst_px, 0.01);
+  EXPECT_LT(part.share, 0.8);
+  const auto back = with_lens_model(wide.camera, LensModel::fisheye);
+  EXPECT_LT(back.worst_px, 0.005);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(back.camera.intrinsics[i], camera_of(LensModel::fisheye).intrinsics[i], 0.01);
+  }
+  const auto near = with_lens_model(camera_of(LensModel::opencv8), splined_lens({2, 20, 16, 100}));
+  EXPECT_LT(near.worst_px, 0.2);  // quadratic pieces
 }
 
 TEST_F(CameraFiles, ThatAreNotKnownAreRefused) {

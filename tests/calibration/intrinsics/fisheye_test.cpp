@@ -3,56 +3,12 @@
 /// Lenses of 190 degrees from the corners of boards.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <numbers>
-
 #include "calibration/intrinsics/calibration_report.h"
-#include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
-#include "calibration/intrinsics/synthetic_views.h"
+#include "calibration/intrinsics/wide_views.h"
 
 namespace vlp {
 namespace {
-
-constexpr std::array kWideImager{1000, 1000};
-
-Lens wide_lens() {
-  return {LensModel::fisheye, std::array{290.0, 291.0, 501.0, 498.0, 0.03, -0.012, 0.004, -0.0006}};
-}
-
-/// Views with the board anywhere up to 85 degrees off the axis, its far tags beyond 90.
-IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double noise_px,
-                           const Eigen::Vector2d& warp_m = {0, 0}) {
-  SyntheticViews views{synthetic_board(kalibr), wide_lens(), kWideImager};
-  views.warp_m = warp_m;
-  IntrinsicsInput input{BoardLattice(views.board), {}, kWideImager, LensModel::fisheye};
-  while (static_cast<int>(input.views.size()) < count) {
-    const double off_axis = random.uniform(0, 1.5), around = random.uniform(-3.14, 3.14);
-    const double lean = random.uniform(-0.6, 0.6), lean_y = random.uniform(-0.6, 0.6);
-    const double roll = random.uniform(-3.14, 3.14), distance_m = random.uniform(0.12, 0.3);
-    const Eigen::Matrix3d towards =
-        Eigen::AngleAxisd(around, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
-        Eigen::AngleAxisd(off_axis, Eigen::Vector3d::UnitY());
-    const Eigen::Matrix3d rotation =
-        towards * Eigen::AngleAxisd(lean, Eigen::Vector3d::UnitX()).toRotationMatrix() *
-        Eigen::AngleAxisd(lean_y, Eigen::Vector3d::UnitY()) *
-        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
-    const SeenBoard seen = views.view(rotation, distance_m * towards.col(2), random, noise_px);
-    if (seen.tags.size() > 5 && input.lattice.enough(seen)) {
-      input.views.push_back(input.lattice.corners(seen));
-    }
-  }
-  return input;
-}
-
-/// Over the pixels up to so far off the axis.
-ProjectionDifference up_to(double degrees, const Lens& found) {
-  return *projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
-    const auto ray = wide_lens().unproject(pixel);
-    const double cosine = ray ? ray->direction.normalized().z() : -1;
-    return cosine > std::cos(degrees * std::numbers::pi / 180) ? 1.0 : INFINITY;
-  });
-}
 
 class WideLens : public testing::TestWithParam<bool> {};
 

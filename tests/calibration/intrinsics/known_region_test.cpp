@@ -11,8 +11,8 @@ constexpr std::array kImager{801, 601};
 constexpr double kMargin = 40;  // 4 % of 1000 px
 
 TEST(KnownRegion, IsTheHullWithAMargin) {
-  const ImageRegion region =
-      known_region({{200, 100}, {600, 100}, {400, 250}, {600, 500}, {200, 500}}, kImager);
+  const ImageRegion region = known_region(
+      {{200, 100}, {600, 100}, {400, 250}, {600, 500}, {200, 500}}, kImager, LensModel::opencv8);
   EXPECT_EQ(region.size(), 4U);
   EXPECT_NEAR(share_of_image(region, kImager),
               (400 + 2 * kMargin) * (400 + 2 * kMargin) / (800 * 600), 1e-12);
@@ -23,7 +23,8 @@ TEST(KnownRegion, IsTheHullWithAMargin) {
 }
 
 TEST(KnownRegion, EndsWithTheImage) {
-  const ImageRegion region = known_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}}, kImager);
+  const ImageRegion region =
+      known_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}}, kImager, LensModel::opencv8);
   EXPECT_NEAR(share_of_image(region, kImager), 1, 1e-12);
   for (const Eigen::Vector2d& corner : region) {
     EXPECT_TRUE(corner.x() == 0 || corner.x() == 800);
@@ -33,15 +34,16 @@ TEST(KnownRegion, EndsWithTheImage) {
 }
 
 TEST(KnownRegion, OfASlantedSetIsSlanted) {
-  const ImageRegion region = known_region({{100, 100}, {700, 500}, {690, 510}, {90, 110}}, kImager);
+  const ImageRegion region =
+      known_region({{100, 100}, {700, 500}, {690, 510}, {90, 110}}, kImager, LensModel::opencv8);
   EXPECT_TRUE(lies_in(region, {400, 300}));
   EXPECT_FALSE(lies_in(region, {700, 100}));
   EXPECT_LT(share_of_image(region, kImager), 0.3);
 }
 
 TEST(KnownRegion, NeedsThreeCornersThatAreNotOnALine) {
-  EXPECT_TRUE(known_region({}, kImager).empty());
-  EXPECT_TRUE(known_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager).empty());
+  EXPECT_TRUE(known_region({}, kImager, LensModel::opencv8).empty());
+  EXPECT_TRUE(known_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, LensModel::opencv8).empty());
   EXPECT_FALSE(lies_in({}, {1, 1}));
   EXPECT_EQ(share_of_image({}, kImager), 0);
 }

@@ -1,0 +1,90 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/spline_fit.h"
+
+#include <Eigen/SparseCholesky>
+
+namespace vlp {
+namespace {
+
+using Entries = std::vector<Eigen::Triplet<double>>;
+
+/// Two directions of the plane have the same equations.
+struct Equations {
+  Entries entries;
+  std::vector<Eigen::RowVector2d> right;
+
+  int next() const { return static_cast<int>(right.size()); }
+};
+
+/// Second differences of the control points, along columns and rows: small.
+void keep_straight(Equations& equations, const SplineGrid& grid) {
+  constexpr double weight = 3e-4;  // which leaves 1e-5 px
+  const auto add = [&](int first, int apart) {
+    const int row = equations.next();
+    equations.entries.emplace_back(row, first, weight);
+    equations.entries.emplace_back(row, first + apart, -2 * weight);
+    equations.entries.emplace_back(row, first + 2 * apart, weight);
+    equations.right.emplace_back(0, 0);
+  };
+  for (int row = 0; row < grid.ny; ++row) {
+    for (int column = 0; column < grid.nx; ++column) {
+      const int first = row * grid.nx + column;
+      if (column + 2 < grid.nx) add(first, 1);
+      if (row + 2 < grid.ny) add(first, grid.nx);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& imager_px,
+                                 LensModel model, const std::vector<double>& core) {
+  constexpr int of_a_piece = 4;
+  constexpr double near = 0.05;  // of the image, around it
+  const SplineGrid grid = grid_of(model);
+  const SplineSurface straight(grid, std::vector<double>(2 * grid.control_points()));
+  const Eigen::Array2d focal_px(core[0], core[1]), center_px(core[2], core[3]);
+  const Eigen::Array2d size_px(imager_px[0], imager_px[1]);
+  Equations equations;
+  keep_straight(equations, grid);
+  const int columns = of_a_piece * (grid.nx - grid.order),
+            rows = of_a_piece * (grid.ny - grid.order);
+  for (int row = 0; row <= rows; ++row) {
+    for (int column = 0; column <= columns; ++column) {
+      const Eigen::Array2d share(double(column) / columns, double(row) / rows);
+      const Eigen::Vector2d u = straight.reach().array() * (2 * share - 1);
+      const auto pixel = lens.project({u.x(), u.y(), 1 - u.squaredNorm() / 4});
+      if (!pixel || (pixel->array() < -near * size_px).any() ||
+          (pixel->array() > (1 + near) * size_px).any()) {
+        continue;
+      }
+      const SplineSurface::Weights at = straight.weights(u);
+      for (int j = 0; j <= grid.order; ++j) {
+        for (int i = 0; i <= grid.order; ++i) {
+          equations.entries.emplace_back(
+              equations.next(), (at.row + j) * grid.nx + at.column + i,
+              at.x[static_cast<std::size_t>(i)] * at.y[static_cast<std::size_t>(j)]);
+        }
+      }
+      equations.right.emplace_back(((pixel->array() - center_px) / focal_px).matrix() - u);
+    }
+  }
+  const auto points = static_cast<Eigen::Index>(grid.control_points());
+  Eigen::SparseMatrix<double> left(equations.next(), points);
+  left.setFromTriplets(equations.entries.begin(), equations.entries.end());
+  Eigen::MatrixX2d right(equations.next(), 2);
+  for (Eigen::Index i = 0; i < right.rows(); ++i) {
+    right.row(i) = equations.right[static_cast<std::size_t>(i)];
+  }
+  const Eigen::SparseMatrix<double> normal = left.transpose() * left;
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
+  const Eigen::MatrixX2d found = factor.solve(left.transpose() * right);
+  std::vector<double> parameters = core;
+  for (Eigen::Index i = 0; i < points; ++i) {
+    parameters.insert(parameters.end(), {found(i, 0), found(i, 1)});
+  }
+  return parameters;
+}
+
+}  // namespace vlp

@@ -1,0 +1,240 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "camera/spline_surface.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+/// What the control points of a piece count in it, from the first: a polynomial each, the constant
+/// first, of t in [0, 1] for cubic pieces and [-1/2, 1/2] for quadratic ones.
+template <int Order>
+Eigen::Matrix<double, Order + 1, Order + 1> basis();
+
+template <>
+Eigen::Matrix3d basis<2>() {
+  Eigen::Matrix3d rows;
+  rows << 1, -4, 4, 6, 0, -8, 1, 4, 4;
+  return rows / 8;
+}
+
+template <>
+Eigen::Matrix4d basis<3>() {
+  Eigen::Matrix4d rows;
+  rows << 1, -3, 3, -1, 4, 0, -6, 3, 1, 3, 3, -3, 0, 0, 0, 1;
+  return rows / 6;
+}
+
+/// One direction's piece and the place in it.
+struct Piece {
+  int index;
+  double t;
+};
+
+/// at: in control points from the first.
+template <int Order>
+Piece piece_at(double at, int control_points) {
+  constexpr double middle = Order == 2 ? 0.5 : 0;
+  const int own = std::clamp(static_cast<int>(at + middle), 1, control_points - Order);
+  return {own - 1, at - own};
+}
+
+}  // namespace
+
+SplineSurface::SplineSurface(const SplineGrid& grid, std::span<const double> control_points)
+    : grid_(grid) {
+  const double edge = 2 * std::tan(rad_from_deg(grid.fov_x_deg) / 4);
+  pieces_per_u_ = (grid.nx - grid.order) / (2 * edge);
+  reach_ = {edge, (grid.ny - grid.order) / (2 * pieces_per_u_)};
+  if (grid.order == 2) {
+    fill_pieces<2>(control_points);
+  } else {
+    fill_pieces<3>(control_points);
+  }
+  fill_starts();
+}
+
+template <int Order>
+void SplineSurface::fill_pieces(std::span<const double> control_points) {
+  constexpr int width = Order + 1;
+  const Eigen::Matrix<double, width, width> by_power = basis<Order>().transpose();
+  Eigen::Matrix<double, width, width> x, y;
+  for (int row = 0; row < grid_.ny - Order; ++row) {
+    for (int column = 0; column < grid_.nx - Order; ++column) {
+      for (int j = 0; j < width; ++j) {
+        for (int i = 0; i < width; ++i) {
+          const auto point = static_cast<std::size_t>((row + j) * grid_.nx + column + i);
+          x(j, i) = control_points[2 * point];
+          y(j, i) = control_points[2 * point + 1];
+        }
+      }
+      const Eigen::Matrix<double, width, width> of_x = by_power * x * by_power.transpose(),
+                                                of_y = by_power * y * by_power.transpose();
+      for (int j = 0; j < width; ++j) {
+        for (int i = 0; i < width; ++i) pieces_.emplace_back(of_x(j, i), of_y(j, i));
+      }
+    }
+  }
+}
+
+template <int Order>
+SplineSurface::Value SplineSurface::value(const Eigen::Vector2d& u) const {
+  constexpr int width = Order + 1;
+  const auto [column, x] = piece_at<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx);
+  const auto [row, y] = piece_at<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
+  const Eigen::Vector2d* powers = pieces_.data() + static_cast<std::ptrdiff_t>(width * width) *
+                                                       (row * (grid_.nx - Order) + column);
+  Eigen::Vector2d shift(0, 0), by_x(0, 0), by_y(0, 0);
+  for (int j = Order; j >= 0; --j) {  // Horner's scheme, in x within y
+    const Eigen::Vector2d* line = powers + j * width;
+    Eigen::Vector2d at = line[Order], slope = at;
+    for (int i = Order - 1; i > 0; --i) {
+      at = at * x + line[i];
+      slope = slope * x + at;
+    }
+    at = at * x + line[0];
+    by_y = by_y * y + shift;
+    shift = shift * y + at;
+    by_x = by_x * y + slope;
+  }
+  Value value{u + shift, Eigen::Matrix2d::Identity()};
+  value.d_distorted_d_u.col(0) += pieces_per_u_ * by_x;
+  value.d_distorted_d_u.col(1) += pieces_per_u_ * by_y;
+  return value;
+}
+
+SplineSurface::Value SplineSurface::operator()(const Eigen::Vector2d& u) const {
+  return grid_.order == 2 ? value<2>(u) : value<3>(u);
+}
+
+template <int Order>
+SplineSurface::Weights SplineSurface::weights_of(const Eigen::Vector2d& u) const {
+  const Piece x = piece_at<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx),
+              y = piece_at<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
+  Weights weights{x.index, y.index, {}, {}};
+  const auto rows = basis<Order>();
+  double power_x = 1, power_y = 1;
+  for (int power = 0; power <= Order; ++power, power_x *= x.t, power_y *= y.t) {
+    for (int i = 0; i <= Order; ++i) {
+      weights.x[static_cast<std::size_t>(i)] += rows(i, power) * power_x;
+      weights.y[static_cast<std::size_t>(i)] += rows(i, power) * power_y;
+    }
+  }
+  return weights;
+}
+
+SplineSurface::Weights SplineSurface::weights(const Eigen::Vector2d& u) const {
+  return grid_.order == 2 ? weights_of<2>(u) : weights_of<3>(u);
+}
+
+std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
+                                                     const Eigen::Vector2d& distorted,
+                                                     Eigen::Matrix2d& d_distorted_d_u) const {
+  constexpr int most_steps = 50, most_halvings = 12;
+  constexpr double rounding = 1e-12;  // of the reach, from which the pixel may have come
+  Value at = (*this)(u);
+  Eigen::Vector2d error = at.distorted - distorted;
+  for (int iteration = 0; iteration < most_steps; ++iteration) {
+    const Eigen::Matrix2d& j = at.d_distorted_d_u;
+    const double determinant = j.determinant();
+    if (!(determinant > 0)) return std::nullopt;
+    Eigen::Vector2d step = Eigen::Vector2d(j(0, 1) * error.y() - j(1, 1) * error.x(),
+                                           j(1, 0) * error.x() - j(0, 0) * error.y()) /
+                           determinant;
+    // Newton squares the error: after a step of 1e-6 1e-12 is left.
+    if (step.squaredNorm() <= 1e-12) {
+      u += step;
+      if (!((u.cwiseAbs() - reach_).maxCoeff() <= rounding * reach_.maxCoeff())) {
+        return std::nullopt;
+      }
+      d_distorted_d_u = j;
+      return within_reach(u);
+    }
+    // Halved until it helps.
+    for (int halving = 0;; ++halving, step /= 2) {
+      if (halving == most_halvings) return std::nullopt;
+      const Eigen::Vector2d next = within_reach(u + step);
+      const Value next_at = (*this)(next);
+      const Eigen::Vector2d next_error = next_at.distorted - distorted;
+      if (!(next_error.squaredNorm() < error.squaredNorm())) continue;
+      u = next, at = next_at, error = next_error;
+      break;
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<Eigen::Vector2d> SplineSurface::undistorted(const Eigen::Vector2d& distorted,
+                                                          Eigen::Matrix2d& d_distorted_d_u) const {
+  return search(start_for(distorted), distorted, d_distorted_d_u);
+}
+
+Eigen::Vector2d SplineSurface::start_for(const Eigen::Vector2d& distorted) const {
+  const Eigen::Vector2d at = (distorted - first_start_).cwiseProduct(starts_per_unit_);
+  const auto within = [](double node) { return node > 0 ? std::min(node, kStarts - 1.0) : 0; };
+  const double column = within(at.x()), row = within(at.y());
+  const int i = std::min(static_cast<int>(column), kStarts - 2);
+  const int j = std::min(static_cast<int>(row), kStarts - 2);
+  const double x = column - i, y = row - j;
+  const Eigen::Vector2d* node = starts_.data() + static_cast<std::ptrdiff_t>(j) * kStarts + i;
+  return within_reach((1 - y) * ((1 - x) * node[0] + x * node[1]) +
+                      y * ((1 - x) * node[kStarts] + x * node[kStarts + 1]));
+}
+
+void SplineSurface::fill_starts() {
+  constexpr int tried = 2 * kStarts - 1;
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  std::vector<std::pair<Eigen::Vector2d, Value>> places;
+  places.reserve(static_cast<std::size_t>(tried) * tried);
+  Eigen::Vector2d least(inf, inf), most(-inf, -inf);
+  for (int row = 0; row < tried; ++row) {
+    for (int column = 0; column < tried; ++column) {
+      const Eigen::Vector2d share = Eigen::Vector2d(column, row) / (kStarts - 1);
+      const Eigen::Vector2d u = reach_.cwiseProduct(share - Eigen::Vector2d(1, 1));
+      places.emplace_back(u, (*this)(u));
+      least = least.cwiseMin(places.back().second.distorted);
+      most = most.cwiseMax(places.back().second.distorted);
+    }
+  }
+  first_start_ = least;
+  constexpr double tiny = 1e-300;  // where all is thrown together
+  starts_per_unit_ = (kStarts - 1) * (most - least).cwiseMax(tiny).cwiseInverse();
+  starts_.assign(static_cast<std::size_t>(kStarts) * kStarts, Eigen::Vector2d::Zero());
+  // Each node starts from the place that comes nearest to it.
+  std::vector<double> distances(starts_.size(), inf);
+  for (const auto& [u, at] : places) {
+    const Eigen::Vector2d node = (at.distorted - least).cwiseProduct(starts_per_unit_);
+    const Eigen::Vector2d whole = node.array().round();
+    const Eigen::Vector2d start =
+        u + at.d_distorted_d_u.inverse() * (whole - node).cwiseQuotient(starts_per_unit_);
+    if (!(at.d_distorted_d_u.determinant() > 0) || !start.allFinite()) continue;
+    const auto index = static_cast<std::size_t>(whole.y() * kStarts + whole.x());
+    const double distance = (node - whole).squaredNorm();
+    if (!(distance < distances[index])) continue;
+    distances[index] = distance;
+    starts_[index] = within_reach(start);
+  }
+  // To nodes that none comes near, from their neighbours: right and down, then left and up.
+  const auto take = [&](std::size_t to, std::size_t from) {
+    if (distances[to] < inf || distances[from] == inf) return;
+    distances[to] = distances[from];
+    starts_[to] = starts_[from];
+  };
+  for (std::size_t i = 1; i < starts_.size(); ++i) {
+    if (i % kStarts > 0) take(i, i - 1);
+    if (i >= kStarts) take(i, i - kStarts);
+  }
+  for (std::size_t i = starts_.size() - 1; i-- > 0;) {
+    if ((i + 1) % kStarts > 0) take(i, i + 1);
+    if (i + kStarts < starts_.size()) take(i, i + kStarts);
+  }
+}
+
+}  // namespace vlp

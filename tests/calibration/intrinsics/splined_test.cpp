@@ -1,0 +1,114 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Splined lenses from the corners of boards, of a lens of 190 degrees that is none of them.
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <numbers>
+
+#include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
+#include "calibration/intrinsics/rotation_vector.h"
+#include "calibration/intrinsics/wide_views.h"
+#include "camera/spline_grid.h"
+
+namespace vlp {
+namespace {
+
+constexpr LensModel kSplined = splined_lens({3, 14, 14, 205});
+
+/// Boards all over the image of a lens that sees to 100 degrees off its axis.
+IntrinsicsInput splined_input(int count, Random& random, double noise_px) {
+  const WideBoards boards{0.1, 0.2, 100 * std::numbers::pi / 180, true};
+  IntrinsicsInput input = wide_input(false, count, random, noise_px, {0, 0}, boards);
+  input.lens_model = kSplined;
+  return input;
+}
+
+TEST(SplinedWideLens, IsKnownBeyondNinetyDegrees) {
+  constexpr double noise_px = 0.02;  // as of rendered boards
+  Random random(18);
+  const auto input = splined_input(40, random, noise_px);
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok()) << explanation_of(solution.status);
+  EXPECT_EQ(solution.views.size(), 40U);
+  EXPECT_FALSE(solution.solved_for.core);
+  EXPECT_NEAR(solution.rms_px, noise_px, 0.003);
+  EXPECT_NEAR(solution.problem.noise_px, noise_px, 0.005);
+  EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
+  EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.1);
+  const CalibrationReport report = report_on(solution, input);
+  EXPECT_LT(report.uncertainty_mean_px, 0.05);
+  ASSERT_TRUE(report.halves);
+  EXPECT_LT(report.halves->mean_px, 0.1);
+  const ProjectionUncertainty uncertainty(solution);
+  EXPECT_EQ(uncertainty.intrinsics_covariance().topRows<4>().norm(), 0);
+}
+
+TEST(SplinedWideLens, OfTooNarrowAGridHasOnlyTheViewsWithinIt) {
+  Random random(19);
+  IntrinsicsInput input = splined_input(12, random, 0.05);
+  input.lens_model = splined_lens({3, 10, 10, 120});
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  EXPECT_FALSE(solution.ok());
+}
+
+/// How much the boards turned from one solution to another in the mean, in the camera.
+Eigen::Vector3d mean_turn(const IntrinsicsSolution& from, const IntrinsicsSolution& to) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < from.problem.poses.size(); ++i) {
+    const Eigen::AngleAxisd turn(rotation_by(to.problem.poses[i].rotation) *
+                                 rotation_by(from.problem.poses[i].rotation).transpose());
+    sum += turn.angle() * turn.axis();
+  }
+  return sum / static_cast<double>(from.problem.poses.size());
+}
+
+// Twenty seeds of noise on the same boards: projections scatter as the uncertainty says.
+TEST(SplinedScatter, IsThatOfTheUncertainty) {
+  constexpr int seeds = 20;
+  constexpr double noise_px = 0.1;
+  Random of_boards(41);
+  IntrinsicsInput exact = splined_input(16, of_boards, 0);
+  exact.lens_model = splined_lens({3, 10, 10, 205});
+  exact.warp = WarpChoice::off;
+  const auto solved = [&](std::uint64_t seed) {
+    IntrinsicsInput input = exact;
+    Random random(seed);
+    for (auto& view : input.views) {
+      for (auto& corner : view) {
+        const double v = random.normal(), u = random.normal();
+        corner.pixel += noise_px * Eigen::Vector2d(u, v);
+      }
+    }
+    return solve_intrinsics(input);
+  };
+  std::vector<IntrinsicsSolution> solutions;
+  for (int seed = 0; seed < seeds; ++seed) {
+    solutions.push_back(solved(300 + static_cast<std::uint64_t>(seed)));
+    ASSERT_TRUE(solutions.back().ok());
+  }
+  // About their own mean: what draws all of them alike is no scatter.
+  const IntrinsicsSolution& first = solutions.front();
+  const ProjectionUncertainty uncertainty(first);
+  const Lens lens = first.lens();
+  double squares = 0, freedoms = 0;
+  for (const Eigen::Vector2d& pixel : pixel_grid(kWideImager)) {
+    const auto ray = lens.unproject(pixel);
+    if (!ray || ray->direction.normalized().z() < 0) continue;
+    std::vector<Eigen::Vector2d> seen;
+    Eigen::Vector2d mean(0, 0);
+    for (const IntrinsicsSolution& solution : solutions) {
+      const Eigen::Vector3d turned = rotation_by(mean_turn(first, solution)) * ray->direction;
+      seen.push_back(solution.lens().project(turned).value());
+      mean += seen.back() / seeds;
+    }
+    const Eigen::Matrix2d information = uncertainty.covariance(pixel).inverse();
+    for (const Eigen::Vector2d& one : seen) squares += (one - mean).dot(information * (one - mean));
+    freedoms += 2 * (seeds - 1);
+  }
+  EXPECT_NEAR(squares / freedoms, 1, 0.25);
+}
+
+}  // namespace
+}  // namespace vlp

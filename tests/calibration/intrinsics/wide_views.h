@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/synthetic_views.h"
+
+namespace vlp {
+
+/// As of a lens of 190 degrees.
+inline constexpr std::array kWideImager{1000, 1000};
+
+inline Lens wide_lens() {
+  return {LensModel::fisheye, std::array{290.0, 291.0, 501.0, 498.0, 0.03, -0.012, 0.004, -0.0006}};
+}
+
+/// Where the boards are, and how far off the axis the lens sees.
+struct WideBoards {
+  double nearest_m = 0.12, farthest_m = 0.3, reach_rad = std::numbers::pi;
+  /// As many in every part of the image, or of the angle off the axis.
+  bool all_over = false;
+};
+
+/// Views with the board anywhere up to 85 degrees off the axis, its far tags beyond 90.
+inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double noise_px,
+                                  const Eigen::Vector2d& warp_m = {0, 0},
+                                  const WideBoards& boards = {}) {
+  SyntheticViews views{synthetic_board(kalibr), wide_lens(), kWideImager};
+  views.warp_m = warp_m;
+  IntrinsicsInput input{BoardLattice(views.board), {}, kWideImager, LensModel::fisheye};
+  while (static_cast<int>(input.views.size()) < count) {
+    const double share = random.uniform(0, 1);
+    const double off_axis = 1.5 * (boards.all_over ? std::sqrt(share) : share);
+    const double around = random.uniform(-3.14, 3.14);
+    const double lean = random.uniform(-0.6, 0.6), lean_y = random.uniform(-0.6, 0.6);
+    const double roll = random.uniform(-3.14, 3.14);
+    const double distance_m = random.uniform(boards.nearest_m, boards.farthest_m);
+    const Eigen::Matrix3d towards =
+        Eigen::AngleAxisd(around, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
+        Eigen::AngleAxisd(off_axis, Eigen::Vector3d::UnitY());
+    const Eigen::Matrix3d rotation =
+        towards * Eigen::AngleAxisd(lean, Eigen::Vector3d::UnitX()).toRotationMatrix() *
+        Eigen::AngleAxisd(lean_y, Eigen::Vector3d::UnitY()) *
+        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
+    SeenBoard seen = views.view(rotation, distance_m * towards.col(2), random, noise_px);
+    std::erase_if(seen.tags, [&](const SeenTag& tag) {
+      return std::ranges::any_of(tag.corners_px, [&](const Eigen::Vector2d& pixel) {
+        const auto ray = views.lens.unproject(pixel);
+        return !ray || std::acos(ray->direction.normalized().z()) > boards.reach_rad;
+      });
+    });
+    if (seen.tags.size() > 5 && input.lattice.enough(seen)) {
+      input.views.push_back(input.lattice.corners(seen));
+    }
+  }
+  return input;
+}
+
+/// Over the pixels up to so far off the axis.
+inline ProjectionDifference up_to(double degrees, const Lens& found) {
+  return *projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
+    const auto ray = wide_lens().unproject(pixel);
+    const double cosine = ray ? ray->direction.normalized().z() : -1;
+    return cosine > std::cos(degrees * std::numbers::pi / 180) ? 1.0 : INFINITY;
+  });
+}
+
+}  // namespace vlp
