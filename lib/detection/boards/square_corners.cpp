@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <utility>
 
@@ -17,6 +18,25 @@ namespace vlp {
 namespace {
 
 constexpr int kFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
+
+/// A large image is searched in one of a half or a third of its width, which takes OpenCV a
+/// fraction of the memory; what is found there is looked at in the image itself.
+int reduction_of(const cv::Mat& image) {
+  constexpr double large_px = 8e6;
+  return static_cast<int>(std::ceil(std::sqrt(static_cast<double>(image.total()) / large_px)));
+}
+
+cv::Mat reduced(const cv::Mat& image, int times) {
+  if (times <= 1) return image;
+  cv::Mat small;
+  cv::resize(image, small, {image.cols / times, image.rows / times}, 0, 0, cv::INTER_AREA);
+  return small;
+}
+
+/// Where in a row of the image a place in the reduced one is; sizes are no multiples.
+double enlarged(float at, int large, int small) {
+  return (static_cast<double>(at) + 0.5) * large / small - 0.5;
+}
 
 /// Nothing is left to chance: what OpenCV draws is the same for every image.
 void start_chance() { cv::theRNG().state = 1; }
@@ -57,10 +77,18 @@ std::vector<SeenPoint> SquareCorners::exact(const std::vector<Guess>& guesses,
 
 std::vector<SeenPoint> SquareCorners::of_chessboard(const GreyLevels& image) const {
   std::vector<cv::Point2f> found;
+  const cv::Mat searched = reduced(image.sharp, reduction_of(image.sharp));
   start_chance();
-  if (!cv::findChessboardCornersSB(image.sharp, {cols_, rows_}, found, kFlags)) return {};
+  if (!cv::findChessboardCornersSB(searched, {cols_, rows_}, found, kFlags)) return {};
   std::vector<SeenPoint> points;
-  for (std::size_t i = 0; i < found.size(); ++i) points.push_back({i, {found[i].x, found[i].y}});
+  const bool whole = searched.size() == image.sharp.size();
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto [x, y] = found[i];
+    points.push_back({i, {x, y}});
+    if (whole) continue;
+    points.back().pixel = {enlarged(x, image.sharp.cols, searched.cols),
+                           enlarged(y, image.sharp.rows, searched.rows)};
+  }
   order_lattice(points, cols_, rows_, true);
   const auto at = [&](int col, int row) {
     return points[static_cast<std::size_t>(row * cols_ + col)].pixel;
@@ -134,6 +162,7 @@ std::array<int, 2> chessboard_shown(const cv::Mat& image) {
   if (std::min(image.cols, image.rows) < least_px) return {0, 0};
   cv::Mat1b levels;
   image.convertTo(levels, CV_8U, image.depth() == CV_16U ? 1 / 257.0 : 1);
+  levels = reduced(levels, reduction_of(levels));
   std::vector<cv::Point2f> corners;
   cv::Mat squares;
   start_chance();
