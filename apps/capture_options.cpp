@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <map>
 #include <stdexcept>
@@ -14,6 +15,7 @@
 #include "camera/lens_model.h"
 #include "detection/image_file.h"
 #include "detection/lights/lights_table.h"
+#include "detection/video.h"
 #include "geometry/angles.h"
 #include "progress.h"
 #include "step_outcome.h"
@@ -47,6 +49,17 @@ void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {
          "as the images show)")
       ->check(CLI::IsMember({"rows", "columns"}))
       ->option_text("rows|columns");
+}
+
+void add_every_option(CLI::App& app, int& every) {
+  app.add_option("--every", every, "Of a video take every Nth frame (default: 1)")
+      ->check(CLI::Range(1, 1000000))
+      ->option_text("N");
+}
+
+void check_every(int every, const std::vector<std::string>& files) {
+  if (every == 1 || std::any_of(files.begin(), files.end(), is_video_name)) return;
+  throw std::invalid_argument("--every is for videos, and there is none");
 }
 
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {
@@ -97,16 +110,19 @@ std::vector<std::string> inputs_of(const CaptureOptions& options) {
 
 SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
                     const std::optional<Calibration>& calibration) {
-  for (const auto& image : images_in(options.images)) {
-    check_output(options.output, {image.string()});
-    if (!options.lights.empty()) check_output(options.lights, {image.string()});
+  if (!is_video_name(options.images)) {
+    for (const auto& image : images_in(options.images)) {
+      check_output(options.output, {image.string()});
+      if (!options.lights.empty()) check_output(options.lights, {image.string()});
+    }
   }
   const LampImages images{options.images,      lamps,
                           options.lamps,       calibration,
                           options.calibration, options.row_time_s,
                           options.classifier,  options.readout,
                           options.exposure_s,  options.annotate,
-                          options.threads,     options.max_mpx};
+                          options.threads,     options.max_mpx,
+                          options.every};
   SeenLamps seen;
   {
     Progress progress("images");
@@ -129,6 +145,12 @@ LampCaptures read_captures_of(const CaptureOptions& options) {
   if (std::filesystem::is_directory(options.images)) {
     captures.frames = std::move(see_lamps(options, captures.lamps, captures.calibration).frames);
     return captures;
+  }
+  if (is_video_name(options.images)) {
+    throw std::invalid_argument(
+        options.images +
+        " is a video: vlp-detect finds the lamps in it, and with --captures "
+        "the times of its frames");
   }
   const std::array<std::pair<const char*, bool>, 4> of_images{
       {{"--classifier", !options.classifier.empty()},

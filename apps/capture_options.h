@@ -16,7 +16,7 @@ namespace vlp {
 
 /// How to find the lamps in captures. Names of files are for messages, too.
 struct CaptureOptions {
-  /// A folder of images, or a detections.csv.
+  /// A folder of images, a video, or a detections.csv.
   std::string images;
   std::string lamps, calibration, output;
   /// Empty: lamps are told apart by the map's frequencies.
@@ -31,6 +31,8 @@ struct CaptureOptions {
   std::optional<double> exposure_s;
   int threads = all_cores();
   double max_mpx = kUsualMaxMpx;
+  /// Of a video every so many-th frame.
+  int every = 1;
 };
 
 /// What --help says of the options that every program has which takes captures of lamps.
@@ -51,6 +53,12 @@ inline constexpr const char* kChosenLens = "auto";
 
 /// Adds --lens MODEL|auto, of those programs that find a lens.
 void add_lens_option(CLI::App& app, std::string& lens);
+
+/// Adds --every, of those programs that take videos.
+void add_every_option(CLI::App& app, int& every);
+
+/// Throws std::invalid_argument when `every` is asked of files among which there is no video.
+void check_every(int every, const std::vector<std::string>& files);
 
 /// Adds --max-mpx.
 void add_max_mpx_option(CLI::App& app, double& max_mpx);
@@ -76,9 +84,9 @@ void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_de
 /// input that was not given.
 std::vector<std::string> inputs_of(const CaptureOptions& options);
 
-/// The lamps in a folder of images, with progress, and with what there is to say of it. Neither
-/// `output` nor `lights` may be one of the images. Throws as see_lamps(), and when that fails, with
-/// `lights` written.
+/// The lamps in a folder of images, or in a video, with progress, and with what there is to say of
+/// it. Neither `output` nor `lights` may be one of the images. Throws as see_lamps(), and when that
+/// fails, with `lights` written.
 SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
                     const std::optional<Calibration>& calibration);
 

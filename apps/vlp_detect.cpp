@@ -12,16 +12,27 @@
 
 #include "app.h"
 #include "capture_options.h"
+#include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "detection/lights/lights_table.h"
+#include "detection/video.h"
 
 namespace vlp {
 namespace {
 
-void run(const CaptureOptions& options) {
-  const std::vector<std::string> inputs{options.lamps, options.calibration, options.classifier};
+void run(const CaptureOptions& options, const std::string& captures) {
+  const std::vector<std::string> inputs{options.images, options.lamps, options.calibration,
+                                        options.classifier};
   check_output(options.output, inputs);
   check_further_output("--lights", options.lights, options.output, inputs);
+  check_further_output("--captures", captures, options.output, inputs);
+  check_every(options.every, {options.images});
+  if (same_file(options.lights, captures)) {
+    throw std::invalid_argument("--lights and --captures name one file");
+  }
+  if (!captures.empty() && !is_video_name(options.images)) {
+    throw std::invalid_argument("--captures is for a video, whose frames have times");
+  }
   std::optional<Calibration> calibration;
   if (!options.calibration.empty()) {
     calibration = read_calibration(options.calibration);
@@ -30,6 +41,7 @@ void run(const CaptureOptions& options) {
   }
   const SeenLamps found = see_lamps(options, read_lamp_map(options.lamps), calibration);
   write_detections(options.output, found.frames);
+  if (!captures.empty()) write_times(captures, found.times_s);
   const auto empty = std::count_if(found.frames.begin(), found.frames.end(),
                                    [](const Frame& frame) { return frame.detections.empty(); });
   const auto count = [&](LightKind kind) { return count_of(found.lights, kind); };
@@ -59,7 +71,9 @@ int main(int argc, char** argv) {
       "    -o detections.csv\n",
       "vlp-detect");
   vlp::CaptureOptions options;
-  app.add_option("images", options.images, "Folder of images: PNG, JPEG, BMP, TIFF or PGM")
+  app.add_option("images", options.images,
+                 "Folder of images: PNG, JPEG, BMP, TIFF or PGM; or a video: AVI, MP4, MOV, MKV or "
+                 "WebM")
       ->required();
   app.add_option("--lamps", options.lamps,
                  "Lamp map, lamps.yaml, with frequencies unless there is a classifier")
@@ -74,6 +88,10 @@ int main(int argc, char** argv) {
   app.add_option(
       "--lights", options.lights,
       "Where to write lights.csv: every light, what it is and why, and what was measured");
+  std::string captures;
+  app.add_option("--captures", captures,
+                 "Where to write captures.csv of a video: its frames and when they were taken");
+  vlp::add_every_option(app, options.every);
   vlp::add_detect_options(app, options);
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::run_app(app, argc, argv, [&] { vlp::run(options, captures); });
 }

@@ -44,6 +44,7 @@ struct Options {
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
   double max_mpx = kUsualMaxMpx;
+  int every = 1;
   std::vector<std::string> gates;
 };
 
@@ -59,7 +60,7 @@ Camera known_camera(const Options& options) {
 }
 
 /// The one file of corners that is given instead of images; empty when images are given.
-std::string corner_file(const Options& options) {
+std::string corner_file(const CLI::App& app, const Options& options) {
   const auto found = std::find_if(options.images.begin(), options.images.end(),
                                   [](const auto& name) { return holds_corners(name); });
   if (found == options.images.end()) {
@@ -78,15 +79,20 @@ std::string corner_file(const Options& options) {
     throw std::invalid_argument(
         *found + " holds corners, but not the size of their images: --imager-px has to tell it");
   }
+  for (const char* of_images : {"--cache", "--threads", "--max-mpx", "--every"}) {
+    if (app.count(of_images) == 0) continue;
+    throw std::invalid_argument(std::string(of_images) + " is for images: " + *found +
+                                " holds corners");
+  }
   return *found;
 }
 
 SeenBoards boards_in(const std::vector<std::filesystem::path>& images, const Board& board,
-                     const Options& options) {
-  const std::string corners = corner_file(options);
+                     const std::string& corners, const Options& options) {
   if (!corners.empty()) return see_corners({corners, board, options.board, *options.imager_px});
   Progress progress("images");
-  return see_boards({images, board, options.board, options.threads, options.cache, options.max_mpx},
+  return see_boards({images, board, options.board, options.threads, options.cache, options.max_mpx,
+                     options.every},
                     [&](std::size_t done, std::size_t total) { progress.update(done, total); });
 }
 
@@ -152,15 +158,17 @@ std::vector<Gate> gates_of(const Options& options) {
 void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = gates_of(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
-  const auto images = corner_file(options).empty()
-                          ? image_files(options.images)
-                          : std::vector<std::filesystem::path>{options.images.front()};
+  const std::string corners = corner_file(app, options);
+  check_every(options.every, options.images);
+  const auto images = corners.empty() ? image_files(options.images)
+                                      : std::vector<std::filesystem::path>{options.images.front()};
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
   check_outputs(options, inputs);
   if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
-  const SeenBoards seen = boards_in(images, board, options);
+  possible_warp(board, options.warp);  // refused before the images are looked at
+  const SeenBoards seen = boards_in(images, board, corners, options);
   tell(seen);
   require(seen);
   if (!options.corners.empty()) write_corner_table(options.corners, seen.views, board);
@@ -195,8 +203,8 @@ void run(const CLI::App& app, const Options& options) {
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("images", options.images,
-                 "Images of the board, or folders of them; or a file of its corners, mrcal's .vnl "
-                 "or a .csv as of --corners, with --imager-px")
+                 "Images of the board, folders of them, or videos; or a file of its corners, "
+                 "mrcal's .vnl or a .csv as of --corners, with --imager-px")
       ->required();
   app.add_option("--board", options.board,
                  "The board, board.yaml, or Kalibr's description of an aprilgrid")
@@ -257,6 +265,7 @@ void add_options(CLI::App& app, Options& options) {
       });
   app.add_option("--cache", options.cache,
                  "Folder to keep the corners of each image in, for the next time");
+  add_every_option(app, options.every);
   add_max_mpx_option(app, options.max_mpx);
   app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));

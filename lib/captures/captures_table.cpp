@@ -3,6 +3,7 @@
 #include "captures/captures_table.h"
 
 #include "captures/csv_reader.h"
+#include "captures/csv_writer.h"
 
 namespace vlp {
 namespace {
@@ -86,6 +87,13 @@ CapturesTable read_captures(const std::filesystem::path& file) {
     }
   }
   return table;
+}
+
+void write_times(const std::filesystem::path& file, const std::map<std::string, double>& times_s) {
+  constexpr int digits = 6;
+  CsvWriter csv(file, {"image", "time_s"});
+  for (const auto& [image, time_s] : times_s) csv.row({image, fixed(time_s, digits)});
+  csv.save();
 }
 
 }  // namespace vlp

@@ -43,4 +43,7 @@ using CapturesTable = std::map<std::string, Capture>;
 /// camera nor axis; a standard deviation that is negative or of no velocity.
 CapturesTable read_captures(const std::filesystem::path& file);
 
+/// Writes a `captures.csv` that tells when each image was taken. Throws InputError.
+void write_times(const std::filesystem::path& file, const std::map<std::string, double>& times_s);
+
 }  // namespace vlp

@@ -2,29 +2,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/detect_captures.h"
 
+#include <mutex>
 #include <utility>
 
 #include "detection/annotate.h"
 #include "detection/detect_image.h"
-#include "detection/images_in_parallel.h"
 
 namespace vlp {
 namespace {
 
 struct CaptureOutcome {
+  std::filesystem::path file;
+  std::optional<double> time_s;
   std::vector<Detection> lamps;
   std::vector<Light> lights;
   std::string refused;
 };
 
-CaptureOutcome outcome_of(const LampDetector& detector, const std::filesystem::path& file,
+CaptureOutcome outcome_of(const LampDetector& detector, const SourceImage& source,
                           const DetectRun& run) {
-  ImageLights found = detect_image(detector, file, run.imager_px, run.max_mpx);
+  ImageLights found = detect_image(detector, source, run.imager_px, run.max_mpx);
   CaptureOutcome outcome;
+  outcome.file = source.file;
+  outcome.time_s = source.time_s;
   outcome.refused = found.refused;
   if (!outcome.refused.empty()) return outcome;
   if (run.annotate) {
-    write_annotated(*run.annotate, file, annotated(found.image, found.lights, detector.readout()));
+    write_annotated(*run.annotate, source.file,
+                    annotated(found.image, found.lights, detector.readout()));
   }
   for (Light& light : found.lights) {
     std::vector<EdgePoint>().swap(light.outline);
@@ -37,24 +42,29 @@ CaptureOutcome outcome_of(const LampDetector& detector, const std::filesystem::p
 
 }  // namespace
 
-CaptureDetections detect_captures(const LampDetector& detector,
-                                  const std::vector<std::filesystem::path>& images,
+CaptureDetections detect_captures(const LampDetector& detector, ImageSource& images,
                                   const DetectRun& run,
                                   const std::function<void(std::size_t done)>& progress) {
-  std::vector<CaptureOutcome> outcomes(images.size());
-  images_in_parallel(
-      images.size(), run.threads,
-      [&](std::size_t i) { outcomes[i] = outcome_of(detector, images[i], run); }, progress);
+  std::vector<CaptureOutcome> outcomes;
+  std::mutex counting;
+  std::size_t done = 0;
+  for_each_image(images, run.threads, [&](const SourceImage& image) {
+    CaptureOutcome outcome = outcome_of(detector, image, run);
+    const std::lock_guard lock(counting);
+    if (outcomes.size() <= image.index) outcomes.resize(image.index + 1);
+    outcomes[image.index] = std::move(outcome);
+    progress(++done);
+  });
 
   CaptureDetections result;
-  result.images = static_cast<int>(images.size());
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    CaptureOutcome& outcome = outcomes[i];
+  for (CaptureOutcome& outcome : outcomes) {
+    result.images.push_back(outcome.file);
     if (!outcome.refused.empty()) {
       result.refused.push_back(std::move(outcome.refused));
       continue;
     }
-    const std::string name = images[i].filename().string();
+    const std::string name = outcome.file.filename().string();
+    if (outcome.time_s) result.times_s.emplace(name, *outcome.time_s);
     result.frames.push_back({name, std::move(outcome.lamps)});
     result.lights.push_back({name, std::move(outcome.lights)});
   }

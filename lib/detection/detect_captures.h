@@ -5,12 +5,13 @@
 #include <array>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "captures/detections_table.h"
-#include "detection/image_file.h"
+#include "detection/image_source.h"
 #include "detection/lamp_detector.h"
 #include "detection/lights/lights_table.h"
 
@@ -24,7 +25,10 @@ struct CaptureDetections {
   std::vector<LightsOfImage> lights;
   /// Images that could not be used, and why, in one line each.
   std::vector<std::string> refused;
-  int images = 0;
+  /// All of them, in their order.
+  std::vector<std::filesystem::path> images;
+  /// Of frames of videos, since the video's start, by the name that the frame has in `frames`.
+  std::map<std::string, double> times_s;
 };
 
 struct DetectRun {
@@ -41,8 +45,7 @@ struct DetectRun {
 /// Detects in each image. An image that cannot be used is refused and does not end it; a picture
 /// that cannot be written does (InputError). The result does not depend on the threads. `progress`
 /// gets the images done so far; its calls do not overlap.
-CaptureDetections detect_captures(const LampDetector& detector,
-                                  const std::vector<std::filesystem::path>& images,
+CaptureDetections detect_captures(const LampDetector& detector, ImageSource& images,
                                   const DetectRun& run,
                                   const std::function<void(std::size_t done)>& progress);
 

@@ -15,7 +15,7 @@ std::vector<ImageLights> detect_lights(const LampDetector& detector,
   images_in_parallel(
       images.size(), threads,
       [&](std::size_t i) {
-        found[i] = detect_image(detector, images[i], imager_px);
+        found[i] = detect_image(detector, SourceImage(images[i]), imager_px);
         found[i].image.release();
         for (Light& light : found[i].lights) light.outline = {};
       },

@@ -34,11 +34,10 @@ bool is_cut_png(const std::string& bytes) {
   return bytes.starts_with("\x89PNG\r\n\x1a\n") && bytes.rfind(end) == std::string::npos;
 }
 
-void check_size(const fs::path& file, const std::string& bytes, double max_mpx) {
-  const auto size = size_in_header(bytes);
-  if (!size) return;
+}  // namespace
+
+void check_size(const fs::path& file, std::int64_t width, std::int64_t height, double max_mpx) {
   constexpr double million = 1e6;
-  const auto [width, height] = *size;
   if (static_cast<double>(width) * static_cast<double>(height) <= max_mpx * million) return;
   throw InputError(
       file, "is " + std::to_string(width) + " x " + std::to_string(height) + " px, more than the " +
@@ -46,8 +45,6 @@ void check_size(const fs::path& file, const std::string& bytes, double max_mpx) 
                 " million that are allowed; --max-mpx of vlp-detect and vlp-intrinsics "
                 "allows more");
 }
-
-}  // namespace
 
 bool is_image_name(const fs::path& file) {
   std::string extension = file.extension().string();
@@ -83,7 +80,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   if (bytes.empty()) throw InputError(file, "cannot be read as an image");
   const char* const cut = "cannot be read as an image: it is cut short";
   if (is_cut_jpeg(bytes)) throw InputError(file, cut);
-  check_size(file, bytes, max_mpx);
+  if (const auto size = size_in_header(bytes)) check_size(file, (*size)[0], (*size)[1], max_mpx);
   if (is_cut_png(bytes)) throw InputError(file, cut);
   cv::Mat image;
   try {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <string>
@@ -18,6 +19,10 @@ std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder
 
 /// Larger images than this are taken for a mistake: decoded they fill gigabytes.
 inline constexpr double kUsualMaxMpx = 200;
+
+/// Throws InputError when that is more than so many million pixels.
+void check_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
+                double max_mpx);
 
 /// An image as grey levels of 8 or 16 bits; colour is converted, and a turn that the file asks for
 /// is not made, because the shutter does not turn. Throws InputError for what is no image, and,

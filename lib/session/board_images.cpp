@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/board_lattice.h"
+#include "calibration/intrinsics/corner_blunders.h"
 #include "calibration/intrinsics/mrcal_files.h"
 #include "detection/boards/corner_cache.h"
 #include "detection/boards/corner_table.h"
@@ -50,6 +52,7 @@ bool upside_down(const BoardView& view) {
 void skip_copies(SeenBoards& seen) {
   std::vector<BoardView> kept;
   std::vector<std::vector<SeenPoint>> known;
+  SkippedViews skipped;
   for (BoardView& view : seen.views) {
     auto corners = corners_of(view.seen);
     const auto original = std::find_if(known.begin(), known.end(), [&](const auto& other) {
@@ -61,13 +64,15 @@ void skip_copies(SeenBoards& seen) {
     });
     if (original != known.end()) {
       const BoardView& same = kept[static_cast<std::size_t>(original - known.begin())];
-      seen.skipped.push_back({view.image, "is the same picture as " + same.image});
+      skipped.add(view.image, "is the same picture as " + same.image,
+                  "are the same pictures as others");
     } else {
       kept.push_back(std::move(view));
       known.push_back(std::move(corners));
     }
   }
   seen.views = std::move(kept);
+  skipped.tell(seen);
 }
 
 void tell_turned(SeenBoards& seen, const Board& board) {
@@ -98,17 +103,27 @@ struct Looked {
   fs::path image;
 };
 
+/// Frames of videos that lie apart.
+FromVideos a_few(const BoardImages& input) {
+  constexpr std::size_t tried = 12;
+  const FromVideos all{input.every, input.max_mpx};
+  const std::size_t apart =
+      std::max<std::size_t>(1, ImageSource(input.images, all).expected() / tried);
+  return {input.every * static_cast<int>(apart), input.max_mpx};
+}
+
 Looked looked_at(const BoardImages& input) {
   constexpr int tried = 3;
   Looked looked;
   int read = 0;
-  for (const fs::path& file : input.images) {
+  ImageSource images(input.images, a_few(input));
+  while (const auto source = images.next()) {
     if (read == tried || !looked.other_tags.empty()) break;
     try {
-      const cv::Mat image = read_image(file, input.max_mpx);
+      const cv::Mat image = source->read(input.max_mpx);
       looked.white_share = std::max(looked.white_share, white_share(image));
       looked.other_tags = other_tags(input.board, image);
-      looked.image = file;
+      looked.image = source->file;
       ++read;
     } catch (const InputError&) {
       continue;  // it is skipped already
@@ -122,9 +137,10 @@ void explain_no_chessboard(const BoardImages& input, SeenBoards& seen) {
   constexpr std::size_t tried = 12;
   const Board& board = input.board;
   std::array<int, 2> most{0, 0};
-  for (std::size_t i = 0; i < std::min(tried, input.images.size()); ++i) {
+  ImageSource images(input.images, a_few(input));
+  for (auto source = images.next(); source && source->index < tried; source = images.next()) {
     try {
-      const auto shown = chessboard_shown(read_image(input.images[i], input.max_mpx));
+      const auto shown = chessboard_shown(source->read(input.max_mpx));
       if (shown[0] * shown[1] > most[0] * most[1]) most = shown;
     } catch (const InputError&) {
       continue;  // it is skipped already
@@ -204,6 +220,32 @@ void explain_no_tags(const BoardImages& input, SeenBoards& seen) {
   seen.fail(StepFailure::undetermined, not_seen(board, seen.views.size()));
 }
 
+/// Leaves out corners that lie elsewhere than their neighbours say; of tags the whole tag.
+void leave_out_blunders(SeenBoards& seen, const Board& board) {
+  const BoardLattice lattice(board);
+  for (BoardView& view : seen.views) {
+    const auto blunders = corner_blunders(lattice.corners(view.seen));
+    if (blunders.empty()) continue;
+    const auto corners = corners_of(view.seen);
+    const Eigen::Vector2d first = corners[blunders.front()].pixel;
+    seen.warnings.push_back(fmt::format(
+        "{}: {} of its {} corners lie elsewhere than their neighbours put them, the first at "
+        "({:.1f}, {:.1f}); left out",
+        view.image, blunders.size(), corners.size(), first.x(), first.y()));
+    for (auto i = blunders.rbegin(); i != blunders.rend(); ++i) {
+      if (!view.seen.points.empty()) {
+        view.seen.points.erase(view.seen.points.begin() + static_cast<std::ptrdiff_t>(*i));
+        continue;
+      }
+      const auto tag = view.seen.tags.begin() + static_cast<std::ptrdiff_t>(*i / 4);
+      const bool gone = i != blunders.rbegin() && *(i - 1) / 4 == *i / 4;
+      if (gone) continue;
+      view.seen.tags.erase(tag);
+      ++view.seen.unusable;
+    }
+  }
+}
+
 }  // namespace
 
 bool holds_corners(const fs::path& file) {
@@ -225,17 +267,19 @@ std::vector<fs::path> image_files(const std::vector<std::string>& names) {
 
 SeenBoards see_boards(const BoardImages& input, const StepProgress& progress) {
   const BoardDetector detector(input.board);
+  ImageSource images(input.images, {input.every, input.max_mpx});
   FoundBoards found = detect_boards(
-      detector, input.images, input.threads, corner_cache(input.cache, input.board),
+      detector, images, input.threads, corner_cache(input.cache, input.board),
       [&](std::size_t done) {
-        if (progress) progress(done, input.images.size());
+        if (progress) progress(done, std::max(done, images.expected()));
       },
       input.max_mpx);
   SeenBoards seen;
-  seen.skipped = skipped_images(input.images, found.refused);
+  seen.skipped = skipped_images(found.images, found.refused);
+  seen.warnings = images.warnings();
   seen.views = std::move(found.views);
   if (seen.views.empty()) {
-    throw nothing_usable(input.images.front().parent_path(), input.images.size(), seen);
+    throw nothing_usable(input.images.front().parent_path(), found.images.size(), seen);
   }
   check_sizes(seen.views);
   skip_copies(seen);
@@ -251,6 +295,7 @@ SeenBoards see_corners(const CornerFile& input) {
   seen.views = is_mrcal_table(input.file)
                    ? read_corners(input.file, input.board, input.imager_px)
                    : read_corner_table(input.file, input.board, input.imager_px);
+  leave_out_blunders(seen, input.board);
   skip_copies(seen);
   const bool any = std::any_of(seen.views.begin(), seen.views.end(),
                                [](const BoardView& view) { return view.seen.any(); });

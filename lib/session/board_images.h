@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Images of a board, to look for it.
+/// Images and videos of a board, to look for it.
 struct BoardImages {
   std::vector<std::filesystem::path> images;
   Board board;
@@ -24,6 +24,8 @@ struct BoardImages {
   std::filesystem::path cache = {};
   /// Larger images are refused unread.
   double max_mpx = kUsualMaxMpx;
+  /// Of a video every so many-th frame.
+  int every = 1;
 };
 
 /// The board in each image that can be used, in their order.

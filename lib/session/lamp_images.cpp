@@ -11,6 +11,7 @@
 #include "detection/detect_captures.h"
 #include "detection/identity/lamp_map_check.h"
 #include "detection/readout.h"
+#include "detection/video.h"
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"
 #include "session/skipped_images.h"
@@ -21,9 +22,11 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Nothing for what is no image: it is reported when the lights are looked for.
-cv::Mat image_or_nothing(const fs::path& file, double max_mpx) {
+cv::Mat next_or_nothing(ImageSource& images, double max_mpx) {
+  const auto image = images.next();
+  if (!image) return {};
   try {
-    return read_image(file, max_mpx);
+    return image->read(max_mpx);
   } catch (const InputError&) {
     return {};
   }
@@ -157,11 +160,12 @@ void check_lamps(std::span<const Frame> frames, const LampMap& lamps, const fs::
   throw InputError(lamps_file, "has none of the lamps that the captures show");
 }
 
-Readout readout_of(std::span<const fs::path> images, const std::optional<Readout>& stated,
-                   StepResult& result, double max_mpx) {
+Readout readout_of(std::vector<fs::path> images, const std::optional<Readout>& stated,
+                   StepResult& result, const FromVideos& from_videos) {
   if (stated) return *stated;
+  ImageSource source(std::move(images), from_videos);
   const auto found = find_readout(
-      images.size(), [&](std::size_t i) { return image_or_nothing(images[i], max_mpx); });
+      source.expected(), [&](std::size_t) { return next_or_nothing(source, from_videos.max_mpx); });
   if (!found) {
     result.warnings.emplace_back(
         "the read-out is not stated and the images do not show it: rows are taken; --readout "
@@ -184,7 +188,8 @@ SeenLamps see_lamps(const LampImages& input, const StepProgress& progress) {
   } else {
     classifier = classifier_for(input, camera, seen.warnings);
   }
-  const auto images = images_in(input.folder);
+  const std::vector<fs::path> images =
+      is_video_name(input.folder) ? std::vector{input.folder} : images_in(input.folder);
   DetectRun run{input.threads};
   run.max_mpx = input.max_mpx;
   std::optional<Readout> stated = input.readout;
@@ -192,18 +197,22 @@ SeenLamps see_lamps(const LampImages& input, const StepProgress& progress) {
     run.imager_px = input.camera->camera.imager_px;
     if (!stated) stated = input.camera->camera.readout;
   }
-  camera.readout = readout_of(images, stated, seen, input.max_mpx);
+  const FromVideos from_videos{input.every, input.max_mpx, run.imager_px};
+  ImageSource source(images, from_videos);
+  camera.readout = readout_of(images, stated, seen, from_videos);
   if (!classifier) warn_of_map(input, camera, seen.warnings);
   if (!input.annotate.empty()) run.annotate = picture_folder(input);
   CaptureDetections found = detect_captures(
-      LampDetector(input.lamps, camera, std::move(classifier)), images, run, [&](std::size_t done) {
-        if (progress) progress(done, images.size());
+      LampDetector(input.lamps, camera, std::move(classifier)), source, run, [&](std::size_t done) {
+        if (progress) progress(done, std::max(done, source.expected()));
       });
-  seen.images = found.images;
+  seen.images = static_cast<int>(found.images.size());
+  seen.times_s = std::move(found.times_s);
+  seen.warnings.insert(seen.warnings.end(), source.warnings().begin(), source.warnings().end());
   seen.frames = std::move(found.frames);
   seen.lights = std::move(found.lights);
-  seen.skipped = skipped_images(images, found.refused);
-  if (seen.frames.empty()) throw nothing_usable(input.folder, images.size(), seen);
+  seen.skipped = skipped_images(found.images, found.refused);
+  if (seen.frames.empty()) throw nothing_usable(input.folder, found.images.size(), seen);
   if (count_of(seen.lights, LightKind::lamp) == 0) {
     seen.fail(StepFailure::undetermined, why_no_lamp(seen));
   }

@@ -3,13 +3,15 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "captures/detections_table.h"
 #include "detection/detect_lights.h"
-#include "detection/image_file.h"
+#include "detection/image_source.h"
 #include "detection/lights/lights_table.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
@@ -17,7 +19,7 @@
 
 namespace vlp {
 
-/// A folder of images, to look for lamps.
+/// A folder of images, or a video, to look for lamps.
 struct LampImages {
   std::filesystem::path folder;
   LampMap lamps;
@@ -39,6 +41,8 @@ struct LampImages {
   int threads = 1;
   /// Larger images are refused unread.
   double max_mpx = kUsualMaxMpx;
+  /// Of a video every so many-th frame.
+  int every = 1;
 };
 
 /// The lamps in each image that can be used.
@@ -47,6 +51,8 @@ struct SeenLamps : StepResult {
   /// All lights of each frame's image, without outlines.
   std::vector<LightsOfImage> lights;
   int images = 0;
+  /// Of a video's frames, since its start, by the name that the frame has in `frames`.
+  std::map<std::string, double> times_s;
 };
 
 /// Throws InputError: no row time, no frequency, no image or none that can be used, a classifier of
@@ -56,9 +62,8 @@ SeenLamps see_lamps(const LampImages& input, const StepProgress& progress = {});
 
 /// Along what the shutter reads: as `stated`, or else as the images show; a note, or a warning when
 /// not even they tell and rows are taken, goes to `result`.
-Readout readout_of(std::span<const std::filesystem::path> images,
-                   const std::optional<Readout>& stated, StepResult& result,
-                   double max_mpx = kUsualMaxMpx);
+Readout readout_of(std::vector<std::filesystem::path> images, const std::optional<Readout>& stated,
+                   StepResult& result, const FromVideos& from_videos = {});
 
 /// Throws InputError when no lamp has a frequency.
 void check_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);

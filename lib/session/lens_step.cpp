@@ -16,6 +16,7 @@
 #include "geometry/median.h"
 #include "report/plots/calibration_plots.h"
 #include "rig/stage.h"
+#include "session/skipped_images.h"
 
 namespace vlp {
 namespace {
@@ -40,10 +41,10 @@ std::string too_few(const Board& board, const SeenBoard& seen) {
 
 /// Whether two views show the board in the same place: what both show is 1 % of the image's width
 /// apart, rms, or less, and neither shows much that the other does not.
-bool alike(const BoardView& a, const BoardView& b) {
+bool alike(const std::vector<SeenPoint>& corners, const std::vector<SeenPoint>& others,
+           int width_px) {
   constexpr double near = 0.01, shared = 0.7;
   double squares = 0, common = 0;
-  const auto corners = corners_of(a.seen), others = corners_of(b.seen);
   auto other = others.begin();
   for (const SeenPoint& corner : corners) {
     while (other != others.end() && other->index < corner.index) ++other;
@@ -53,7 +54,7 @@ bool alike(const BoardView& a, const BoardView& b) {
     squares += (corner.pixel - other->pixel).squaredNorm();
   }
   const auto most = static_cast<double>(std::max(corners.size(), others.size()));
-  return common >= shared * most && std::sqrt(squares / common) <= near * a.imager_px[0];
+  return common >= shared * most && std::sqrt(squares / common) <= near * width_px;
 }
 
 /// A region of more of the image than this is all of it.
@@ -64,46 +65,42 @@ struct Sorted {
   IntrinsicsInput solved, held_out;
 };
 
-/// A square chessboard looks the same after a quarter turn, which takes its bend along one edge for
-/// that along the other.
-WarpChoice warp_of(const LensInput& input) {
-  const Board& board = input.board;
-  if (board.kind != BoardKind::chessboard || board.cols != board.rows) return input.warp;
-  if (input.warp == WarpChoice::on) {
-    throw std::invalid_argument(
-        "a square chessboard looks the same after a quarter turn, so that its bend cannot be told: "
-        "leave --warp on out");
-  }
-  return WarpChoice::off;
-}
-
 Sorted sorted(const LensInput& input, LensResult& result) {
   const IntrinsicsInput none{BoardLattice(input.board),
                              {},
                              input.views.front().imager_px,
                              input.camera.lens_model,
-                             warp_of(input)};
+                             possible_warp(input.board, input.warp)};
   Sorted sorted{none, none};
   int usable = 0;
+  SkippedViews skipped;
   std::vector<const BoardView*> different;
+  std::vector<std::vector<SeenPoint>> corners_of_different;
   for (const BoardView& view : input.views) {
     if (!none.lattice.enough(view.seen)) {
-      result.skipped.push_back({view.image, too_few(input.board, view.seen)});
+      skipped.add(view.image, too_few(input.board, view.seen), "show too little of the board");
       continue;
     }
-    const auto like = std::find_if(different.begin(), different.end(),
-                                   [&](const BoardView* other) { return alike(view, *other); });
-    if (like != different.end()) {
-      result.skipped.push_back(
-          {view.image, "shows the board where " + (*like)->image + " does: the two count as one"});
+    auto corners = corners_of(view.seen);
+    const auto like =
+        std::find_if(corners_of_different.begin(), corners_of_different.end(),
+                     [&](const auto& others) { return alike(corners, others, view.imager_px[0]); });
+    if (like != corners_of_different.end()) {
+      const BoardView& other =
+          *different[static_cast<std::size_t>(like - corners_of_different.begin())];
+      skipped.add(view.image,
+                  "shows the board where " + other.image + " does: the two count as one",
+                  "show the board where others do: each place counts once");
       continue;
     }
     different.push_back(&view);
+    corners_of_different.push_back(std::move(corners));
     const bool held_out = input.held_out > 0 && ++usable % input.held_out == 0;
     auto& part = held_out ? sorted.held_out : sorted.solved;
     part.views.push_back(none.lattice.corners(view.seen));
     if (!held_out) result.images.push_back(view.image);
   }
+  skipped.tell(result);
   return sorted;
 }
 
@@ -175,6 +172,16 @@ std::string why_none_fits(IntrinsicsInput input) {
 }
 
 }  // namespace
+
+WarpChoice possible_warp(const Board& board, WarpChoice wanted) {
+  if (board.kind != BoardKind::chessboard || board.cols != board.rows) return wanted;
+  if (wanted == WarpChoice::on) {
+    throw std::invalid_argument(
+        "a square chessboard looks the same after a quarter turn, so that its bend cannot be told: "
+        "leave --warp on out");
+  }
+  return WarpChoice::off;
+}
 
 LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
   LensResult result;

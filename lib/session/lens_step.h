@@ -43,6 +43,11 @@ struct LensResult : StepResult {
   std::vector<std::string> images;
 };
 
+/// What of the board's bend can be solved for. A square chessboard looks the same after a quarter
+/// turn, which takes its bend along one edge for that along the other: its bend is left out, and
+/// std::invalid_argument is thrown when it is wanted.
+WarpChoice possible_warp(const Board& board, WarpChoice wanted);
+
 /// The lens from views of the board, and how far it can be trusted; views that are alike count as
 /// one. Metrics: lens_metrics().
 /// Throws std::invalid_argument for a board without enough rows and columns (BoardLattice).

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "detection/video.h"
+
 namespace vlp {
 
 std::vector<SkippedImage> skipped_images(const std::vector<std::filesystem::path>& images,
@@ -27,6 +29,31 @@ std::vector<SkippedImage> skipped_images(const std::vector<std::filesystem::path
     ++image;
   }
   return skipped;
+}
+
+void SkippedViews::add(const std::string& image, const std::string& reason, const char* of_frames) {
+  const auto video = video_of_frame(image);
+  if (!video) {
+    alone_.push_back({image, reason});
+    return;
+  }
+  details_.push_back(image + ": " + reason);
+  const auto same = std::find_if(together_.begin(), together_.end(), [&](const Together& other) {
+    return other.video == *video && other.of_frames == of_frames;
+  });
+  if (same == together_.end()) {
+    together_.push_back({*video, of_frames, 1});
+  } else {
+    ++same->count;
+  }
+}
+
+void SkippedViews::tell(StepResult& result) const {
+  result.skipped.insert(result.skipped.end(), alone_.begin(), alone_.end());
+  for (const auto& [video, of_frames, count] : together_) {
+    result.skipped.push_back({video, fmt::format("{} of its frames {}", count, of_frames)});
+  }
+  result.details.insert(result.details.end(), details_.begin(), details_.end());
 }
 
 InputError nothing_usable(const std::filesystem::path& where, std::size_t images,

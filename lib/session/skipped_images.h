@@ -17,6 +17,24 @@ namespace vlp {
 std::vector<SkippedImage> skipped_images(const std::vector<std::filesystem::path>& images,
                                          const std::vector<std::string>& refused);
 
+/// Views that are skipped, a line each; but frames of a video, of which there are many, together, a
+/// line for each video and reason, and a detail each.
+class SkippedViews {
+ public:
+  /// `of_frames`: what is said of all such frames together, after "12 of its frames".
+  void add(const std::string& image, const std::string& reason, const char* of_frames);
+  void tell(StepResult& result) const;
+
+ private:
+  struct Together {
+    std::string video, of_frames;
+    int count;
+  };
+  std::vector<SkippedImage> alone_;
+  std::vector<Together> together_;
+  std::vector<std::string> details_;
+};
+
 /// That none of so many images can be used, with the reason of the first.
 InputError nothing_usable(const std::filesystem::path& where, std::size_t images,
                           const StepResult& result);

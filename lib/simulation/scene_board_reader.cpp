@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "rig/board_layout.h"
@@ -19,7 +20,10 @@ SceneBoard read_scene_board(YamlMap map) {
   board.margin_m = map.required("margin_m").number_within(0, 2, "m");
   const YamlValue warp = map.required("warp_m");
   board.warp_m = Eigen::Vector2d(warp.numbers(2).data());
-  const double most = 0.1 * tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
+  constexpr double micrometres = 1e6;  // in which the bound is told
+  const double tenth_m =
+      0.1 * tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
+  const double most = std::round(micrometres * tenth_m) / micrometres;
   for (const YamlValue& part : warp.list()) part.number_within(-most, most, "m");
   board.white_e_per_s = read_radiance(map, "white_e_per_s");
   board.black_e_per_s = read_radiance(map, "black_e_per_s");

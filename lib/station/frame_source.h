@@ -4,19 +4,18 @@
 
 #include <array>
 #include <filesystem>
-#include <memory>
 #include <string>
+
+#include "detection/video.h"
 
 namespace vlp {
 
-/// Frames of a camera (/dev/video0, by V4L2) or of a video file, through OpenCV.
+/// Frames of a camera or of a video, as images in a folder.
 class FrameSource {
  public:
   /// A camera is asked for frames of this size. Throws InputError when it cannot be opened.
-  FrameSource(const std::string& source, const std::array<int, 2>& imager_px);
-  ~FrameSource();
-  FrameSource(const FrameSource&) = delete;
-  FrameSource& operator=(const FrameSource&) = delete;
+  FrameSource(const std::string& source, const std::array<int, 2>& imager_px)
+      : source_(source), video_(source, imager_px) {}
 
   /// Saves the next frame, grey, as FOLDER/frame-000123.png, whole or not at all, and returns its
   /// path; nothing at the end of a file. Throws InputError when it cannot be written, or when a
@@ -26,9 +25,8 @@ class FrameSource {
   bool ended() const { return ended_; }
 
  private:
-  struct Capture;
   std::string source_;
-  std::unique_ptr<Capture> capture_;
+  Video video_;
   bool ended_ = false;
   int frames_ = 0;
 };

@@ -9,6 +9,8 @@
 
 #include "calibration/intrinsics/camera_imports.h"
 #include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/synthetic_views.h"
+#include "detection/boards/corner_table.h"
 #include "pipeline/intrinsics_program.h"
 #include "rig/calibration.h"
 #include "support/datasets.h"
@@ -50,6 +52,56 @@ class CornerFiles : public IntrinsicsProgram {
 };
 
 constexpr const char* kSize = "--imager-px 800 600";
+
+TEST_F(CornerFiles, RefuseOptionsThatAreForImages) {
+  const std::string corners = folder.file("corners.vnl", vnl({"a.png"})).string();
+  for (const std::string option : {"--cache", "--threads", "--max-mpx", "--every"}) {
+    EXPECT_EQ(
+        refusal(corners, std::string(kSize) + " " + option + " 2"),
+        "vlp-intrinsics: error: " + option + " is for images: " + corners + " holds corners\n");
+  }
+}
+
+/// A slip in a table costs its tag, and neither the view nor the table.
+TEST_F(CornerFiles, MayHoldASlip) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  std::vector<BoardView> seen;
+  Random random(5);
+  const BoardLattice lattice(views.board);
+  constexpr double noise_px = 0.02;
+  while (seen.size() < 10) {
+    const SeenBoard view = views.random_view(random, noise_px);
+    if (!lattice.enough(view)) continue;
+    seen.push_back({"view" + std::to_string(seen.size()) + ".png", views.imager_px, view});
+  }
+  const fs::path table = folder / "corners.csv", board = folder / "board.yaml";
+  write_board(board, views.board);
+  const auto lens_with = [&](const Eigen::Vector2d& wrong) {
+    auto spoilt = seen;
+    spoilt[3].seen.tags[7].corners_px[2] = wrong;
+    write_corner_table(table, spoilt, views.board);
+    const auto result = calibrate(table.string(), board.string(), kSize);
+    EXPECT_LE(result.exit_code, 1) << result.errors;
+    EXPECT_THAT(result.errors, HasSubstr("view3.png: 1 of its "));
+    EXPECT_THAT(result.errors, HasSubstr("corners lie elsewhere than their neighbours put them"));
+    EXPECT_THAT(result.output, HasSubstr("views         10 used, 0 dropped"));
+    return lens_of("camera.yaml");
+  };
+  for (const Eigen::Vector2d& wrong : {Eigen::Vector2d(2, 2), {-5, 20}, {1e6, 300}}) {
+    const auto apart = projection_difference(views.lens, lens_with(wrong), views.imager_px,
+                                             [](const auto&) { return 1; });
+    EXPECT_LT(apart->mean_px, 0.1);
+  }
+}
+
+/// Before images are looked at, which there are none of here.
+TEST_F(CornerFiles, OfASquareChessboardTellNoBend) {
+  const std::string none = (folder / "none.png").string();
+  for (const std::string& images : {none, folder.file("corners.vnl", vnl({"a.png"})).string()}) {
+    EXPECT_THAT(refusal(images, images == none ? "--warp on" : std::string("--warp on ") + kSize),
+                HasSubstr("its bend cannot be told: leave --warp on out"));
+  }
+}
 
 TEST_F(CornerFiles, GiveTheLensOfTheImagesToTheLastBit) {
   const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";

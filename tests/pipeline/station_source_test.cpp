@@ -64,8 +64,9 @@ TEST_F(StationSource, ThatIsNotThereLeavesNothingBehind) {
   EXPECT_EQ(camera.errors,
             "vlp-station: error: /dev/video99: there is no such camera: is it connected?\n");
   const auto video = run_program(run("0001", "--source " + folder.file("a.avi", "a").string()));
-  EXPECT_THAT(video.errors, AllOf(HasSubstr("a.avi: cannot be opened as a camera or a video\n"),
-                                  Not(HasSubstr("OpenCV"))));
+  EXPECT_THAT(video.errors,
+              AllOf(HasSubstr("a.avi: cannot be opened as a video: is it cut short, or none?\n"),
+                    Not(HasSubstr("OpenCV"))));
   EXPECT_FALSE(fs::exists(captures("0001")));
 }
 

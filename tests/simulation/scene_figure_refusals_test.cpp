@@ -244,8 +244,7 @@ TEST(SceneFigures, OfSteadyLampsAndBoardsAreChecked) {
             "centre) is not within 0 and 2 (of the radiance at the centre): is it in the right "
             "unit?");
   EXPECT_EQ(refusal_with("[0.0003, -0.0002]", "[0.3, -0.2]"),
-            "scene.yaml:20: board.warp_m[0]: 0.3 m is not within -0.009000000000000001 and "
-            "0.009000000000000001 m: is it in the "
+            "scene.yaml:20: board.warp_m[0]: 0.3 m is not within -0.009 and 0.009 m: is it in the "
             "right unit?");
 }
 

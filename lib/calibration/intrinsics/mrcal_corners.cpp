@@ -8,6 +8,7 @@
 #include <limits>
 #include <set>
 #include <string_view>
+#include <unordered_map>
 
 #include "calibration/intrinsics/board_lattice.h"
 #include "calibration/intrinsics/mrcal_files.h"
@@ -53,6 +54,7 @@ class CornerRows {
       from = end + 1;
     }
     if (rows.empty()) throw InputError(file, "holds no corner");
+    if (too_many_outside(outside_, seen_)) throw InputError(*first_outside_);
   }
 
   InputError error(std::size_t line, const std::string& problem) const {
@@ -82,7 +84,8 @@ class CornerRows {
     if (x && y && *x >= 0 && *y >= 0 && row.weight > 0) {
       row.pixel = {*x, *y};
       const std::string outside = outside_words(*row.pixel, imager_px_);
-      if (!outside.empty()) throw error(line, outside);
+      ++seen_;
+      if (!outside.empty() && outside_++ == 0) first_outside_ = error(line, outside);
     }
     rows.push_back(row);
   }
@@ -115,6 +118,8 @@ class CornerRows {
   std::string text_;
   bool weights_ = false;
   bool legend_ = false;
+  std::size_t seen_ = 0, outside_ = 0;
+  std::optional<InputError> first_outside_;
 };
 
 /// How far the points of lines of so many are from lying evenly, all images together; NaN with too
@@ -176,6 +181,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
   const CornerRows table(file, imager_px);
   std::vector<BoardView> views;
   std::set<std::string_view> known;
+  std::unordered_map<std::string, std::size_t> view_of_image;
   std::vector<std::vector<CornerRow>> images;
   for (std::size_t from = 0; from < table.rows.size();) {
     const auto [line, name, first_pixel, weight] = table.rows[from];
@@ -198,9 +204,9 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
       part = static_cast<std::size_t>(image.back() - '0');
       image.resize(ending);
     }
-    auto view = std::find_if(views.begin(), views.end(),
-                             [&](const BoardView& other) { return other.image == image; });
-    if (view == views.end()) view = views.insert(view, {image, imager_px, {}});
+    const auto [place, is_new] = view_of_image.try_emplace(image, views.size());
+    if (is_new) views.push_back({image, imager_px, {}});
+    BoardView& view = views[place->second];
     const bool none = end == from + 1 && !first_pixel;
     if (!none && end - from != lattice.points()) {
       throw table.error(
@@ -208,7 +214,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
     }
     for (std::size_t i = from; i < end; ++i) {
       if (!table.rows[i].pixel) continue;
-      view->seen.points.push_back(
+      view.seen.points.push_back(
           {lattice.index_of(part, i - from), *table.rows[i].pixel, table.rows[i].weight});
     }
     if (!none)

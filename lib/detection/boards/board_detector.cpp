@@ -86,8 +86,7 @@ BoardDetector::BoardDetector(const Board& board) {
 BoardDetector::~BoardDetector() = default;
 
 std::optional<SeenTag> BoardDetector::exact(const SeenTag& tag, const GreyLevels& image) const {
-  if (touching_) return touching_->exact(tag, image);
-  return with_exact_edges(tag, image.sharp, *stripes_).value_or(tag);
+  return touching_->exact(tag, image);
 }
 
 SeenBoard BoardDetector::seen_squares(const cv::Mat1b& levels) const {
@@ -141,10 +140,19 @@ SeenBoard BoardDetector::detect(const cv::Mat& image) const {
     }
   }
   const GreyLevels grey{levels, touching_ ? smooth(levels) : cv::Mat1f()};
+  std::vector<SeenTag> once;
   for (const auto& [id, same] : found) {
-    if (same.size() > 1) continue;
-    const auto tag = exact(same.front(), grey);
-    if (tag) seen.tags.push_back(*tag);
+    if (same.size() == 1) once.push_back(same.front());
+  }
+  if (stripes_) {
+    const auto found_exact = with_exact_edges(once, levels, *stripes_);
+    for (std::size_t i = 0; i < once.size(); ++i) {
+      seen.tags.push_back(found_exact[i].value_or(once[i]));
+    }
+  } else {
+    for (const SeenTag& tag : once) {
+      if (const auto found_exact = exact(tag, grey)) seen.tags.push_back(*found_exact);
+    }
   }
   if (touching_) {
     for (const SeenTag& tag : touching_->others(seen.tags, grey)) {

@@ -83,6 +83,13 @@ BoardView read_view(const fs::path& file, const std::string& image) {
   return view;
 }
 
+std::string digest_of(const SourceImage& image) {
+  if (image.frame.empty()) return sha256_of_file(image.file);
+  const cv::Mat levels = image.frame.isContinuous() ? image.frame : image.frame.clone();
+  const std::string bytes(levels.ptr<char>(), levels.total() * levels.elemSize());
+  return sha256_of_text(fmt::format("{} {} {}", levels.cols, levels.rows, bytes));
+}
+
 }  // namespace
 
 BoardCache corner_cache(const fs::path& folder, const Board& board) {
@@ -90,19 +97,19 @@ BoardCache corner_cache(const fs::path& folder, const Board& board) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw InputError(folder, "cannot be made: " + error.message());
-  const auto place_of = [folder, settings = settings_of(board)](const fs::path& image) {
-    return folder / (sha256_of_text(sha256_of_file(image) + " " + settings) + ".csv");
+  const auto place_of = [folder, settings = settings_of(board)](const SourceImage& image) {
+    return folder / (sha256_of_text(digest_of(image) + " " + settings) + ".csv");
   };
-  const auto find = [place_of](const fs::path& image) -> std::optional<BoardView> {
+  const auto find = [place_of](const SourceImage& image) -> std::optional<BoardView> {
     const fs::path file = place_of(image);
     if (!fs::exists(file)) return {};
     try {
-      return read_view(file, image.filename().string());
+      return read_view(file, image.file.filename().string());
     } catch (const InputError&) {
       return {};
     }
   };
-  const auto keep = [place_of](const fs::path& image, const BoardView& view) {
+  const auto keep = [place_of](const SourceImage& image, const BoardView& view) {
     try {
       write_view(place_of(image), view);
     } catch (const InputError&) {  // a full disk; the view itself is there

@@ -65,6 +65,11 @@ std::string outside_words(const Eigen::Vector2d& pixel, const std::array<int, 2>
       shortest(pixel.x()), shortest(pixel.y()), width, height);
 }
 
+bool too_many_outside(std::size_t outside, std::size_t corners) {
+  constexpr std::size_t one_of = 50;
+  return one_of * outside > corners;
+}
+
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px) {
   const CsvTable csv(file);
@@ -75,6 +80,8 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
   std::vector<ImageCorners> images;
   std::unordered_map<std::string, std::size_t> index_of;
   std::set<std::pair<std::size_t, std::size_t>> known;  // of points
+  std::size_t seen = 0, outside = 0;
+  std::optional<InputError> first_outside;
   for (std::size_t row = 0; row < csv.rows(); ++row) {
     const std::string name(csv.text(row, image));
     if (name.empty()) throw csv.error(row, image, "is empty");
@@ -86,8 +93,9 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
       continue;
     }
     const Eigen::Vector2d pixel(csv.number(row, u_px), csv.number(row, v_px));
+    ++seen;
     if (const auto words = outside_words(pixel, imager_px); !words.empty()) {
-      throw csv.error(row, u_px, words);
+      if (outside++ == 0) first_outside = csv.error(row, u_px, words);
     }
     const int corner = csv.integer(row, number);
     if (corner < 0 || corner > last) {
@@ -116,6 +124,7 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
     place = pixel;
   }
   if (images.empty()) throw InputError(file, "holds no corner");
+  if (too_many_outside(outside, seen)) throw InputError(*first_outside);
   std::set<int> ids;
   for (const BoardTag& tag : board_layout(board)) ids.insert(tag.id);
   std::vector<BoardView> views;

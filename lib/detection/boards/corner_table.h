@@ -18,7 +18,7 @@ namespace vlp {
 /// columns (order_lattice()). An image without any
 /// has one row, empty but for its name. Tags without all four corners are left out, those that the
 /// board does not have are foreign. Throws InputError, with file and line, also for a corner that
-/// stands twice or is outside the image.
+/// stands twice, and when too_many_outside() the image.
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px);
 
@@ -29,5 +29,8 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
 
 /// What is wrong with the place of a corner; empty when nothing is.
 std::string outside_words(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px);
+
+/// A few corners outside the image may be slips; more mean an image of another size.
+bool too_many_outside(std::size_t outside, std::size_t corners);
 
 }  // namespace vlp

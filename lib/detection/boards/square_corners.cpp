@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <utility>
 
@@ -21,6 +22,25 @@ constexpr int kFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
 /// Whether the pixel lies in the image, which one that is not finite does not.
 bool in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < image.cols && pixel.y() < image.rows;
+}
+
+/// A large image is searched in one of a half or a third of its width, which takes OpenCV a
+/// fraction of the memory; what is found there is looked at in the image itself.
+int reduction_of(const cv::Mat& image) {
+  constexpr double large_px = 8e6;
+  return static_cast<int>(std::ceil(std::sqrt(static_cast<double>(image.total()) / large_px)));
+}
+
+cv::Mat reduced(const cv::Mat& image, int times) {
+  if (times <= 1) return image;
+  cv::Mat small;
+  cv::resize(image, small, {image.cols / times, image.rows / times}, 0, 0, cv::INTER_AREA);
+  return small;
+}
+
+/// Where in a row of the image a place in the reduced one is; sizes are no multiples.
+double enlarged(float at, int large, int small) {
+  return (static_cast<double>(at) + 0.5) * large / small - 0.5;
 }
 
 /// Nothing is left to chance: what OpenCV draws is the same for every image.
@@ -62,10 +82,18 @@ std::vector<SeenPoint> SquareCorners::exact(const std::vector<Guess>& guesses,
 
 std::vector<SeenPoint> SquareCorners::of_chessboard(const GreyLevels& image) const {
   std::vector<cv::Point2f> found;
+  const cv::Mat searched = reduced(image.sharp, reduction_of(image.sharp));
   start_chance();
-  if (!cv::findChessboardCornersSB(image.sharp, {cols_, rows_}, found, kFlags)) return {};
+  if (!cv::findChessboardCornersSB(searched, {cols_, rows_}, found, kFlags)) return {};
   std::vector<SeenPoint> points;
-  for (std::size_t i = 0; i < found.size(); ++i) points.push_back({i, {found[i].x, found[i].y}});
+  const bool whole = searched.size() == image.sharp.size();
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto [x, y] = found[i];
+    points.push_back({i, {x, y}});
+    if (whole) continue;
+    points.back().pixel = {enlarged(x, image.sharp.cols, searched.cols),
+                           enlarged(y, image.sharp.rows, searched.rows)};
+  }
   order_lattice(points, cols_, rows_, true);
   const auto at = [&](int col, int row) {
     return points[static_cast<std::size_t>(row * cols_ + col)].pixel;
@@ -141,7 +169,7 @@ std::vector<SeenPoint> SquareCorners::beside(const std::vector<SeenTag>& markers
 std::array<int, 2> chessboard_shown(const cv::Mat& image) {
   constexpr int least_px = 10;
   if (std::min(image.cols, image.rows) < least_px) return {0, 0};
-  const cv::Mat1b levels = eight_bits(image);
+  const cv::Mat1b levels = reduced(eight_bits(image), reduction_of(image));
   std::vector<cv::Point2f> corners;
   cv::Mat squares;
   start_chance();

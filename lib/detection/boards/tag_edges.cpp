@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "detection/boards/blurred_step.h"
@@ -18,6 +19,25 @@ struct EdgePixel {
   double along, across_px, grey;
 };
 
+constexpr double kWhite = 255;
+
+/// A level of light as the image has it, behind a tone curve, and the derivative by the light.
+struct Coded {
+  Coded(double light, double gamma) : level(light), slope(1) {
+    if (gamma == 1) return;
+    constexpr double least = 1e-3;  // the curve is vertical at 0
+    const double some = std::max(light, least);
+    level = kWhite * std::pow(some / kWhite, 1 / gamma);
+    slope = level / (gamma * some);
+  }
+
+  double level, slope;
+};
+
+double light_of(double level, double gamma) {
+  return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
+}
+
 /// Parameters: the parabola's three, blur, middle, contrast, light along and across.
 struct Edge {
   using Scalar = double;
@@ -25,6 +45,7 @@ struct Edge {
   using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
 
   const std::vector<EdgePixel>& pixels;
+  double gamma;
 
   int NumResiduals() const { return static_cast<int>(pixels.size()); }
 
@@ -34,13 +55,15 @@ struct Edge {
       const auto& [w, v, grey] = pixels[static_cast<std::size_t>(i)];
       const BlurredStep step(v - p[0] - w * (p[1] + w * p[2]), p[3]);
       const double lit = 1 + p[6] * w + p[7] * v, unlit = p[4] + p[5] * step.value;
-      residuals[i] = unlit * lit - grey;
+      const Coded coded(unlit * lit, gamma);
+      residuals[i] = coded.level - grey;
       if (jacobian == nullptr) continue;
       const double by_distance = lit * p[5] * step.slope;
       Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>> all(jacobian, rows,
                                                                             NUM_PARAMETERS);
       all.row(i) << -by_distance, -by_distance * w, -by_distance * w * w, lit * p[5] * step.by_blur,
           lit, lit * step.value, unlit * w, unlit * v;
+      if (gamma != 1) all.row(i) *= coded.slope;
     }
     return true;
   }
@@ -86,10 +109,10 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image, const Parabola& edg
 }
 
 /// Middle and contrast of pixels, roughly: those well inside against those well outside.
-void start_edge_levels(const std::vector<EdgePixel>& pixels, Edge::Parameters& p) {
+void start_edge_levels(const std::vector<EdgePixel>& pixels, double gamma, Edge::Parameters& p) {
   double in = 0, out = 0, ins = 0, outs = 0;
   for (const EdgePixel& pixel : pixels) {
-    (pixel.across_px < 0 ? in : out) += pixel.grey;
+    (pixel.across_px < 0 ? in : out) += light_of(pixel.grey, gamma);
     (pixel.across_px < 0 ? ins : outs) += 1;
   }
   in /= std::max(ins, 1.0);
@@ -98,27 +121,30 @@ void start_edge_levels(const std::vector<EdgePixel>& pixels, Edge::Parameters& p
   p[5] = (out - in) / 2;
 }
 
-/// False when the pixels look otherwise.
-bool fit(Parabola& edge, const cv::Mat1b& image, const Band& band) {
+/// The sum of the squares that are left over; infinite when the pixels look otherwise.
+double fit(Parabola& edge, const cv::Mat1b& image, const Band& band, double gamma) {
   constexpr std::size_t least_pixels = 24;
   constexpr int most_steps = 15;
   constexpr double usual_blur_px = 0.8, least_blur_px = 0.05, most_blur_px = 6;
   constexpr double enough = 1e-3;  // grey levels squared
   constexpr double least_contrast = 3, unlike = 0.35;
   const auto pixels = pixels_beside(image, edge, band);
-  if (pixels.size() < least_pixels) return false;
+  constexpr double no_edge = std::numeric_limits<double>::infinity();
+  if (pixels.size() < least_pixels) return no_edge;
   Edge::Parameters p = Edge::Parameters::Zero();
   p[3] = usual_blur_px;
-  start_edge_levels(pixels, p);
-  const Edge step{pixels};
+  start_edge_levels(pixels, gamma, p);
+  const Edge step{pixels, gamma};
   ceres::TinySolver<Edge> solver;
   solver.options.max_num_iterations = most_steps;
   solver.options.function_tolerance = enough;
   solver.Solve(step, &p);
   edge.abc = p.head<3>();
-  const double rms = std::sqrt(2 * solver.summary.final_cost / static_cast<double>(pixels.size()));
-  return p.allFinite() && p[3] > least_blur_px && p[3] < most_blur_px &&
-         std::abs(p[5]) > least_contrast && rms < unlike * std::abs(p[5]);
+  const double squares = 2 * solver.summary.final_cost;
+  const double rms = std::sqrt(squares / static_cast<double>(pixels.size()));
+  const bool good = p.allFinite() && p[3] > least_blur_px && p[3] < most_blur_px &&
+                    std::abs(p[5]) > least_contrast && rms < unlike * std::abs(p[5]);
+  return good ? squares : no_edge;
 }
 
 /// Newton's method, from a point near it.
@@ -134,37 +160,83 @@ Eigen::Vector2d crossing(const Parabola& a, const Parabola& b, Eigen::Vector2d p
   return point;
 }
 
-}  // namespace
+/// The edges of a tag, each fitted from corner to corner.
+struct TagEdges {
+  std::array<Parabola, 4> edges;
+  double width_px = INFINITY;  // of the shortest
+  /// Infinite where an edge is none.
+  double squares = 0;
+};
 
-std::optional<SeenTag> with_exact_edges(const SeenTag& tag, const cv::Mat1b& image,
-                                        const EdgeStripes& stripes) {
+TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& stripes,
+                double gamma) {
   // The stripe's other side is kept away from by 2 px: it is blurred, too.
-  constexpr double least_px = 1.5, most_px = 4.5, away_px = 2, moved_px = 1.5, moved_share = 0.03;
+  constexpr double least_px = 1.5, most_px = 4.5, away_px = 2;
   const auto& corners = tag.corners_px;
+  TagEdges found;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  double width_px = INFINITY;
   for (std::size_t k = 0; k < 4; ++k) {
     middle += corners[k] / 4;
-    width_px = std::min(width_px, (corners[(k + 1) % 4] - corners[k]).norm());
+    found.width_px = std::min(found.width_px, (corners[(k + 1) % 4] - corners[k]).norm());
   }
-  const Band band{std::clamp(stripes.inside * width_px - away_px, least_px, most_px),
-                  std::clamp(stripes.outside * width_px - away_px, least_px, most_px)};
-  const double most_moved_px = std::max(moved_px, moved_share * width_px);
-  std::array<Parabola, 4> edges;
+  const Band band{std::clamp(stripes.inside * found.width_px - away_px, least_px, most_px),
+                  std::clamp(stripes.outside * found.width_px - away_px, least_px, most_px)};
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d from = corners[k], to = corners[(k + 1) % 4];
-    Parabola& edge = edges[k];
+    Parabola& edge = found.edges[k];
     edge.middle = (from + to) / 2;
     edge.half_px = (to - from).norm() / 2;
     edge.along = (to - from) / (2 * edge.half_px);
     edge.across = {-edge.along.y(), edge.along.x()};
     if (edge.across.dot(edge.middle - middle) < 0) edge.across = -edge.across;
-    if (!fit(edge, image, band)) return {};
+    found.squares += fit(edge, image, band, gamma);
+    if (!std::isfinite(found.squares)) break;
   }
+  return found;
+}
+
+/// Nothing when an edge is none, or a corner has gone too far.
+std::optional<SeenTag> crossed(const SeenTag& tag, const TagEdges& found) {
+  constexpr double moved_px = 1.5, moved_share = 0.03;
+  if (!std::isfinite(found.squares)) return {};
+  const double most_moved_px = std::max(moved_px, moved_share * found.width_px);
   SeenTag exact = tag;
   for (std::size_t k = 0; k < 4; ++k) {
-    exact.corners_px[k] = crossing(edges[(k + 3) % 4], edges[k], corners[k]);
-    if (!((exact.corners_px[k] - corners[k]).norm() < most_moved_px)) return {};
+    const Eigen::Vector2d& from = tag.corners_px[k];
+    exact.corners_px[k] = crossing(found.edges[(k + 3) % 4], found.edges[k], from);
+    if (!((exact.corners_px[k] - from).norm() < most_moved_px)) return {};
+  }
+  return exact;
+}
+
+}  // namespace
+
+std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> tags,
+                                                     const cv::Mat1b& image,
+                                                     const EdgeStripes& stripes) {
+  constexpr std::size_t asked = 8;  // tags, the widest
+  constexpr double usual_gamma = 2.2;
+  constexpr double better = 0.99;  // of the squares, or it is chance
+  std::vector<TagEdges> found;
+  std::vector<std::size_t> widest;
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    found.push_back(fitted(tags[i], image, stripes, 1));
+    if (std::isfinite(found[i].squares)) widest.push_back(i);
+  }
+  std::stable_sort(widest.begin(), widest.end(), [&](std::size_t a, std::size_t b) {
+    return found[a].width_px > found[b].width_px;
+  });
+  widest.resize(std::min(widest.size(), asked));
+  double as_it_is = 0, behind_curve = 0;
+  for (const std::size_t i : widest) {
+    as_it_is += found[i].squares;
+    behind_curve += fitted(tags[i], image, stripes, usual_gamma).squares;
+  }
+  const bool curved = behind_curve < better * as_it_is;
+  std::vector<std::optional<SeenTag>> exact;
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    if (curved) found[i] = fitted(tags[i], image, stripes, usual_gamma);
+    exact.push_back(crossed(tags[i], found[i]));
   }
   return exact;
 }

@@ -4,6 +4,8 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "detection/boards/board_detector.h"
 
@@ -14,15 +16,23 @@ struct EdgeStripes {
   double inside, outside;
 };
 
-/// The tag with its corners where its four edges cross. Each edge is fitted to the pixels beside
-/// it, from corner to corner, as a parabola, since the lens bends it, by least squares:
+/// The tags of an image with their corners where their four edges cross. Each edge is fitted to the
+/// pixels beside it, from corner to corner, as a parabola, since the lens bends it, by least
+/// squares:
 ///   grey = (middle + contrast step(v - a - b w - c w^2)) (1 + light . (w, v)),
 /// with w from -1 to 1 along the edge, v across it and a blurred step. On rendered boards corners
 /// are good to 0.019 px and without a bias; libapriltag's straight lines, which take no notice of
-/// light that changes over the image, leave 0.05 px and are drawn outwards by the lens. Nothing
-/// when an edge looks otherwise, or when a corner is more than 1.5 px, and than 3 % of the tag,
-/// from where it was.
-std::optional<SeenTag> with_exact_edges(const SeenTag& tag, const cv::Mat1b& image,
-                                        const EdgeStripes& stripes);
+/// light that changes over the image, leave 0.05 px and are drawn outwards by the lens.
+///
+/// Behind a tone curve, level = 255 (grey / 255)^(1 / gamma), an edge is steeper on its dark side,
+/// which draws the fit there, by more the narrower the stripes are. So gamma is 2.2, about that of
+/// cameras for people, when that fits the widest tags of the image better than 1. What is left of
+/// another curve is alike all over a view, and found when the lens is (edge_shifts()).
+///
+/// Nothing for a tag of which an edge looks otherwise, or a corner is more than 1.5 px, and than 3
+/// % of the tag, from where it was.
+std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> tags,
+                                                     const cv::Mat1b& image,
+                                                     const EdgeStripes& stripes);
 
 }  // namespace vlp

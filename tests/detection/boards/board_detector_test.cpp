@@ -120,7 +120,8 @@ TEST_P(RenderedBoard, IsTheSameWhateverTheThreads) {
   const BoardDetector detector(board);
   const std::vector<fs::path> images(6, rig / "sample-boards/0000.png");
   std::size_t most = 0;
-  const auto four = detect_boards(detector, images, 4, {}, [&](std::size_t n) { most = n; });
+  ImageSource source(images);
+  const auto four = detect_boards(detector, source, 4, {}, [&](std::size_t n) { most = n; });
   EXPECT_EQ(most, images.size());
   const SeenBoard one = detector.detect(image);
   ASSERT_EQ(four.views.size(), images.size());
@@ -145,7 +146,8 @@ TEST(BoardDetector, RefusesAFamilyThatArucoLacks) {
 std::map<std::size_t, int> images_by_tags(const fs::path& folder, const fs::path& board) {
   std::map<std::size_t, int> counts;
   const BoardDetector detector(read_board(board));
-  for (const auto& view : detect_boards(detector, images_in(folder), 2, {}, [](auto) {}).views) {
+  ImageSource images(images_in(folder));
+  for (const auto& view : detect_boards(detector, images, 2, {}, [](auto) {}).views) {
     ++counts[view.seen.tags.size()];
   }
   return counts;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <opencv2/core/version.hpp>
 #include <opencv2/imgproc.hpp>
 #if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
@@ -142,6 +144,21 @@ TEST(SquareCorners, OfAChessboardAreCountedWithTheImage) {
     cv::rotate(image, turned, cv::ROTATE_180);
     expect_all_corners(board, detector.detect(turned));
   }
+}
+
+/// Larger images are searched in a reduced one.
+TEST(SquareCorners, OfALargeImageAreAsExact) {
+  const Board board = squares(BoardKind::chessboard, 9, 6);
+  const cv::Mat drawn = drawn_chessboard(board);
+  cv::Mat image(3001, 4002, CV_8U, cv::Scalar(255));
+  const cv::Point at(1703, 1201);
+  drawn.copyTo(image(cv::Rect(at, drawn.size())));
+  SeenBoard seen = BoardDetector(board).detect(image);
+  for (SeenPoint& point : seen.points) point.pixel -= Eigen::Vector2d(at.x, at.y);
+  expect_all_corners(board, seen);
+  auto shown = chessboard_shown(image);  // either way around
+  std::sort(shown.begin(), shown.end());
+  EXPECT_EQ(shown, (std::array{6, 9}));
 }
 
 TEST(SquareCorners, OfAChessboardAreAllOrNone) {

@@ -1,0 +1,92 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/corner_blunders.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "geometry/homography.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kNeighbours = 8;
+
+using Corners = std::vector<BoardLattice::Corner>;
+
+/// The nearest corners on the board, those taken out left aside.
+std::vector<std::size_t> around(const Corners& corners, const std::vector<bool>& out,
+                                std::size_t middle) {
+  std::vector<std::pair<double, std::size_t>> away;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (i == middle || out[i]) continue;
+    away.emplace_back((corners[i].in_board_m - corners[middle].in_board_m).squaredNorm(), i);
+  }
+  const std::size_t count = std::min(kNeighbours, away.size());
+  std::partial_sort(away.begin(), away.begin() + static_cast<std::ptrdiff_t>(count), away.end());
+  std::vector<std::size_t> nearest;
+  for (std::size_t k = 0; k < count; ++k) nearest.push_back(away[k].second);
+  return nearest;
+}
+
+/// How far a corner is from where its neighbours put it, over what it may be; 0 with too few.
+double misplaced(const Corners& corners, const std::vector<std::size_t>& nearest,
+                 std::size_t middle) {
+  constexpr double share = 0.25, least_px = 3;
+  if (nearest.size() < kNeighbours) return 0;
+  std::vector<PlanePair> pairs;
+  double step_px = INFINITY;
+  for (const std::size_t i : nearest) {
+    pairs.push_back({corners[i].in_board_m.head<2>(), corners[i].pixel});
+  }
+  const Eigen::Matrix3d px_from_board = homography(pairs);
+  const auto put = [&](const Eigen::Vector3d& at_m) -> Eigen::Vector2d {
+    return (px_from_board * at_m.head<2>().homogeneous()).hnormalized();
+  };
+  const Eigen::Vector2d expected = put(corners[middle].in_board_m);
+  for (const std::size_t i : nearest) {
+    step_px = std::min(step_px, (put(corners[i].in_board_m) - expected).norm());
+  }
+  const double off_px = (corners[middle].pixel - expected).norm();
+  return off_px / std::max(least_px, share * step_px);
+}
+
+}  // namespace
+
+std::vector<std::size_t> corner_blunders(const Corners& corners) {
+  constexpr std::size_t most = 10;  // one of so many
+  std::vector<bool> out(corners.size(), false);
+  std::vector<std::vector<std::size_t>> nearest(corners.size());
+  std::vector<double> off(corners.size());
+  const auto look = [&](std::size_t i) {
+    nearest[i] = around(corners, out, i);
+    off[i] = misplaced(corners, nearest[i], i);
+  };
+  for (std::size_t i = 0; i < corners.size(); ++i) look(i);
+  std::vector<std::size_t> found;
+  while (!corners.empty()) {
+    const auto worst =
+        static_cast<std::size_t>(std::max_element(off.begin(), off.end()) - off.begin());
+    if (off[worst] <= 1) break;
+    if ((found.size() + 1) * most > corners.size()) return {};  // another board, or another order
+    found.push_back(worst);
+    out[worst] = true;
+    off[worst] = 0;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const auto& others = nearest[i];
+      if (!out[i] && std::find(others.begin(), others.end(), worst) != others.end()) look(i);
+    }
+  }
+  // A blunder may have put its neighbours to the wrong place before it was found itself.
+  std::erase_if(found, [&](std::size_t i) {
+    look(i);
+    out[i] = off[i] > 1;
+    return !out[i];
+  });
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+}  // namespace vlp

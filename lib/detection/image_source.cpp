@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/image_source.h"
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "detection/images_in_parallel.h"
+#include "detection/video.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+
+ImageSource::ImageSource(std::vector<std::filesystem::path> files, const FromVideos& from_videos)
+    : files_(std::move(files)), from_videos_(from_videos) {
+  for (const auto& file : files_) {
+    if (!is_video_name(file)) {
+      ++expected_;
+      continue;
+    }
+    Video video(file.string());
+    const auto [width, height] = video.size_px();
+    check_size(file, width, height, from_videos_.max_mpx);
+    check_imager(file, cv::Size(width, height), from_videos_.imager_px);
+    if (!video.next()) throw InputError(file, "holds no frame that can be decoded");
+    const auto every = static_cast<std::size_t>(from_videos_.every);
+    expected_ += (std::max<std::size_t>(video.frames_stated(), 1) + every - 1) / every;
+  }
+}
+
+ImageSource::~ImageSource() = default;
+
+std::size_t ImageSource::expected() const { return expected_; }
+
+std::optional<SourceImage> ImageSource::next_frame() {
+  const auto& file = files_[file_];
+  if (!video_) {
+    video_ = std::make_unique<Video>(file.string());
+  } else {
+    for (int i = 1; i < from_videos_.every; ++i) video_->skip();
+  }
+  auto frame = video_->next();
+  if (!frame) {
+    const std::string missing = video_->missing();
+    if (!missing.empty()) warnings_.push_back(file.string() + ": " + missing);
+    video_.reset();
+    return {};
+  }
+  SourceImage image(frame_name(file.string(), frame->number));
+  image.frame = std::move(frame->image);
+  image.time_s = frame->time_s;
+  return image;
+}
+
+std::optional<SourceImage> ImageSource::next() {
+  const std::lock_guard lock(taking_);
+  for (; file_ < files_.size(); ++file_) {
+    std::optional<SourceImage> image;
+    if (is_video_name(files_[file_])) {
+      image = next_frame();
+      if (!image) continue;
+    } else {
+      image.emplace(files_[file_++]);
+    }
+    image->index = given_++;
+    return image;
+  }
+  return {};
+}
+
+void for_each_image(ImageSource& source, int threads,
+                    const std::function<void(const SourceImage&)>& task) {
+  const auto workers = static_cast<std::size_t>(threads);
+  std::atomic<bool> failed = false;
+  images_in_parallel(workers, threads, [&](std::size_t) {
+    try {
+      while (!failed) {
+        const auto image = source.next();
+        if (!image) return;
+        task(*image);
+      }
+    } catch (...) {
+      failed = true;
+      throw;
+    }
+  });
+}
+
+void check_imager(const std::filesystem::path& file, const cv::Size& size,
+                  const std::optional<std::array<int, 2>>& imager_px) {
+  if (!imager_px || (size.width == (*imager_px)[0] && size.height == (*imager_px)[1])) return;
+  throw InputError(file, "is " + std::to_string(size.width) + " x " + std::to_string(size.height) +
+                             ", the calibration's camera has " + std::to_string((*imager_px)[0]) +
+                             " x " + std::to_string((*imager_px)[1]) + " px");
+}
+
+}  // namespace vlp

@@ -1,0 +1,140 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Videos as input of vlp-detect and vlp-intrinsics, against the images that they were made of.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "captures/captures_table.h"
+#include "detection/image_file.h"
+#include "pipeline/intrinsics_program.h"
+#include "support/datasets.h"
+#include "support/write_video.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+/// A video of the images in a folder, each so many times.
+bool film_of(const fs::path& file, const fs::path& folder, int times, const char* codec = "FFV1") {
+  std::vector<cv::Mat> frames;
+  for (const auto& image : images_in(folder)) {
+    for (int i = 0; i < times; ++i) frames.push_back(read_image(image));
+  }
+  return write_video(file, frames, codec);
+}
+
+/// The text with every `from` replaced.
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  for (auto at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+    text.replace(at, from.size(), to);
+  }
+  return text;
+}
+
+class FilmOfLamps : public testing::Test {
+ protected:
+  ProgramResult detect(const std::string& images, const std::string& output,
+                       const std::string& options = "") const {
+    return run_program("vlp-detect '" + images + "' --lamps " + kRig +
+                       "/lamps.yaml --calibration " + kRig + "/true_calibration.yaml -o " +
+                       (folder / output).string() + " " + options);
+  }
+  const TemporaryFolder folder;
+};
+
+TEST_F(FilmOfLamps, ShowsWhatItsImagesShow) {
+  const std::string film = (folder / "drive.avi").string();
+  if (!film_of(film, kRig + "/sample", 1)) GTEST_SKIP() << "OpenCV writes no FFV1";
+  ASSERT_EQ(detect(kRig + "/sample", "images.csv").exit_code, 0);
+  const auto found = detect(film, "film.csv",
+                            "--annotate " + (folder / "pictures").string() + " --captures " +
+                                (folder / "captures.csv").string());
+  ASSERT_EQ(found.exit_code, 0) << found.errors;
+  EXPECT_EQ(found.errors, "");
+  EXPECT_THAT(found.output, HasSubstr("images      2\n"));
+  const std::string table = TemporaryFolder::content_of(folder / "film.csv");
+  EXPECT_EQ(with(with(table, "drive.avi#000000", "0000.png"), "drive.avi#000001", "0001.png"),
+            TemporaryFolder::content_of(folder / "images.csv"));
+  EXPECT_TRUE(fs::exists(folder / "pictures/drive.avi#000001.png"));
+  EXPECT_NEAR(*read_captures(folder / "captures.csv").at("drive.avi#000001").time_s, 0.05, 1e-9);
+  // Both go on to the fixes.
+  const auto located = run_program("vlp-locate " + (folder / "film.csv").string() + " --captures " +
+                                   (folder / "captures.csv").string() + " --lamps " + kRig +
+                                   "/lamps.yaml --calibration " + kRig +
+                                   "/true_calibration.yaml -o " + (folder / "fixes.csv").string());
+  EXPECT_EQ(located.exit_code, 0) << located.errors;
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "fixes.csv"), HasSubstr("drive.avi#000001,ok"));
+
+  ASSERT_EQ(detect(film, "first.csv", "--every 2").exit_code, 0);
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "first.csv"),
+              Not(HasSubstr("drive.avi#000001")));
+}
+
+TEST_F(FilmOfLamps, IsRefusedInALine) {
+  const auto refused = [&](const std::string& images, const std::string& options,
+                           const std::string& message) {
+    const auto result = detect(images, "found.csv", options);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_EQ(result.errors, "vlp-detect: error: " + message + "\n");
+    EXPECT_FALSE(fs::exists(folder / "found.csv"));
+  };
+  const std::string none = folder.file("none.mp4", "no video").string();
+  refused(none, "", none + ": cannot be opened as a video: is it cut short, or none?");
+  refused(kRig + "/sample", "--every 2", "--every is for videos, and there is none");
+  refused(kRig + "/sample", "--captures " + (folder / "captures.csv").string(),
+          "--captures is for a video, whose frames have times");
+  const auto located =
+      run_program("vlp-locate " + none + " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
+                  "/true_calibration.yaml -o " + (folder / "fixes.csv").string());
+  EXPECT_THAT(located.errors, HasSubstr("is a video: vlp-detect finds the lamps in it"));
+
+  const std::string film = (folder / "drive.avi").string();
+  if (!film_of(film, kRig + "/sample", 6)) GTEST_SKIP() << "OpenCV writes no FFV1";
+  const auto over = detect(film, "drive.avi");
+  EXPECT_EQ(over.errors,
+            "vlp-detect: error: " + film + ": is an input, too, and would be overwritten\n");
+  const std::string bytes = TemporaryFolder::content_of(film);
+  const std::string cut = folder.file("cut.avi", bytes.substr(0, bytes.size() * 6 / 10)).string();
+  const auto result = detect(cut, "found.csv");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.errors, StartsWith("vlp-detect: warning: " + cut + ": "));
+  EXPECT_THAT(result.errors, HasSubstr(" of its 12 frames can be decoded; is it cut short"));
+}
+
+class FilmOfABoard : public IntrinsicsProgram {};
+
+TEST_F(FilmOfABoard, GivesTheLensOfItsImages) {
+  const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
+  std::string scene = TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+  scene = with(scene, "views: {count: 36", "views: {count: 12");
+  ASSERT_EQ(run_program("vlp-simulate -q " + folder.file("scene.yaml", scene).string() +
+                        " --only boards -o " + rig)
+                .exit_code,
+            0);
+  const std::string film = (folder / "boards.avi").string();
+  if (!film_of(film, rig + "/boards", 2)) GTEST_SKIP() << "OpenCV writes no FFV1";
+  // Few views: gates are not met.
+  const auto of_images = calibrate(rig + "/boards", board);
+  ASSERT_LE(of_images.exit_code, 1) << of_images.errors;
+  const std::string corners = content("camera.corners.vnl");
+  const auto of_film = calibrate(film, board);
+  EXPECT_EQ(of_film.exit_code, of_images.exit_code) << of_film.errors;
+  EXPECT_THAT(of_film.errors, HasSubstr("vlp-intrinsics: warning: boards.avi: 12 of its frames are "
+                                        "the same pictures as others; skipped\n"));
+  std::string names = content("camera.corners.vnl");
+  for (int i = 0; i < 12; ++i) {
+    const auto number = [](int n) { return (n < 10 ? "0" : "") + std::to_string(n); };
+    names = with(names, "boards.avi#0000" + number(2 * i), "00" + number(i) + ".png");
+  }
+  EXPECT_EQ(names, corners);
+}
+
+}  // namespace
+}  // namespace vlp
