@@ -169,8 +169,8 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
 
 std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
   const Background background = background_of(image);
-  const cv::Mat lines = lines_of(image, camera_.readout, background);
-  const auto blobs = group_runs(find_runs(lines, background.threshold), most_dark_rows_);
+  const auto [lines, lit, memory] = lines_of(image, camera_.readout, background);
+  const auto blobs = group_runs(find_runs(lines, background.threshold, lit), most_dark_rows_);
   std::vector<LightPart> parts;
   parts.reserve(blobs.size());
   for (const Blob& blob : blobs) {
