@@ -48,7 +48,7 @@ struct Light {
   std::optional<int> lamp;
   /// Image of the centre of its outline, (u, v).
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis, from the scatter of the outline.
+  /// Standard deviation of `pixel` per axis, by its outline, or by unknown_lens_sd_px() as well.
   double sigma_px;
   /// Of a rectangle that of the disc of its area.
   double radius_px;
