@@ -68,9 +68,11 @@ struct Light {
   /// How soft the outline is: from a quarter to three quarters of the level.
   double rise_px;
   /// Of a rectangle, see rectangle_of(), a polygon around it within its edges, (u, v), and its long
-  /// side over the short one, behind the lens; empty of others.
+  /// side over the short one, behind the lens, with the standard deviation of its logarithm, by the
+  /// scatter of the edges and a quarter of their blur, which a tone curve may move them by; empty
+  /// of others.
   std::vector<Eigen::Vector2d> face;
-  double aspect;
+  double aspect, aspect_sd;
   /// The share of the blob's edge that lies on the circle; of a rectangle the share of the pixels
   /// along the edge that is seen worst that look like an edge.
   double roundness;
