@@ -15,7 +15,9 @@
 #include "detection/lights/rectangle.h"
 #include "detection/lights/rim.h"
 #include "detection/lights/runs.h"
+#include "detection/lights/unknown_lens.h"
 #include "geometry/frames.h"
+#include "rig/detection.h"
 
 namespace vlp {
 namespace {
@@ -57,6 +59,16 @@ double clipped_share(const cv::Mat& lines, const Eigen::Vector2d& low,
   cv::minMaxLoc(pixels, nullptr, &brightest);
   if (!is_full_scale(brightest, pixels.depth())) return 0;
   return double(cv::countNonZero(pixels >= brightest)) / double(pixels.total());
+}
+
+/// To what the outlines say. Which of two lights has the surer centre is not for it to say: it is
+/// the smaller one's.
+void add_unknown_lens(const cv::Size& size, std::vector<Light>& lights) {
+  for (Light& light : lights) {
+    if (light.kind == LightKind::formless) continue;
+    const double sigma_px = std::hypot(light.sigma_px, unknown_lens_sd_px(light, size));
+    light.sigma_px = std::min(sigma_px, kMaxSigma_px);
+  }
 }
 
 /// How far two centres are apart, per axis.
@@ -184,8 +196,8 @@ void LampDetector::correct_shear(std::vector<Light>& lights) const {
 
 std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
   const Background background = background_of(image);
-  const cv::Mat lines = lines_of(image, camera_.readout, background);
-  const auto blobs = group_runs(find_runs(lines, background.threshold), most_dark_rows_);
+  const auto [lines, lit, memory] = lines_of(image, camera_.readout, background);
+  const auto blobs = group_runs(find_runs(lines, background.threshold, lit), most_dark_rows_);
   std::vector<LightPart> parts;
   parts.reserve(blobs.size());
   for (const Blob& blob : blobs) {
@@ -201,6 +213,7 @@ std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
     return a.pixel.y() != b.pixel.y() ? a.pixel.y() < b.pixel.y() : a.pixel.x() < b.pixel.x();
   });
   identify(lights, image.size());
+  if (!shape_.has_lens()) add_unknown_lens(image.size(), lights);
   return lights;
 }
 

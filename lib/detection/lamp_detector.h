@@ -52,8 +52,9 @@ class LampDetector {
   /// The centres of lights that a moving camera sees in part, see Shear.
   void correct_shear(std::vector<Light>& lights) const;
   void identify(std::vector<Light>& lights, const cv::Size& size) const;
-  /// Whether a light looks like that lamp: round, or a rectangle with its sides' ratio.
-  bool has_shape_of(const Light& light, int lamp) const;
+  /// How far a light is from that lamp's shape, round, or a rectangle with its sides' ratio: the
+  /// logarithm of what the ratio is off by, 0 of discs; nothing when it has another shape.
+  std::optional<double> shape_off(const Light& light, int lamp) const;
   /// The lamp whose stripes these are; nothing when none or two may be.
   std::optional<int> lamp_of(const Stripes& stripes) const;
 

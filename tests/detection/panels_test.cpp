@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Panels and tubes among discs, by a camera that leans.
 #include <algorithm>
+#include <utility>
 
 #include "detection/rendered_captures.h"
 #include "positioning/positioner.h"
@@ -82,6 +83,74 @@ TEST(Panels, AreFoundWithoutALensLessSurely) {
     }
   }
   EXPECT_GT(found, 5);
+}
+
+Scene panels_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/panels/scene.yaml"); }
+
+TEST(Panels, LeaveSmallDiscsBesideThemDiscs) {
+  Scene scene = panels_scene();
+  for (SceneLamp& lamp : scene.lamps) {
+    if (lamp.glow.rectangle) continue;
+    lamp.glow.diameter_m = 0.095;  // 10 to 12 px
+    lamp.frequency_hz = 6100 + 1200 * (lamp.id - 5);
+  }
+  const Captures captures(std::move(scene), "check");
+  const Score score = captures.score(kStep, [](int lamp) { return !is_panel_or_tube(lamp); });
+  EXPECT_GT(score.lamps, 35);
+  EXPECT_EQ(score.missed, 0);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_LT(score.rms_px(), 0.04);
+  EXPECT_LT(score.chi_square / score.lamps, 1.5);
+}
+
+/// A bar along y, at 2.2 m, between camera and ceiling.
+Panel bar(double x_m, double width_m) {
+  return {{x_m, -1.5, 2.2}, {width_m, 0, 0}, {0, 3, 0}, 1e6};
+}
+
+TEST(Panels, HiddenInPartAreAsSureAsTheyState) {
+  Scene scene = panels_scene();
+  // Along edges of panels and across a tube's end: what is left of them is a rectangle, too.
+  scene.clutter.occluders = {bar(-1.2, 0.08), bar(0.6, 0.3)};
+  const Captures captures(std::move(scene), "check");
+  int found = 0, far = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 5) {
+    const LampShot shot = captures.shot(i);
+    const auto truth = captures.truth(shot);
+    for (const Light& light : captures.detector().detect(captures.image(shot))) {
+      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      const auto lamp = std::find_if(truth.begin(), truth.end(),
+                                     [&](const TrueLamp& one) { return one.id == light.lamp; });
+      ASSERT_NE(lamp, truth.end());
+      const double off_px = (light.pixel - lamp->pixel).norm();
+      // A tube of 20 px width does not show that less than 3 px of its end are hidden.
+      if (off_px > 3) {
+        EXPECT_LT(off_px, 3 * light.sigma_px) << "lamp " << lamp->id << " in image " << i;
+        ++far;
+      }
+      ++found;
+    }
+  }
+  EXPECT_GT(found, 10);
+  EXPECT_GT(far, 5) << "there is something to state";
+}
+
+TEST(Panels, CutByTheImagesEdgeAreNoLamps) {
+  const Captures captures("panels", "check");
+  int cut = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 5) {
+    const LampShot shot = captures.shot(i);
+    const auto lights = captures.detector().detect(captures.image(shot));
+    for (const TrueLamp& lamp : captures.truth(shot)) {
+      if (!is_panel_or_tube(lamp.id) || lamp.in_view >= 1) continue;
+      ++cut;
+      for (const Light& light : lights) {
+        EXPECT_FALSE(light.lamp == lamp.id && light.kind == LightKind::lamp)
+            << "lamp " << lamp.id << " in image " << i;
+      }
+    }
+  }
+  EXPECT_GT(cut, 10);
 }
 
 TEST(Panels, GiveFixes) {

@@ -10,6 +10,7 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
+#include <utility>
 
 #include "detection/lamp_detector.h"
 #include "simulation/exposure.h"
@@ -32,7 +33,9 @@ struct Score {
 class Captures {
  public:
   explicit Captures(const std::string& scene, const std::string& folder)
-      : scene_(read_scene(VLP_SOURCE_DIR "/datasets/" + scene + "/scene.yaml")),
+      : Captures(read_scene(VLP_SOURCE_DIR "/datasets/" + scene + "/scene.yaml"), folder) {}
+  Captures(Scene scene, const std::string& folder)
+      : scene_(std::move(scene)),
         renderer_(scene_),
         set_(*std::find_if(scene_.sets.begin(), scene_.sets.end(),
                            [&](const CaptureSet& set) { return set.folder == folder; })) {}
@@ -42,7 +45,7 @@ class Captures {
     const cv::Mat lines =
         expose(scene_.sensor, renderer_.lamp_electrons(shot), shot.noise_seed, scene_.picture);
     const cv::Mat image = scene_.camera.readout == Readout::rows ? lines : cv::Mat(lines.t());
-    return cv::imdecode(encoded(image, scene_.picture), cv::IMREAD_UNCHANGED);
+    return cv::imdecode(encoded(image, scene_.picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   }
   std::vector<TrueLamp> truth(const LampShot& shot) const {
     return true_lamps(scene_, renderer_, shot);
@@ -55,7 +58,11 @@ class Captures {
   /// Of the lamps that count; what is wrong of others counts, too.
   Score score(
       std::size_t step, const std::function<bool(int)>& counts = [](int) { return true; }) const {
-    const LampDetector lamp_detector = detector();
+    return score(step, detector(), counts);
+  }
+  Score score(
+      std::size_t step, const LampDetector& lamp_detector,
+      const std::function<bool(int)>& counts = [](int) { return true; }) const {
     Score score;
     for (std::size_t i = 0; i < shots_in(set_); i += step) {
       const LampShot shot = this->shot(i);

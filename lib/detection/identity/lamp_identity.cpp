@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include "detection/identity/coherence.h"
@@ -25,6 +27,20 @@ std::optional<LightReason> why_steady(const Light& light) {
   return std::nullopt;
 }
 
+/// What a lean of 5 degrees that nobody knows of changes the logarithm of a rectangle's ratio of
+/// sides by, 35 degrees from the axis.
+constexpr double kLeanedOff = 0.06;
+
+/// Of a rectangle whose sides have not quite the lamp's ratio something may hide one end: what is
+/// left of it has its centre half as far off. That is in its sigma.
+void add_hidden_end(double off, double leaned_off, Light& light) {
+  constexpr double clear = 3;
+  if (!(off > leaned_off + clear * light.aspect_sd)) return;
+  const double length_px =
+      std::sqrt(std::numbers::pi * light.aspect) * light.radius_px;  // its area has that radius
+  light.sigma_px = std::hypot(light.sigma_px, off * length_px / 2 / std::numbers::sqrt2);
+}
+
 void refuse(Light& light, LightReason reason) {
   light.lamp.reset();
   light.reason = reason;
@@ -43,15 +59,16 @@ std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
   return lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
 }
 
-bool LampDetector::has_shape_of(const Light& light, int lamp) const {
-  // A lean of 5 degrees that nobody knows of changes the ratio by 6 % at 35 degrees from the axis,
-  // a lens that nobody knows by more.
-  const double most_off = shape_.has_lens() ? 0.12 : 0.3;
+std::optional<double> LampDetector::shape_off(const Light& light, int lamp) const {
+  // A lens that nobody knows changes the ratio of the sides by more than a lean.
+  const double most_off = shape_.has_lens() ? 2 * kLeanedOff : 0.3;
   const Lamp* mapped = find_lamp(lamps_.lamps, lamp);  // a classifier may know others
   const auto rectangle = mapped != nullptr ? mapped->rectangle : std::nullopt;
-  if (!rectangle || !is_rectangle(light)) return !rectangle && !is_rectangle(light);
+  if (rectangle.has_value() != is_rectangle(light)) return std::nullopt;
+  if (!rectangle) return 0;
   const double aspect = rectangle->size_m.maxCoeff() / rectangle->size_m.minCoeff();
-  return std::abs(std::log(light.aspect / aspect)) < most_off;
+  const double off = std::abs(std::log(light.aspect / aspect));
+  return off < most_off ? std::optional(off) : std::nullopt;
 }
 
 void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) const {
@@ -66,7 +83,13 @@ void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) co
     if (!light.uneven) sharpest_px = std::min(sharpest_px, light.rise_px);
     light.lamp = lamp_of(light.stripes);
     if (!readable(light.stripes)) light.reason = LightReason::irregular;
-    if (light.lamp && !has_shape_of(light, *light.lamp)) refuse(light, LightReason::other_shape);
+    if (!light.lamp) continue;
+    const auto off = shape_off(light, *light.lamp);
+    if (!off) {
+      refuse(light, LightReason::other_shape);
+    } else if (is_rectangle(light) && shape_.has_lens()) {
+      add_hidden_end(*off, shape_.knows_level() ? 0 : kLeanedOff, light);
+    }
   }
   for (Light& light : lights) {
     if (!light.lamp) continue;

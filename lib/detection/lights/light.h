@@ -49,7 +49,7 @@ struct Light {
   std::optional<int> lamp;
   /// Image of the centre of its outline, (u, v).
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis, from the scatter of the outline.
+  /// Standard deviation of `pixel` per axis, by its outline, or by unknown_lens_sd_px() as well.
   double sigma_px;
   /// Of a rectangle that of the disc of its area.
   double radius_px;
@@ -69,9 +69,11 @@ struct Light {
   /// How soft the outline is: from a quarter to three quarters of the level.
   double rise_px;
   /// Of a rectangle, see rectangle_of(), a polygon around it within its edges, (u, v), and its long
-  /// side over the short one, behind the lens; empty of others.
+  /// side over the short one, behind the lens, with the standard deviation of its logarithm, by the
+  /// scatter of the edges and a quarter of their blur, which a tone curve may move them by; empty
+  /// of others.
   std::vector<Eigen::Vector2d> face;
-  double aspect;
+  double aspect, aspect_sd;
   /// The share of the blob's edge that lies on the circle; of a rectangle the share of the pixels
   /// along the edge that is seen worst that look like an edge.
   double roundness;

@@ -50,6 +50,7 @@ class LightShape {
   std::vector<Eigen::Vector2d> turned(std::vector<Eigen::Vector2d> points) const;
 
   bool has_lens() const { return camera_.lens.has_value(); }
+  bool knows_level() const { return !camera_.level_from_camera.isIdentity(0); }
   /// The point of the level plane, at height 1, that is seen at (u, v), and back; without a lens
   /// that is the pixel itself.
   std::optional<Eigen::Vector2d> plane_of(const Eigen::Vector2d& pixel) const;

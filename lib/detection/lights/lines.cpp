@@ -5,63 +5,71 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <vector>
+#include <cstdlib>
+#include <new>
+#include <opencv2/imgproc.hpp>
+
+#include "detection/lights/runs.h"
 
 namespace vlp {
 namespace {
 
-constexpr int kTile = 64;
-
-template <typename Level>
-bool any_above(const cv::Mat& tile, double threshold) {
-  Level brightest = 0;
-  for (int row = 0; row < tile.rows; ++row) {
-    const auto* pixels = tile.ptr<Level>(row);
-    for (int column = 0; column < tile.cols; ++column) {
-      brightest = std::max(brightest, pixels[column]);
-    }
-  }
-  return brightest > threshold;
+/// Black. The system gives such memory page by page, when it is used first.
+Lines black_lines(const cv::Size& size, int type) {
+  Lines lines;
+  const std::size_t pixels = std::size_t(size.width) * std::size_t(size.height);
+  lines.memory = {std::calloc(pixels, std::size_t(CV_ELEM_SIZE(type))), std::free};
+  if (!lines.memory) throw std::bad_alloc();
+  lines.pixels = cv::Mat(size, type, lines.memory.get());
+  return lines;
 }
 
-std::size_t index_of(const cv::Size& tiles, int row, int column) {
-  return static_cast<std::size_t>(row) * static_cast<std::size_t>(tiles.width) +
-         static_cast<std::size_t>(column);
+cv::Rect grown(const cv::Rect& tiles, int by) {
+  return {tiles.x - by, tiles.y - by, tiles.width + 2 * by, tiles.height + 2 * by};
 }
 
-/// Tiles with something bright, and those around them, where outlines are seen from outside.
-std::vector<bool> tiles_to_turn(const cv::Mat& image, const cv::Size& tiles, double threshold) {
-  const cv::Rect all({0, 0}, image.size());
-  std::vector<bool> turn(index_of(tiles, tiles.height, 0));
-  for (int row = 0; row < tiles.height; ++row) {
-    for (int column = 0; column < tiles.width; ++column) {
-      const cv::Mat tile = image(cv::Rect(column * kTile, row * kTile, kTile, kTile) & all);
-      const bool lit = image.depth() == CV_8U ? any_above<std::uint8_t>(tile, threshold)
-                                              : any_above<std::uint16_t>(tile, threshold);
-      if (!lit) continue;
-      for (int r = std::max(0, row - 1); r <= std::min(tiles.height - 1, row + 1); ++r) {
-        for (int c = std::max(0, column - 1); c <= std::min(tiles.width - 1, column + 1); ++c) {
-          turn[index_of(tiles, r, c)] = true;
-        }
-      }
-    }
+cv::Rect pixels_of(const cv::Rect& tiles) {
+  return {tiles.x * kTile_px, tiles.y * kTile_px, tiles.width * kTile_px, tiles.height * kTile_px};
+}
+
+/// Not those with one lit pixel and none in the tiles around: that is noise, and no run.
+cv::Mat1b without_lone_pixels(const cv::Mat1b& lit) {
+  cv::Mat1b around;
+  cv::boxFilter(lit, around, -1, {3, 3}, {-1, -1}, false, cv::BORDER_CONSTANT);
+  return cv::Mat1b((lit > 0) & (around > 1));
+}
+
+/// The background's level around each group of lit tiles, as far as it is large.
+void fill_around(const cv::Mat1b& lit, double level, cv::Mat& pixels) {
+  const cv::Rect all({0, 0}, pixels.size());
+  cv::Mat labels, groups, centers;
+  const int count = cv::connectedComponentsWithStats(lit, labels, groups, centers);
+  for (int group = 1; group < count; ++group) {
+    const auto* box = groups.ptr<int>(group);
+    const cv::Rect tiles(box[cv::CC_STAT_LEFT], box[cv::CC_STAT_TOP], box[cv::CC_STAT_WIDTH],
+                         box[cv::CC_STAT_HEIGHT]);
+    const int size = std::max(tiles.width, tiles.height);
+    if (size == 1) continue;  // the tiles around it are turned
+    pixels(pixels_of(grown(tiles, size)) & all).setTo(std::round(level));
   }
-  return turn;
 }
 
 }  // namespace
 
-cv::Mat lines_of(const cv::Mat& image, Readout readout, const Background& background) {
-  if (readout == Readout::rows) return image;
-  const cv::Size tiles((image.cols + kTile - 1) / kTile, (image.rows + kTile - 1) / kTile);
-  const auto turn = tiles_to_turn(image, tiles, background.threshold);
+Lines lines_of(const cv::Mat& image, Readout readout, const Background& background) {
+  if (readout == Readout::rows) return {image, {}, {}};
+  const cv::Mat1b lit = without_lone_pixels(lit_tiles(image, background.threshold));
+  Lines lines = black_lines({image.rows, image.cols}, image.type());
+  cv::transpose(lit, lines.lit);
+  fill_around(lines.lit, background.level, lines.pixels);
+  cv::Mat1b turned;
+  cv::dilate(lit, turned, cv::Mat1b::ones(3, 3));
   const cv::Rect all({0, 0}, image.size());
-  cv::Mat lines(image.cols, image.rows, image.type(), cv::Scalar(std::round(background.level)));
-  for (int row = 0; row < tiles.height; ++row) {
-    for (int column = 0; column < tiles.width; ++column) {
-      if (!turn[index_of(tiles, row, column)]) continue;
-      const cv::Rect tile = cv::Rect(column * kTile, row * kTile, kTile, kTile) & all;
-      cv::Mat target = lines(cv::Rect(tile.y, tile.x, tile.height, tile.width));
+  for (int row = 0; row < turned.rows; ++row) {
+    for (int column = 0; column < turned.cols; ++column) {
+      if (turned(row, column) == 0) continue;
+      const cv::Rect tile = pixels_of({column, row, 1, 1}) & all;
+      cv::Mat target = lines.pixels(cv::Rect(tile.y, tile.x, tile.height, tile.width));
       cv::transpose(image(tile), target);
     }
   }

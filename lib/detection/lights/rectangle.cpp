@@ -75,6 +75,21 @@ double aspect_of(const Sides& sides) {
   return std::max(ratio, 1 / ratio);
 }
 
+/// Of the logarithm of aspect_of().
+double aspect_sd_of(const std::array<StraightEdge, 4>& edges, double per_px) {
+  constexpr double of_blur = 0.25;
+  const auto square = [](double value) { return value * value; };
+  double variance = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const StraightEdge &edge = edges[i], &opposite = edges[(i + 2) % 4];
+    const Eigen::Vector2d across = opposite.side.from - edge.side.from;
+    const double apart_px = std::abs(across.dot(edge.side.inwards())) / per_px;
+    const double middle_variance = edge.covariance_px.sum() / 4;
+    variance += (middle_variance + square(of_blur * edge.blur_px)) / square(apart_px);
+  }
+  return std::sqrt(variance);
+}
+
 /// The rectangle of the least area around the points, the light on the left of its sides.
 Corners rectangle_around(const std::vector<Eigen::Vector2d>& points, double per_px) {
   const Eigen::Vector2d& origin = points.front();
@@ -269,6 +284,7 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& s
   light.outside = double(strays) / double(points.size());
   light.face = face_of(sides, stray_px * per_px, shape);
   light.aspect = aspect_of(sides);
+  light.aspect_sd = aspect_sd_of(edges, per_px);
   return light.face.empty() ? std::nullopt : std::optional(std::move(light));
 }
 

@@ -8,33 +8,55 @@
 namespace vlp {
 namespace {
 
-constexpr int kBlock = 64;
-
-/// Whether a pixel of a block is lit. Without a branch inside, so that it is compiled to vectors.
+/// Whether a pixel of a tile's row is lit. Without a branch inside, so that it is compiled to
+/// vectors.
 template <typename Level>
 bool any_above(const Level* pixels, int count, Level threshold) {
   Level brightest = 0;
-  if (count == kBlock) {
-    for (int i = 0; i < kBlock; ++i) brightest = std::max(brightest, pixels[i]);
+  if (count == kTile_px) {
+    for (int i = 0; i < kTile_px; ++i) brightest = std::max(brightest, pixels[i]);
   } else {
     for (int i = 0; i < count; ++i) brightest = std::max(brightest, pixels[i]);
   }
   return brightest > threshold;
 }
 
+int tiles_in(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
+
+/// No level is above the threshold.
+bool is_above_all(const cv::Mat& image, double threshold) {
+  return threshold >= (image.depth() == CV_8U ? 255 : 65535);
+}
+
+template <typename Level>
+void mark_lit(const cv::Mat& image, Level threshold, cv::Mat1b& lit) {
+  for (int row = 0; row < image.rows; ++row) {
+    const auto* pixels = image.ptr<Level>(row);
+    auto* of_row = lit.ptr(row / kTile_px);
+    for (int tile = 0; tile < lit.cols; ++tile) {
+      const auto* first = pixels + tile * kTile_px;
+      const int count = std::min(kTile_px, image.cols - tile * kTile_px);
+      if (of_row[tile] > 1 || !any_above(first, count, threshold)) continue;
+      const auto lit_pixels =
+          std::count_if(first, first + count, [&](Level level) { return level > threshold; });
+      of_row[tile] = of_row[tile] + lit_pixels > 1 ? 2 : 1;
+    }
+  }
+}
+
 template <typename Level>
 void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
-                     std::vector<Run>& runs) {
+                     const std::vector<int>& tiles, std::vector<Run>& runs) {
   constexpr int most_gap = 2, least_width = 3;
   Run run{row, 0, -1};  // none yet
   const auto finish = [&] {
     if (run.width() >= least_width) runs.push_back(run);
     run.end = -1;
   };
-  for (int block = 0; block < columns; block += kBlock) {
-    const int end = std::min(block + kBlock, columns);
-    if (!any_above(pixels + block, end - block, threshold)) continue;
-    for (int column = block; column < end; ++column) {
+  for (const int tile : tiles) {
+    const int begin = tile * kTile_px, end = std::min(begin + kTile_px, columns);
+    if (!any_above(pixels + begin, end - begin, threshold)) continue;
+    for (int column = begin; column < end; ++column) {
       if (pixels[column] <= threshold) continue;
       if (run.end >= 0 && column - run.end > most_gap) finish();
       if (run.end < 0) run.begin = column;
@@ -45,11 +67,17 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
 }
 
 template <typename Level>
-std::vector<Run> runs_of(const cv::Mat& image, double threshold) {
+std::vector<Run> runs_of(const cv::Mat& image, Level threshold, const cv::Mat1b& lit) {
   std::vector<Run> runs;
-  const auto level = static_cast<Level>(threshold);
-  for (int row = 0; row < image.rows; ++row) {
-    add_runs_of_row(image.ptr<Level>(row), image.cols, row, level, runs);
+  std::vector<int> tiles;
+  for (int top = 0; top < image.rows; top += kTile_px) {
+    tiles.clear();
+    for (int tile = 0; tile < tiles_in(image.cols); ++tile) {
+      if (lit.empty() || lit(top / kTile_px, tile) != 0) tiles.push_back(tile);
+    }
+    for (int row = top; row < std::min(top + kTile_px, image.rows); ++row) {
+      add_runs_of_row(image.ptr<Level>(row), image.cols, row, threshold, tiles, runs);
+    }
   }
   return runs;
 }
@@ -92,11 +120,21 @@ cv::Rect Blob::box() const {
   return {begin, top(), end - begin, bottom() + 1 - top()};
 }
 
-std::vector<Run> find_runs(const cv::Mat& image, double threshold) {
-  const double most = image.depth() == CV_8U ? 255 : 65535;
-  if (threshold >= most) return {};
-  return image.depth() == CV_8U ? runs_of<std::uint8_t>(image, threshold)
-                                : runs_of<std::uint16_t>(image, threshold);
+cv::Mat1b lit_tiles(const cv::Mat& image, double threshold) {
+  cv::Mat1b lit(tiles_in(image.rows), tiles_in(image.cols), std::uint8_t(0));
+  if (is_above_all(image, threshold)) return lit;
+  if (image.depth() == CV_8U) {
+    mark_lit(image, static_cast<std::uint8_t>(threshold), lit);
+  } else {
+    mark_lit(image, static_cast<std::uint16_t>(threshold), lit);
+  }
+  return lit;
+}
+
+std::vector<Run> find_runs(const cv::Mat& image, double threshold, const cv::Mat1b& lit) {
+  if (is_above_all(image, threshold)) return {};
+  return image.depth() == CV_8U ? runs_of(image, static_cast<std::uint8_t>(threshold), lit)
+                                : runs_of(image, static_cast<std::uint16_t>(threshold), lit);
 }
 
 std::vector<Blob> group_runs(const std::vector<Run>& runs, int most_dark_rows) {

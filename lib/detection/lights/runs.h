@@ -14,9 +14,17 @@ struct Run {
   int width() const { return end - begin; }
 };
 
+/// Of tiles: so many rows and columns. Those at the right and at the bottom may have less.
+inline constexpr int kTile_px = 64;
+
+/// How many pixels of each tile are above `threshold`: 0, 1, or 2 when there are more. `image` has
+/// one channel of 8 or 16 bits.
+cv::Mat1b lit_tiles(const cv::Mat& image, double threshold);
+
 /// The runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a run;
-/// runs of less than three pixels are noise. `image` has one channel of 8 or 16 bits.
-std::vector<Run> find_runs(const cv::Mat& image, double threshold);
+/// runs of less than three pixels are noise. `image` has one channel of 8 or 16 bits. Only tiles
+/// that are `lit`, not 0, are looked at, or all of them when it is empty.
+std::vector<Run> find_runs(const cv::Mat& image, double threshold, const cv::Mat1b& lit = {});
 
 /// Runs that belong to one light: they overlap from row to row, across up to `most_dark_rows` dark
 /// ones. Lights that touch are one blob.

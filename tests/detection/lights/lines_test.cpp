@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "detection/lights/runs.h"
 #include "detection/rendered_captures.h"
 #include "support/random.h"
 
@@ -30,7 +31,8 @@ cv::Mat spots_on_dark(const cv::Size& size, int depth, int spots) {
 }
 
 void expect_turned(const cv::Mat& image, double threshold) {
-  const cv::Mat lines = lines_of(image, Readout::columns, {0, 1, threshold}), all = image.t();
+  const auto [lines, lit, memory] = lines_of(image, Readout::columns, {0, 1, threshold});
+  const cv::Mat all = image.t();
   ASSERT_EQ(lines.size(), all.size());
   ASSERT_EQ(lines.type(), all.type());
   const cv::Mat bright = all > threshold;
@@ -47,11 +49,17 @@ void expect_turned(const cv::Mat& image, double threshold) {
   const cv::Mat differs = lines != all;
   EXPECT_EQ(cv::countNonZero(differs & (lines != 0)), 0);
   EXPECT_EQ(cv::countNonZero(differs & bright), 0);
+  // Where nothing is lit nothing is looked for, and nothing is missed.
+  const auto some = find_runs(lines, threshold, lit), every = find_runs(all, threshold);
+  EXPECT_TRUE(std::equal(some.begin(), some.end(), every.begin(), every.end(),
+                         [](const Run& a, const Run& b) {
+                           return a.row == b.row && a.begin == b.begin && a.end == b.end;
+                         }));
 }
 
 TEST(Lines, AreTheImageWhenRowsAreRead) {
   const cv::Mat image = spots_on_dark({100, 70}, CV_8U, 3);
-  EXPECT_EQ(lines_of(image, Readout::rows, {0, 1, 100}).data, image.data);
+  EXPECT_EQ(lines_of(image, Readout::rows, {0, 1, 100}).pixels.data, image.data);
 }
 
 TEST(Lines, AreTheImageTurnedAroundAllThatIsBright) {
@@ -65,14 +73,43 @@ TEST(Lines, AreTheImageTurnedAroundAllThatIsBright) {
   }
 }
 
-TEST(Lines, AreAsDarkAsTheBackgroundWhereNothingIsBright) {
+TEST(Lines, AreAsDarkAsTheBackgroundAroundWhatIsBright) {
   for (const int depth : {CV_8U, CV_16U}) {
-    const cv::Mat dark = spots_on_dark({601, 333}, depth, 0);
-    const cv::Mat lines = lines_of(dark, Readout::columns, {7.4, 1, 100 * 257});
-    EXPECT_EQ(lines.size(), cv::Size(333, 601));
-    EXPECT_EQ(lines.type(), dark.type());
-    EXPECT_EQ(cv::countNonZero(lines != 7), 0);
+    const double white = depth == CV_8U ? 255 : 65535;
+    cv::Mat image = spots_on_dark({2000, 1500}, depth, 0);
+    const cv::Rect light(900, 700, 200, 150);
+    image(light).setTo(white);
+    const auto [lines, lit, memory] = lines_of(image, Readout::columns, {7.4, 1, white - 1});
+    EXPECT_EQ(lines.size(), cv::Size(1500, 2000));
+    EXPECT_EQ(lines.type(), image.type());
+    // As far as it is large: 200 px, and more.
+    const cv::Rect around(light.y - 200, light.x - 200, light.height + 400, light.width + 400);
+    const cv::Mat turned = image.t();
+    const cv::Mat differs = lines(around) != turned(around), at_level = lines(around) == 7;
+    EXPECT_EQ(cv::countNonZero(differs & ~at_level), 0);
+    EXPECT_GT(cv::countNonZero(differs), 100'000) << "beside the tiles that are turned";
+    EXPECT_EQ(cv::countNonZero(lines(cv::Rect(0, 0, 300, 300))), 0) << "far from it";
   }
+}
+
+TEST(Lines, OfADarkImageAreBlackAlsoWithNoise) {
+  cv::Mat dark = spots_on_dark({601, 333}, CV_8U, 0);
+  dark.at<std::uint8_t>(100, 200) = dark.at<std::uint8_t>(300, 500) = 200;  // no run of three
+  const Lines lines = lines_of(dark, Readout::columns, {7.4, 1, 100});
+  EXPECT_EQ(lines.pixels.size(), cv::Size(333, 601));
+  EXPECT_EQ(cv::countNonZero(lines.pixels), 0);
+  EXPECT_TRUE(find_runs(lines.pixels, 100, lines.lit).empty());
+}
+
+TEST(Lines, HaveTheRunThatTilesShare) {
+  cv::Mat image(200, 200, CV_8U, cv::Scalar(0));
+  image.at<std::uint8_t>(63, 10) = image.at<std::uint8_t>(65, 10) = 200;
+  const auto [lines, lit, memory] = lines_of(image, Readout::columns, {0, 1, 100});
+  const auto runs = find_runs(lines, 100, lit);
+  ASSERT_EQ(runs.size(), 1U);
+  EXPECT_EQ(runs[0].row, 10);
+  EXPECT_EQ(runs[0].begin, 63);
+  EXPECT_EQ(runs[0].end, 66);
 }
 
 /// The first of two places by row, then by column of the lines.
