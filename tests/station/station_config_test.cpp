@@ -51,10 +51,11 @@ TEST_F(StationYaml, IsReadWithTheFilesThatItNames) {
 /// What stands there behind a '#' is right as it stands.
 TEST_F(StationYaml, ShowsWhatAShiftMayWant) {
   folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
-  folder.file("station.yaml",
-              std::regex_replace(
-                  TemporaryFolder::content_of(folder / "station.yaml"),
-                  std::regex("\n# (golden:|verify_due:|serial_pattern:|hook:|keep:| {9})"), "\n$1"));
+  folder.file(
+      "station.yaml",
+      std::regex_replace(TemporaryFolder::content_of(folder / "station.yaml"),
+                         std::regex("\n# (golden:|verify_due:|serial_pattern:|hook:|keep:| {9})"),
+                         "\n$1"));
   const StationConfig config = read_station(folder / "station.yaml");
   ASSERT_TRUE(config.golden);
   EXPECT_THAT(config.golden->gates, SizeIs(7));
