@@ -34,7 +34,7 @@ struct Coded {
   double level, slope;
 };
 
-double light_of(double level, double gamma) {
+double light_behind(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
@@ -112,7 +112,7 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image, const Parabola& edg
 void start_edge_levels(const std::vector<EdgePixel>& pixels, double gamma, Edge::Parameters& p) {
   double in = 0, out = 0, ins = 0, outs = 0;
   for (const EdgePixel& pixel : pixels) {
-    (pixel.across_px < 0 ? in : out) += light_of(pixel.grey, gamma);
+    (pixel.across_px < 0 ? in : out) += light_behind(pixel.grey, gamma);
     (pixel.across_px < 0 ? ins : outs) += 1;
   }
   in /= std::max(ins, 1.0);
