@@ -17,8 +17,8 @@ namespace vlp {
 namespace {
 
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
-using OwnMatrix = Eigen::Matrix<double, 7, 7>;
-using OwnVector = Eigen::Matrix<double, 7, 1>;
+using CaptureMatrix = Eigen::Matrix<double, 7, 7>;
+using CaptureVector = Eigen::Matrix<double, 7, 1>;
 
 /// Where the camera of a capture stands, its yaw, and how it moves; from the state.
 struct Placed {
@@ -499,14 +499,14 @@ namespace {
 
 /// A capture's own unknowns and what they are mixed with, to be eliminated.
 struct OwnBlock {
-  OwnMatrix own = OwnMatrix::Zero();
+  CaptureMatrix own = CaptureMatrix::Zero();
   std::vector<Eigen::Index> columns;
-  std::vector<OwnVector> mixed;
+  std::vector<CaptureVector> mixed;
 
   void add(const Eigen::MatrixXd& by_own, Eigen::Index first, const Eigen::MatrixXd& by_shared) {
     const Eigen::MatrixXd product = by_own.transpose() * by_shared;
     for (Eigen::Index i = 0; i < product.cols(); ++i) {
-      OwnVector column = OwnVector::Zero();
+      CaptureVector column = CaptureVector::Zero();
       column.head(product.rows()) = product.col(i);
       const auto place = std::find(columns.begin(), columns.end(), first + i);
       if (place == columns.end()) {
@@ -596,7 +596,7 @@ Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
     const OwnBlock& block = own[k];
     const Eigen::Index size = captures[k].size(), n = std::ssize(block.columns);
     if (n == 0) continue;
-    OwnMatrix known = block.own;
+    CaptureMatrix known = block.own;
     const Eigen::VectorXd weights = motion_prior(captures[k]).weights;
     known.diagonal().segment(captures[k].pose_size(), weights.size()) += weights.cwiseAbs2();
     Eigen::MatrixXd mixed(size, n);
