@@ -85,7 +85,9 @@ Eigen::Matrix2Xd parameter_jacobian(const Lens& lens, const Eigen::Vector3d& x_i
   const auto [parameters, d_pixel] = lens.by_parameters(x_in_camera).value();
   const auto count = static_cast<Eigen::Index>(parameter_count(lens.model()));
   Eigen::Matrix2Xd jacobian = Eigen::Matrix2Xd::Zero(2, count);
-  jacobian(Eigen::all, parameters) = d_pixel;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    jacobian.col(parameters[i]) = d_pixel.col(static_cast<Eigen::Index>(i));
+  }
   return jacobian;
 }
 

@@ -77,11 +77,11 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   report.halves = projection_difference(
       even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         const double sigma_px = uncertainty.worst_px(pixel);
-        const bool compared = lies_in(report.region, pixel) &&
-                              std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
-                                return half.worst_px(pixel) > hole * sigma_px;
-                              });
-        return compared ? sigma_px : std::numeric_limits<double>::infinity();
+        const bool told = lies_in(report.region, pixel) &&
+                          std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
+                            return half.worst_px(pixel) > hole * sigma_px;
+                          });
+        return told ? sigma_px : std::numeric_limits<double>::infinity();
       });
   return report;
 }

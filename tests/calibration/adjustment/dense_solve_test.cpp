@@ -248,18 +248,24 @@ INSTANTIATE_TEST_SUITE_P(Adjustment, DenseSolve,
                                          Known{"RefinedMapAndLens", 2e-3, true}),
                          [](const auto& one) { return one.param.name; });
 
-/// A lens that may move, a lamp, a capture on a spot and one that leans by itself.
+/// A lens that may move, a lamp, a capture that turns on a spot and one that leans and drives by
+/// itself.
 class Derivatives : public testing::Test {
  protected:
   Camera camera = synthetic_camera();
-  AdjustmentProblem problem{camera.lens_model,
-                            LensFreedom(camera, lens_covariance(camera, 0.1, 6)), 2, 1};
+  AdjustmentProblem problem{camera.lens_model, LensFreedom(camera, lens_covariance(camera, 0.1, 6)),
+                            2, 1};
 
   Derivatives() {
     const AdjustmentLayout& at = problem.layout();
     problem.lamps = {{{0.4, 0.3, 1.6}, 0.001}, {{-0.5, 0.2, 1.5}, 0.001}};
-    problem.add_capture({0, Eigen::Matrix3d::Identity(), 0}, {{0, 0, 0}, 0.7});
-    problem.add_capture({{}, level_from_inclination({0.05, -0.04}).transpose(), 0},
+    KnownMotion motion;
+    motion.yaw_rate_rad_per_s = 1.5;
+    motion.yaw_rate_sd_rad_per_s = 0.1;
+    problem.add_capture({0, Eigen::Matrix3d::Identity(), motion}, {{0, 0, 0}, 0.7});
+    motion.velocity_m_per_s = {0.8, -0.5};
+    motion.velocity_sd_m_per_s = 0.2;
+    problem.add_capture({{}, level_from_inclination({0.05, -0.04}).transpose(), motion},
                         {{0.1, -0.2, 0.1}, -2});
     Eigen::VectorXd& state = problem.state();
     for (Eigen::Index i = 0; i < at.lens_size; ++i) state[i] = 0.1 * static_cast<double>(i % 3);
@@ -291,7 +297,7 @@ TEST_F(Derivatives, OfSightingsAreThoseOfDifferences) {
   const AdjustmentLayout& at = problem.layout();
   for (const std::size_t capture : {0U, 1U}) {
     for (const std::size_t lamp : {0U, 1U}) {
-      const AdjustmentProblem::Sighting sighting{capture, lamp, {400, 300}, 0.5};
+      const AdjustmentProblem::Sighting sighting{capture, lamp, {400, 300}, 0.5, 0.012};
       const auto residual = [&] { return problem.linearize(sighting, *problem.lens())->residual; };
       const auto found = problem.linearize(sighting, *problem.lens());
       ASSERT_TRUE(found);
@@ -306,7 +312,7 @@ TEST_F(Derivatives, OfSightingsAreThoseOfDifferences) {
       if (capture == 0) {
         expect(found->by_lever_arm, at.lever_arm);
         expect(found->by_spot, at.spot(0));
-        expect(found->by_own.leftCols<1>(), own);
+        expect(found->by_own.leftCols(2), own);
       } else {
         expect(found->by_own, own);
       }
