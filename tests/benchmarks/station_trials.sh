@@ -5,16 +5,18 @@
 # Units for the station of datasets/station, each with a lens, a mount and noise of its own: whether
 # good ones pass, and faulty ones fail with the cause named first. In the project's folder, built:
 #   tests/benchmarks/station_trials.sh good [COUNT [FIRST_SEED]]     by default 50 units, from seed 1
-#   tests/benchmarks/station_trials.sh faulty [COUNT [FIRST_SEED]]   5 of each kind
+#   tests/benchmarks/station_trials.sh faulty [COUNT [FIRST_SEED]]   5 of each of six kinds
+#   tests/benchmarks/station_trials.sh kinds [COUNT [FIRST_SEED]]    1 of each of 28 kinds
 #   tests/benchmarks/station_trials.sh timing [COUNT [FIRST_SEED]]   1 unit
 # A line for each; exit code 1 when one did not end as it should. A good unit takes 9 s of processor
-# time, six faulty ones 30 s. timing: the processor time, pictures included, and how long the verdict
-# takes after the last image, others coming every 50 ms before.
+# time, six faulty ones 30 s. kinds needs /usr/bin/python3 with OpenCV (python3-opencv). timing: the
+# processor time, pictures included, and how long the verdict takes after the last image, others
+# coming every 50 ms before.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 PATH=$PWD/build/bin:$PATH
 what=${1:-good} count=${2:-} first=${3:-1}
-declare -A counts=([good]=50 [faulty]=5 [timing]=1)
+declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [timing]=1)
 [ -n "${counts[$what]:-}" ] || { sed -n '5,14s/^# \?//p' "$0"; exit 2; }
 count=${count:-${counts[$what]}}
 work=$(mktemp -d)
@@ -67,7 +69,7 @@ tried() {
   if [[ $said != *"$3"* ]]; then
     wrong=$((wrong + 1)) end='   NOT AS IT SHOULD'
   fi
-  printf '%-10s %4d   %s%s\n' "$1" "$2" "${said#*camera*: }" "$end"
+  printf '%-24s %4d   %s%s\n' "$1" "$2" "${said#*camera*: }" "$end"
 }
 
 good() {
@@ -106,6 +108,189 @@ faulty() {
   sed -i 's/first_id: 0/first_id: 30/' "$work/station/board.yaml"
   tried board "$1" 'wrong board'
   cp datasets/station/board.yaml "$work/station/board.yaml"
+}
+
+# scene_change SED_SCRIPT: of the scene that scene_of has written.
+scene_change() {
+  local before
+  before=$(<"$work/scene.yaml")
+  sed -i "$1" "$work/scene.yaml"
+  [ "$before" != "$(<"$work/scene.yaml")" ] || { echo "nothing of the scene is $1" >&2; exit 2; }
+}
+# station_change FILE SED_SCRIPT; station_again: the files of the station as they are shipped.
+station_change() {
+  local before
+  before=$(<"$work/station/$1")
+  sed -i "$2" "$work/station/$1"
+  [ "$before" != "$(<"$work/station/$1")" ] || { echo "nothing of $1 is $2" >&2; exit 2; }
+}
+station_again() { cp datasets/station/*.yaml "$work/station/"; }
+
+# unit_again: the good unit as another camera would take it: the same pictures, other files.
+again=0
+unit_again() {
+  rm -rf "$work/unit"
+  cp -r "$work/good" "$work/unit"
+  again=$((again + 1))
+  find "$work/unit" -name '*.png' -exec sh -c 'for f; do echo "$0" >>"$f"; done' "$again" {} +
+}
+
+# picture COMMANDS STEP...: changes all images of steps; `image` is one, of floats, `x` and `y` are
+# the places of its pixels.
+picture() {
+  local commands=$1 step
+  shift
+  for step; do
+    /usr/bin/python3 - "$commands" "$work/unit/$step"/*.png <<'EOF'
+import sys
+import cv2
+import numpy
+for name in sys.argv[2:]:
+    image = cv2.imread(name, cv2.IMREAD_GRAYSCALE).astype(numpy.float32)
+    y, x = numpy.mgrid[: image.shape[0], : image.shape[1]]
+    exec(sys.argv[1])
+    cv2.imwrite(name, image.clip(0, 255).astype(numpy.uint8))
+EOF
+  done
+}
+
+# Whatever can be wrong with a camera, with the station or with what the operator does, once each:
+# the cause that is named first.
+kinds() {
+  local seed=$1 table
+  # The camera.
+  scene_of "$seed" 514.8 525.2 18 0.7
+  render --only boards
+  tried decentred "$seed" 'the lens is decentred'
+  scene_of "$seed" 514.8 525.2 5 2.5
+  render --only boards
+  tried blurred "$seed" 'the lens is blurred'
+  scene_of "$seed" 460 500 5 0.7
+  render --only boards
+  tried wrong-lens "$seed" 'wrong lens'
+  scene_of $((seed + 3000)) 514.8 525.2 5 0.7
+  scene_change 's/tilt_deg: [0-9.]*$/tilt_deg: 4/'
+  render
+  tried leaning "$seed" 'the camera leans on its mount'
+  scene_of $((seed + 2000)) 514.8 525.2 5 0.7
+  scene_change 's/lever_arm_m: .*/lever_arm_m: [0.03, 0.01]/'
+  render
+  tried beside "$seed" 'the camera sits beside its axis'
+
+  # The good unit that the station and the operator do wrong.
+  scene_of "$seed" 514.8 525.2 5 0.7
+  render
+  rm -rf "$work/good"
+  cp -r "$work/unit" "$work/good"
+  # A finger has been on the lens: a veil, and all of it a bit blurred.
+  picture 'image = 0.7 * cv2.GaussianBlur(image, (0, 0), 2.5) + 0.3 * image.mean()' \
+    boards rotation dispersion check
+  tried dirty-lens "$seed" 'the lens is blurred: out of focus, or dirty'
+  unit_again
+  picture 'image = cv2.blur(image, (15, 1))' boards
+  tried vibration "$seed" 'the lens is blurred'
+
+  # The board.
+  unit_again
+  station_change board.yaml 's/first_id: 0/first_id: 30/'
+  tried other-board "$seed" 'wrong board'
+  station_again
+  scene_of $((seed + 5000)) 514.8 525.2 5 0.7
+  scene_change 's/warp_m: .*/warp_m: [0.01, -0.0002]/'
+  render --only boards
+  tried bent-board "$seed" 'the board is bent'
+  unit_again
+  picture 'image = 12 * image' boards
+  tried bright-boards "$seed" 'overexposed'
+  scene_of $((seed + 6000)) 514.8 525.2 5 0.7
+  scene_change 's/white_e_per_s: .*/white_e_per_s: 2.4e+4/;s/black_e_per_s: .*/black_e_per_s: 1.5e+3/;s/surround_e_per_s: .*/surround_e_per_s: 6.0e+3/'
+  render --only boards
+  tried dark-boards "$seed" 'too dark'
+
+  # The lamps, and what the station's files say of them.
+  unit_again
+  station_change lamps.yaml 's/\[0, 0.28, 1.6\]/[0.04, 0.26, 1.6]/'
+  tried loose-lamp "$seed" 'lamp 5 is loose'
+  station_again
+  unit_again
+  station_change lamps.yaml 's/\[0.6, -0.3, 1.6\]/[0.61, -0.3, 1.6]/'
+  tried lamp-10-mm "$seed" 'lamp 3 is loose'
+  station_again
+  unit_again
+  station_change lamps.yaml 's/id: 2, \(.*\)frequency_hz: 2000/id: 2, \1frequency_hz: 3800/;s/id: 5, \(.*\)frequency_hz: 3800/id: 5, \1frequency_hz: 2000/'
+  tried swapped "$seed" 'lamps 2 and 5'
+  station_again
+  unit_again
+  station_change lamps.yaml 's/frequency_hz: 2500/frequency_hz: 2780/'
+  tried lamp-of-other-frequency "$seed" 'lamp 3 is never seen'
+  station_again
+  scene_of $((seed + 4000)) 514.8 525.2 5 0.7
+  scene_change '/id: 4,/s/radiance_e_per_s: 2.0e+8/radiance_e_per_s: 1.0e+5/'
+  render
+  tried unlit-lamp "$seed" 'lamp 4 is never seen'
+  scene_of "$seed" 514.8 525.2 5 0.7
+  scene_change 's/ambient_e_per_s: .*/ambient_e_per_s: 1.0e+10/'
+  render --only rotation
+  cp -r "$work/good/boards" "$work/unit/"
+  find "$work/unit/boards" -name '*.png' -exec sh -c 'for f; do echo x >>"$f"; done' sh {} +
+  tried bright-lamps "$seed" 'overexposed'
+  scene_of $((seed + 7000)) 514.8 525.2 5 0.7
+  scene_change 's/radiance_e_per_s: 2.0e+8/radiance_e_per_s: 2.0e+6/;s/ambient_e_per_s: .*/ambient_e_per_s: 1.0e+4/'
+  render --only rotation
+  cp -r "$work/good/boards" "$work/unit/"
+  find "$work/unit/boards" -name '*.png' -exec sh -c 'for f; do echo z >>"$f"; done' sh {} +
+  tried dark-lamps "$seed" 'too dark'
+  unit_again
+  station_change camera_type.yaml 's/row_time_s: 3.0e-05/row_time_s: 3.3e-05/'
+  tried row-time "$seed" "the row time of the camera's type"
+  station_again
+
+  # The places.
+  unit_again
+  for table in captures truth; do
+    [ ! -e "$work/unit/check/$table.csv" ] || awk -F, -v OFS=, \
+      '/^0003.png/ { $3 += 0.02 } { print }' "$work/good/check/$table.csv" >"$work/unit/check/$table.csv"
+  done
+  tried one-point "$seed" '0003.png was not taken where its table says'
+  unit_again
+  for table in captures truth; do
+    [ ! -e "$work/unit/dispersion/$table.csv" ] || awk -F, -v OFS=, \
+      '/^0.*png/ { $3 += 0.02 } { print }' "$work/good/dispersion/$table.csv" >"$work/unit/dispersion/$table.csv"
+  done
+  tried station-moved "$seed" 'the station or its lamp map is off'
+  unit_again
+  rm -f "$work/unit/check/captures.csv" "$work/unit/check/truth.csv"
+  tried no-table "$seed" 'check: nothing tells where'
+
+  # The images.
+  unit_again
+  rm -r "$work/unit/check"
+  cp -r "$work/unit/boards" "$work/unit/check"
+  tried boards-as-check "$seed" 'check'
+  unit_again
+  rm -r "$work/unit/boards"
+  cp -r "$work/unit/check" "$work/unit/boards"
+  tried check-as-boards "$seed" 'boards (0/36)'
+  rm -rf "$work/unit"
+  cp -r "$work/good" "$work/unit"
+  vlp-station run -q --station "$work/station/station.yaml" --camera-id "other-$seed" \
+    --batch "$work/unit" >/dev/null 2>&1 || true
+  tried anothers "$seed" "already of camera other-$seed"
+  # Two cameras in one unit's folders.
+  scene_of $((seed + 1000)) 505 510 9 0.7
+  render --only rotation,dispersion,check
+  cp -r "$work/good/boards" "$work/unit/"
+  find "$work/unit/boards" -name '*.png' -exec sh -c 'for f; do echo y >>"$f"; done' sh {} +
+  tried swapped-units "$seed" 'the lamps do not turn about one axis'
+  # The capture tool writes each view of four again and again.
+  unit_again
+  (cd "$work/unit/boards" && for image in 00[0-3]?.png; do
+    cp "000$((10#${image%.png} % 4)).png" double.png && echo "$image" >>double.png && mv double.png "$image"
+  done)
+  tried double-images "$seed" 'the same pose again'
+  unit_again
+  rm -f "$work"/unit/boards/00[123]?.png
+  tried few-boards "$seed" 'boards: not enough images'
 }
 
 timing() {
