@@ -181,16 +181,16 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
 
 void LampDetector::correct_shear(std::vector<Light>& lights) const {
   const auto has_sharp_circle = [](const Light& light) {
-    return light.sums && !light.glows && !light.uneven;
+    return !light.sums.empty() && !light.glows && !light.uneven;
   };
   std::vector<OutlineSums> sums;
   for (const Light& light : lights) {
-    if (has_sharp_circle(light)) sums.push_back(*light.sums);
+    if (has_sharp_circle(light)) sums.push_back(light.sums);
   }
   const auto shear = Shear::common(sums);
   if (!shear) return;
   for (Light& light : lights) {
-    if (has_sharp_circle(light)) shape_.shift(shear->oval_of(*light.sums), light);
+    if (has_sharp_circle(light)) shape_.shift(shear->oval_of(light.sums), light);
   }
 }
 

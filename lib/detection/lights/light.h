@@ -82,8 +82,8 @@ struct Light {
   double outside;
   /// As (column, row) of the lines that the shutter reads: (v, u) for a read-out along columns.
   std::vector<EdgePoint> outline;
-  /// Of a circle in the level plane what it leaves of the outline.
-  std::optional<OutlineSums> sums;
+  /// Of a circle in the level plane what it leaves of the outline; of no points else.
+  OutlineSums sums;
 };
 
 inline bool is_rectangle(const Light& light) { return !light.face.empty(); }

@@ -145,7 +145,7 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   for (std::size_t i = 0; i < outline.size(); ++i) {
     if (shown[i]) light.outline.push_back(outline[i]);
   }
-  if (circle) light.sums.emplace(points, weights, shown, *circle, line_slope_at(*circle));
+  if (circle) light.sums = {points, weights, shown, *circle, line_slope_at(*circle)};
   light.rise_px = median_rise_px(light.outline);
   return light;
 }
@@ -159,9 +159,9 @@ Eigen::Vector2d LightShape::line_slope_at(const Circle& circle) const {
 }
 
 void LightShape::shift(const Oval& oval, Light& light) const {
-  const auto estimate = light.sums->solved(oval);
+  const auto estimate = light.sums.solved(oval);
   if (!estimate) return;
-  const Circle& circle = light.sums->circle();
+  const Circle& circle = light.sums.circle();
   const auto pixel = pixel_of(circle.center + circle.radius * estimate->p.head<2>());
   if (!pixel) return;
   light.pixel = *pixel;

@@ -31,6 +31,8 @@ class OutlineSums {
     Matrix5 covariance;
   };
 
+  /// Of no points.
+  OutlineSums() = default;
   /// points, weights: of the whole outline; counted: those that the sums are of. line_slope: of the
   /// number of the line in which the shutter reads a point near the circle, over the point's x, y.
   OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
@@ -41,12 +43,13 @@ class OutlineSums {
   /// when the points do not tell.
   std::optional<Estimate> solved(const std::optional<Oval>& known) const;
 
+  bool empty() const { return count_ == 0; }
   const Circle& circle() const { return circle_; }
   const Eigen::Vector2d& line_slope() const { return line_slope_; }
 
  private:
-  Circle circle_;
-  Eigen::Vector2d line_slope_;
+  Circle circle_{Eigen::Vector2d::Zero(), 1};
+  Eigen::Vector2d line_slope_ = Eigen::Vector2d::Zero();
   Matrix5 normal_ = Matrix5::Zero();
   Vector5 gradient_ = Vector5::Zero();
   double squares_ = 0, weight_ = 0;
