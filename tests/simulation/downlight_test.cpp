@@ -125,7 +125,9 @@ TEST_F(Downlight, ShowsTheChipsBehindItsDiffuser) {
   EXPECT_NEAR(more(439, 299), 0, 1e-6) << "no chip beyond the rim";
   for (int v = 0; v < image.rows; v += 3) {
     for (int u = 0; u < image.cols; u += 3) {
-      if (even(v, u) == 0) EXPECT_EQ(image(v, u), 0);
+      if (even(v, u) == 0) {
+        EXPECT_EQ(image(v, u), 0);
+      }
     }
   }
 }
