@@ -39,7 +39,8 @@ TEST_P(RectangleLamp, CoversWhatItsProjectedSidesEnclose) {
   const FrameRenderer renderer(scene_);
   const Glow& glow = scene_.lamps[0].glow;
   // Written out, not taken from what the renderer uses.
-  const auto& [size_m, yaw_rad] = GetParam();
+  const Eigen::Vector2d size_m = GetParam().size_m;  // Clang 14 captures no binding
+  const double yaw_rad = GetParam().yaw_rad;
   const Eigen::Vector3d along(std::cos(yaw_rad), std::sin(yaw_rad), 0);
   const Eigen::Vector3d across(-along.y(), along.x(), 0);
   const auto corner = [&](double a, double b) {
