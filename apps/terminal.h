@@ -36,8 +36,9 @@ class Terminal {
   /// Takes what was typed before now, at a terminal, up to a scanner's pause.
   void forget_keys() const;
   /// The line that is typed, or comes from a scanner or a file: asked for by `prompt`, whose last
-  /// line it follows; by that line alone, on stderr, when stdout is no terminal but stdin is. 200 bytes at most, in
-  /// whole characters of UTF-8. Nothing at the end of the input, and when SIGINT or SIGTERM came.
+  /// line it follows; by that line alone, on stderr, when stdout is no terminal but stdin is. 200
+  /// bytes at most, in whole characters of UTF-8. Nothing at the end of the input, and when SIGINT
+  /// or SIGTERM came.
   std::optional<std::string> line(std::vector<ScreenLine> prompt);
 
  private:

@@ -93,7 +93,7 @@ SplineSurface::Value SplineSurface::value(const Eigen::Vector2d& u) const {
                                                        (row * (grid_.nx - Order) + column);
   Eigen::Vector2d shift(0, 0), by_x(0, 0), by_y(0, 0);
   for (int j = Order; j >= 0; --j) {  // Horner's scheme, in x within y
-    const Eigen::Vector2d* line = powers + j * width;
+    const Eigen::Vector2d* line = powers + std::ptrdiff_t{j} * width;
     Eigen::Vector2d at = line[Order], slope = at;
     for (int i = Order - 1; i > 0; --i) {
       at = at * x + line[i];

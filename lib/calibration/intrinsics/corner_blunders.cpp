@@ -37,6 +37,7 @@ double misplaced(const Corners& corners, const std::vector<std::size_t>& nearest
   constexpr double share = 0.25, least_px = 3;
   if (nearest.size() < kNeighbours) return 0;
   std::vector<PlanePair> pairs;
+  pairs.reserve(nearest.size());
   double step_px = INFINITY;
   for (const std::size_t i : nearest) {
     pairs.push_back({corners[i].in_board_m.head<2>(), corners[i].pixel});
