@@ -47,6 +47,18 @@ TEST_F(TurnMapTest, ShowsTheAnglesThatAreMissing) {
   EXPECT_FALSE(map.enough);
 }
 
+// Not from the lowest, which hangs on the fixes' last micrometres.
+TEST_F(TurnMapTest, CountsFromTheCaptureThatCameFirst) {
+  frames.resize(3);
+  const auto forwards = turn_map(frames, config, calibration).heights.at(0).parts;
+  std::reverse(frames.begin(), frames.end());
+  const auto backwards = turn_map(frames, config, calibration).heights.at(0).parts;
+  EXPECT_EQ(std::count(forwards.begin(), forwards.end(), true), 3);
+  EXPECT_TRUE(forwards[0] && backwards[0]);
+  EXPECT_NE(forwards[1], backwards[1]);
+  EXPECT_NE(forwards[11], backwards[11]);
+}
+
 TEST_F(TurnMapTest, HasAsManyHeightsAsThereAre) {
   frames.erase(frames.begin() + 12, frames.end());
   EXPECT_THAT(turn_map(frames, config, calibration).heights, SizeIs(1));
