@@ -59,7 +59,7 @@ void print_height_and_yaw(const Evaluation& evaluation) {
   }
 }
 
-void print_stations(const StationFigures& figures) {
+void print_stations(const BiasAndScatter& figures) {
   const auto& stations = figures.stations;
   const auto worst_bias = std::max_element(
       stations.begin(), stations.end(),

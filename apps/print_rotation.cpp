@@ -39,7 +39,7 @@ void print_residuals(const RotationFit& fit, const SpotCaptures& spot) {
              spot.sightings.size() - fit.outliers.size());
   fmt::print("outliers    {}\n", fit.outliers.size());
   for (const auto& [index, distance_px] : fit.outliers) {
-    const SpotSighting& sighting = spot.sightings[index];
+    const SpotObservation& sighting = spot.sightings[index];
     fmt::print("  outlier   {} lamp {}: {:.2f} px off\n", spot.captures[sighting.capture].image,
                spot.lamps[sighting.lamp].id, distance_px);
   }

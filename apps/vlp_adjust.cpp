@@ -69,7 +69,7 @@ void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& pa
 
 void print_summary(const AdjustmentResult& found, const Calibration& before, bool lens_stated) {
   const RotationCenter& center = found.center;
-  const double focal_px = std::sqrt(found.camera.intrinsics[0] * found.camera.intrinsics[1]);
+  const double focal_px = std::sqrt(found.camera.focal_px().prod());
   fmt::print("captures    {} used, {} left out\n", found.captures, found.captures_left_out);
   fmt::print("detections  {} used, {} left out\n", found.detections, found.detections_left_out);
   const Eigen::Vector3d& up = center.zenith_in_camera;

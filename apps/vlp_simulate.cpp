@@ -63,7 +63,7 @@ void run(const Options& options) {
                                                  options.output, how, show)
                               : simulate(scene, options.output, how, show);
   }
-  for (const std::string& doubt : summary.doubts) spdlog::warn("{}", doubt);
+  for (const std::string& warning : summary.warnings) spdlog::warn("{}", warning);
   fmt::print("rendered {} {}, {} were there; in {}\n", summary.rendered, what, summary.found,
              options.output);
 }

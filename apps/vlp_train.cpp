@@ -85,7 +85,7 @@ void train(const Options& options) {
                      "equal, with their endings");
   }
   check_examples(labelled.lights, inputs.lamps);
-  LampClassifier classifier = trained(labelled.lights);
+  LampClassifier classifier = train_classifier(labelled.lights);
   classifier.row_time_s = inputs.seen.camera.row_time_s;
   check_kept(classifier);
   write_lamp_classifier(options.output, classifier);

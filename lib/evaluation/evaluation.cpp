@@ -65,7 +65,7 @@ Evaluation evaluate(const EvaluationInput& input) {
   evaluation.yaw_rad = signed_figures(errors, &FixError::yaw_rad);
   evaluation.drawn = "runs of fixes";
   if (input.truth) {
-    evaluation.stations = station_figures(errors, input.truth->rows);
+    evaluation.stations = bias_and_scatter(errors, input.truth->rows);
     evaluation.drawn = evaluation.stations ? "stations" : "captures";
     evaluation.stated = stated_ratio(input.fixes.rows, errors);
   }

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "evaluation/errors/bias_and_scatter.h"
 #include "evaluation/errors/bootstrap.h"
 #include "evaluation/errors/comparison.h"
 #include "evaluation/errors/error_figures.h"
 #include "evaluation/errors/error_ratios.h"
 #include "evaluation/errors/fix_errors.h"
 #include "evaluation/errors/line_fit.h"
-#include "evaluation/errors/station_figures.h"
 
 namespace vlp {
 
@@ -57,7 +57,7 @@ struct Evaluation {
   std::string drawn;
   std::optional<SignedFigures> height_m, yaw_rad;
   /// With a truth: where stations have two fixes or more.
-  std::optional<StationFigures> stations;
+  std::optional<BiasAndScatter> stations;
   /// With a commanded line: where the fixes have a direction.
   std::optional<LineFit> fit;
   /// With a truth.

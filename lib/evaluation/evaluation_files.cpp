@@ -51,7 +51,7 @@ Json json_of(const std::vector<std::pair<double, double>>& distribution_m) {
   return points;
 }
 
-Json json_of(const StationFigures& figures) {
+Json json_of(const BiasAndScatter& figures) {
   Json list = Json::array();
   for (const auto& station : figures.stations) {
     list.push_back({{"x_m", station.xy_m.x()},

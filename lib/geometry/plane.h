@@ -9,17 +9,17 @@
 namespace vlp {
 
 /// a b: `b` turned by the angle of `a` and stretched by its length.
-inline Eigen::Vector2d times(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+inline Eigen::Vector2d complex_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return {a.x() * b.x() - a.y() * b.y(), a.x() * b.y() + a.y() * b.x()};
 }
 
 /// conj(a) b: the real part is the dot product, the imaginary part the cross product.
-inline Eigen::Vector2d conj_times(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+inline Eigen::Vector2d conj_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return {a.x() * b.x() + a.y() * b.y(), a.x() * b.y() - a.y() * b.x()};
 }
 
 /// The matrix of multiplication by `a`.
-inline Eigen::Matrix2d times_matrix(const Eigen::Vector2d& a) {
+inline Eigen::Matrix2d product_matrix(const Eigen::Vector2d& a) {
   return (Eigen::Matrix2d() << a.x(), -a.y(), a.y(), a.x()).finished();
 }
 

@@ -39,7 +39,7 @@ std::optional<Similarity> fit_similarity(std::size_t count, const From& from, co
   double spread = 0, from_magnitude = 0, to_magnitude = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector2d difference = from(i) - from_mean;
-    product += conj_times(difference, to(i) - to_mean);
+    product += conj_product(difference, to(i) - to_mean);
     spread += difference.squaredNorm();
     from_magnitude += from(i).squaredNorm();
     to_magnitude += to(i).squaredNorm();
@@ -51,7 +51,7 @@ std::optional<Similarity> fit_similarity(std::size_t count, const From& from, co
     return std::nullopt;
   }
   const Eigen::Vector2d factor = product / spread;
-  return Similarity{to_mean - times(factor, from_mean), factor};
+  return Similarity{to_mean - complex_product(factor, from_mean), factor};
 }
 
 }  // namespace vlp

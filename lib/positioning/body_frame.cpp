@@ -18,7 +18,7 @@ namespace {
 
 using Agreeing = std::bitset<kMaxSightings>;
 
-// As in fix_frame().
+// As in fix_robustly().
 constexpr double kUnexplained = 25;
 constexpr double kMuchBetter = 100;
 

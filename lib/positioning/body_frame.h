@@ -7,8 +7,8 @@
 #include <span>
 
 #include "body_fix.h"
-#include "consensus.h"
 #include "fix.h"
+#include "robust_fix.h"
 
 namespace vlp {
 
@@ -38,10 +38,11 @@ struct BodySolution {
 /// The fix of a body that drives, turns or leans, from a frame of two lamps or more whose
 /// identities may be wrong. Where the lean is known to 0.15 rad it starts from the fix of a level
 /// camera (initial_pose), and otherwise from the poses of the three lamps that are widest apart
-/// (three_lamp_poses). Bodies are below their lamps. What fix_frame() does for cameras that stand
-/// level it does here: lamps that are as far from where the fix sees them as fix_frame() says,
-/// there in z, here in metres across their rays; a map that is mirrored; a majority that agrees;
-/// noise that does not explain the residuals, though a single lamp less does, and no other. And:
+/// (three_lamp_poses). Bodies are below their lamps. What fix_robustly() does for cameras that
+/// stand level it does here: lamps that are as far from where the fix sees them as fix_robustly()
+/// says, there in z, here in metres across their rays; a map that is mirrored; a majority that
+/// agrees; noise that does not explain the residuals, though a single lamp less does, and no other.
+/// And:
 ///   undetermined  lamps and priors leave the position uncertain by more than a quarter of the
 ///                 distance to the lamps: two lamps, or three on one line, and a lean that is free;
 ///   ambiguous     another solution explains the frame nearly as well (exp(-6) as likely or more);

@@ -8,16 +8,16 @@
 
 namespace vlp {
 
-PoseEstimate robot_from_camera(const PoseEstimate& camera, const LeanEffect& by_lean,
+PoseEstimate robot_from_camera(const PoseEstimate& camera, const InclinationJacobian& by_lean,
                                double inclination_sigma_rad, const CameraMount& mount,
-                               const Lean& lean) {
+                               const InclinationRotation& lean) {
   const Eigen::Matrix3d world_from_level = rotation_about_z(camera.pose.yaw_rad);
   const Eigen::Vector3d arm_in_level =
       lean.level_from_base * rotation_about_z(-mount.yaw_in_robot_rad) * mount.position_in_robot_m;
   const Eigen::Vector3d arm_in_world = world_from_level * arm_in_level;
   Eigen::Matrix4d d_robot_d_camera = Eigen::Matrix4d::Identity();
   d_robot_d_camera.topRightCorner<2, 1>() << arm_in_world.y(), -arm_in_world.x();
-  LeanEffect robot_by_lean = d_robot_d_camera * by_lean;
+  InclinationJacobian robot_by_lean = d_robot_d_camera * by_lean;
   for (int i = 0; i < 2; ++i) {
     const Eigen::Vector3d axis = lean.error_axes.col(i);
     robot_by_lean.col(i).head<3>() -= world_from_level * axis.cross(arm_in_level);

@@ -135,7 +135,7 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   }
   // From errors that are independent (lens, own of the zenith, own of the offset) to those there
   // are.
-  const Eigen::Vector2d focal_px = focal_px_of(calibration.camera);
+  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
   Eigen::MatrixXd passed_on = Eigen::MatrixXd::Identity(first_lamp, first_lamp);
   if (turned && !adjustment) {
     const RotationCenter& center = *calibration.rotation_center;
@@ -239,7 +239,7 @@ CommonErrors::Gain CommonErrors::gain_of(std::span<const Sighting> sightings,
     if (sightings.size() == 1) {
       // fix_one_lamp(): s = p - H e^{jg} z.
       d_fix_d_z.setZero();
-      d_fix_d_z.topRows<2>() = -height_above(pose, sighting.lamp_m) * times_matrix(pose.heading);
+      d_fix_d_z.topRows<2>() = -height_above(pose, sighting.lamp_m) * product_matrix(pose.heading);
     } else {
       const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
       d_fix_d_z = camera.covariance * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
@@ -319,7 +319,7 @@ Matrix2 CommonErrors::covariance_of(const Effect& effect, std::size_t lamp) cons
 }
 
 Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<const Matrix2> common,
-                             const WeightedFix& fix) {
+                             const LeastSquaresFix& fix) {
   Unexplained found;
   if (sightings.size() < 4) return found;
   const LevelPose pose(fix.pose);
@@ -396,7 +396,7 @@ std::optional<Matrix2> whole_offset_covariance(const Calibration& calibration) {
     if (turned && !(errors.stated(CommonPart::zenith) && dispersion.by_zenith)) return std::nullopt;
   }
   const Eigen::Index offset = errors.joint().rows() - 2;
-  const Eigen::Vector2d focal_px = focal_px_of(calibration.camera);
+  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
   return Matrix2(focal_px.asDiagonal() * errors.joint().block<2, 2>(offset, offset) *
                  focal_px.asDiagonal());
 }

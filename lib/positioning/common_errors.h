@@ -17,8 +17,8 @@
 #include "camera_mount.h"
 #include "correction.h"
 #include "fix.h"
-#include "frame_fix.h"
-#include "weighted_fix.h"
+#include "least_squares_fix.h"
+#include "robust_fix.h"
 
 namespace vlp {
 
@@ -94,8 +94,8 @@ class CommonErrors {
   /// Of (X, Y, Z, yaw), and of all states of a body (BodyIndex).
   using Gain = GainOf<4>;
   using BodyGain = GainOf<kBodyStates>;
-  /// Of a fix of least squares (fix_weighted) with the covariance of `camera`, from sightings of
-  /// these lamps of the map; of a single one, of fix_one_lamp().
+  /// Of a fix of least squares (fix_least_squares) with the covariance of `camera`, from sightings
+  /// of these lamps of the map; of a single one, of fix_one_lamp().
   Gain gain_of(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
                const PoseEstimate& camera, const Lens& lens,
                const Eigen::Matrix3d& level_from_base) const;
@@ -138,7 +138,7 @@ struct Unexplained {
   std::size_t count = 0;
 };
 Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<const Matrix2> common,
-                             const WeightedFix& fix);
+                             const LeastSquaresFix& fix);
 
 /// Of the zenith's normalized point, from all that it rests on: its captures and the lens, or of
 /// the adjustment where there is one. Nothing where a part is not stated, or how the lens' errors

@@ -27,10 +27,8 @@ Eigen::Matrix3d level_from_camera(const Calibration& calibration, Correction cor
   if (correction == Correction::dispersion && !dispersion) {
     throw std::invalid_argument("the calibration has no dispersion");
   }
-  const Eigen::Vector2d focal_px(calibration.camera.intrinsics[0],
-                                 calibration.camera.intrinsics[1]);
-  const Eigen::Vector2d center_px(calibration.camera.intrinsics[2],
-                                  calibration.camera.intrinsics[3]);
+  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
+  const Eigen::Vector2d center_px = calibration.camera.center_px();
   if (rotation && !(rotation->zenith_in_camera.allFinite() && rotation->center_px.allFinite() &&
                     rotation->zenith_in_camera.z() > 0)) {
     throw std::invalid_argument("the rotation_center is not finite or its zenith not in front");

@@ -3,11 +3,13 @@
 #include "positioning/initial_pose.h"
 
 #include <algorithm>
+#include <cmath>
 
-#include "positioning/coplanar_fix.h"
+#include "geometry/similarity.h"
 #include "positioning/two_lamp_fix.h"
 
 namespace vlp {
+
 namespace {
 
 constexpr double kSameHeight_m = 1e-6;
@@ -55,6 +57,19 @@ InitialPose initial_pose(std::span<const Sighting> sightings) {
   const bool second =
       disagreement(pair.poses[1], sightings) < disagreement(pair.poses[0], sightings);
   return {FixStatus::ok, pair.poses[second ? 1 : 0]};
+}
+
+std::optional<Pose> fix_coplanar_lamps(std::span<const Sighting> sightings) {
+  const auto similarity = fit_similarity(
+      sightings.size(), [&](std::size_t i) { return sightings[i].z; },
+      [&](std::size_t i) -> Eigen::Vector2d { return sightings[i].lamp_m.head<2>(); });
+  if (!similarity) return std::nullopt;
+  double ceiling_m = 0;
+  for (const Sighting& sighting : sightings) ceiling_m += sighting.lamp_m.z();
+  ceiling_m /= static_cast<double>(sightings.size());
+  const Eigen::Vector2d& c = similarity->factor;
+  return Pose{{similarity->offset.x(), similarity->offset.y(), ceiling_m - c.norm()},
+              std::atan2(c.y(), c.x())};
 }
 
 }  // namespace vlp

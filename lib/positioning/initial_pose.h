@@ -2,12 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 
+#include "../geometry/frames.h"
 #include "fix.h"
 #include "sighting.h"
 
 namespace vlp {
+
+/// Position and yaw from two or more lamps at one height, in closed form: the similarity
+/// p = s + c z of least squares gives H = |c|, g = arg c (the method of [19] in Chen and Guan).
+/// All lamps weigh alike. Precondition: the lamps' heights are equal; their mean is used.
+/// Nothing when the lamps are seen as one.
+std::optional<Pose> fix_coplanar_lamps(std::span<const Sighting> sightings);
 
 struct InitialPose {
   /// `ok`, or why there is none.

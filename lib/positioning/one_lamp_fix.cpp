@@ -10,7 +10,8 @@ std::optional<Pose> fix_one_lamp(const Sighting& sighting, const HeightAndYaw& k
   const double height_m = sighting.lamp_m.z() - known.z_m;
   if (!(height_m > 0)) return std::nullopt;
   const LevelPose above({0, 0, known.z_m}, {std::cos(known.yaw_rad), std::sin(known.yaw_rad)});
-  const Eigen::Vector2d s = sighting.lamp_m.head<2>() - height_m * times(above.heading, sighting.z);
+  const Eigen::Vector2d s =
+      sighting.lamp_m.head<2>() - height_m * complex_product(above.heading, sighting.z);
   return Pose{{s.x(), s.y(), known.z_m}, known.yaw_rad};
 }
 
@@ -29,7 +30,8 @@ Eigen::Matrix<double, 4, 3> one_lamp_rotation_effect(const Sighting& sighting, c
   d_z << tilt_jacobian(sighting.z), Eigen::Vector2d(-sighting.z.y(), sighting.z.x());
   const LevelPose camera(pose);
   Eigen::Matrix<double, 4, 3> effect = Eigen::Matrix<double, 4, 3>::Zero();
-  effect.topRows<2>() = -height_above(camera, sighting.lamp_m) * times_matrix(camera.heading) * d_z;
+  effect.topRows<2>() =
+      -height_above(camera, sighting.lamp_m) * product_matrix(camera.heading) * d_z;
   return effect;
 }
 

@@ -15,9 +15,9 @@
 #include "positioning/body_frame.h"
 #include "positioning/camera_mount.h"
 #include "positioning/common_errors.h"
-#include "positioning/frame_fix.h"
 #include "positioning/known_motion.h"
 #include "positioning/one_lamp_fix.h"
+#include "positioning/robust_fix.h"
 #include "positioning/row_clock.h"
 #include "positioning/sighting.h"
 
@@ -238,7 +238,7 @@ std::size_t Positioner::Impl::index_of(int id) const {
   return static_cast<std::size_t>(lamp - lamps_.begin());
 }
 
-/// Where everything that is uncertain is stated, it decides; else the rules of fix_frame() do.
+/// Where everything that is uncertain is stated, it decides; else the rules of fix_robustly() do.
 void Positioner::Impl::reject_unexplained(SightedFrame& frame,
                                           const Eigen::Matrix3d& level_from_base,
                                           ConsistentFix& solution) const {
@@ -375,21 +375,22 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   if (needs_body(sensors) && detections.size() > 1) {
     if (auto fix = locate_body(detections, sensors, {})) return *fix;
   }
-  const Lean lean = sensors.inclination
-                        ? lean_of(*sensors.inclination, mount_ ? mount_->yaw_in_robot_rad : 0)
-                        : Lean();
+  const InclinationRotation lean =
+      sensors.inclination
+          ? inclination_rotation(*sensors.inclination, mount_ ? mount_->yaw_in_robot_rad : 0)
+          : InclinationRotation();
   SightedFrame frame;
   const FixStatus seen = sight(detections, lean.level_from_base, frame);
   if (seen != FixStatus::ok) return refused(seen, frame.unknown_lamps);
 
   Fix fix;
   const double sigma_rad = sensors.inclination_sigma_rad;
-  LeanEffect by_lean = LeanEffect::Zero();
+  InclinationJacobian by_lean = InclinationJacobian::Zero();
   if (frame.size > 1) {
     // Where all that is uncertain is stated, noise alone decides nothing.
     const bool total = common_.complete();
     if (total) frame.noise_is_stated = false;
-    ConsistentFix found = fix_frame(frame, max_residual_share_);
+    ConsistentFix found = fix_robustly(frame, max_residual_share_);
     if (total) reject_unexplained(frame, lean.level_from_base, found);
     const auto& [status, solution] = found;
     if (status != FixStatus::ok) return refused(status, frame.unknown_lamps);

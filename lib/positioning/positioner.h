@@ -29,7 +29,7 @@ struct PositionerOptions {
   /// With it, fixes are of the robot's centre; without, of the camera.
   std::optional<CameraMount> mount;
   /// Lamps are inconsistent when one is farther from where the fix sees it than this share of
-  /// the spread (rms) of all lamps in the image (or too near to another lamp, see fix_frame).
+  /// the spread (rms) of all lamps in the image (or too near to another lamp, see fix_robustly).
   /// Noise, lens and a tilt of 5 degrees that nothing corrects put it off by 0.05 or less.
   double max_residual_share = 0.1;
   /// For detections that do not state their sigma_px: the standard deviation per axis in the
@@ -97,10 +97,10 @@ class Positioner {
              const PositionerOptions& options = {});
 
   /// The fix of one frame. Neither allocates nor throws. One lamp: fix_one_lamp(); two: in closed
-  /// form; more: fix_weighted() from initial_pose(), without the lamps whose identity is wrong
-  /// (fix_frame) and, where the calibration's or the survey's covariance covers every lamp, those
-  /// that all that is uncertain together does not explain (find_unexplained). Where the sensors let
-  /// it move or lean, or know its height, with two lamps or more: fix_body_frame().
+  /// form; more: fix_least_squares() from initial_pose(), without the lamps whose identity is wrong
+  /// (fix_robustly) and, where the calibration's or the survey's covariance covers every lamp,
+  /// those that all that is uncertain together does not explain (find_unexplained). Where the
+  /// sensors let it move or lean, or know its height, with two lamps or more: fix_body_frame().
   Fix locate(std::span<const Detection> detections, const Sensors& sensors = {}) const noexcept;
   /// With frames from shortly before, of two lamps or more that are seen now and then: velocity,
   /// yaw rate and lean stay the same from one to the next. Where the sensors give none, all is at

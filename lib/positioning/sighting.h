@@ -51,7 +51,7 @@ inline double height_above(const LevelPose& camera, const Eigen::Vector3d& lamp_
 
 inline Eigen::Vector2d predicted_z(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
   const Eigen::Vector2d offset = (lamp_m - camera.position_m).head<2>();
-  return conj_times(camera.heading, offset) / height_above(camera, lamp_m);
+  return conj_product(camera.heading, offset) / height_above(camera, lamp_m);
 }
 
 inline Prediction predict(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {

@@ -44,11 +44,11 @@ TwoLampFix fix_two_lamps(const Sighting& first, const Sighting& second) {
       continue;
     }
     const Eigen::Vector2d level_d = height_m * difference + h * second.z;
-    const Eigen::Vector2d turn = conj_times(level_d, d);
+    const Eigen::Vector2d turn = conj_product(level_d, d);
     const double length = turn.norm();
     if (!(length > 0)) continue;
     const Eigen::Vector2d heading = turn / length;
-    const Eigen::Vector2d s = first.lamp_m.head<2>() - height_m * times(heading, first.z);
+    const Eigen::Vector2d s = first.lamp_m.head<2>() - height_m * complex_product(heading, first.z);
     fix.poses[static_cast<std::size_t>(fix.count++)] =
         LevelPose({s.x(), s.y(), first.lamp_m.z() - height_m}, heading).pose();
   }

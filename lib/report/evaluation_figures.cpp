@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "evaluation/cautions.h"
+#include "evaluation/sample_size_warnings.h"
 #include "geometry/angles.h"
 #include "report/plots/round_numbers.h"
 
@@ -103,11 +103,11 @@ std::vector<std::string> report_notes(const Evaluation& evaluation) {
                     " " + evaluation.drawn + ".");
   }
   if (evaluation.comparison) notes.push_back(note_of(*evaluation.comparison));
-  if (const std::string caution = caution_of_limit(evaluation); !caution.empty()) {
-    notes.push_back("Caution: " + caution + ".");
+  if (const std::string warning = warning_of_limit(evaluation); !warning.empty()) {
+    notes.push_back("Caution: " + warning + ".");
   }
-  for (const std::string& caution : cautions_of_few(evaluation)) {
-    notes.push_back("Caution: " + caution + ".");
+  for (const std::string& warning : sample_size_warnings(evaluation)) {
+    notes.push_back("Caution: " + warning + ".");
   }
   return notes;
 }

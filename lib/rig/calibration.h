@@ -28,6 +28,10 @@ struct Camera {
   /// Time from one row (or column) of the read-out to the next.
   std::optional<double> row_time_s;
   std::optional<Readout> readout;
+
+  /// fx, fy and cx, cy, which are the first four intrinsics of every lens model.
+  Eigen::Vector2d focal_px() const { return {intrinsics[0], intrinsics[1]}; }
+  Eigen::Vector2d center_px() const { return {intrinsics[2], intrinsics[3]}; }
 };
 
 /// What the intrinsic calibration says of itself.

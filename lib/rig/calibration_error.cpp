@@ -13,17 +13,12 @@ namespace {
 /// The pixel of the zenith in the undistorted image.
 void recenter(Calibration& calibration) {
   if (!calibration.rotation_center) return;
-  const auto& k = calibration.camera.intrinsics;
   RotationCenter& center = *calibration.rotation_center;
-  center.center_px = zenith_point(center).cwiseProduct(focal_px_of(calibration.camera)) +
-                     Eigen::Vector2d(k[2], k[3]);
+  center.center_px = zenith_point(center).cwiseProduct(calibration.camera.focal_px()) +
+                     calibration.camera.center_px();
 }
 
 }  // namespace
-
-Eigen::Vector2d focal_px_of(const Camera& camera) {
-  return {camera.intrinsics[0], camera.intrinsics[1]};
-}
 
 Eigen::Index stated_intrinsics(const Camera& camera) {
   constexpr Eigen::Index core = 4;
@@ -56,7 +51,7 @@ Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& er
 }
 
 Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& error) {
-  calibration.dispersion->offset_px += error.cwiseProduct(focal_px_of(calibration.camera));
+  calibration.dispersion->offset_px += error.cwiseProduct(calibration.camera.focal_px());
   return calibration;
 }
 

@@ -10,9 +10,6 @@
 /// what a step passes on state it: intrinsics, and normalized points (x/z, y/z).
 namespace vlp {
 
-/// fx, fy.
-Eigen::Vector2d focal_px_of(const Camera& camera);
-
 /// How many of the intrinsics have errors that a calibration states, and steps pass on: all; of a
 /// splined lens, whose control points are known each from a few corners, fx, fy, cx, cy, which
 /// stand for the whole. What its control points lack is in IntrinsicsReport::uncertainty_px alone.

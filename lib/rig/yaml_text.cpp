@@ -45,7 +45,7 @@ std::string shortened(std::string_view text, std::size_t enough) {
 
 std::string in_quotes(std::string_view text) { return "'" + shortened(text, 40) + "'"; }
 
-std::string shown(const YAML::Node& node) {
+std::string quote(const YAML::Node& node) {
   if (node.IsScalar()) return in_quotes(node.Scalar());
   return node.IsMap() ? "a mapping" : node.IsSequence() ? "a list" : "nothing";
 }

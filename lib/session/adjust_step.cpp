@@ -159,7 +159,7 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
     captures.frames.insert(captures.frames.end(), set.frames.begin(), set.frames.end());
   }
   const Calibration alone = camera_alone(input.calibration);
-  if (doubts_map(captures, alone, result)) return result;
+  if (map_is_wrong(captures, alone, result)) return result;
   const AdjustmentInput all = adjustment_of(input, result);
   result.found = adjust_captures(all);
   const AdjustmentResult& found = result.found;

@@ -83,7 +83,7 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
   const Eigen::Vector2d& arm_m = *center->lever_arm_m;
   const double height_m = mean_height_m(places, lamps, levelled);
   if (!(height_m > 0)) return;
-  const Eigen::Vector2d focal_px(levelled.camera.intrinsics[0], levelled.camera.intrinsics[1]);
+  const Eigen::Vector2d focal_px = levelled.camera.focal_px();
   const Eigen::Vector2d beside_m =
       height_m * result.fit.dispersion.offset_px.cwiseQuotient(focal_px);
   constexpr double alike = 0.2, least_m = 1e-3;
@@ -105,10 +105,10 @@ void pass_on(DispersionResult& result, const CapturesWith& captures_with, const 
     const DispersionFit fit =
         fit_dispersion(captures_with(moved), input.lamps, moved, method, circle);
     if (fit.status != DispersionStatus::ok) return {};
-    return Eigen::VectorXd(fit.dispersion.offset_px.cwiseQuotient(focal_px_of(moved.camera)));
+    return Eigen::VectorXd(fit.dispersion.offset_px.cwiseQuotient(moved.camera.focal_px()));
   };
   const Eigen::Vector2d exact =
-      dispersion.offset_px.cwiseQuotient(focal_px_of(input.calibration.camera));
+      dispersion.offset_px.cwiseQuotient(input.calibration.camera.focal_px());
   bool told = true;
   if (const auto& report = input.calibration.intrinsics_report; report && report->covariance) {
     const auto by_lens = [&](const Eigen::VectorXd& error) {
@@ -120,7 +120,7 @@ void pass_on(DispersionResult& result, const CapturesWith& captures_with, const 
   if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
     constexpr double least = 1e-5;  // of second order in it: 1e-10 is left
     const double sd =
-        std::sqrt(center->covariance->trace()) / input.calibration.camera.intrinsics[0];
+        std::sqrt(center->covariance->trace()) / input.calibration.camera.focal_px().x();
     const double step = std::max(least, sd);
     const auto by_error = [&](const Eigen::VectorXd& error) {
       return offset_with(with_zenith_error(input.calibration, error));
@@ -140,7 +140,7 @@ void pass_on(DispersionResult& result, const CapturesWith& captures_with, const 
 void add_lever_arm(Dispersion& dispersion, const LampCaptures& input, double height_m) {
   const RotationCenter& center = *input.calibration.rotation_center;
   if (!center.lever_arm_covariance || !dispersion.covariance || !(height_m > 0)) return;
-  const Eigen::Vector2d focal_px = focal_px_of(input.calibration.camera);
+  const Eigen::Vector2d focal_px = input.calibration.camera.focal_px();
   Matrix2 covariance_m2 = *center.lever_arm_covariance;
   if (center.lever_arm_by_zenith && center.covariance) {
     const Matrix2 per_px = *center.lever_arm_by_zenith * focal_px.cwiseInverse().asDiagonal();
@@ -159,7 +159,7 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   DispersionResult result;
   Calibration levelled = input.calibration;
   levelled.dispersion.reset();
-  if (doubts_map(input, levelled, result)) return result;
+  if (map_is_wrong(input, levelled, result)) return result;
   const bool of_axis =
       std::find(places.of.begin(), places.of.end(), PlaceOf::axis) != places.of.end();
   const auto& center = input.calibration.rotation_center;

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "evaluation/cautions.h"
 #include "evaluation/evaluation_metrics.h"
+#include "evaluation/sample_size_warnings.h"
 #include "report/evaluation_figures.h"
 #include "report/evaluation_pictures.h"
 #include "report/report.h"
@@ -37,12 +37,12 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
   if (input.line_m && !evaluation.fit) {
     result.warnings.emplace_back("no line is fitted: the fixes are spread in no direction");
   }
-  if (std::string caution = caution_of_limit(evaluation); !caution.empty()) {
-    result.warnings.push_back(std::move(caution));
+  if (std::string warning = warning_of_limit(evaluation); !warning.empty()) {
+    result.warnings.push_back(std::move(warning));
   }
   if (!result.caution.empty()) result.warnings.push_back(result.caution);
-  for (std::string& caution : cautions_of_few(evaluation)) {
-    result.notes.push_back(std::move(caution));
+  for (std::string& warning : sample_size_warnings(evaluation)) {
+    result.notes.push_back(std::move(warning));
   }
 }
 

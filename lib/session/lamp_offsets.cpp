@@ -184,7 +184,7 @@ std::optional<Eigen::Vector2d> seen_by_the_others(const Displacements& found, st
       from_m.size(), [&](std::size_t i) { return from_m[i]; },
       [&](std::size_t i) { return to_m[i]; });
   if (!to_map) return std::nullopt;
-  return to_map->offset + times(to_map->factor, at_m(lamp)) - found.map_m[lamp];
+  return to_map->offset + complex_product(to_map->factor, at_m(lamp)) - found.map_m[lamp];
 }
 
 }  // namespace

@@ -15,8 +15,8 @@
 #include "captures/outside_image.h"
 #include "geometry/median.h"
 #include "positioning/correction.h"
+#include "positioning/inclination_rotation.h"
 #include "positioning/known_motion.h"
-#include "positioning/lean.h"
 #include "positioning/residual_noise.h"
 #include "rig/find_lamp.h"
 #include "session/capture_motion.h"
@@ -232,7 +232,8 @@ std::optional<Eigen::Vector2d> off_m(const LocateInput& input, std::size_t frame
   if (!ray) return std::nullopt;
   const auto inclination =
       fix.body ? std::optional(fix.body->inclination) : sensors_of(image, input).inclination;
-  const Lean lean = inclination ? lean_of(*inclination, 0) : Lean();
+  const InclinationRotation lean =
+      inclination ? inclination_rotation(*inclination, 0) : InclinationRotation();
   const Eigen::Vector3d level = lean.level_from_base * base_from_camera * ray->direction;
   if (!(level.z() > 0)) return std::nullopt;
   const Pose& pose = fix.estimate.pose;

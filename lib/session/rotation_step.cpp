@@ -9,7 +9,7 @@
 #include <functional>
 #include <utility>
 
-#include "calibration/levelling/map_doubt.h"
+#include "calibration/levelling/map_diagnosis.h"
 #include "calibration/passed_on.h"
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/turning_axis.h"
@@ -144,14 +144,14 @@ Calibration camera_alone(const Calibration& calibration) {
   return alone;
 }
 
-bool doubts_map(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
-  const std::string doubt = doubt_of_map(input.frames, input.lamps, calibration);
+bool map_is_wrong(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
+  const std::string doubt = diagnose_map(input.frames, input.lamps, calibration);
   if (!doubt.empty()) result.fail(StepFailure::wrong_map, doubt, input.lamps_file);
   return !doubt.empty();
 }
 
 void blame_map(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
-  if (doubts_map(input, calibration, result)) return;
+  if (map_is_wrong(input, calibration, result)) return;
   if (!contradicts_map(input.frames, input.lamps, calibration)) return;
   result.fail(StepFailure::wrong_map,
               "most captures contradict it: is it the map of this room, and the calibration this "
@@ -162,7 +162,7 @@ void blame_map(const LampCaptures& input, const Calibration& calibration, StepRe
 RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
                               HistoryEntry entry) {
   RotationResult result;
-  if (doubts_map(input, camera_alone(input.calibration), result)) return result;
+  if (map_is_wrong(input, camera_alone(input.calibration), result)) return result;
   const Camera& camera = input.calibration.camera;
   result.spot = spot_captures(input.frames, input.lamps, camera);
   for (const auto& [image, reason] : result.spot.left_out) {
@@ -198,7 +198,7 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
 LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
   LevellingResult result;
   const Calibration alone = camera_alone(input.calibration);
-  if (doubts_map(input, alone, result)) return result;
+  if (map_is_wrong(input, alone, result)) return result;
   LevellingOptions options;
   options.refine_map = refine_map;
   options.motions = input.motions;

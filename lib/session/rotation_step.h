@@ -27,8 +27,8 @@ struct LampCaptures {
 Calibration camera_alone(const Calibration& calibration);
 
 /// Whether the captures, seen by this calibration, say in particular what is wrong with the lamp
-/// map (calibration/levelling/map_doubt.h); then the step fails: wrong_map.
-bool doubts_map(const LampCaptures& input, const Calibration& calibration, StepResult& result);
+/// map (calibration/levelling/map_diagnosis.h); then the step fails: wrong_map.
+bool map_is_wrong(const LampCaptures& input, const Calibration& calibration, StepResult& result);
 
 /// Of a step that failed: the map is to blame when the captures contradict it, in particular or
 /// mostly.

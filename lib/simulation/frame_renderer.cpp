@@ -3,9 +3,21 @@
 #include "simulation/frame_renderer.h"
 
 #include <cmath>
+#include <vector>
+
+#include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
+#include "rig/board_layout.h"
+#include "simulation/coverage.h"
+#include "simulation/disc.h"
+#include "simulation/downlight.h"
+#include "simulation/mosaic.h"
+#include "simulation/pixel_window.h"
+#include "simulation/smear.h"
+
 namespace vlp {
+
 namespace {
 
 /// How far the point spread reaches; less than 1e-4 of the light is beyond.
@@ -42,6 +54,186 @@ FrameRenderer::FrameRenderer(const Scene& scene)
 
 cv::Mat1f FrameRenderer::collected(const cv::Mat1f& electrons_per_s, double exposure_s) const {
   return cv::Mat1f(rays_.without_margin(electrons_per_s).mul(vignetting_, exposure_s));
+}
+
+namespace {
+
+Eigen::Isometry3d panel_from_world(const Panel& panel) {
+  Eigen::Isometry3d world_from_panel;
+  const Eigen::Vector3d a = panel.edge_a_m.normalized(), b = panel.edge_b_m.normalized();
+  world_from_panel.linear() << a, b, a.cross(b);
+  world_from_panel.translation() = panel.corner_m;
+  return world_from_panel.inverse();
+}
+
+/// What the camera sees in one part of an exposure, in electrons per second, without vignetting.
+class LampFrame {
+ public:
+  LampFrame(const Scene& scene, const PixelRays& rays, const CarrierMotion& motion,
+            const Shutter& part)
+      : scene_(scene), rays_(rays), motion_(motion), part_(part) {
+    if (scene.clutter.occluders.empty()) return;
+    open_ = rays_.image(1);
+    for (const Panel& occluder : scene.clutter.occluders)
+      open_ = open_.mul(1 - hidden_by(occluder));
+  }
+
+  /// What is always on.
+  cv::Mat1f steady() const {
+    const Clutter& clutter = scene_.clutter;
+    cv::Mat1f image = rays_.image(static_cast<float>(scene_.ambient_e_per_s));
+    if (clutter.windows.empty() && clutter.steady_lamps.empty() && clutter.occluders.empty()) {
+      return image;
+    }
+    for (const Panel& window : clutter.windows) {
+      draw(window, window.radiance_e_per_s - scene_.ambient_e_per_s, image);
+    }
+    for (const Glow& lamp : clutter.steady_lamps) {
+      const PixelWindow window = window_of_light(lamp);
+      if (!window.empty()) draw(lamp, window, window.of(image, rays_.margin_px()));
+    }
+    for (const Panel& occluder : clutter.occluders) {
+      const cv::Mat1f hidden = hidden_by(occluder);
+      image = image.mul(1 - hidden) + occluder.radiance_e_per_s * hidden;
+    }
+    blur(image, scene_.optics.blur_px);
+    return image;
+  }
+
+  /// Adds a light that is switched.
+  void add(const Glow& glow, const SquareWave& wave, cv::Mat1f& image) const {
+    const PixelWindow window = window_of_light(glow);
+    if (window.empty()) return;
+    cv::Mat1f patch = window.image(0);
+    draw(glow, window, patch);
+    if (!open_.empty()) patch = patch.mul(window.of(open_, rays_.margin_px()));
+    blur(patch, scene_.optics.blur_px);
+    cv::Mat1f target = window.of(image, rays_.margin_px());
+    for (int line = window.line_begin; line < window.line_end; ++line) {
+      const int row = line - window.line_begin;
+      target.row(row) += wave.lit_share(part_.begin_s(line), part_.end_s(line)) * patch.row(row);
+    }
+  }
+
+ private:
+  /// The share of each pixel that an occluder covers.
+  cv::Mat1f hidden_by(const Panel& occluder) const {
+    cv::Mat1f hidden = rays_.image(0);
+    draw(occluder, 1, hidden);
+    return hidden;
+  }
+  PixelWindow window_of_light(const Glow& glow) const {
+    return window_of(outline_of(glow), motion_, part_, rays_);
+  }
+  TargetFromCamera target_from_camera(const Eigen::Isometry3d& target_from_world) const {
+    return [this, target_from_world](int line) {
+      return target_from_world * motion_.world_from_camera(part_.middle_s(line));
+    };
+  }
+  /// `target` is the window's part of an image.
+  void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
+    if (glow.rectangle) return draw(panel_of(glow), glow.radiance_e_per_s, window, target);
+    const Eigen::Isometry3d glow_from_world(Eigen::Translation3d(-glow.position_m));
+    const TargetFromCamera glow_from_camera = target_from_camera(glow_from_world);
+    if (glow.recess || glow.chips || glow.halo) {
+      add_downlight(rays_, window, glow_from_camera, glow, target);
+      return;
+    }
+    add_shape(rays_, window, glow_from_camera, Disc(glow.diameter_m / 2, glow.edge_share),
+              glow.radiance_e_per_s, target);
+  }
+  void draw(const Panel& panel, double value, cv::Mat1f& image) const {
+    const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
+    if (!window.empty()) draw(panel, value, window, window.of(image, rays_.margin_px()));
+  }
+  /// `target` is the window's part of an image.
+  void draw(const Panel& panel, double value, const PixelWindow& window, cv::Mat1f target) const {
+    add_shape(rays_, window, target_from_camera(panel_from_world(panel)),
+              Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}}), value, target);
+  }
+
+  const Scene& scene_;
+  const PixelRays& rays_;
+  const CarrierMotion& motion_;
+  const Shutter& part_;
+  cv::Mat1f open_;  // the share of each pixel that no occluder hides; empty without any
+};
+
+/// Points all over what is in view, for the smear.
+std::vector<Eigen::Vector3d> outlines_of(const Scene& scene) {
+  std::vector<Eigen::Vector3d> points_m;
+  const auto add = [&](const auto& thing) {
+    const auto outline_m = outline_of(thing);
+    points_m.insert(points_m.end(), outline_m.begin(), outline_m.end());
+  };
+  for (const SceneLamp& lamp : scene.lamps) add(lamp.glow);
+  for (const Glow& lamp : scene.clutter.steady_lamps) add(lamp);
+  for (const Reflection& reflection : scene.clutter.reflections) add(reflection.glow);
+  for (const Panel& window : scene.clutter.windows) add(window);
+  for (const Panel& occluder : scene.clutter.occluders) add(occluder);
+  return points_m;
+}
+
+}  // namespace
+
+cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
+  Shutter part = shutter(shot.exposure_s);
+  if (!shot.motion.at_rest()) {
+    const auto pose = [&](double time_s) {
+      return shot.motion.world_from_camera(time_s).inverse();
+    };
+    part.count = parts_of_exposure(moved_px(outlines_of(scene_), pose, shot.exposure_s, rays_));
+  }
+  cv::Mat1f sum = rays_.image(0);
+  for (; part.index < part.count; ++part.index) {
+    LampFrame frame(scene_, rays_, shot.motion, part);
+    sum += frame.steady();
+    for (std::size_t i = 0; i < scene_.lamps.size(); ++i) {
+      frame.add(scene_.lamps[i].glow, shot.waves[i], sum);
+    }
+    for (const Reflection& reflection : scene_.clutter.reflections) {
+      frame.add(reflection.glow, shot.waves[reflection.lamp], sum);
+    }
+  }
+  return collected(sum, shot.exposure_s / part.count);
+}
+
+namespace {
+
+/// Points all over the board, for the smear.
+std::vector<Eigen::Vector3d> points_on(const Board& board) {
+  std::vector<Eigen::Vector3d> points_m;
+  if (board.has_squares()) {
+    for (const Eigen::Vector2d& at_m : square_corners_m(board)) {
+      points_m.emplace_back(at_m.x(), at_m.y(), 0);
+    }
+    return points_m;
+  }
+  for (const BoardTag& tag : board_layout(board)) {
+    points_m.emplace_back(tag.corners_m[0].x(), tag.corners_m[0].y(), 0);
+    points_m.emplace_back(tag.corners_m[2].x(), tag.corners_m[2].y(), 0);
+  }
+  return points_m;
+}
+
+}  // namespace
+
+cv::Mat1f FrameRenderer::board_electrons(const BoardShot& shot) const {
+  Shutter part = shutter(shot.exposure_s);
+  if (!shot.velocity_in_camera_m_per_s.isZero(0)) {
+    const auto pose = [&](double time_s) { return shot.camera_from_board(time_s); };
+    part.count =
+        parts_of_exposure(moved_px(points_on(scene_.board->print), pose, shot.exposure_s, rays_));
+  }
+  cv::Mat1f image = rays_.image(static_cast<float>(scene_.board->surround_e_per_s));
+  for (; part.index < part.count; ++part.index) {
+    const auto board_from_camera = [&](int line) {
+      return shot.camera_from_board(part.middle_s(line)).inverse();
+    };
+    add_shape(rays_, whole_window(rays_), board_from_camera, *print_, 1.0 / part.count, image);
+  }
+  blur(image, scene_.optics.blur_px);
+  return collected(image, shot.exposure_s);
 }
 
 }  // namespace vlp

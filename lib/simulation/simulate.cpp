@@ -9,10 +9,10 @@
 #include "captures/in_parallel.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
-#include "simulation/doubts.h"
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
 #include "simulation/picture.h"
+#include "simulation/scene_warnings.h"
 #include "simulation/truth.h"
 
 namespace vlp {
@@ -116,11 +116,11 @@ SimulationSummary simulate(const Scene& scene, const fs::path& output,
   for (const CaptureSet& set : sets) {
     const fs::path folder = output / set.folder;
     make_folder(folder);
-    const auto doubts = doubts_about(scene, set);
-    summary.doubts.insert(summary.doubts.end(), doubts.begin(), doubts.end());
+    const auto warnings = warnings_about(scene, set);
+    summary.warnings.insert(summary.warnings.end(), warnings.begin(), warnings.end());
     if (const std::size_t empty = write_truth(scene, renderer, set, folder); empty > 0) {
-      summary.doubts.push_back(set.folder + ": nothing is in view in " + std::to_string(empty) +
-                               " of " + std::to_string(shots_in(set)) + " captures");
+      summary.warnings.push_back(set.folder + ": nothing is in view in " + std::to_string(empty) +
+                                 " of " + std::to_string(shots_in(set)) + " captures");
     }
     in_parallel(shots_in(set), options.threads, [&](std::size_t index) {
       const bool rendered = render(scene, renderer, set, index, folder);

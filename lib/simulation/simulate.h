@@ -21,9 +21,9 @@ struct SimulationOptions {
 };
 
 struct SimulationSummary {
-  /// What may make captures useless: doubts_about() each folder, and captures without a lamp in
+  /// What may make captures useless: warnings_about() each folder, and captures without a lamp in
   /// view.
-  std::vector<std::string> doubts;
+  std::vector<std::string> warnings;
   std::size_t rendered = 0;
   /// Images that were there, whole, from an earlier run.
   std::size_t found = 0;

@@ -11,7 +11,7 @@
 #include <tuple>
 #include <utility>
 
-#include "calibration/levelling/map_doubt.h"
+#include "calibration/levelling/map_diagnosis.h"
 #include "detection/identity/lamp_rule.h"
 #include "positioning/positioner.h"
 
@@ -102,7 +102,7 @@ std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMa
                                      const Calibration& calibration, double fits_px) {
   constexpr std::size_t least_lamps = 4;
   if (frames.size() < kLeastFrames) return {};
-  std::string doubt = doubt_of_map(frames, map, calibration);
+  std::string doubt = diagnose_map(frames, map, calibration);
   if (!doubt.empty()) return {std::move(doubt)};
   const Misfits now = misfits_px(frames, map, calibration);
   if (mean_misfit_px(now) < fits_px || map.lamps.size() < least_lamps) return {};

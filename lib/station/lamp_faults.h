@@ -15,12 +15,12 @@
 namespace vlp {
 
 /// What is wrong with the map of a station's lamps, as far as captures that do not fit it tell: two
-/// lamps that are swapped, or a map that is mirrored (calibration/levelling/map_doubt.h); one that
-/// hangs elsewhere, when the captures do not fit to `fits_px`, the mean residual per capture, and
-/// without it do far better: in the mean, and more than a tenth of those that see it, two or more,
-/// each by itself, so that no single reflection is held against a lamp. A line for people; nothing
-/// when the map fits, or nothing single mends it. A camera that is being calibrated may be a pixel
-/// off; of one that is known less is asked.
+/// lamps that are swapped, or a map that is mirrored (calibration/levelling/map_diagnosis.h); one
+/// that hangs elsewhere, when the captures do not fit to `fits_px`, the mean residual per capture,
+/// and without it do far better: in the mean, and more than a tenth of those that see it, two or
+/// more, each by itself, so that no single reflection is held against a lamp. A line for people;
+/// nothing when the map fits, or nothing single mends it. A camera that is being calibrated may be
+/// a pixel off; of one that is known less is asked.
 std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
                                      const Calibration& calibration, double fits_px = 1);
 

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <map>
 
-#include "detection/drawn_lamp.h"
 #include "detection/rendered_captures.h"
 
 namespace vlp {

@@ -35,7 +35,7 @@ TEST(Plane, TimesIsTheComplexProduct) {
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
     const Complex expected = complex_of(a) * complex_of(b);
-    EXPECT_THAT(times(a, b), IsNear(vector_of(expected), kRounding));
+    EXPECT_THAT(complex_product(a, b), IsNear(vector_of(expected), kRounding));
   }
 }
 
@@ -44,19 +44,19 @@ TEST(Plane, ConjTimesConjugatesTheFirstFactor) {
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
     const Complex expected = std::conj(complex_of(a)) * complex_of(b);
-    EXPECT_THAT(conj_times(a, b), IsNear(vector_of(expected), kRounding));
+    EXPECT_THAT(conj_product(a, b), IsNear(vector_of(expected), kRounding));
   }
 }
 
 TEST(Plane, ConjTimesIsDotAndCrossProduct) {
-  EXPECT_EQ(conj_times({1, 2}, {3, 5}), Eigen::Vector2d(1 * 3 + 2 * 5, 1 * 5 - 2 * 3));
+  EXPECT_EQ(conj_product({1, 2}, {3, 5}), Eigen::Vector2d(1 * 3 + 2 * 5, 1 * 5 - 2 * 3));
 }
 
 TEST(Plane, TimesMatrixMultiplies) {
   Random random(3);
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
-    EXPECT_THAT(times_matrix(a) * b, IsNear(times(a, b), kRounding));
+    EXPECT_THAT(product_matrix(a) * b, IsNear(complex_product(a, b), kRounding));
   }
 }
 

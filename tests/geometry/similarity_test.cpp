@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 
 Vector2d mapped(const Similarity& similarity, const Vector2d& z) {
-  return similarity.offset + times(similarity.factor, z);
+  return similarity.offset + complex_product(similarity.factor, z);
 }
 
 Points mapped(const Similarity& similarity, const Points& from) {
@@ -94,7 +94,7 @@ TEST(Similarity, NeverMirrors) {
   ASSERT_TRUE(found);
   EXPECT_GT(sum_of_squares(*found, from, mirrored), 1);
   // The map is a rotation and a stretch whatever the points: orientation is kept.
-  EXPECT_GT(times_matrix(found->factor).determinant(), 0);
+  EXPECT_GT(product_matrix(found->factor).determinant(), 0);
 }
 
 TEST(Similarity, OfMetreSizedShapesInUtmCoordinatesKeepsTheirMillimetres) {

@@ -135,13 +135,13 @@ TEST_F(Adjust, WantsToKnowWhatTheSurveyIsWorth) {
 
 TEST_F(Adjust, EstimatesALensThatStatesNothing) {
   const std::vector<double> truth = rig.calibration.camera.intrinsics;
-  rig.calibration.camera.intrinsics[0] *= 0.97;
+  rig.calibration.camera.focal_px().x() *= 0.97;
   EXPECT_THAT(adjust("--map-sd-m 0.001").output,
               HasSubstr("taken as exact: the calibration has no"));
   const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("lens        corrected"));
-  EXPECT_NEAR(read_calibration(folder / "adjusted.yaml").camera.intrinsics[0] / truth[0], 1, 1e-3);
+  EXPECT_NEAR(read_calibration(folder / "adjusted.yaml").camera.focal_px().x() / truth[0], 1, 1e-3);
 }
 
 TEST_F(Adjust, RefusesAStatementOfALensThatMakesItsOwn) {

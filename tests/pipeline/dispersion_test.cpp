@@ -161,7 +161,7 @@ TEST(DispersionOfImages, IsTheCamerasTilt) {
   Calibration calibration = read_calibration(rendered + "/true_calibration.yaml");
   // As if the rotation centre were wrong by 2 and -3 px.
   RotationCenter& center = *calibration.rotation_center;
-  center.zenith_in_camera += Eigen::Vector3d(2 / calibration.camera.intrinsics[0],
+  center.zenith_in_camera += Eigen::Vector3d(2 / calibration.camera.focal_px().x(),
                                              -3 / calibration.camera.intrinsics[1], 0);
   center.zenith_in_camera.normalize();
   write_calibration(folder / "rotated.yaml", calibration);

@@ -142,7 +142,7 @@ TEST_F(IntrinsicsProgram, FitsAPhonesImagesAsWellAsOthers) {
   const Calibration found = read_calibration(folder / "camera.yaml");
   EXPECT_LT(found.intrinsics_report->rms_px, 0.735 / std::sqrt(2));  // OpenCV's, 2-D
   // MATLAB's. The standard deviation by views is 22, by noise 3.1.
-  EXPECT_NEAR(found.camera.intrinsics[0], 3196.9, 25);
+  EXPECT_NEAR(found.camera.focal_px().x(), 3196.9, 25);
 }
 
 TEST_F(IntrinsicsProgram, ChoosesTheLensModel) {

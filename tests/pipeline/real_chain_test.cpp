@@ -129,7 +129,7 @@ TEST_F(IntrinsicsProgram, GivesAPhonesLensAsFarAsItsLimitUnderRealLamps) {
   // n lamps about the camera, S the sum of their squared distances from its axis:
   // sd_x = sigma h / (f sqrt(n)), sd_z = sigma h^2 / (f sqrt(S)); the lens stretches the image by
   // up to 3 k1 r^2 = 2 % there, which makes them smaller.
-  const double h_m = 2.45, at_ceiling_m = rms_px * h_m / found.camera.intrinsics[0];
+  const double h_m = 2.45, at_ceiling_m = rms_px * h_m / found.camera.focal_px().x();
   EXPECT_EQ(figure("lamps"), 5);
   EXPECT_NEAR(figure("sd_x_m") * std::sqrt(5) / at_ceiling_m, 0.99, 0.01);
   const double apart_m = 2 * std::hypot(0.3556, 0.3683);  // sqrt(S), of four

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/angles.h"
-#include "positioning/coplanar_fix.h"
+#include "positioning/initial_pose.h"
 #include "positioning/one_lamp_fix.h"
 #include "positioning/two_lamp_fix.h"
 #include "support/near.h"

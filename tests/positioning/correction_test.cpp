@@ -20,7 +20,7 @@ Eigen::Vector2d seen_at(const Eigen::Matrix3d& level_from_camera, const Eigen::V
 class CorrectionTest : public testing::Test {
  protected:
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
-  Eigen::Vector2d focal_px{calibration.camera.intrinsics[0], calibration.camera.intrinsics[1]};
+  Eigen::Vector2d focal_px{calibration.camera.focal_px().x(), calibration.camera.intrinsics[1]};
   Eigen::Vector2d z{0.3, -0.2};
 };
 
@@ -43,8 +43,7 @@ TEST_F(CorrectionTest, TiltTakesTheZenithToTheOrigin) {
 }
 
 TEST_F(CorrectionTest, ShiftSubtractsTheCentreInTheUndistortedPlane) {
-  const Eigen::Vector2d principal(calibration.camera.intrinsics[2],
-                                  calibration.camera.intrinsics[3]);
+  const Eigen::Vector2d principal = calibration.camera.center_px();
   calibration.rotation_center = {
       RotationModel::shift, principal + Eigen::Vector2d(9, -4), {0, 0, 1}, {}};
   const Eigen::Vector2d moved = seen_at(level_from_camera(calibration, Correction::all), z);

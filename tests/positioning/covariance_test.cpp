@@ -5,8 +5,8 @@
 /// share of 5 % within 0.15 %.
 #include <gtest/gtest.h>
 
-#include "positioning/coplanar_fix.h"
 #include "positioning/error_budget.h"
+#include "positioning/initial_pose.h"
 #include "positioning/positioner.h"
 #include "positioning/two_lamp_fix.h"
 #include "support/scatter.h"

@@ -33,7 +33,7 @@ class Offsets : public testing::Test {
             lamp.position_m.head<2>() + moved_m_[static_cast<std::size_t>(lamp.id)] - camera_m;
         const Eigen::Vector2d noise(noise_m * random.normal(), noise_m * random.normal());
         view.lamps.push_back(
-            {lamp.id, camera_m + wrong_m + times(turned, from_camera_m) + noise, 1.6});
+            {lamp.id, camera_m + wrong_m + complex_product(turned, from_camera_m) + noise, 1.6});
       }
       views.push_back(view);
     }
@@ -71,9 +71,9 @@ TEST_F(Offsets, OfTheOthersAreAsTheProjectorOfTheMapHasThem) {
   for (const LampOffset& one : found()) {
     if (one.lamp == 3) continue;
     const double own = 1 - 1.0 / 8 - q(one.lamp).squaredNorm() / squares;
-    const Eigen::Vector2d by =
-        Eigen::Vector2d(-1.0 / 8, 0) - times(q(one.lamp), {q(3).x(), -q(3).y()}) / squares;
-    EXPECT_LT((one.offset_m - times(by, moved_m_[3]) / own).norm(), 3e-5) << one.lamp;
+    const Eigen::Vector2d by = Eigen::Vector2d(-1.0 / 8, 0) -
+                               complex_product(q(one.lamp), {q(3).x(), -q(3).y()}) / squares;
+    EXPECT_LT((one.offset_m - complex_product(by, moved_m_[3]) / own).norm(), 3e-5) << one.lamp;
   }
 }
 

@@ -97,8 +97,8 @@ TEST(StepsInARow, MoveWithTheLensAsTheySay) {
   EXPECT_GT(zenith.norm(), 1e-6);
   EXPECT_LT((zenith - zenith_said).norm(), 0.02 * zenith.norm());
   const Eigen::Vector2d offset =
-      moved.dispersion->offset_px.cwiseQuotient(focal_px_of(moved.camera)) -
-      exact.dispersion->offset_px.cwiseQuotient(focal_px_of(exact.camera));
+      moved.dispersion->offset_px.cwiseQuotient(moved.camera.focal_px()) -
+      exact.dispersion->offset_px.cwiseQuotient(exact.camera.focal_px());
   const Eigen::Vector2d offset_said =
       *exact.dispersion->by_intrinsics * error + *exact.dispersion->by_zenith * zenith;
   EXPECT_GT(offset.norm(), 1e-6);

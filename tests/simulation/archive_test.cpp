@@ -80,10 +80,10 @@ TEST(Archive, DrawsWithinTheSpreadsACameraAtATime) {
     EXPECT_EQ(first.scene.camera.intrinsics, second.scene.camera.intrinsics);
     EXPECT_EQ(first.scene.mount.lever_arm_m, second.scene.mount.lever_arm_m);
     EXPECT_NE(first.scene.lamps[0].map_error_m, second.scene.lamps[0].map_error_m);
-    focal_lengths.insert(first.scene.camera.intrinsics[0]);
+    focal_lengths.insert(first.scene.camera.focal_px().x());
     seeds.insert({first.scene.seed, second.scene.seed});
-    EXPECT_NEAR(first.scene.camera.intrinsics[0], 100, 1);
-    EXPECT_NEAR(first.scene.camera.intrinsics[1] / first.scene.camera.intrinsics[0], 1.01, 1e-12);
+    EXPECT_NEAR(first.scene.camera.focal_px().x(), 100, 1);
+    EXPECT_NEAR(first.scene.camera.intrinsics[1] / first.scene.camera.focal_px().x(), 1.01, 1e-12);
     EXPECT_NEAR(first.scene.camera.intrinsics[2], 80, 3);
     EXPECT_LE((first.scene.mount.lever_arm_m - scene.mount.lever_arm_m).lpNorm<Eigen::Infinity>(),
               0.003);

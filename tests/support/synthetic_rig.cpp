@@ -54,10 +54,9 @@ RotationCenter tilted_by(const Camera& camera, double tilt_rad, double azimuth_r
   center.model = RotationModel::tilt;
   center.zenith_in_camera = {std::sin(tilt_rad) * std::cos(azimuth_rad),
                              std::sin(tilt_rad) * std::sin(azimuth_rad), std::cos(tilt_rad)};
-  const Eigen::Vector2d focal_px(camera.intrinsics[0], camera.intrinsics[1]);
-  center.center_px =
-      Eigen::Vector2d(camera.intrinsics[2], camera.intrinsics[3]) +
-      focal_px.cwiseProduct(center.zenith_in_camera.head<2>() / center.zenith_in_camera.z());
+  const Eigen::Vector2d focal_px = camera.focal_px();
+  center.center_px = camera.center_px() + focal_px.cwiseProduct(center.zenith_in_camera.head<2>() /
+                                                                center.zenith_in_camera.z());
   return center;
 }
 

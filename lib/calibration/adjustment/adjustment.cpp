@@ -17,9 +17,8 @@
 #include "calibration/adjustment/adjustment_problem.h"
 #include "geometry/median.h"
 #include "geometry/symmetric.h"
-#include "positioning/consistent_fix.h"
-#include "positioning/frame_fix.h"
-#include "positioning/lean.h"
+#include "positioning/inclination_rotation.h"
+#include "positioning/robust_fix.h"
 #include "positioning/row_clock.h"
 #include "rig/calibration_error.h"
 #include "rig/find_lamp.h"
@@ -71,7 +70,7 @@ std::optional<Pose> rough_pose(const std::vector<Sighting>& sightings,
       }
     }
     frame.size = sightings.size();
-    const auto [status, fix] = fix_frame(frame, usual_share);
+    const auto [status, fix] = fix_robustly(frame, usual_share);
     if (status == FixStatus::ok) return fix.pose;
   }
   const auto [status, fix] = fix_consistent(sightings, kInfinite);
@@ -121,7 +120,8 @@ Assembled assemble(const AdjustmentInput& input) {
   std::vector<Sighting> sightings;
   std::vector<std::size_t> lamps;
   for (const AdjustmentCapture& capture : input.captures) {
-    const Lean lean = capture.inclination ? lean_of(*capture.inclination, 0) : Lean();
+    const InclinationRotation lean =
+        capture.inclination ? inclination_rotation(*capture.inclination, 0) : InclinationRotation();
     seen.clear();
     sightings.clear();
     lamps.clear();
@@ -532,13 +532,11 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
 
   // The calibration.
   result.camera.intrinsics = problem.intrinsics();
-  const Eigen::Vector2d focal_px(result.camera.intrinsics[0], result.camera.intrinsics[1]);
+  const Eigen::Vector2d focal_px = result.camera.focal_px();
   const Eigen::Vector2d zenith = state.segment<2>(at.zenith);
   result.center.model = RotationModel::tilt;
   result.center.zenith_in_camera = zenith.homogeneous().normalized();
-  result.center.center_px =
-      Eigen::Vector2d(result.camera.intrinsics[2], result.camera.intrinsics[3]) +
-      focal_px.cwiseProduct(zenith);
+  result.center.center_px = result.camera.center_px() + focal_px.cwiseProduct(zenith);
   Matrix2 center_covariance =
       focal_px.asDiagonal() * covariance.block<2, 2>(at.zenith, at.zenith) * focal_px.asDiagonal();
   center_covariance(1, 0) = center_covariance(0, 1);

@@ -70,7 +70,7 @@ PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d
   if (!typical.at_one_yaw()) return {DispersionStatus::many_yaws};
   Eigen::Matrix2d image_from_floor =
       focal_px.asDiagonal() *
-      Eigen::Matrix2d(times_matrix(typical.heading.normalized()).transpose() / typical.height_m);
+      Eigen::Matrix2d(product_matrix(typical.heading.normalized()).transpose() / typical.height_m);
   constexpr int max_rounds = 30;
   constexpr double settled_m = 1e-10;  // far below any noise
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();

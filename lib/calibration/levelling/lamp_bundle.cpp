@@ -13,12 +13,12 @@ namespace vlp {
 namespace {
 
 using Capture = LampBundle::Capture;
-using Seen = LampBundle::Seen;
+using Observation = LampBundle::Observation;
 
 double chi_squared(const LampBundle& bundle) {
   double sum = 0;
   for (const Capture& capture : bundle.captures) {
-    for (const Seen& seen : capture.seen) {
+    for (const Observation& seen : capture.seen) {
       sum += whitened_residual(bundle, capture, seen).squaredNorm();
     }
     sum += motion_deviations(capture).squaredNorm();
@@ -92,7 +92,7 @@ LampBundle moved(const LampBundle& bundle, const Step& step) {
 }  // namespace
 
 Eigen::Vector2d whitened_residual(const LampBundle& bundle, const Capture& capture,
-                                  const Seen& seen) {
+                                  const Observation& seen) {
   const Eigen::Vector3d x =
       bundle.level_from_camera.transpose() * x_in_level(capture, seen, bundle.lamps_m[seen.lamp]);
   if (!(x.z() > 0)) return Eigen::Vector2d::Constant(std::nan(""));

@@ -22,7 +22,7 @@ namespace vlp {
 ///   level_from_camera^T Rz(-w t) (Rz(-g_k) (P_i - S_k) - u t);
 /// what is not known of u and w is the capture's own, too, with what is known for a prior.
 struct LampBundle {
-  struct Seen {
+  struct Observation {
     /// Index into lamps_m.
     std::size_t lamp;
     /// Measured, in the camera's undistorted plane.
@@ -34,7 +34,7 @@ struct LampBundle {
   };
   struct Capture {
     LevelPose camera;
-    std::vector<Seen> seen;
+    std::vector<Observation> seen;
     /// What is known of u and w, and what they are taken to be.
     KnownMotion known = {};
     Eigen::Vector2d velocity_m_per_s = known.velocity_m_per_s;
@@ -48,7 +48,7 @@ struct LampBundle {
 
 /// Measured less predicted z, whitened; not finite when the lamp is not in front of the camera.
 Eigen::Vector2d whitened_residual(const LampBundle& bundle, const LampBundle::Capture& capture,
-                                  const LampBundle::Seen& seen);
+                                  const LampBundle::Observation& seen);
 
 struct BundleFit {
   /// Sum of the squared whitened residuals, those of motions that are known in part among them.

@@ -10,13 +10,13 @@ namespace vlp {
 namespace {
 
 using Capture = LampBundle::Capture;
-using Seen = LampBundle::Seen;
+using Observation = LampBundle::Observation;
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
 /// Back by the angle of that unit number.
 Eigen::Vector3d turned_back(const Eigen::Vector2d& turn, const Eigen::Vector3d& x) {
   Eigen::Vector3d back;
-  back << conj_times(turn, x.head<2>()), x.z();
+  back << conj_product(turn, x.head<2>()), x.z();
   return back;
 }
 
@@ -27,7 +27,7 @@ struct InLevel {
   Eigen::Vector2d turn;
 };
 
-InLevel in_level(const Capture& capture, const Seen& seen, const Eigen::Vector3d& lamp_m) {
+InLevel in_level(const Capture& capture, const Observation& seen, const Eigen::Vector3d& lamp_m) {
   InLevel x;
   x.still = turned_back(capture.camera.heading, lamp_m - capture.camera.position_m);
   const double angle_rad = capture.yaw_rate_rad_per_s * seen.time_s;
@@ -46,7 +46,7 @@ struct Linearized {
   Matrix23 by_lamp;
 };
 
-Linearized linearize(const LampBundle& bundle, const Capture& capture, const Seen& seen) {
+Linearized linearize(const LampBundle& bundle, const Capture& capture, const Observation& seen) {
   const InLevel in = in_level(capture, seen, bundle.lamps_m[seen.lamp]);
   const Eigen::Vector3d& level = in.read;
   const Eigen::Vector3d x = bundle.level_from_camera.transpose() * level;
@@ -109,20 +109,20 @@ OwnVector motion_deviations(const Capture& capture) {
 Capture moved(const Capture& capture, const OwnVector& step) {
   Capture next = capture;
   next.camera = LevelPose(capture.camera.position_m + step.head<3>(),
-                          times(capture.camera.heading, {1, step[3]}).normalized());
+                          complex_product(capture.camera.heading, {1, step[3]}).normalized());
   if (capture.known.velocity_sd_m_per_s > 0) next.velocity_m_per_s += step.segment<2>(4);
   if (capture.known.yaw_rate_sd_rad_per_s > 0) next.yaw_rate_rad_per_s += step.tail(1)[0];
   return next;
 }
 
-Eigen::Vector3d x_in_level(const Capture& capture, const Seen& seen,
+Eigen::Vector3d x_in_level(const Capture& capture, const Observation& seen,
                            const Eigen::Vector3d& lamp_m) {
   return in_level(capture, seen, lamp_m).read;
 }
 
 std::vector<Eigen::Index> shared_of(const Capture& capture) {
   std::vector<Eigen::Index> indices{0, 1};
-  for (const Seen& seen : capture.seen) {
+  for (const Observation& seen : capture.seen) {
     const auto first = static_cast<Eigen::Index>(2 + 3 * seen.lamp);
     indices.insert(indices.end(), {first, first + 1, first + 2});
   }

@@ -27,7 +27,7 @@ OwnVector motion_weights(const LampBundle::Capture& capture);
 LampBundle::Capture moved(const LampBundle::Capture& capture, const OwnVector& step);
 
 /// x of a lamp in the level frame of a capture, when it is read.
-Eigen::Vector3d x_in_level(const LampBundle::Capture& capture, const LampBundle::Seen& seen,
+Eigen::Vector3d x_in_level(const LampBundle::Capture& capture, const LampBundle::Observation& seen,
                            const Eigen::Vector3d& lamp_m);
 
 /// Of one capture: its own unknowns x and the shared ones s that it touches,

@@ -12,13 +12,13 @@
 #include "calibration/levelling/measured_lamps.h"
 #include "camera/lens.h"
 #include "geometry/plane.h"
-#include "positioning/weighted_fix.h"
+#include "positioning/least_squares_fix.h"
 
 namespace vlp {
 namespace {
 
 using Capture = LampBundle::Capture;
-using Seen = LampBundle::Seen;
+using Observation = LampBundle::Observation;
 
 double square_px(const Lens& lens, const Eigen::Vector2d& z, const Eigen::Vector2d& expected) {
   return lens.focal_px().cwiseProduct(z - expected).squaredNorm();
@@ -27,7 +27,7 @@ double square_px(const Lens& lens, const Eigen::Vector2d& z, const Eigen::Vector
 double residual_px(const LampBundle& bundle, const Lens& lens, double degrees_of_freedom) {
   double sum = 0;
   for (const Capture& capture : bundle.captures) {
-    for (const Seen& seen : capture.seen) {
+    for (const Observation& seen : capture.seen) {
       const Eigen::Vector2d expected =
           seen.z_in_camera - seen.whitening.inverse() * whitened_residual(bundle, capture, seen);
       sum += square_px(lens, seen.z_in_camera, expected);
@@ -37,13 +37,13 @@ double residual_px(const LampBundle& bundle, const Lens& lens, double degrees_of
 }
 
 /// Where a camera that stands there would see the lamp as this one does.
-Eigen::Vector3d where_seen(const Capture& capture, const Seen& seen,
+Eigen::Vector3d where_seen(const Capture& capture, const Observation& seen,
                            const Eigen::Vector3d& lamp_m) {
   if (capture.velocity_m_per_s.isZero(0) && capture.yaw_rate_rad_per_s == 0) return lamp_m;
   const Eigen::Vector3d level = x_in_level(capture, seen, lamp_m);
   Eigen::Vector3d seen_m = lamp_m;
-  seen_m.head<2>() =
-      capture.camera.position_m.head<2>() + times(capture.camera.heading, level.head<2>());
+  seen_m.head<2>() = capture.camera.position_m.head<2>() +
+                     complex_product(capture.camera.heading, level.head<2>());
   return seen_m;
 }
 
@@ -54,11 +54,11 @@ double residual_before_px(const LampBundle& bundle, const std::vector<Eigen::Vec
   std::vector<Sighting> sightings;
   for (const Capture& capture : bundle.captures) {
     sightings.clear();
-    for (const Seen& seen : capture.seen) {
+    for (const Observation& seen : capture.seen) {
       sightings.push_back(
           {where_seen(capture, seen, lamps_m[seen.lamp]), seen.z_in_camera, seen.whitening, 1});
     }
-    const auto fix = fix_weighted(sightings, capture.camera.pose());
+    const auto fix = fix_least_squares(sightings, capture.camera.pose());
     if (!fix) continue;
     const LevelPose camera(fix->pose);
     for (const Sighting& sighting : sightings) {

@@ -15,7 +15,7 @@ namespace vlp {
 namespace {
 
 using Capture = LampBundle::Capture;
-using Seen = LampBundle::Seen;
+using Observation = LampBundle::Observation;
 
 LampBundle place(const std::vector<MeasuredCapture>& measured,
                  const std::vector<Eigen::Vector3d>& lamps_m,
@@ -48,7 +48,7 @@ bool take_out_worst(LampBundle& bundle, const BundleFit& fit) {
   std::vector<double> squares;
   squares.reserve(detections_in(bundle));
   for (const Capture& capture : bundle.captures) {
-    for (const Seen& seen : capture.seen) {
+    for (const Observation& seen : capture.seen) {
       squares.push_back(whitened_residual(bundle, capture, seen).squaredNorm());
     }
   }
@@ -58,12 +58,12 @@ bool take_out_worst(LampBundle& bundle, const BundleFit& fit) {
   const double limit = limit_sigmas * limit_sigmas * std::max(variance, rounding * rounding);
   bool any = false;
   for (Capture& capture : bundle.captures) {
-    const auto square = [&](const Seen& seen) {
+    const auto square = [&](const Observation& seen) {
       return whitened_residual(bundle, capture, seen).squaredNorm();
     };
-    const auto worst =
-        std::max_element(capture.seen.begin(), capture.seen.end(),
-                         [&](const Seen& a, const Seen& b) { return square(a) < square(b); });
+    const auto worst = std::max_element(
+        capture.seen.begin(), capture.seen.end(),
+        [&](const Observation& a, const Observation& b) { return square(a) < square(b); });
     if (square(*worst) <= limit) continue;
     any = true;
     capture.seen.erase(worst);

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "positioning/frame_fix.h"
+#include "positioning/robust_fix.h"
 #include "rig/find_lamp.h"
 
 namespace vlp {
@@ -28,10 +28,10 @@ double distance_to_nearest(const std::vector<Eigen::Vector3d>& lamps_m, std::siz
 
 }  // namespace
 
-std::optional<std::vector<LampBundle::Seen>> measured_lamps(
+std::optional<std::vector<LampBundle::Observation>> measured_lamps(
     std::span<const Detection> detections, const LampMap& map, const Lens& lens,
     const std::optional<RowClock>& row_clock) {
-  std::vector<LampBundle::Seen> measured;
+  std::vector<LampBundle::Observation> measured;
   measured.reserve(detections.size());
   for (const Detection& detection : detections) {
     const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
@@ -57,7 +57,7 @@ std::optional<std::vector<LampBundle::Seen>> measured_lamps(
 std::optional<LampBundle::Capture> placed_capture(const MeasuredCapture& measured,
                                                   const std::vector<Eigen::Vector3d>& lamps_m,
                                                   const Eigen::Matrix3d& level_from_camera) {
-  const std::vector<LampBundle::Seen>& seen = measured.seen;
+  const std::vector<LampBundle::Observation>& seen = measured.seen;
   SightedFrame frame;
   // What the stated noise does not explain may be the tilt that is sought.
   frame.noise_is_stated = false;
@@ -70,7 +70,7 @@ std::optional<LampBundle::Capture> placed_capture(const MeasuredCapture& measure
     frame.ids[frame.size++] = static_cast<int>(i);
   }
   if (frame.size < 3) return std::nullopt;
-  const auto [status, fix] = fix_frame(frame, kMaxResidualShare);
+  const auto [status, fix] = fix_robustly(frame, kMaxResidualShare);
   if (status != FixStatus::ok || frame.size < 3) return std::nullopt;
   LampBundle::Capture capture{LevelPose(fix.pose), {}, measured.motion};
   capture.seen.reserve(frame.size);

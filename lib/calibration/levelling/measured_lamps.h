@@ -20,17 +20,17 @@ namespace vlp {
 /// Detections of other lamps and pixels that no ray to the front reaches are left out. Nothing
 /// when a lamp stands twice or the capture holds more than kMaxSightings. Without a row clock all
 /// are read at once.
-std::optional<std::vector<LampBundle::Seen>> measured_lamps(
+std::optional<std::vector<LampBundle::Observation>> measured_lamps(
     std::span<const Detection> detections, const LampMap& map, const Lens& lens,
     const std::optional<RowClock>& row_clock);
 
 /// What there is of one capture.
 struct MeasuredCapture {
-  std::vector<LampBundle::Seen> seen;
+  std::vector<LampBundle::Observation> seen;
   KnownMotion motion;
 };
 
-/// The fix of a capture of three lamps or more by fix_frame(), as if it stood, and those of its
+/// The fix of a capture of three lamps or more by fix_robustly(), as if it stood, and those of its
 /// lamps that agree; nothing where there is none.
 std::optional<LampBundle::Capture> placed_capture(const MeasuredCapture& measured,
                                                   const std::vector<Eigen::Vector3d>& lamps_m,

@@ -24,7 +24,7 @@ struct Trace {
 Trace trace_of(const SpotCaptures& spot, std::size_t lamp, std::size_t height) {
   Trace trace;
   for (std::size_t i = 0; i < spot.sightings.size(); ++i) {
-    const SpotSighting& sighting = spot.sightings[i];
+    const SpotObservation& sighting = spot.sightings[i];
     if (sighting.lamp != lamp || spot.captures[sighting.capture].height != height) continue;
     if (!(sighting.ray.z() > 0)) continue;
     trace.sightings.push_back(i);
@@ -103,7 +103,7 @@ std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
 CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera) {
   assert(spot.status == SpotStatus::ok);
   CircleCenters result;
-  const double focal_px = camera.intrinsics[0];
+  const double focal_px = camera.focal_px().x();
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   double squares = 0, freedom = 0;

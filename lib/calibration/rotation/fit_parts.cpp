@@ -8,7 +8,7 @@ namespace vlp {
 
 RotationCenter rotation_center_at(const Eigen::Vector2d& z, RotationModel model,
                                   const Camera& camera, const std::optional<Matrix2>& covariance) {
-  const Eigen::Vector2d focal_px(camera.intrinsics[0], camera.intrinsics[1]);
+  const Eigen::Vector2d focal_px = camera.focal_px();
   RotationCenter center;
   center.model = model;
   center.center_px = undistorted_pixel(camera, z);

@@ -26,7 +26,7 @@ struct JointResidual {
     return true;
   }
 
-  static std::unique_ptr<ceres::CostFunction> create(const SpotSighting& sighting) {
+  static std::unique_ptr<ceres::CostFunction> create(const SpotObservation& sighting) {
     return std::make_unique<ceres::AutoDiffCostFunction<JointResidual, 2, 2, 2, 1>>(
         new JointResidual{SpotResidual(sighting)});
   }
@@ -52,7 +52,7 @@ RotationFit fit_joint_center(const SpotCaptures& spot, const Camera& camera) {
   for (std::size_t i = 0; i < yaws_rad.size(); ++i) {
     yaws_at[spot.captures[i].height].push_back(&yaws_rad[i]);
   }
-  for (const SpotSighting& sighting : spot.sightings) {
+  for (const SpotObservation& sighting : spot.sightings) {
     const std::size_t height = spot.captures[sighting.capture].height;
     fit.add(JointResidual::create(sighting),
             {center.data(), places[height][sighting.lamp].data(), &yaws_rad[sighting.capture]});

@@ -13,15 +13,15 @@ Tilt tilt_of(const RotationCenter& center) {
 
 std::optional<double> axis_sd_rad(const RotationCenter& center, const Camera& camera) {
   if (!center.covariance) return std::nullopt;
-  const Eigen::Vector2d focal_px(camera.intrinsics[0], camera.intrinsics[1]);
+  const Eigen::Vector2d focal_px = camera.focal_px();
   const Eigen::Vector2d variances =
       center.covariance->diagonal().cwiseQuotient(focal_px.cwiseAbs2());
   return std::sqrt(variances.mean());
 }
 
 Eigen::Vector2d undistorted_pixel(const Camera& camera, const Eigen::Vector2d& z) {
-  const Eigen::Vector2d focal_px(camera.intrinsics[0], camera.intrinsics[1]);
-  return focal_px.cwiseProduct(z) + Eigen::Vector2d(camera.intrinsics[2], camera.intrinsics[3]);
+  const Eigen::Vector2d focal_px = camera.focal_px();
+  return focal_px.cwiseProduct(z) + camera.center_px();
 }
 
 }  // namespace vlp

@@ -17,7 +17,7 @@
 namespace vlp {
 
 /// One lamp in one capture.
-struct SpotSighting {
+struct SpotObservation {
   /// Indices in SpotCaptures.
   std::size_t capture;
   std::size_t lamp;
@@ -78,7 +78,7 @@ struct SpotCaptures {
   std::vector<SpotCapture> captures;
   /// From low to high.
   std::vector<SpotHeight> heights;
-  std::vector<SpotSighting> sightings;
+  std::vector<SpotObservation> sightings;
   /// The middle one of the detections' sigma_px; nothing unless all state it.
   std::optional<double> stated_px = {};
   Eigen::Vector3d zenith_in_camera = Eigen::Vector3d::UnitZ();

@@ -16,7 +16,7 @@ struct SpotResidual {
   Eigen::Vector3d ray;
   Eigen::Matrix<double, 2, 3> weighted;
 
-  explicit SpotResidual(const SpotSighting& sighting)
+  explicit SpotResidual(const SpotObservation& sighting)
       : ray(sighting.ray), weighted(sighting.d_pixel_d_ray / sighting.sigma_px) {}
 
   template <typename T>

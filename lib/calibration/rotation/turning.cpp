@@ -20,7 +20,7 @@ Turning fit_turning(std::span<const TurningFix> fixes, std::size_t spots, bool l
   for (std::size_t k = 0; k < fixes.size(); ++k) {
     const auto& [pose, height_m, spot] = fixes[k];
     const auto row = static_cast<Eigen::Index>(2 * k);
-    const Eigen::Matrix2d turn = times_matrix({std::cos(pose.yaw_rad), std::sin(pose.yaw_rad)});
+    const Eigen::Matrix2d turn = product_matrix({std::cos(pose.yaw_rad), std::sin(pose.yaw_rad)});
     design.block<2, 2>(row, static_cast<Eigen::Index>(2 * spot)).setIdentity();
     design.block<2, 2>(row, arm) = height_m * turn;
     if (lever_arm) design.block<2, 2>(row, arm + 2) = turn;

@@ -2,19 +2,55 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/rotation/turning_axis.h"
 
+#include <ceres/ceres.h>
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <memory>
 
-#include "calibration/rotation/axis_residual.h"
 #include "calibration/rotation/fit_parts.h"
 #include "calibration/rotation/robust_fit.h"
+#include "calibration/rotation/spot_residual.h"
 #include "geometry/similarity.h"
 
 namespace vlp {
 namespace {
+
+/// The residual of fit_turning_axis(). Parameters: the zenith's normalized point in the camera (2),
+/// the lever arm (2), the lamp's place on the ceiling (2), the axis and the height of the camera
+/// (3), the yaw (1); all in the world but the first two.
+struct AxisResidual {
+  SpotResidual in_image;
+  double lamp_z_m;
+
+  template <typename T>
+  bool operator()(const T* zenith, const T* lever_arm_m, const T* lamp_m, const T* axis_m,
+                  const T* yaw_rad, T* residual) const {
+    using std::cos, std::sin, std::sqrt;
+    const T x = lamp_m[0] - axis_m[0], y = lamp_m[1] - axis_m[1];
+    const T c = cos(*yaw_rad), s = sin(*yaw_rad);
+    const Eigen::Matrix<T, 3, 1> in_level(c * x + s * y - lever_arm_m[0],
+                                          c * y - s * x - lever_arm_m[1], lamp_z_m - axis_m[2]);
+    // camera_from_level: the transpose of level_from_zenith(), the smallest turn of n to +Z.
+    const T nz = 1.0 / sqrt(1.0 + zenith[0] * zenith[0] + zenith[1] * zenith[1]);
+    const Eigen::Matrix<T, 3, 1> n(zenith[0] * nz, zenith[1] * nz, nz);
+    const T across = (n[0] * in_level[0] + n[1] * in_level[1]) / (1.0 + nz);
+    const T lift = in_level[2] - across;
+    const Eigen::Matrix<T, 3, 1> in_camera(in_level[0] + n[0] * lift, in_level[1] + n[1] * lift,
+                                           nz * in_level[2] - across * (1.0 + nz));
+    in_image(in_camera, residual);
+    return true;
+  }
+
+  static std::unique_ptr<ceres::CostFunction> create(const SpotObservation& sighting,
+                                                     double lamp_z_m) {
+    return std::make_unique<ceres::AutoDiffCostFunction<AxisResidual, 2, 2, 2, 2, 3, 1>>(
+        new AxisResidual{SpotResidual(sighting), lamp_z_m});
+  }
+};
 
 /// What is estimated, in the world.
 struct State {
@@ -35,7 +71,7 @@ State start_from(const SpotCaptures& spot) {
 }
 
 void add_residuals(RobustFit& fit, const SpotCaptures& spot, bool lever_arm, State& state) {
-  for (const SpotSighting& sighting : spot.sightings) {
+  for (const SpotObservation& sighting : spot.sightings) {
     const std::size_t height = spot.captures[sighting.capture].height;
     fit.add(AxisResidual::create(sighting, spot.lamps[sighting.lamp].position_m.z()),
             {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[sighting.lamp].data(),
@@ -124,7 +160,7 @@ RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera) {
   // The method is exact: what is left is noise, or the captures are of no turn about one axis.
   constexpr double most_share = 0.007, most_times = 4;
   const double most_px =
-      std::max(most_share * camera.intrinsics[0], most_times * spot.stated_px.value_or(0));
+      std::max(most_share * camera.focal_px().x(), most_times * spot.stated_px.value_or(0));
   return result.residual_px > most_px ? RotationFit() : result;
 }
 

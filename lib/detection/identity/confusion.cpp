@@ -53,7 +53,7 @@ Confusion cross_validated(std::span<const LabelledLight> lights) {
     for (const LabelledLight& light : lights) {
       (light.image % kFolds == std::size_t(fold) ? held_out : others).push_back(light);
     }
-    const LampClassifier classifier = trained(others);
+    const LampClassifier classifier = train_classifier(others);
     for (const LabelledLight& light : held_out) judge(classifier, light, confusion);
   }
   return confusion;

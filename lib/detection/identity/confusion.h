@@ -30,7 +30,7 @@ Confusion confusion_of(const LampClassifier& classifier, std::span<const Labelle
 inline constexpr int kFolds = 5;
 
 /// Each fifth of the images (every fifth one, so that the answer is always the same) judged by a
-/// classifier that was trained on the others. `lights` as for trained().
+/// classifier that was trained on the others. `lights` as for train_classifier().
 Confusion cross_validated(std::span<const LabelledLight> lights);
 
 }  // namespace vlp

@@ -51,7 +51,7 @@ inline constexpr int kLeastExamples = 6;
 /// Trained on lights of two lamps or more, with kLeastExamples or more of each. Lights that
 /// are far from their lamp's others, being partly hidden for instance, are left out. C is shrunk
 /// towards its diagonal by the weight of ten lights, and lamps may drift by kLampDrift.
-LampClassifier trained(std::span<const LabelledLight> lights);
+LampClassifier train_classifier(std::span<const LabelledLight> lights);
 
 /// The lamp with these stripes; nothing when another may be it (probability below 99 %), or when
 /// they are like no lamp's: (z - c_k)^T C^-1 (z - c_k) above 36, a share of 3e-7 of normal

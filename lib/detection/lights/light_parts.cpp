@@ -75,8 +75,8 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
 
 }  // namespace
 
-std::vector<Light> joined(std::vector<LightPart>& parts, const LightShape& shape,
-                          const Background& background) {
+std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
+                        const Background& background) {
   // A lamp is in a few pieces; an image of thousands of them shows something else.
   constexpr int most_tries = 2000;
   int tries = 0;

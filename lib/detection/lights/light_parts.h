@@ -22,8 +22,8 @@ struct LightPart {
 /// The lights that the parts are of: what stands in the way splits a lamp, but its parts lie on one
 /// circle. Of lights that overlap the one with more of an outline stands. What is left in `parts`
 /// has no form.
-std::vector<Light> joined(std::vector<LightPart>& parts, const LightShape& shape,
-                          const Background& background);
+std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
+                        const Background& background);
 
 /// Parts without a form, but those inside one of `lights`, as lights, with the reason. What is less
 /// than five pixels wide or high is a speck, and no light. `size` is that of the lines.

@@ -8,7 +8,7 @@ namespace vlp {
 
 /// A number whose every bit depends on every bit of `value` (the output function of SplitMix64;
 /// Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
-constexpr std::uint64_t mixed(std::uint64_t value) {
+constexpr std::uint64_t mix(std::uint64_t value) {
   value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9;
   value = (value ^ (value >> 27)) * 0x94d049bb133111eb;
   return value ^ (value >> 31);
@@ -17,9 +17,9 @@ constexpr std::uint64_t mixed(std::uint64_t value) {
 /// SplitMix64: random numbers that cost nothing to seed and are the same everywhere.
 class SplitMix {
  public:
-  explicit SplitMix(std::uint64_t seed) : state_(mixed(seed)) {}
+  explicit SplitMix(std::uint64_t seed) : state_(mix(seed)) {}
 
-  std::uint64_t operator()() { return mixed(state_ += 0x9e3779b97f4a7c15); }
+  std::uint64_t operator()() { return mix(state_ += 0x9e3779b97f4a7c15); }
 
  private:
   std::uint64_t state_;

@@ -70,7 +70,7 @@ class StationTable {
     std::uint64_t hash = 0;
     for (const double number : cell) {
       // + 0: there is a zero with a minus sign, whose bits are others.
-      hash = mixed(hash ^ std::bit_cast<std::uint64_t>(number + 0.0));
+      hash = mix(hash ^ std::bit_cast<std::uint64_t>(number + 0.0));
     }
     return hash;
   }

@@ -31,12 +31,12 @@ RotationPlot plot_of(const std::string& title, const SpotCaptures& spot,
   RotationPlot plot{
       title, {}, fit.center.center_px, undistorted_pixel(camera, Eigen::Vector2d::Zero())};
   for (const auto& [lamp, height, circle] : circles.circles) {
-    const Eigen::Vector2d radii_px(camera.intrinsics[0], camera.intrinsics[1]);
+    const Eigen::Vector2d radii_px = camera.focal_px();
     plot.traces.push_back({spot.lamps[lamp].id,
                            {},
                            undistorted_pixel(camera, circle.circle.center),
                            circle.circle.radius * radii_px});
-    for (const SpotSighting& sighting : spot.sightings) {
+    for (const SpotObservation& sighting : spot.sightings) {
       if (sighting.lamp != lamp || spot.captures[sighting.capture].height != height) continue;
       plot.traces.back().places_px.push_back(undistorted_pixel(camera, sighting.ray.hnormalized()));
     }

@@ -114,7 +114,7 @@ class RenderedDrive : public testing::Test {
     return (center.zenith_in_camera - truth.rotation_center->zenith_in_camera).norm();
   }
   double zenith_sd(const RotationCenter& center) const {
-    return std::sqrt(center.covariance->trace()) / scene.camera.intrinsics[0];
+    return std::sqrt(center.covariance->trace()) / scene.camera.focal_px().x();
   }
   static void print(const char* what, const Found& found) {
     std::printf("%-28s zenith %.5f deg (sd %.5f), lever arm %.4f mm (sd %.4f)\n", what,

@@ -39,7 +39,7 @@ double misshape_m(const LampMap& found, const LampMap& truth) {
   }
   for (std::size_t i = 0; i < truth.lamps.size(); ++i) {
     Eigen::Vector3d fitted;
-    fitted << fit->offset + times(fit->factor, lamp(found, i).head<2>()),
+    fitted << fit->offset + complex_product(fit->factor, lamp(found, i).head<2>()),
         scale * lamp(found, i).z() + lift_m;
     worst_m = std::max(worst_m, (fitted - lamp(truth, i)).norm());
   }

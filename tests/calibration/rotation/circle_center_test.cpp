@@ -83,7 +83,7 @@ TEST(CircleCenter, LeavesOutAPointThatIsWrong) {
   const CircleCenters found = fit_circle_centers(spot, scene.camera);
   EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   ASSERT_EQ(found.mean.outliers.size(), 1U);
-  const SpotSighting& outlier = spot.sightings[found.mean.outliers[0].sighting];
+  const SpotObservation& outlier = spot.sightings[found.mean.outliers[0].sighting];
   EXPECT_EQ(spot.captures[outlier.capture].image, "3.png");
   EXPECT_EQ(spot.lamps[outlier.lamp].id, frames[3].detections[2].lamp);
 }

@@ -91,7 +91,7 @@ TEST(SpotCaptures, OutliersAreFoundAndChangeLittle) {
   expect_axis(found, scene, 0.01);
   std::vector<std::pair<std::string, int>> named;
   for (const auto& outlier : found.outliers) {
-    const SpotSighting& sighting = spot.sightings[outlier.sighting];
+    const SpotObservation& sighting = spot.sightings[outlier.sighting];
     named.emplace_back(spot.captures[sighting.capture].image, spot.lamps[sighting.lamp].id);
   }
   EXPECT_THAT(named, testing::IsSupersetOf(wrong));

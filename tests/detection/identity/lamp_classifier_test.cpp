@@ -39,7 +39,7 @@ const std::vector<Made> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5}};
 const std::vector<Made> kTwins{{1, 12, 0.35}, {2, 12, 0.7}};
 
 TEST(LampClassifier, KnowsTheLampsThatItWasTrainedOn) {
-  const LampClassifier classifier = trained(lights_of(kLamps, 30, 1));
+  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
   ASSERT_EQ(classifier.lamps.size(), 3);
   EXPECT_EQ(classifier.lamps[0].lamp, 4);
   const Confusion confusion = confusion_of(classifier, lights_of(kLamps, 100, 2));
@@ -51,14 +51,14 @@ TEST(LampClassifier, KnowsTheLampsThatItWasTrainedOn) {
 }
 
 TEST(LampClassifier, TellsLampsOfOnePeriodApartByTheirDuty) {
-  const LampClassifier classifier = trained(lights_of(kTwins, 40, 1));
+  const LampClassifier classifier = train_classifier(lights_of(kTwins, 40, 1));
   const Confusion confusion = confusion_of(classifier, lights_of(kTwins, 100, 2));
   EXPECT_EQ(confusion.wrong(), 0);
   EXPECT_GE(confusion.right(), 150) << confusion.counts;
 }
 
 TEST(LampClassifier, CallsAnUnknownLampUnknown) {
-  const LampClassifier classifier = trained(lights_of(kLamps, 30, 1));
+  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
   const Confusion confusion =
       confusion_of(classifier, lights_of({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
   EXPECT_EQ(confusion.unknown(), 100);
@@ -66,7 +66,7 @@ TEST(LampClassifier, CallsAnUnknownLampUnknown) {
 
 TEST(LampClassifier, CallsLampsUnknownThatAreAlike) {
   const std::vector<Made> alike{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 13.35, 0.5}};
-  const LampClassifier classifier = trained(lights_of(alike, 30, 1));
+  const LampClassifier classifier = train_classifier(lights_of(alike, 30, 1));
   const Confusion confusion = confusion_of(classifier, lights_of(alike, 100, 2));
   EXPECT_EQ(confusion.counts(0, 0), 100);
   EXPECT_GE(confusion.unknown(), 190);
@@ -79,7 +79,7 @@ TEST(LampClassifier, CallsLampsUnknownThatAreAlike) {
 TEST(LampClassifier, IsNotMisledByAFewWrongLabels) {
   auto lights = lights_of(kLamps, 30, 1);
   lights[0].lamp = 9, lights[4].lamp = 4, lights[8].lamp = 7;
-  const LampClassifier classifier = trained(lights);
+  const LampClassifier classifier = train_classifier(lights);
   int used = 0;
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
   EXPECT_LE(used, 87);
@@ -90,7 +90,7 @@ TEST(LampClassifier, IsNotMisledByAFewWrongLabels) {
 }
 
 TEST(LampClassifier, TakesUnclearStripesOnlyVeryNearALamp) {
-  const LampClassifier classifier = trained(lights_of(kLamps, 30, 1));
+  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
   Stripes stripes = lights_of(kLamps, 1, 3)[1].stripes;
   ASSERT_EQ(lamp_of(classifier, stripes), 7);
   stripes.period_lines *= 1.025;
@@ -101,9 +101,9 @@ TEST(LampClassifier, TakesUnclearStripesOnlyVeryNearALamp) {
 
 TEST(LampClassifier, DoesNotDependOnTheOrderOfTheLights) {
   auto lights = lights_of(kLamps, 20, 1);
-  const LampClassifier a = trained(lights);
+  const LampClassifier a = train_classifier(lights);
   std::reverse(lights.begin(), lights.end());
-  const LampClassifier b = trained(lights);
+  const LampClassifier b = train_classifier(lights);
   EXPECT_TRUE(a.covariance.isApprox(b.covariance, 1e-9));
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(a.lamps[i].examples, b.lamps[i].examples);

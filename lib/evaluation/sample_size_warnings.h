@@ -16,10 +16,10 @@ std::string unasked_missing(const Evaluation& evaluation, const std::vector<Chec
 
 /// That the theoretical limit is beaten: the noise it is of is stated too large, or the fixes use
 /// more than what it is of, one image of a level camera; empty when it is not. Without a full stop.
-std::string caution_of_limit(const Evaluation& evaluation);
+std::string warning_of_limit(const Evaluation& evaluation);
 
 /// What so few stations or captures (or, of a comparison, pairs' ones) mean for the intervals and
 /// the verdict, a line each without a full stop; none when there are 50 or more.
-std::vector<std::string> cautions_of_few(const Evaluation& evaluation);
+std::vector<std::string> sample_size_warnings(const Evaluation& evaluation);
 
 }  // namespace vlp

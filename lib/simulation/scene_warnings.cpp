@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "simulation/doubts.h"
+#include "simulation/scene_warnings.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,7 @@ std::string whole(double value) { return std::to_string(std::lround(value)); }
 
 void add_brightness(const Scene& scene, const CaptureSet& set, const std::string& bright,
                     double bright_e_per_s, const std::string& dark, double dark_e_per_s,
-                    std::vector<std::string>& doubts) {
+                    std::vector<std::string>& warnings) {
   constexpr double too_dark = 0.03, too_bright = 0.6;
   const double white = white_dn(scene.sensor);
   const std::string fit =
@@ -31,45 +31,45 @@ void add_brightness(const Scene& scene, const CaptureSet& set, const std::string
   const double high = level_of(scene, set, bright_e_per_s);
   const double low = level_of(scene, set, dark_e_per_s);
   if (high - low < too_dark * white) {
-    doubts.push_back(set.folder + ": " + bright + " is only " + whole(high - low) + " of " +
-                     whole(white) + " grey levels above " + dark + fit);
+    warnings.push_back(set.folder + ": " + bright + " is only " + whole(high - low) + " of " +
+                       whole(white) + " grey levels above " + dark + fit);
   }
   if (low > too_bright * white) {
-    doubts.push_back(set.folder + ": " + dark + " is at " + whole(low) + " of " + whole(white) +
-                     " grey levels" + fit);
+    warnings.push_back(set.folder + ": " + dark + " is at " + whole(low) + " of " + whole(white) +
+                       " grey levels" + fit);
   }
 }
 
-void add_stripes(const Scene& scene, const CaptureSet& set, std::vector<std::string>& doubts) {
+void add_stripes(const Scene& scene, const CaptureSet& set, std::vector<std::string>& warnings) {
   constexpr double finest_lines = 2.2;
   for (const SceneLamp& lamp : scene.lamps) {
     const std::string name = set.folder + ": lamp " + std::to_string(lamp.id);
     if (set.exposure_s * lamp.frequency_hz >= 1) {
-      doubts.push_back(name + " has no clear stripes: the exposure is longer than its period");
+      warnings.push_back(name + " has no clear stripes: the exposure is longer than its period");
     } else if (lamp.frequency_hz * *scene.camera.row_time_s * finest_lines > 1) {
-      doubts.push_back(name + " has stripes of less than " +
-                       std::to_string(finest_lines).substr(0, 3) + " lines");
+      warnings.push_back(name + " has stripes of less than " +
+                         std::to_string(finest_lines).substr(0, 3) + " lines");
     }
   }
 }
 
 }  // namespace
 
-std::vector<std::string> doubts_about(const Scene& scene, const CaptureSet& set) {
-  std::vector<std::string> doubts;
+std::vector<std::string> warnings_about(const Scene& scene, const CaptureSet& set) {
+  std::vector<std::string> warnings;
   if (set.board) {
     add_brightness(scene, set, "the board's white", scene.board->white_e_per_s, "its black",
-                   scene.board->black_e_per_s, doubts);
-    return doubts;
+                   scene.board->black_e_per_s, warnings);
+    return warnings;
   }
   double brightest = 0;
   for (const SceneLamp& lamp : scene.lamps) {
     brightest = std::max(brightest, lamp.glow.radiance_e_per_s);
   }
   add_brightness(scene, set, "the brightest lamp", brightest + scene.ambient_e_per_s, "the ceiling",
-                 scene.ambient_e_per_s, doubts);
-  add_stripes(scene, set, doubts);
-  return doubts;
+                 scene.ambient_e_per_s, warnings);
+  add_stripes(scene, set, warnings);
+  return warnings;
 }
 
 }  // namespace vlp

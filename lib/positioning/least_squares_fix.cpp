@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "positioning/weighted_fix.h"
+#include "positioning/least_squares_fix.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -35,7 +35,8 @@ NormalEquations linearize(std::span<const Sighting> sightings, const LevelPose& 
 
 /// The turn is taken along the tangent: equal to the angle where it counts, for small steps.
 LevelPose moved(const LevelPose& pose, const Eigen::Vector4d& step) {
-  return {pose.position_m + step.head<3>(), times(pose.heading, {1, step[3]}).normalized()};
+  return {pose.position_m + step.head<3>(),
+          complex_product(pose.heading, {1, step[3]}).normalized()};
 }
 
 double residual_px(std::span<const Sighting> sightings, const LevelPose& camera) {
@@ -49,7 +50,8 @@ double residual_px(std::span<const Sighting> sightings, const LevelPose& camera)
 
 }  // namespace
 
-std::optional<WeightedFix> fix_weighted(std::span<const Sighting> sightings, const Pose& start) {
+std::optional<LeastSquaresFix> fix_least_squares(std::span<const Sighting> sightings,
+                                                 const Pose& start) {
   constexpr int max_iterations = 50;
   // Of the distance and of a radian: far below any noise, far above rounding.
   constexpr double small_step = 1e-10;
@@ -69,8 +71,8 @@ std::optional<WeightedFix> fix_weighted(std::span<const Sighting> sightings, con
       if (step.head<3>().norm() <= small_step * scale_m && std::abs(step[3]) <= small_step) {
         const Eigen::Matrix4d covariance = normal.information.inverse();
         if (!covariance.allFinite()) return std::nullopt;
-        return WeightedFix{next.pose(), covariance, normal.chi_squared,
-                           residual_px(sightings, next)};
+        return LeastSquaresFix{next.pose(), covariance, normal.chi_squared,
+                               residual_px(sightings, next)};
       }
       const NormalEquations next_normal = linearize(sightings, next);
       if (next_normal.lamps_above &&
@@ -84,7 +86,7 @@ std::optional<WeightedFix> fix_weighted(std::span<const Sighting> sightings, con
 }
 
 Eigen::Matrix<double, 4, 3> rotation_effect(std::span<const Sighting> sightings,
-                                            const WeightedFix& fix) {
+                                            const LeastSquaresFix& fix) {
   const LevelPose camera(fix.pose);
   Eigen::Matrix<double, 4, 2> gradient = Eigen::Matrix<double, 4, 2>::Zero();
   for (const Sighting& sighting : sightings) {

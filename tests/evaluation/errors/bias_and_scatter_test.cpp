@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/errors/station_figures.h"
+#include "evaluation/errors/bias_and_scatter.h"
 
 #include <gmock/gmock.h>
 
@@ -13,7 +13,7 @@ namespace vlp {
 namespace {
 
 /// Two stations with biases of 3 mm and -3 mm along x and fixes 4 mm to either side along y.
-TEST(StationFigures, TellBiasFromScatter) {
+TEST(BiasAndScatter, TellBiasFromScatter) {
   std::vector<FixError> errors;
   for (const std::size_t station : {0U, 1U}) {
     for (const double side : {-4e-3, 4e-3}) {
@@ -21,7 +21,7 @@ TEST(StationFigures, TellBiasFromScatter) {
     }
   }
   errors.push_back({4, {1, 1}, {}, {}, 2, 0});  // alone at its station
-  const auto figures = station_figures(errors, {{"a", {5, 6}, {}, {}}});
+  const auto figures = bias_and_scatter(errors, {{"a", {5, 6}, {}, {}}});
   ASSERT_TRUE(figures);
   ASSERT_EQ(figures->stations.size(), 2);
   EXPECT_EQ(figures->fixes, 4);
@@ -32,14 +32,14 @@ TEST(StationFigures, TellBiasFromScatter) {
   EXPECT_EQ(figures->bias_m, 0);  // 9 of bias^2, and 16 that chance puts there
 }
 
-TEST(StationFigures, FindABiasUnderMoreScatter) {
+TEST(BiasAndScatter, FindABiasUnderMoreScatter) {
   Random random(1);
   std::vector<FixError> errors;
   for (std::size_t i = 0; i < 20000; ++i) {
     errors.push_back(
         {i, {1e-3 + 2e-3 * random.normal(), 2e-3 * random.normal()}, {}, {}, i / 4, 0});
   }
-  const auto figures = station_figures(errors, {{"a", {0, 0}, {}, {}}});
+  const auto figures = bias_and_scatter(errors, {{"a", {0, 0}, {}, {}}});
   // Means of four scatter by as much as the bias is; standard errors are 0.02 and 0.03 mm.
   EXPECT_NEAR(figures->scatter_m, 2e-3 * std::sqrt(2), 0.06e-3);
   EXPECT_NEAR(figures->bias_m, 1e-3, 0.1e-3);

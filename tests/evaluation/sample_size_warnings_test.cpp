@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/cautions.h"
+#include "evaluation/sample_size_warnings.h"
 
 #include <gmock/gmock.h>
 
@@ -43,43 +43,44 @@ TEST(Cautions, TellOfMissingFixesThatNoGateAsksFor) {
 }
 
 TEST(Cautions, TellOfFewUnits) {
-  EXPECT_THAT(cautions_of_few(evaluation(50)), IsEmpty());
-  EXPECT_THAT(cautions_of_few(evaluation(49)),
+  EXPECT_THAT(sample_size_warnings(evaluation(50)), IsEmpty());
+  EXPECT_THAT(sample_size_warnings(evaluation(49)),
               ElementsAre("of so few as 49 stations intervals are somewhat too narrow, that of p90 "
                           "most"));
-  EXPECT_THAT(cautions_of_few(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
+  EXPECT_THAT(sample_size_warnings(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
   Evaluation path = evaluation(30);  // as many runs as a path ever has
   path.against = "path";
-  EXPECT_THAT(cautions_of_few(path), IsEmpty());
+  EXPECT_THAT(sample_size_warnings(path), IsEmpty());
   Evaluation none = evaluation(4);
   none.intervals_m = {};
-  EXPECT_THAT(cautions_of_few(none),
+  EXPECT_THAT(sample_size_warnings(none),
               ElementsAre("there are too few stations with a fix for intervals"));
 }
 
 TEST(Cautions, TellOfALimitThatIsBeaten) {
   Evaluation limited = evaluation(1000);
-  EXPECT_EQ(caution_of_limit(limited), "");
+  EXPECT_EQ(warning_of_limit(limited), "");
   limited.limit = LimitRatio{0.609, 1e-3, 36, 1.0 / 12};
-  EXPECT_THAT(caution_of_limit(limited),
+  EXPECT_THAT(warning_of_limit(limited),
               AllOf(HasSubstr("0.609 times the theoretical limit: either the noise of a lamp's "
                               "pixel is stated too large, or the fixes use more than one image"),
                     Not(HasSubstr("nothing beats"))));
   limited.limit->horizontal = 0.9;
-  EXPECT_EQ(caution_of_limit(limited), "");
+  EXPECT_EQ(warning_of_limit(limited), "");
 }
 
 TEST(Cautions, CountTheUnitsOfThePairs) {
   Evaluation compared = evaluation(1000);
   compared.comparison = Comparison{};
   compared.comparison->units = 8;
-  EXPECT_THAT(cautions_of_few(compared),
+  EXPECT_THAT(sample_size_warnings(compared),
               ElementsAre("of so few as 8 stations with a fix in both files a comparison is no "
                           "evidence, which takes 20"));
   compared.comparison->units = 49;
-  EXPECT_THAT(cautions_of_few(compared), ElementsAre(HasSubstr("49 stations with a fix in both")));
+  EXPECT_THAT(sample_size_warnings(compared),
+              ElementsAre(HasSubstr("49 stations with a fix in both")));
   compared.comparison->units = 50;
-  EXPECT_THAT(cautions_of_few(compared), IsEmpty());
+  EXPECT_THAT(sample_size_warnings(compared), IsEmpty());
 }
 
 }  // namespace

@@ -1,12 +1,17 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "positioning/frame_fix.h"
+#include "positioning/robust_fix.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/LU>
+
+#include "positioning/initial_pose.h"
+#include "positioning/two_lamp_fix.h"
+
 namespace vlp {
+
 namespace {
 
 // The stated noise does not explain residuals beyond five of its standard deviations. A majority
@@ -17,7 +22,7 @@ constexpr double kTooNoisy = kTooNoisySigmas * kTooNoisySigmas;
 constexpr double kClearGain = 100;
 
 /// Squared residuals over what the stated noise lets expect.
-double excess_of(const WeightedFix& fix, std::size_t lamps) {
+double excess_of(const LeastSquaresFix& fix, std::size_t lamps) {
   return fix.chi_squared / static_cast<double>(2 * lamps - 4);
 }
 
@@ -104,7 +109,7 @@ void SightedFrame::keep(const std::bitset<kMaxSightings>& kept) {
   size = next;
 }
 
-ConsistentFix fix_frame(SightedFrame& frame, double max_residual_share) {
+ConsistentFix fix_robustly(SightedFrame& frame, double max_residual_share) {
   const double limit = limit_of(frame, max_residual_share);
   const ConsistentFix all = fix_consistent(frame.span(), limit);
   if (frame.size < 3) return all;
@@ -118,6 +123,82 @@ ConsistentFix fix_frame(SightedFrame& frame, double max_residual_share) {
   if (!majority) return all;
   frame.keep(majority->agreeing);
   return fix_consistent(frame.span(), limit_of(frame, max_residual_share));
+}
+
+namespace {
+
+struct Vote {
+  Consensus consensus;
+  double sum_of_squares;
+};
+
+Vote vote(std::span<const Sighting> sightings, const Pose& pose, double max_residual) {
+  const LevelPose camera(pose);
+  Vote result{{pose, {}, 0}, 0};
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    if (!(height_above(camera, sightings[i].lamp_m) > 0)) continue;
+    const double square = (sightings[i].z - predicted_z(camera, sightings[i].lamp_m)).squaredNorm();
+    if (!(square <= max_residual * max_residual)) continue;
+    result.consensus.agreeing.set(i);
+    ++result.consensus.count;
+    result.sum_of_squares += square;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::optional<Consensus> find_consensus(std::span<const Sighting> sightings, double max_residual) {
+  const std::size_t n = sightings.size();
+  const std::size_t stride = 1 + n / 65;
+  Vote best{{{}, {}, 0}, 0};
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = i + 1; j < n; j += stride) {
+      const TwoLampFix pair = fix_two_lamps(sightings[i], sightings[j]);
+      for (int k = 0; k < pair.count; ++k) {
+        const Vote next = vote(sightings, pair.poses[static_cast<std::size_t>(k)], max_residual);
+        const bool wins = next.consensus.count > best.consensus.count ||
+                          (next.consensus.count == best.consensus.count &&
+                           next.sum_of_squares < best.sum_of_squares);
+        if (wins) best = next;
+      }
+    }
+  }
+  if (best.consensus.count < 3 || 2 * best.consensus.count <= n) return std::nullopt;
+  return best.consensus;
+}
+
+namespace {
+
+bool agree(std::span<const Sighting> sightings, const Pose& pose, double max_residual) {
+  const LevelPose camera(pose);
+  return std::all_of(sightings.begin(), sightings.end(), [&](const Sighting& sighting) {
+    return (sighting.z - predicted_z(camera, sighting.lamp_m)).norm() <= max_residual;
+  });
+}
+
+}  // namespace
+
+ConsistentFix fix_consistent(std::span<const Sighting> sightings, double max_residual) {
+  const InitialPose start = initial_pose(sightings);
+  if (start.status != FixStatus::ok) return {start.status, {}};
+  const auto fix = fix_least_squares(sightings, start.pose);
+  if (!fix) return {FixStatus::degenerate, {}};
+  const double height_m = sightings.front().lamp_m.z() - fix->pose.position_m.z();
+  if (!(fix->covariance(2, 2) < height_m * height_m)) return {FixStatus::degenerate, *fix};
+  if (sightings.size() > 2 && !agree(sightings, fix->pose, max_residual)) {
+    return {FixStatus::inconsistent, *fix};
+  }
+  return {FixStatus::ok, *fix};
+}
+
+double spread_of(std::span<const Sighting> sightings) {
+  const double n = static_cast<double>(sightings.size());
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Sighting& sighting : sightings) mean += sighting.z / n;
+  double sum = 0;
+  for (const Sighting& sighting : sightings) sum += (sighting.z - mean).squaredNorm();
+  return std::sqrt(sum / n);
 }
 
 }  // namespace vlp

@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-struct WeightedFix {
+struct LeastSquaresFix {
   Pose pose;
   /// Of (X, Y, Zs, g) in metres and radians: (J^T W J)^-1 for the pixels' sigma_px.
   Matrix4 covariance;
@@ -27,11 +27,12 @@ struct WeightedFix {
 /// over (X, Y, Zs, g) by Gauss-Newton steps, halved where they do not help, from `start`.
 /// Nothing when a lamp is not above `start`, when the lamps do not determine the state, or when
 /// 50 steps do not converge.
-std::optional<WeightedFix> fix_weighted(std::span<const Sighting> sightings, const Pose& start);
+std::optional<LeastSquaresFix> fix_least_squares(std::span<const Sighting> sightings,
+                                                 const Pose& start);
 
 /// What a small rotation of the level frame about each of its axes does to (X, Y, Zs, g) of `fix`,
-/// which fix_weighted() gave for `sightings`: metres and radians per radian.
+/// which fix_least_squares() gave for `sightings`: metres and radians per radian.
 Eigen::Matrix<double, 4, 3> rotation_effect(std::span<const Sighting> sightings,
-                                            const WeightedFix& fix);
+                                            const LeastSquaresFix& fix);
 
 }  // namespace vlp

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/cautions.h"
+#include "evaluation/sample_size_warnings.h"
 
 #include <algorithm>
 
@@ -28,7 +28,7 @@ std::string unasked_missing(const Evaluation& evaluation, const std::vector<Chec
          " no fix, and no gate 'missing' asks";
 }
 
-std::string caution_of_limit(const Evaluation& evaluation) {
+std::string warning_of_limit(const Evaluation& evaluation) {
   const auto& limit = evaluation.limit;
   if (!limit || !limit->beaten()) return "";
   constexpr int digits = 3;
@@ -38,28 +38,28 @@ std::string caution_of_limit(const Evaluation& evaluation) {
          "(other frames, a known height, lamps partly in view, a camera that leans)";
 }
 
-std::vector<std::string> cautions_of_few(const Evaluation& evaluation) {
-  std::vector<std::string> cautions;
+std::vector<std::string> sample_size_warnings(const Evaluation& evaluation) {
+  std::vector<std::string> warnings;
   const std::string& drawn = evaluation.drawn;
   if (const auto& intervals = evaluation.intervals_m; !intervals) {
-    cautions.push_back("there are too few " + drawn + " with a fix for intervals");
+    warnings.push_back("there are too few " + drawn + " with a fix for intervals");
   } else if (intervals->units < (evaluation.against == "truth" ? kEnoughUnits : kPathRuns)) {
     const std::string p90 =
         intervals->p90 ? ", that of p90 most"
                        : ", and p90 has none, which takes " + std::to_string(kFewestUnitsOfP90);
-    cautions.push_back(so_few(intervals->units, drawn) + "intervals are somewhat too narrow" + p90);
+    warnings.push_back(so_few(intervals->units, drawn) + "intervals are somewhat too narrow" + p90);
   }
   if (const auto& comparison = evaluation.comparison; !comparison) {
-    return cautions;
+    return warnings;
   } else if (comparison->too_few()) {
-    cautions.push_back(so_few(comparison->units, drawn) +
+    warnings.push_back(so_few(comparison->units, drawn) +
                        "with a fix in both files a comparison is no evidence, which takes " +
                        std::to_string(kFewestUnitsCompared));
   } else if (comparison->units < kEnoughUnits) {
-    cautions.push_back(so_few(comparison->units, drawn) +
+    warnings.push_back(so_few(comparison->units, drawn) +
                        "with a fix in both files the difference's interval is somewhat too narrow");
   }
-  return cautions;
+  return warnings;
 }
 
 }  // namespace vlp

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/errors/station_figures.h"
+#include "evaluation/errors/bias_and_scatter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +17,8 @@ struct Sums {
 
 }  // namespace
 
-std::optional<StationFigures> station_figures(const std::vector<FixError>& errors,
-                                              const std::vector<TruthRow>& truth) {
+std::optional<BiasAndScatter> bias_and_scatter(const std::vector<FixError>& errors,
+                                               const std::vector<TruthRow>& truth) {
   std::vector<Sums> sums;
   for (const FixError& error : errors) {
     if (error.unit >= sums.size()) sums.resize(error.unit + 1);
@@ -33,7 +33,7 @@ std::optional<StationFigures> station_figures(const std::vector<FixError>& error
     const Eigen::Vector2d bias_m = station.errors_m / static_cast<double>(station.fixes);
     station.squared_deviations_m2 += (error.horizontal_m - bias_m).squaredNorm();
   }
-  StationFigures figures{{}, 0, 0, 0};
+  BiasAndScatter figures{{}, 0, 0, 0};
   double squared_deviations_m2 = 0, squared_biases_m2 = 0;
   for (const Sums& station : sums) {
     if (station.fixes < 2) continue;

@@ -5,13 +5,48 @@
 #include <array>
 #include <bitset>
 #include <cstddef>
+#include <optional>
 #include <span>
 
-#include "consensus.h"
-#include "consistent_fix.h"
+#include "../geometry/frames.h"
+#include "fix.h"
+#include "least_squares_fix.h"
 #include "sighting.h"
 
 namespace vlp {
+
+/// The most sightings that one frame may have.
+inline constexpr std::size_t kMaxSightings = 256;
+
+/// Which sightings agree with a pose.
+struct Consensus {
+  Pose pose;
+  std::bitset<kMaxSightings> agreeing;
+  std::size_t count;
+};
+
+/// The largest set of sightings that one pose explains, each within `max_residual` of the
+/// sighting's z: every pair of lamps proposes its poses, the one with the most agreeing lamps wins,
+/// and of several the one with the least squared residuals. Nothing without a majority of three or
+/// more. Of more than 64 lamps the pairs are a fixed selection. Precondition: at most
+/// kMaxSightings.
+std::optional<Consensus> find_consensus(std::span<const Sighting> sightings, double max_residual);
+
+struct ConsistentFix {
+  /// `ok`, or why there is none.
+  FixStatus status;
+  LeastSquaresFix fix;
+};
+
+/// The least-squares fix of two or more lamps from initial_pose(), looked at critically:
+///   degenerate    the lamps do not determine it: the standard deviation of the height exceeds the
+///                 height;
+///   inconsistent  of three or more, one is farther in z than `max_residual` from where the fix
+///                 sees it.
+ConsistentFix fix_consistent(std::span<const Sighting> sightings, double max_residual);
+
+/// Root of the mean squared distance of the sightings from their mean, in z.
+double spread_of(std::span<const Sighting> sightings);
 
 /// The lamps of one frame, in room of a fixed size so that nothing is allocated.
 struct SightedFrame {
@@ -43,6 +78,6 @@ struct SightedFrame {
 /// explain their residuals: if the mirror image is a hundred times better, it is `mirrored_map`;
 /// where all noise is stated and it explains the residuals of a majority, and a hundred times
 /// better, the others are rejected.
-ConsistentFix fix_frame(SightedFrame& frame, double max_residual_share);
+ConsistentFix fix_robustly(SightedFrame& frame, double max_residual_share);
 
 }  // namespace vlp

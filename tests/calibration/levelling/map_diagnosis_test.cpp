@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "calibration/levelling/map_doubt.h"
+#include "calibration/levelling/map_diagnosis.h"
 
 #include <gmock/gmock.h>
 
@@ -26,7 +26,7 @@ class MapDoubt : public testing::Test {
     camera.camera = rig.calibration.camera;
     return camera;
   }
-  std::string doubt() const { return doubt_of_map(frames, map, camera_alone()); }
+  std::string doubt() const { return diagnose_map(frames, map, camera_alone()); }
   bool contradicted() const { return contradicts_map(frames, map, camera_alone()); }
 };
 

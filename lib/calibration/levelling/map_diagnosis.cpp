@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "calibration/levelling/map_doubt.h"
+#include "calibration/levelling/map_diagnosis.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -78,7 +78,7 @@ Exchange best_exchange(const std::vector<std::vector<Detection>>& captures, Lamp
 
 }  // namespace
 
-std::string doubt_of_map(std::span<const Frame> frames, const LampMap& map,
+std::string diagnose_map(std::span<const Frame> frames, const LampMap& map,
                          const Calibration& calibration) {
   const auto captures = captures_of(frames, map);
   const auto are_most = [&](std::size_t count) { return 2 * count > captures.size(); };

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "positioning/consensus.h"
+#include "positioning/robust_fix.h"
 
 #include <gtest/gtest.h>
 

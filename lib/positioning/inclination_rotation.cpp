@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "positioning/lean.h"
+#include "positioning/inclination_rotation.h"
 
 #include <cmath>
 
 namespace vlp {
 
-Lean lean_of(const Inclination& inclination, double yaw_in_robot_rad) {
+InclinationRotation inclination_rotation(const Inclination& inclination, double yaw_in_robot_rad) {
   const Eigen::Matrix3d base_from_robot = rotation_about_z(-yaw_in_robot_rad);
   const double pitch_rad = inclination.pitch_rad;
-  Lean lean;
+  InclinationRotation lean;
   lean.level_from_base =
       base_from_robot * level_from_inclination(inclination) * base_from_robot.transpose();
   lean.error_axes.col(0) =

@@ -12,7 +12,7 @@
 namespace vlp {
 
 /// Bias against scatter, over the stations that have two fixes or more.
-struct StationFigures {
+struct BiasAndScatter {
   struct Station {
     /// Where its first capture was.
     Eigen::Vector2d xy_m;
@@ -33,7 +33,7 @@ struct StationFigures {
 };
 
 /// Of errors_against_truth(). Nothing when no station has two fixes.
-std::optional<StationFigures> station_figures(const std::vector<FixError>& errors,
-                                              const std::vector<TruthRow>& truth);
+std::optional<BiasAndScatter> bias_and_scatter(const std::vector<FixError>& errors,
+                                               const std::vector<TruthRow>& truth);
 
 }  // namespace vlp

@@ -17,8 +17,8 @@ namespace vlp {
 ///   swapped   when most of them fit the map once two lamps change places, twice as many as for any
 ///             other two lamps and as without.
 /// Whatever sigma_px the detections state, a lamp contradicts the others as it does where none is
-/// stated (fix_frame); a tilt that is not in the calibration may be up to five degrees.
-std::string doubt_of_map(std::span<const Frame> frames, const LampMap& map,
+/// stated (fix_robustly); a tilt that is not in the calibration may be up to five degrees.
+std::string diagnose_map(std::span<const Frame> frames, const LampMap& map,
                          const Calibration& calibration);
 
 /// Whether most of the captures of three lamps or more have no fix, by the same rules.
