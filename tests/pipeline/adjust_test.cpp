@@ -135,7 +135,7 @@ TEST_F(Adjust, WantsToKnowWhatTheSurveyIsWorth) {
 
 TEST_F(Adjust, EstimatesALensThatStatesNothing) {
   const std::vector<double> truth = rig.calibration.camera.intrinsics;
-  rig.calibration.camera.focal_px().x() *= 0.97;
+  rig.calibration.camera.intrinsics[0] *= 0.97;
   EXPECT_THAT(adjust("--map-sd-m 0.001").output,
               HasSubstr("taken as exact: the calibration has no"));
   const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");

@@ -62,7 +62,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"UnknownKey", "lamps.yaml", "diameter_m", "diameter_mm", ":3: lamps[0]: "},
         Bad{"WrongUnit", "lamps.yaml", "1.6]", "1600]", ":3: lamps[0].position_m[2]: 1600 m"},
         Bad{"DuplicateLamp", "lamps.yaml", "id: 2", "id: 1", ":4: lamps[1]: "},
-        Bad{"NotANumber", "calibration.yaml", "520,", ".nan,", "camera.focal_px().x(): "},
+        Bad{"NotANumber", "calibration.yaml", "520,", ".nan,", "camera.intrinsics[0]: "},
         Bad{"LensModel", "calibration.yaml", "OPENCV8", "OPENCV5", "camera.intrinsics: "},
         Bad{"Truncated", "calibration.yaml", "\nrotation_center", "", ""},
         Bad{"Binary", "lamps.yaml", "format", std::string("\0\1\2", 3), ":1: "},

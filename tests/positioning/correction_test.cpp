@@ -20,7 +20,7 @@ Eigen::Vector2d seen_at(const Eigen::Matrix3d& level_from_camera, const Eigen::V
 class CorrectionTest : public testing::Test {
  protected:
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
-  Eigen::Vector2d focal_px{calibration.camera.focal_px().x(), calibration.camera.intrinsics[1]};
+  Eigen::Vector2d focal_px = calibration.camera.focal_px();
   Eigen::Vector2d z{0.3, -0.2};
 };
 

@@ -83,7 +83,7 @@ TEST(Archive, DrawsWithinTheSpreadsACameraAtATime) {
     focal_lengths.insert(first.scene.camera.focal_px().x());
     seeds.insert({first.scene.seed, second.scene.seed});
     EXPECT_NEAR(first.scene.camera.focal_px().x(), 100, 1);
-    EXPECT_NEAR(first.scene.camera.intrinsics[1] / first.scene.camera.focal_px().x(), 1.01, 1e-12);
+    EXPECT_NEAR(first.scene.camera.focal_px().y() / first.scene.camera.focal_px().x(), 1.01, 1e-12);
     EXPECT_NEAR(first.scene.camera.intrinsics[2], 80, 3);
     EXPECT_LE((first.scene.mount.lever_arm_m - scene.mount.lever_arm_m).lpNorm<Eigen::Infinity>(),
               0.003);

@@ -142,7 +142,7 @@ TEST(Adjustment, CorrectsTheLensWithinItsCovarianceAndNamesAnotherLens) {
   ASSERT_TRUE(right.ok());
   EXPECT_FALSE(right.lens_contradicted);
   EXPECT_LT(right.lens_chi_squared, 1e-3);
-  camera.focal_px().x() += 30 * std::sqrt(covariance(0, 0));
+  camera.intrinsics[0] += 30 * std::sqrt(covariance(0, 0));
   const AdjustmentResult wrong = adjust_captures(survey.input);
   ASSERT_TRUE(wrong.ok());
   EXPECT_TRUE(wrong.lens_contradicted) << wrong.lens_chi_squared << " of " << wrong.lens_freedom;
@@ -169,7 +169,7 @@ TEST(Adjustment, FindsALensOfWhichNothingIsStated) {
   const std::vector<double> truth = camera.intrinsics;
   survey.five_places(1e-4);
   survey.add_noise(random, true, true, true);
-  camera.focal_px().x() *= 0.96;
+  camera.intrinsics[0] *= 0.96;
   camera.intrinsics[1] *= 0.97;
   camera.intrinsics[2] += 5;
   camera.intrinsics[4] += 0.03;
