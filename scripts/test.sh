@@ -9,4 +9,4 @@ cd "$(dirname "$0")/.."
 scripts/setup.sh --tests
 cmake --preset release -DVLP_TOOLBOX=ON -DBUILD_TESTING=ON -DVLP_WARNINGS_AS_ERRORS="${CI:+ON}"
 cmake --build --preset release
-ctest --preset release --parallel "$(nproc)"
+ctest --preset release --parallel $(($(nproc) + 1))  # some wait for others

@@ -18,8 +18,8 @@ Eigen::Matrix3d level_from_inclination(const Inclination& inclination) {
 }
 
 Eigen::Matrix3d level_from_zenith(const Eigen::Vector3d& zenith_in_camera) {
-  assert(zenith_in_camera.z() > 0);
   const Eigen::Vector3d up = zenith_in_camera.normalized();
+  assert(up.z() > -1);
   // Rodrigues' formula for the rotation u -> e_z, free of trigonometry: the axis times the sine
   // is u x e_z = (u_y, -u_x, 0) and the cosine is u_z.
   const double k = 1.0 / (1.0 + up.z());

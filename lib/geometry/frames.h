@@ -34,7 +34,7 @@ Eigen::Matrix3d rotation_about_z(double yaw_rad);
 Eigen::Matrix3d level_from_inclination(const Inclination& inclination);
 
 /// level_from_camera of a calibrated tilt: the smallest rotation that turns `zenith_in_camera`
-/// (the direction of up; any length but zero, z > 0) to +Z. It adds no yaw.
+/// (the direction of up; any length but zero, not -Z) to +Z. It adds no yaw.
 Eigen::Matrix3d level_from_zenith(const Eigen::Vector3d& zenith_in_camera);
 
 /// x_in_level of a world point seen from `level`.

@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "geometry/homography.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
+
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -39,8 +40,8 @@ Eigen::Matrix3d homography(std::span<const PlanePair> pairs) {
         Eigen::RowVector3d::Zero(), from.transpose(), -to.y() * from.transpose();
     squares += rows.transpose() * rows;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(squares);
-  const Eigen::Matrix<double, 9, 1> smallest = solver.eigenvectors().col(0);
+  const Eigen::Matrix<double, 9, 1> smallest =
+      symmetric_eigen(Eigen::MatrixXd(squares)).vectors.col(0);
   const Eigen::Matrix3d fitted =
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(smallest.data());
   return to_normal.inverse() * fitted * from_normal;

@@ -34,4 +34,8 @@ std::optional<Eigen::Matrix4d> inverse_of_positive(const Eigen::Matrix4d& matrix
   return inverse;
 }
 
+Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return a.ldlt().solve(b);
+}
+
 }  // namespace vlp

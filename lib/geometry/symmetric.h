@@ -25,4 +25,7 @@ SymmetricEigen<Eigen::Dynamic> symmetric_eigen(const Eigen::MatrixXd& matrix);
 /// positive, or has no finite inverse.
 std::optional<Eigen::Matrix4d> inverse_of_positive(const Eigen::Matrix4d& matrix);
 
+/// A^-1 B by LDL^T.
+Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+
 }  // namespace vlp

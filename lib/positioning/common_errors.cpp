@@ -34,19 +34,20 @@ void add_turns(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibrati
 Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, Eigen::Index size) {
   if (size == 0) return Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols());
   if (first + size == covariance.rows()) return covariance;  // what is left is theirs alone
-  const auto columns = covariance.middleCols(first, size);
+  const Eigen::MatrixXd columns = covariance.middleCols(first, size);
   const Eigen::VectorXd sd = columns.middleRows(first, size).diagonal().cwiseMax(0).cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
-  const auto eigen = symmetric_eigen(Eigen::MatrixXd(
-      inverse_sd.asDiagonal() * columns.middleRows(first, size) * inverse_sd.asDiagonal()));
+  const Eigen::MatrixXd scaled = columns * inverse_sd.asDiagonal();
+  const auto eigen = symmetric_eigen(
+      Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
   constexpr double rounding = 1e-12;
   const Eigen::ArrayXd values = eigen.values;
   const Eigen::VectorXd whitening =
       (values > rounding * static_cast<double>(size))
           .select(values.max(1e-300).rsqrt(), Eigen::ArrayXd::Zero(size));
-  const Eigen::MatrixXd root =
-      columns * inverse_sd.asDiagonal() * eigen.vectors * whitening.asDiagonal();
+  Eigen::MatrixXd root = scaled * eigen.vectors;
+  root *= whitening.asDiagonal();
   Eigen::MatrixXd known = root * root.transpose();
   known.middleRows(first, size) = columns.transpose();
   known.middleCols(first, size) = columns;

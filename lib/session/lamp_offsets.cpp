@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "session/lamp_offsets.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -11,6 +9,7 @@
 #include "geometry/median.h"
 #include "geometry/plane.h"
 #include "geometry/similarity.h"
+#include "geometry/symmetric.h"
 #include "rig/find_lamp.h"
 
 namespace vlp {
@@ -47,8 +46,11 @@ Eigen::MatrixXd similarities(const std::vector<Eigen::Vector2d>& points,
     moves.block<2, 1>(2 * i, 2) = Eigen::Vector2d(-at.y(), at.x());
     moves.block<2, 1>(2 * i, 3) = at * scales[static_cast<std::size_t>(i)];
   }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(moves);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(2 * count, qr.rank());
+  const auto [squares, directions] = symmetric_eigen(Eigen::MatrixXd(moves.transpose() * moves));
+  constexpr double rounding = 1e-12;
+  const auto rank = (squares.array() > rounding * squares.maxCoeff()).count();
+  return moves * directions.rightCols(rank) *
+         squares.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
 /// What the capture says of its lamps, whatever its fix: the projector onto it.
@@ -123,10 +125,12 @@ std::optional<Displacements> solved(const LampMap& map, const std::vector<Ceilin
   if (freedoms <= 0) return std::nullopt;
   const Eigen::MatrixXd closed =
       found.projector * normal * found.projector + open * open.transpose();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(closed);
+  const auto [weights, directions] = symmetric_eigen(closed);
   constexpr double tied = 1e-9;
-  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > tied)) return std::nullopt;
-  found.moved_m = factor.solve(found.projector * gradient);
+  if (!(weights.minCoeff() > tied)) return std::nullopt;
+  const Eigen::MatrixXd inverse =
+      directions * weights.cwiseInverse().asDiagonal() * directions.transpose();
+  found.moved_m = inverse * (found.projector * gradient);
   double squares_m2 = 0;
   for (std::size_t c = 0; c < views.size(); ++c) {
     Eigen::VectorXd moved(told[c].rows());
@@ -137,7 +141,7 @@ std::optional<Displacements> solved(const LampMap& map, const std::vector<Ceilin
     squares_m2 += found.residuals_m.emplace_back(off_m[c] - told[c] * moved).squaredNorm();
   }
   found.covariance_m2 =
-      squares_m2 / static_cast<double>(freedoms) * found.projector * factor.solve(found.projector);
+      squares_m2 / static_cast<double>(freedoms) * found.projector * inverse * found.projector;
   return found;
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "camera/lens.h"
+#include "geometry/frames.h"
 #include "rig/board_layout.h"
 #include "simulation/picture.h"
 #include "simulation/seeded_random.h"
@@ -144,8 +145,7 @@ BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t inde
   const double distance_m = random.uniform(views.distance_m.first, views.distance_m.second);
   const double azimuth = std::numbers::pi * share(), tilt = views.tilt_rad * std::abs(share());
   const double roll = views.roll_rad * share();
-  const Eigen::Matrix3d facing =
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), sight).toRotationMatrix();
+  const Eigen::Matrix3d facing = level_from_zenith(sight).transpose();
   const Eigen::Vector3d tilt_axis(std::cos(azimuth), std::sin(azimuth), 0);
 
   BoardShot shot;

@@ -4,7 +4,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -224,7 +223,7 @@ double AdjustmentProblem::told_of_motion(std::size_t index) const {
   const Eigen::VectorXd weights = motion_prior(capture).weights;
   own.diagonal().tail(size) += weights.cwiseAbs2();
   const Eigen::MatrixXd covariance =
-      own.ldlt().solve(Eigen::MatrixXd::Identity(capture.size(), capture.size()));
+      solve_symmetric(own, Eigen::MatrixXd::Identity(capture.size(), capture.size()));
   return static_cast<double>(size) - covariance.diagonal().tail(size).dot(weights.cwiseAbs2());
 }
 
@@ -604,7 +603,7 @@ Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
       mixed.col(i) = block.mixed[static_cast<std::size_t>(i)].head(size);
     }
     const Eigen::MatrixXd taken =
-        mixed.transpose() * known.topLeftCorner(size, size).ldlt().solve(mixed);
+        mixed.transpose() * solve_symmetric(known.topLeftCorner(size, size), mixed);
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j < n; ++j) {
         information(block.columns[static_cast<std::size_t>(i)],
@@ -615,8 +614,8 @@ Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   Eigen::MatrixXd covariance =
-      scale.asDiagonal() * scaled.ldlt().solve(Eigen::MatrixXd::Identity(at.shared, at.shared)) *
-      scale.asDiagonal();
+      scale.asDiagonal() *
+      solve_symmetric(scaled, Eigen::MatrixXd::Identity(at.shared, at.shared)) * scale.asDiagonal();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     if (lamps[i].sd_m > 0) continue;

@@ -4,7 +4,6 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,6 +19,7 @@
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/spline_fit.h"
+#include "geometry/symmetric.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -238,7 +238,7 @@ FittedCamera with_lens_model(const Camera& camera, LensModel model) {
   for (int i = 0; i < most_steps && at.count > 0 && !is_splined(model); ++i) {
     Eigen::MatrixXd damped = at.normal;
     damped.diagonal() *= 1 + damping;
-    const Eigen::VectorXd change = damped.ldlt().solve(at.right);
+    const Eigen::VectorXd change = solve_symmetric(damped, at.right);
     std::vector<double> next = parameters;
     for (std::size_t k = 0; k < next.size(); ++k) next[k] += change[static_cast<Eigen::Index>(k)];
     const bool possible = change.allFinite() && next[0] > 0 && next[1] > 0;

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/edge_shift.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include "calibration/intrinsics/rotation_vector.h"
 #include "calibration/intrinsics/view_pose.h"
 #include "geometry/median.h"
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -31,7 +31,7 @@ struct ShiftEquations {
     Column sum = right;
     all.diagonal().tail<4>() += weights;
     sum.tail<4>() += weights.cwiseProduct(usual);
-    const Column solution = all.ldlt().solve(sum);
+    const Column solution = solve_symmetric(all, sum);
     EdgeShift result = shift;
     if (solution.allFinite()) result.by = solution.tail<4>();
     return result;

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/view_pose.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
@@ -10,6 +9,8 @@
 #include <vector>
 
 #include "calibration/intrinsics/rotation_vector.h"
+#include "geometry/frames.h"
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -52,7 +53,7 @@ std::optional<Placed> stepped(Corners corners, const Lens& lens, const Placed& p
     right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
   }
   normal.diagonal() *= 1 + damping;
-  const Eigen::Matrix<double, 6, 1> step = normal.ldlt().solve(right);
+  const Eigen::Matrix<double, 6, 1> step = solve_symmetric(normal, right);
   if (!step.allFinite()) return {};
   const double angle = step.head<3>().norm();
   const Eigen::Vector3d axis =
@@ -105,8 +106,7 @@ std::optional<ViewPose> view_pose(Corners corners, const Lens& lens) {
     rays.emplace_back(&corner, ray->direction.normalized());
     middle += rays.back().second;
   }
-  const Eigen::Matrix3d turned_from_camera =
-      Eigen::Quaterniond::FromTwoVectors(middle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Matrix3d turned_from_camera = level_from_zenith(middle);
   std::vector<cv::Point3d> in_board;
   std::vector<cv::Point2d> normalized;
   for (const auto& [corner, ray] : rays) {
