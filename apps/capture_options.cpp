@@ -108,33 +108,47 @@ std::vector<std::string> inputs_of(const CaptureOptions& options) {
   return {options.images, options.lamps, options.calibration, options.classifier};
 }
 
-SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
-                    const std::optional<Calibration>& calibration) {
+LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
+                       const std::optional<Calibration>& calibration) {
+  return {options.images,      lamps,
+          options.lamps,       calibration,
+          options.calibration, options.row_time_s,
+          options.classifier,  options.readout,
+          options.exposure_s,  options.annotate,
+          options.threads,     options.max_mpx,
+          options.every};
+}
+
+void tell_of_lights(const std::vector<LightsOfImage>& lights) {
+  if (!spdlog::should_log(spdlog::level::debug)) return;
+  for (const auto& [image, of_image] : lights) {
+    for (const Light& light : of_image) spdlog::debug("{}: {}", image, line_of(light));
+  }
+}
+
+SeenLamps look_for_lamps(const CaptureOptions& options, const LampMap& lamps,
+                         const std::optional<Calibration>& calibration) {
   if (!is_video_name(options.images)) {
     for (const auto& image : images_in(options.images)) {
       check_output(options.output, {image.string()});
       if (!options.lights.empty()) check_output(options.lights, {image.string()});
     }
   }
-  const LampImages images{options.images,      lamps,
-                          options.lamps,       calibration,
-                          options.calibration, options.row_time_s,
-                          options.classifier,  options.readout,
-                          options.exposure_s,  options.annotate,
-                          options.threads,     options.max_mpx,
-                          options.every};
   SeenLamps seen;
   {
     Progress progress("images");
-    seen = see_lamps(images,
+    seen = see_lamps(lamp_images(options, lamps, calibration),
                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   tell(seen);
-  if (spdlog::should_log(spdlog::level::debug))
-    for (const auto& [image, lights] : seen.lights) {
-      for (const Light& light : lights) spdlog::debug("{}: {}", image, line_of(light));
-    }
+  tell_of_lights(seen.lights);
   if (!options.lights.empty()) write_lights(options.lights, seen.lights);
+  return seen;
+}
+
+SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
+                    const std::optional<Calibration>& calibration) {
+  SeenLamps seen = look_for_lamps(options, lamps, calibration);
   require(seen);
   return seen;
 }

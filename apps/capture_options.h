@@ -84,9 +84,20 @@ void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_de
 /// input that was not given.
 std::vector<std::string> inputs_of(const CaptureOptions& options);
 
+/// For see_lamps() of the session.
+LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
+                       const std::optional<Calibration>& calibration);
+
+/// Each light, for --verbose.
+void tell_of_lights(const std::vector<LightsOfImage>& lights);
+
 /// The lamps in a folder of images, or in a video, with progress, and with what there is to say of
-/// it. Neither `output` nor `lights` may be one of the images. Throws as see_lamps(), and when that
-/// fails, with `lights` written.
+/// it, and with `lights` written; whether there are some is not required. Neither `output` nor
+/// `lights` may be one of the images. Throws as see_lamps().
+SeenLamps look_for_lamps(const CaptureOptions& options, const LampMap& lamps,
+                         const std::optional<Calibration>& calibration);
+
+/// The same, and throws when it fails.
 SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
                     const std::optional<Calibration>& calibration);
 

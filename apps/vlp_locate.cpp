@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-locate: identified lamps in images -> positions.
 #include <fmt/core.h>
+#include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include "capture_options.h"
 #include "geometry/angles.h"
 #include "rig/detection.h"
+#include "session/leaning_captures.h"
 #include "session/locate_step.h"
 #include "session/session_folder.h"
 #include "step_outcome.h"
@@ -101,15 +103,10 @@ void print_summary(const FixSummary& summary) {
   }
 }
 
-void run(const Options& options) {
-  std::vector<std::string> inputs = inputs_of(options.images);
-  inputs.push_back(options.captures);
-  check_output(options.images.output, inputs);
-  const CapturesTable captures = captures_of(options);
-  LampCaptures seen = read_captures_of(options.images);
-  if (options.sigma_px) set_sigma(seen.frames, *options.sigma_px);
+LocateInput input_of(const Options& options, const CapturesTable& captures, LampCaptures seen) {
   LocateInput input{std::move(seen.frames), std::move(seen.lamps), std::move(seen.calibration),
                     captures};
+  if (options.sigma_px) set_sigma(input.frames, *options.sigma_px);
   input.how.correction = kCorrections.at(options.correction);
   if (const auto& mount = options.camera_on_robot) {
     input.how.mount =
@@ -122,6 +119,48 @@ void run(const Options& options) {
   input.lean_sd_rad = rad_from_deg(options.lean_sd_deg.value_or(0));
   input.height_sd_m = options.height_sd_m;
   input.frames_together = options.frames_together;
+  return input;
+}
+
+/// The lamps in images, of cameras that lean in the planes that are level by their fixes.
+LocateInput see_leaning(const Options& options, const CapturesTable& captures) {
+  const LampMap lamps = read_lamp_map(options.images.lamps);
+  const Calibration calibration = read_calibration(options.images.calibration);
+  const SeenLamps first = look_for_lamps(options.images, lamps, calibration);
+  LocateInput input =
+      input_of(options, captures, {first.frames, lamps, options.images.lamps, calibration});
+  LampImages images = lamp_images(options.images, lamps, calibration);
+  images.annotate.clear();
+  const LevelsOfImages levels = look_at_leaning(input, [&](const LevelsOfImages& some) {
+    std::vector<Frame> seen = see_lamps_again(images, some).frames;
+    if (options.sigma_px) set_sigma(seen, *options.sigma_px);
+    return seen;
+  });
+  const bool seen_some = std::any_of(input.frames.begin(), input.frames.end(),
+                                     [](const Frame& one) { return !one.detections.empty(); });
+  if (!seen_some) require(first);
+  const bool shown = !options.images.annotate.empty() || spdlog::should_log(spdlog::level::debug);
+  if (shown && !levels.empty()) {
+    images.annotate = options.images.annotate;
+    tell_of_lights(see_lamps_again(images, levels).lights);
+  }
+  return input;
+}
+
+LocateInput read_input(const Options& options) {
+  const bool images = std::filesystem::is_directory(options.images.images);
+  const bool leans =
+      options.lean_sd_deg.value_or(0) > 0 || options.inclination_sigma_deg.value_or(0) > 0;
+  const CapturesTable captures = captures_of(options);
+  if (images && leans) return see_leaning(options, captures);
+  return input_of(options, captures, read_captures_of(options.images));
+}
+
+void run(const Options& options) {
+  std::vector<std::string> inputs = inputs_of(options.images);
+  inputs.push_back(options.captures);
+  check_output(options.images.output, inputs);
+  const LocateInput input = read_input(options);
   const LocateResult found = locate_frames(input);
   write_fixes(options.images.output, found.rows);
   tell(found);

@@ -21,7 +21,11 @@ struct CaptureOutcome {
 
 CaptureOutcome outcome_of(const LampDetector& detector, const SourceImage& source,
                           const DetectRun& run) {
-  ImageLights found = detect_image(detector, source, run.imager_px, run.max_mpx);
+  const auto level = run.levels.find(source.file.filename().string());
+  ImageLights found =
+      level == run.levels.end()
+          ? detect_image(detector, source, run.imager_px, run.max_mpx)
+          : detect_image(detector.leaning(level->second), source, run.imager_px, run.max_mpx);
   CaptureOutcome outcome;
   outcome.file = source.file;
   outcome.time_s = source.time_s;

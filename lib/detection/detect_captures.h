@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <filesystem>
 #include <functional>
@@ -31,6 +32,9 @@ struct CaptureDetections {
   std::map<std::string, double> times_s;
 };
 
+/// level_from_camera of images, by name; nothing: nobody knows (LampDetector::leaning).
+using LevelsOfImages = std::map<std::string, std::optional<Eigen::Matrix3d>>;
+
 struct DetectRun {
   /// Images at a time.
   int threads;
@@ -40,6 +44,8 @@ struct DetectRun {
   std::optional<std::filesystem::path> annotate = std::nullopt;
   /// Larger images are refused unread.
   double max_mpx = kUsualMaxMpx;
+  /// Of those whose camera leans otherwise than the detector's.
+  LevelsOfImages levels = {};
 };
 
 /// Detects in each image. An image that cannot be used is refused and does not end it; a picture

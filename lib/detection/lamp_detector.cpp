@@ -103,6 +103,17 @@ LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera,
       has_rectangles_(std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
                                   [](const Lamp& lamp) { return lamp.rectangle.has_value(); })) {}
 
+LampDetector LampDetector::leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const {
+  DetectorCamera camera = camera_;
+  if (level_from_camera) {
+    camera.level_from_camera = *level_from_camera;
+  } else {
+    camera.lens.reset();
+    camera.most_slender = 4;  // 75 degrees off its axis
+  }
+  return {lamps_, camera, classifier_};
+}
+
 std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& blob,
                                               const Background& background) const {
   constexpr double least_roundness = 0.5, softest_edge = 0.3;

@@ -40,6 +40,10 @@ class LampDetector {
   /// The lights of an image, from the top. It has one channel of 8 or 16 bits and is not empty.
   std::vector<Light> detect(const cv::Mat& image) const;
 
+  /// The same detector for a camera that leans otherwise, with its level_from_camera; nothing: as
+  /// nobody knows. Then ellipses are fitted in the image, as without a lens.
+  LampDetector leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
+
   Readout readout() const { return camera_.readout; }
 
  private:

@@ -140,6 +140,54 @@ fs::path picture_folder(const LampImages& input) {
   return input.annotate;
 }
 
+/// How the images of an input are looked at. What there is to say of that goes to `result`.
+struct LampSearch {
+  LampSearch(const LampImages& lamp_images, StepResult& result);
+
+  CaptureDetections run_over(const std::vector<fs::path>& some, const StepProgress& progress,
+                             StepResult& result) const {
+    ImageSource source(some, from_videos);
+    CaptureDetections found = detect_captures(LampDetector(input.lamps, camera, classifier), source,
+                                              run, [&](std::size_t done) {
+                                                if (progress)
+                                                  progress(done, std::max(done, source.expected()));
+                                              });
+    result.warnings.insert(result.warnings.end(), source.warnings().begin(),
+                           source.warnings().end());
+    return found;
+  }
+
+  const LampImages& input;
+  DetectorCamera camera;
+  std::optional<LampClassifier> classifier;
+  std::vector<fs::path> images;
+  DetectRun run;
+  FromVideos from_videos;
+};
+
+LampSearch::LampSearch(const LampImages& lamp_images, StepResult& result)
+    : input(lamp_images),
+      camera(input.camera ? detector_camera(*input.camera)
+                          : DetectorCamera{Readout::rows, input.row_time_s, {}}),
+      run{input.threads} {
+  if (input.classifier_file.empty()) {
+    check_frequencies(input.lamps, input.lamps_file);
+    check_row_time(input, camera);
+  } else {
+    classifier = classifier_for(input, camera, result.warnings);
+  }
+  images = is_video_name(input.folder) ? std::vector{input.folder} : images_in(input.folder);
+  run.max_mpx = input.max_mpx;
+  std::optional<Readout> stated = input.readout;
+  if (input.camera) {
+    run.imager_px = input.camera->camera.imager_px;
+    if (!stated) stated = input.camera->camera.readout;
+  }
+  from_videos = {input.every, input.max_mpx, run.imager_px};
+  camera.readout = readout_of(images, stated, result, from_videos);
+  if (!input.annotate.empty()) run.annotate = picture_folder(input);
+}
+
 }  // namespace
 
 void check_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
@@ -179,36 +227,11 @@ Readout readout_of(std::vector<fs::path> images, const std::optional<Readout>& s
 
 SeenLamps see_lamps(const LampImages& input, const StepProgress& progress) {
   SeenLamps seen;
-  DetectorCamera camera = input.camera ? detector_camera(*input.camera)
-                                       : DetectorCamera{Readout::rows, input.row_time_s, {}};
-  std::optional<LampClassifier> classifier;
-  if (input.classifier_file.empty()) {
-    check_frequencies(input.lamps, input.lamps_file);
-    check_row_time(input, camera);
-  } else {
-    classifier = classifier_for(input, camera, seen.warnings);
-  }
-  const std::vector<fs::path> images =
-      is_video_name(input.folder) ? std::vector{input.folder} : images_in(input.folder);
-  DetectRun run{input.threads};
-  run.max_mpx = input.max_mpx;
-  std::optional<Readout> stated = input.readout;
-  if (input.camera) {
-    run.imager_px = input.camera->camera.imager_px;
-    if (!stated) stated = input.camera->camera.readout;
-  }
-  const FromVideos from_videos{input.every, input.max_mpx, run.imager_px};
-  ImageSource source(images, from_videos);
-  camera.readout = readout_of(images, stated, seen, from_videos);
-  if (!classifier) warn_of_map(input, camera, seen.warnings);
-  if (!input.annotate.empty()) run.annotate = picture_folder(input);
-  CaptureDetections found = detect_captures(
-      LampDetector(input.lamps, camera, std::move(classifier)), source, run, [&](std::size_t done) {
-        if (progress) progress(done, std::max(done, source.expected()));
-      });
+  LampSearch search(input, seen);
+  if (!search.classifier) warn_of_map(input, search.camera, seen.warnings);
+  CaptureDetections found = search.run_over(search.images, progress, seen);
   seen.images = static_cast<int>(found.images.size());
   seen.times_s = std::move(found.times_s);
-  seen.warnings.insert(seen.warnings.end(), source.warnings().begin(), source.warnings().end());
   seen.frames = std::move(found.frames);
   seen.lights = std::move(found.lights);
   seen.skipped = skipped_images(found.images, found.refused);
@@ -217,6 +240,17 @@ SeenLamps see_lamps(const LampImages& input, const StepProgress& progress) {
     seen.fail(StepFailure::undetermined, why_no_lamp(seen));
   }
   return seen;
+}
+
+CaptureDetections see_lamps_again(const LampImages& input, const LevelsOfImages& levels) {
+  StepResult said_before;
+  LampSearch search(input, said_before);
+  std::vector<fs::path> images = search.images;
+  std::erase_if(images, [&](const fs::path& image) {
+    return levels.find(image.filename().string()) == levels.end();
+  });
+  search.run.levels = levels;
+  return search.run_over(images, {}, said_before);
 }
 
 }  // namespace vlp

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
+#include "detection/detect_captures.h"
 #include "detection/detect_lights.h"
 #include "detection/image_source.h"
 #include "detection/lights/lights_table.h"
@@ -59,6 +60,10 @@ struct SeenLamps : StepResult {
 /// other lamps or of another row time. undetermined: no lamp is identified. Warns of lamps of the
 /// map that are too much alike.
 SeenLamps see_lamps(const LampImages& input, const StepProgress& progress = {});
+
+/// The lamps in those of the images once more, with what is known by now of how their cameras
+/// leaned. Precondition: see_lamps() could use them, with the same input.
+CaptureDetections see_lamps_again(const LampImages& input, const LevelsOfImages& levels);
 
 /// Along what the shutter reads: as `stated`, or else as the images show; a note, or a warning when
 /// not even they tell and rows are taken, goes to `result`.

@@ -23,7 +23,6 @@
 #include "session/lamp_offsets.h"
 
 namespace vlp {
-namespace {
 
 Sensors sensors_of(const std::string& image, const LocateInput& input) {
   Sensors sensors;
@@ -48,6 +47,8 @@ Sensors sensors_of(const std::string& image, const LocateInput& input) {
   }
   return sensors;
 }
+
+namespace {
 
 /// The frames that come within this before each, latest first, by their time stamps.
 constexpr double kLongestTogether_s = 0.2;

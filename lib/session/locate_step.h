@@ -43,6 +43,9 @@ struct LocateInput {
   int frames_together = 1;
 };
 
+/// What is known of a capture besides its image.
+Sensors sensors_of(const std::string& image, const LocateInput& input);
+
 struct LocateResult : StepResult {
   /// Of each frame.
   std::vector<Fix> fixes;

@@ -10,6 +10,11 @@
 /// which nothing is known but the greatest speed. Then cameras that stand and lean by up to 15
 /// degrees, by 30, of which nobody knows how. The chi-square of the pose is the square of its
 /// errors over what pixels of that noise allow.
+///
+/// "possible" is what exact centres with the noise of those of the standing camera allow
+/// (body_limit), over what they allow one that is known to stand. Of the centres there is the mean
+/// error along the motion of the lamps in the image and across it, and what scatters about it per
+/// axis.
 #include <fmt/core.h>
 
 #include <Eigen/Cholesky>
@@ -21,7 +26,9 @@
 
 #include "detection/lamp_detector.h"
 #include "geometry/angles.h"
+#include "positioning/body_limit.h"
 #include "positioning/positioner.h"
+#include "rig/find_lamp.h"
 #include "simulation/exposure.h"
 #include "simulation/truth.h"
 #include "support/random.h"
@@ -31,6 +38,8 @@ namespace {
 
 struct Errors {
   double horizontal = 0, height = 0, yaw = 0, velocity = 0, chi_squared = 0, pose_chi_squared = 0;
+  /// Of the velocity's error, along the velocity.
+  double along = 0;
   int fixes = 0, refused = 0;
 
   void add(const Fix& fix, const CarrierMotion& truth) {
@@ -53,9 +62,46 @@ struct Errors {
     const Eigen::Matrix2d of_velocity =
         fix.body->covariance.block<2, 2>(kBodyVelocity, kBodyVelocity);
     velocity += off.squaredNorm() / 2;
+    along += off.dot(truth.camera_velocity_m_per_s().normalized());
     chi_squared += off.dot(of_velocity.ldlt().solve(off)) / 2;
   }
   double rms(double sum) const { return std::sqrt(sum / fixes); }
+};
+
+/// A capture as a limit is of it.
+struct Seen {
+  std::vector<Eigen::Vector3d> lamps_m;
+  Pose pose;
+  double speed_m_per_s, turn_rate_rad_per_s;
+};
+
+/// Mean squares that exact centres with that noise allow.
+struct Possible {
+  double horizontal = 0, height = 0, yaw = 0, velocity = 0;
+
+  void add(const BodyCovariance& covariance) {
+    horizontal += covariance(0, 0) + covariance(1, 1);
+    height += covariance(2, 2);
+    yaw += covariance(kBodyYaw, kBodyYaw);
+    velocity += covariance.block<2, 2>(kBodyVelocity, kBodyVelocity).trace() / 2;
+  }
+};
+
+/// Of lamps' centres, along the motion in the image and across it.
+struct CenterErrors {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double squares = 0;
+  int count = 0;
+
+  void add(const Eigen::Vector2d& error_px, const Eigen::Vector2d& motion) {
+    const Eigen::Vector2d along = motion.normalized();
+    const Eigen::Vector2d across(-along.y(), along.x());
+    sum += Eigen::Vector2d(along.dot(error_px), across.dot(error_px));
+    squares += error_px.squaredNorm();
+    ++count;
+  }
+  Eigen::Vector2d mean() const { return sum / count; }
+  double scatter_px() const { return std::sqrt((squares / count - mean().squaredNorm()) / 2); }
 };
 
 class Trials {
@@ -111,11 +157,12 @@ class Trials {
     const LampDetector detector(lamps, detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Errors standing;
+    double noise_px = 0;
     for (const double speed_m_per_s : {0.0, 0.25, 0.5, 1.0, 2.0}) {
       Random random(71);
       std::array<Errors, 5> errors;
-      double center_squares = 0;
-      int centers = 0;
+      CenterErrors centers;
+      std::vector<Seen> captures_seen;
       for (int i = 0; i < captures; ++i) {
         LampShot shot = lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % 12);
         CarrierMotion& motion = shot.motion;
@@ -131,11 +178,20 @@ class Trials {
         motion.turn_rate_rad_per_s = speed_m_per_s > 0 ? rate_rad_per_s : 0;
         const auto detections = detections_in(renderer, detector, shot);
         if (detections.size() < 4) continue;
+        const Eigen::Matrix3d camera_from_world = motion.world_from_camera(0).linear().transpose();
+        const Eigen::Vector2d image_motion =  // of any direction where it stands
+            -(camera_from_world *
+              Eigen::Vector3d(std::cos(direction_rad), std::sin(direction_rad), 0))
+                 .head<2>();
+        Seen seen{{}, motion.pose(0), speed_m_per_s, std::abs(motion.turn_rate_rad_per_s)};
+        for (const Detection& detection : detections) {
+          seen.lamps_m.push_back(find_lamp(lamps.lamps, detection.lamp)->position_m);
+        }
+        captures_seen.push_back(std::move(seen));
         for (const TrueLamp& lamp : true_lamps(scene_, renderer, shot)) {
           for (const Detection& detection : detections) {
             if (detection.lamp != lamp.id || lamp.in_view < 1) continue;
-            center_squares += (detection.pixel - lamp.pixel).squaredNorm();
-            ++centers;
+            centers.add(detection.pixel - lamp.pixel, image_motion);
           }
         }
         Sensors known = {}, unknown = {};
@@ -164,18 +220,61 @@ class Trials {
         const std::array frames{EarlierFrame{before, before_s}};
         errors[4].add(positioner.locate(two, unknown, frames), motion);
       }
-      if (speed_m_per_s == 0) standing = errors[0];
+      if (speed_m_per_s == 0) {
+        standing = errors[0];
+        noise_px = centers.scatter_px();
+      }
       constexpr std::array names{"as if standing", "speed unknown", "odometry 1 %", "two, odometry",
                                  "two, two frames"};
       const std::string speed = fmt::format("{:4.2f} m/s", speed_m_per_s);
-      fmt::print("{:.0f} us  {}  {} centres of lamps wholly in view: {:.4f} px, 2-D rms\n",
-                 1e6 * *scene_.camera.row_time_s, speed, centers,
-                 std::sqrt(center_squares / centers));
+      fmt::print(
+          "{:.0f} us  {}  {} centres of lamps wholly in view: {:.4f} px, 2-D rms; mean along "
+          "{:+.4f}, across {:+.4f}, scatter {:.4f} per axis\n",
+          1e6 * *scene_.camera.row_time_s, speed, centers.count,
+          std::sqrt(centers.squares / centers.count), centers.mean().x(), centers.mean().y(),
+          centers.scatter_px());
       for (std::size_t i = 0; i < errors.size(); ++i) print(speed, names[i], errors[i], &standing);
+      for (const bool odometry : {false, true}) {
+        print_possible(speed, captures_seen, odometry, noise_px);
+      }
     }
   }
 
  private:
+  /// Of a camera of which nothing is known but its greatest speed, or with odometry.
+  void print_possible(const std::string& speed, const std::vector<Seen>& captures, bool odometry,
+                      double noise_px) const {
+    const Lens lens(scene_.camera.lens_model, scene_.camera.intrinsics);
+    const Eigen::Matrix3d camera_from_level = scene_.mount.level_from_camera.transpose();
+    const auto clock = row_clock_of(scene_.camera);
+    Possible moving, standing;
+    int count = 0;
+    for (const Seen& seen : captures) {
+      const KnownMotion known = KnownMotion::up_to(2.5, rad_from_deg(180));
+      BodyPrior prior;
+      prior.velocity_sd_m_per_s = odometry ? 0.01 * seen.speed_m_per_s : known.velocity_sd_m_per_s;
+      prior.yaw_rate_sd_rad_per_s =
+          odometry ? 0.01 * seen.turn_rate_rad_per_s : known.yaw_rate_sd_rad_per_s;
+      const auto limit =
+          body_limit(seen.lamps_m, lens, camera_from_level, seen.pose, noise_px, prior, clock);
+      if (!limit) continue;
+      moving.add(limit->fix.covariance);
+      BodyCovariance still = BodyCovariance::Zero();
+      still.topLeftCorner<4, 4>() = limit->noise;
+      standing.add(still);
+      ++count;
+    }
+    const auto times = [&](double Possible::*sum) {
+      return std::sqrt(moving.*sum / standing.*sum);
+    };
+    fmt::print(
+        "{:.0f} us  {}  possible, {:14}  ({:5.2f})  height ({:5.2f})  yaw ({:5.2f})  v {:5.1f} "
+        "mm/s\n",
+        1e6 * *scene_.camera.row_time_s, speed, odometry ? "odometry 1 %" : "speed unknown",
+        times(&Possible::horizontal), times(&Possible::height), times(&Possible::yaw),
+        1e3 * std::sqrt(moving.velocity / count));
+  }
+
   std::vector<Detection> detections_in(const FrameRenderer& renderer, const LampDetector& detector,
                                        const LampShot& shot) const {
     const cv::Mat image = expose(scene_.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
@@ -219,7 +318,8 @@ class Trials {
         times(&Errors::horizontal), 1e3 * e.rms(e.height), times(&Errors::height),
         deg_from_rad(e.rms(e.yaw)), times(&Errors::yaw), e.pose_chi_squared / e.fixes);
     if (e.velocity > 0) {
-      fmt::print("  v {:5.1f} mm/s chi2 {:.2f}", 1e3 * e.rms(e.velocity), e.chi_squared / e.fixes);
+      fmt::print("  v {:5.1f} mm/s (mean along it {:+.2f}) chi2 {:.2f}", 1e3 * e.rms(e.velocity),
+                 1e3 * e.along / e.fixes, e.chi_squared / e.fixes);
     }
     fmt::print("\n");
   }

@@ -89,7 +89,6 @@ std::optional<Eigen::Vector2d> LightShape::pixel_of(const Eigen::Vector2d& plane
 
 std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
                                           const Background& background) const {
-  constexpr double most_slender = 2;  // a disc seen 60 degrees off its axis
   std::vector<Eigen::Vector2d> points, pixels;
   double brightest = 0;
   std::erase_if(outline, [&](const EdgePoint& edge) {
@@ -122,7 +121,8 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
     fit = fit_robust_ellipse(points, weights, tolerance);
   }
   if (!fit || fit->count < static_cast<int>(kLeastOutlinePoints)) return std::nullopt;
-  if (!camera_.lens && slenderness(fit->rim_from_circle) > most_slender) return std::nullopt;
+  if (!camera_.lens && slenderness(fit->rim_from_circle) > camera_.most_slender)
+    return std::nullopt;
 
   Light light{};
   const auto pixel = pixel_of(fit->center);

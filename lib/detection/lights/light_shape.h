@@ -24,13 +24,15 @@ struct DetectorCamera {
   std::optional<Lens> lens;
   /// level_from_camera, for discs that a tilted camera sees.
   Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();
+  /// Ellipses are no lights that are longer than so many times their width: of a disc seen 60
+  /// degrees off its axis.
+  double most_slender = 2;
 };
 
 /// The shape of lights by their outline. Edge points go through the lens into the level plane; a
 /// circle is fitted there robustly, and its centre is projected back, because the centre of an
 /// outline in the image is not the image of the centre (lib/THEORY.md, "Lamp centroid"). Without a
-/// lens an ellipse is fitted in the image, no more than twice as long as wide: a disc that is seen
-/// up to 60 degrees off its axis.
+/// lens an ellipse is fitted in the image.
 class LightShape {
  public:
   explicit LightShape(const DetectorCamera& camera) : camera_(camera) {}
