@@ -204,14 +204,16 @@ TEST_F(CornerFiles, AreRefusedInOneTrueLine) {
 
 /// Tables of chessboards whose sizes are miscounted.
 TEST_F(CornerFiles, TellWhatIsWrongWithTheSize) {
-  std::string text = "# filename x y level\n";
+  std::string text = "# filename x y level\n", table = "image,corner,u_px,v_px\n";
   for (int row = 0; row < 5; ++row) {
     for (int col = 0; col < 8; ++col) {
-      text +=
-          "0.png " + std::to_string(100 + 50 * col) + " " + std::to_string(100 + 50 * row) + " 0\n";
+      const std::string u = std::to_string(100 + 50 * col), v = std::to_string(100 + 50 * row);
+      text.append("0.png ").append(u).append(" ").append(v).append(" 0\n");
+      table.append("0.png,").append(std::to_string(8 * row + col));
+      table.append(",").append(u).append(",").append(v).append("\n");
     }
   }
-  const std::string corners = folder.file("corners.vnl", text).string();
+  std::string corners = folder.file("corners.vnl", text).string();
   const auto refusal_of = [&](const std::string& size) {
     const std::string board = folder
                                   .file("board.yaml", "format: vlp-board/1\nkind: chessboard\n" +
@@ -227,6 +229,14 @@ TEST_F(CornerFiles, TellWhatIsWrongWithTheSize) {
                         ":2: the corners lie in rows of 8, but a board of 6 x 9 squares has 5 x 8 "
                         "corners; swap cols and rows"));
   EXPECT_THAT(refusal_of("cols: 9\nrows: 6"), HasSubstr("3 "));  // one view is too few
+
+  corners = folder.file("corners.csv", table).string();
+  EXPECT_THAT(refusal_of("cols: 6\nrows: 9"),
+              HasSubstr("2 vlp-intrinsics: error: " + corners +
+                        ": the corners lie in rows of 8, but a board of 6 x 9 squares has 5 x 8 "
+                        "corners; swap cols and rows of board.yaml\n"));
+  EXPECT_THAT(refusal_of("cols: 11\nrows: 5"), HasSubstr("is board.yaml that of the board?"));
+  EXPECT_THAT(refusal_of("cols: 9\nrows: 6"), HasSubstr("3 "));
 }
 
 }  // namespace

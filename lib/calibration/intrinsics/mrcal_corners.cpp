@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <string_view>
 #include <unordered_map>
@@ -14,6 +13,7 @@
 #include "calibration/intrinsics/mrcal_files.h"
 #include "detection/boards/corner_table.h"
 #include "detection/boards/lattice_order.h"
+#include "detection/boards/lattice_rows.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/yaml_text.h"
@@ -122,37 +122,6 @@ class CornerRows {
   std::optional<InputError> first_outside_;
 };
 
-/// How far the points of lines of so many are from lying evenly, all images together; NaN with too
-/// few.
-double unevenness(const std::vector<std::vector<CornerRow>>& images, std::size_t line) {
-  double sum_px = 0, count = 0;
-  for (const auto& rows : images) {
-    for (std::size_t i = 2; i < rows.size(); ++i) {
-      if (i % line < 2 || !rows[i].pixel || !rows[i - 1].pixel || !rows[i - 2].pixel) continue;
-      sum_px += (*rows[i].pixel - 2 * *rows[i - 1].pixel + *rows[i - 2].pixel).norm();
-      count += 1;
-    }
-  }
-  return count > 0 ? sum_px / count : std::numeric_limits<double>::quiet_NaN();
-}
-
-/// The number of points after which a new line begins, by what is most even.
-std::size_t line_shown(const std::vector<std::vector<CornerRow>>& images) {
-  constexpr double better = 0.5;
-  const std::size_t points = images.front().size();
-  std::size_t best = points;
-  double least = std::numeric_limits<double>::infinity();
-  // Parts of a line are as even as it is.
-  for (std::size_t line = points / 3; line >= 3; --line) {
-    if (points % line != 0) continue;
-    const double px = unevenness(images, line);
-    if (!(px < better * least)) continue;
-    least = px;
-    best = line;
-  }
-  return best;
-}
-
 /// How a board's lattice is counted, for messages.
 std::string counted(const Board& board, const BoardLattice& lattice) {
   return fmt::format("a board of {} x {} {} has {} x {} corners", board.cols, board.rows,
@@ -182,7 +151,8 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
   std::vector<BoardView> views;
   std::set<std::string_view> known;
   std::unordered_map<std::string, std::size_t> view_of_image;
-  std::vector<std::vector<CornerRow>> images;
+  std::vector<LatticePixels> images;
+  std::size_t first_line = 0;  // of an image with corners
   for (std::size_t from = 0; from < table.rows.size();) {
     const auto [line, name, first_pixel, weight] = table.rows[from];
     std::size_t end = from + 1;
@@ -217,9 +187,11 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
       view.seen.points.push_back(
           {lattice.index_of(part, i - from), *table.rows[i].pixel, table.rows[i].weight});
     }
-    if (!none)
-      images.emplace_back(table.rows.begin() + static_cast<std::ptrdiff_t>(from),
-                          table.rows.begin() + static_cast<std::ptrdiff_t>(end));
+    if (!none) {
+      if (images.empty()) first_line = line;
+      images.emplace_back();
+      for (std::size_t i = from; i < end; ++i) images.back().push_back(table.rows[i].pixel);
+    }
     from = end;
   }
   if (images.empty()) return views;
@@ -228,15 +200,13 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
               [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
   }
   const auto stated = static_cast<std::size_t>(lattice.cols());
-  const std::size_t shown = line_shown(images);
-  if (shown < lattice.points() && shown != stated &&
-      unevenness(images, shown) < unevenness(images, stated) / 2) {
-    throw table.error(
-        images.front().front().line,
-        fmt::format("the corners lie in rows of {}, but {}{}", shown, counted(board, lattice),
-                    shown == static_cast<std::size_t>(lattice.rows())
-                        ? "; swap cols and rows of board.yaml"
-                        : "; is board.yaml that of the board?"));
+  const std::size_t shown = row_shown(images, stated);
+  if (shown != stated) {
+    throw table.error(first_line, fmt::format("the corners lie in rows of {}, but {}{}", shown,
+                                              counted(board, lattice),
+                                              shown == static_cast<std::size_t>(lattice.rows())
+                                                  ? "; swap cols and rows of board.yaml"
+                                                  : "; is board.yaml that of the board?"));
   }
   if (lattice.parts() == 1) {
     for (BoardView& view : views) {

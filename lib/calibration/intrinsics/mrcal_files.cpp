@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/numpy_archive.h"
@@ -87,6 +90,25 @@ void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSoluti
   write_file(file, text);
 }
 
+namespace {
+
+/// Words of the table, a view each.
+std::vector<std::string> names_in_table(const IntrinsicsSolution& solution,
+                                        std::span<const std::string> images) {
+  std::vector<std::string> names;
+  std::set<std::string> known;
+  for (const std::size_t view : solution.views) {
+    std::string name = images[view];
+    std::ranges::replace(name, ' ', '_');
+    std::string own = name;
+    for (int n = 2; !known.insert(own).second; ++n) own = name + "-" + std::to_string(n);
+    names.push_back(own);
+  }
+  return names;
+}
+
+}  // namespace
+
 void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
                    std::span<const std::string> images) {
   const BoardProblem& problem = solution.problem;
@@ -96,10 +118,10 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
   const bool weights = std::ranges::any_of(problem.points, [](const Eigen::Vector3d& point) {
     return point.z() > 0 && std::log2(point.z()) != std::floor(std::log2(point.z()));
   });
+  const std::vector<std::string> names = names_in_table(solution, images);
   std::string text = weights ? "# filename x y weight\n" : "# filename x y level\n";
   for (std::size_t board = 0; board < problem.poses.size(); ++board) {
-    std::string name = images[solution.views[board / parts]];
-    std::ranges::replace(name, ' ', '_');  // words of the table
+    std::string name = names[board / parts];
     if (parts > 1) name += "-corner" + std::to_string(board % parts);
     for (std::size_t i = board * count; i < (board + 1) * count; ++i) {
       const Eigen::Vector3d& point = problem.points[i];

@@ -24,7 +24,8 @@ void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSoluti
 /// Writes the corners that were solved for as mrcal-calibrate-cameras reads them (--corners-cache):
 /// filename x y level, with level -log2(weight), row by row of the lattice, "-" for a corner not
 /// seen or left out. Of a board in four parts each image stands four times, as NAME-corner0 to
-/// NAME-corner3. images: the names of the input's views. Throws InputError.
+/// NAME-corner3. images: the names of the input's views; where folders have images of one name, the
+/// second is NAME-2, because the table knows views by their names. Throws InputError.
 void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
                    std::span<const std::string> images);
 

@@ -13,6 +13,7 @@
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
 #include "detection/boards/lattice_order.h"
+#include "detection/boards/lattice_rows.h"
 #include "rig/board_layout.h"
 #include "rig/yaml_text.h"
 
@@ -49,6 +50,23 @@ SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
   std::sort(seen.points.begin(), seen.points.end(),
             [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
   return seen;
+}
+
+/// Counted as board.yaml says, points of another board do not lie in rows.
+std::string wrong_rows(const Board& board, std::span<const ImageCorners> images) {
+  const auto cols = static_cast<std::size_t>(board.cols - 1),
+             rows = static_cast<std::size_t>(board.rows - 1);
+  std::vector<LatticePixels> pixels;
+  for (const ImageCorners& corners : images) {
+    pixels.emplace_back(cols * rows);
+    for (const SeenPoint& point : corners.points) pixels.back()[point.index] = point.pixel;
+  }
+  const std::size_t shown = row_shown(pixels, cols);
+  if (shown == cols) return "";
+  return fmt::format(
+      "the corners lie in rows of {}, but a board of {} x {} squares has {} x {} corners; {}",
+      shown, board.cols, board.rows, cols, rows,
+      shown == rows ? "swap cols and rows of board.yaml" : "is board.yaml that of the board?");
 }
 
 }  // namespace
@@ -125,6 +143,9 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
   }
   if (images.empty()) throw InputError(file, "holds no corner");
   if (too_many_outside(outside, seen)) throw InputError(*first_outside);
+  if (board.has_squares()) {
+    if (const auto words = wrong_rows(board, images); !words.empty()) throw InputError(file, words);
+  }
   std::set<int> ids;
   for (const BoardTag& tag : board_layout(board)) ids.insert(tag.id);
   std::vector<BoardView> views;

@@ -48,6 +48,25 @@ TEST_P(MrcalCorners, ComeBackAsTheyWereSolvedFor) {
   EXPECT_NEAR(again.rms_px, solution.rms_px, 1e-5);
 }
 
+/// Images of two folders, which number theirs alike.
+TEST_P(MrcalCorners, OfImagesOfOneNameStayApart) {
+  constexpr std::size_t count = 8;
+  Random random(3);
+  const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
+  ASSERT_TRUE(solution.ok());
+  ASSERT_EQ(solution.views.size(), count);
+  const std::vector<std::string> names{"0.png",   "1.png", "0.png", "1.png",
+                                       "1.png-2", "a b",   "a_b",   "0.png"};
+  write_corners(folder / "corners.vnl", solution, names);
+  std::vector<std::string> found;
+  for (const BoardView& view : read_corners(folder / "corners.vnl", views.board, kImager_px)) {
+    EXPECT_TRUE(view.seen.any());
+    found.push_back(view.image);
+  }
+  EXPECT_EQ(found, (std::vector<std::string>{"0.png", "1.png", "0.png-2", "1.png-2", "1.png-2-2",
+                                             "a_b", "a_b-2", "0.png-3"}));
+}
+
 INSTANTIATE_TEST_SUITE_P(Boards, MrcalCorners, testing::Values(false, true));
 
 Board chessboard() {

@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/lattice_rows.h"
+
+#include <limits>
+
+namespace vlp {
+namespace {
+
+/// How far the points of rows of so many are from lying evenly; NaN with too few.
+double unevenness(std::span<const LatticePixels> images, std::size_t row) {
+  double sum_px = 0, count = 0;
+  for (const LatticePixels& points : images) {
+    for (std::size_t i = 2; i < points.size(); ++i) {
+      if (i % row < 2 || !points[i] || !points[i - 1] || !points[i - 2]) continue;
+      sum_px += (*points[i] - 2 * *points[i - 1] + *points[i - 2]).norm();
+      count += 1;
+    }
+  }
+  return count > 0 ? sum_px / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace
+
+std::size_t row_shown(std::span<const LatticePixels> images, std::size_t stated) {
+  constexpr double better = 0.5;
+  if (images.empty()) return stated;
+  const std::size_t points = images.front().size();
+  std::size_t best = stated;
+  double least = std::numeric_limits<double>::infinity();
+  // Parts of a row are as even as it is.
+  for (std::size_t row = points / 3; row >= 3; --row) {
+    if (points % row != 0) continue;
+    const double px = unevenness(images, row);
+    if (!(px < better * least)) continue;
+    least = px;
+    best = row;
+  }
+  return least < better * unevenness(images, stated) ? best : stated;
+}
+
+}  // namespace vlp
