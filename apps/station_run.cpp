@@ -17,6 +17,7 @@
 #include "station/golden_due.h"
 #include "station/hook.h"
 #include "station/publish_run.h"
+#include "station/run_hooks.h"
 #include "station/spool.h"
 #include "station/verify_station.h"
 #include "station_guide.h"
@@ -35,17 +36,6 @@ void note(const StationConfig& config, const RunRecord& record) {
   } catch (const InputError& error) {
     spdlog::error("when the golden unit is due is not known: {}", error.what());
   }
-}
-
-/// Runs the hook of a kept run and keeps what became of it. A verdict is a verdict without it.
-void call_hook(const Hook& hook, RunRecord& record, const HookLock& lock, Spool& spool) {
-  record.events.push_back(run_hook(hook, record, lock));
-  try {
-    spool.keep(record);
-  } catch (const InputError& error) {
-    spdlog::error("what became of the hook is not recorded: {}", error.what());
-  }
-  spool.deliver();
 }
 
 /// Keeps the run, says the verdict, writes its files; then the records, which may be away, and the
@@ -84,7 +74,8 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
   }
   spool.deliver();
   if (config.hook) {
-    call_hook(*config.hook, record, *lock, spool);
+    const std::string problem = call_hook(*config.hook, record, *lock, spool);
+    if (!problem.empty()) spdlog::error("{}", problem);
     terminal.print(hook_lines(record));
   }
   terminal.print(spool_lines(spool.state()));
@@ -129,9 +120,16 @@ void add_folders(Unit& unit, const fs::path& folder) {
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }
 
-/// The record of a unit that ends now. A golden unit that failed or became due meanwhile spoils it.
+/// The record of a unit that ends now. A golden unit that failed meanwhile spoils it; one that only
+/// became due does not.
 RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions& options) {
-  if (unit.distrusted().empty()) unit.distrust(golden_problem(unit.config()));
+  if (unit.distrusted().empty()) {
+    unit.distrust(golden_problem(unit.config(), GoldenAt::verdict));
+    const std::string due = golden_problem(unit.config());
+    if (unit.distrusted().empty() && !due.empty()) {
+      spdlog::warn("{} before the next unit; this one was begun before it was", due);
+    }
+  }
   RunRecord record = record_of(unit, run, kProgram);
   record.operator_name = options.operator_name;
   record.shift = options.shift;
@@ -219,27 +217,15 @@ void run_hooks(const StationRunOptions& options) {
   if (!config.hook) throw InputError(options.station, "has no hook: add the key 'hook'");
   Spool spool(config.spool, config.records);
   spool.deliver();
-  const auto runs = spool.with_open_hook(config.station);
-  int failed = 0;
-  for (const std::string& run : runs) {
-    const HookLock lock(spool.folder(), run);
-    auto record = spool.find(run);
-    // Another program may have done it meanwhile.
-    if (!record || !hook_is_open(*record)) continue;
-    if (!lock.held()) {
-      fmt::print("{}\n", printable(fmt::format("{} {} {}: is being run", run, record->camera,
-                                               record->verdict)));
-      continue;
-    }
-    call_hook(*config.hook, *record, lock, spool);
-    const std::string problem = hook_problem(*record);
-    if (!problem.empty()) ++failed;
-    fmt::print("{}\n", printable(fmt::format("{} {} {}: {}", run, record->camera, record->verdict,
-                                             problem.empty() ? "done" : problem)));
-  }
+  const HooksRun hooks =
+      run_open_hooks(config, spool, [](const RunRecord& run, const std::string& outcome) {
+        fmt::print("{}\n", printable(fmt::format("{} {} {}: {}", run.run, run.camera, run.verdict,
+                                                 outcome)));
+      });
   if (const std::string state = spool.state(); !state.empty()) spdlog::warn("{}", printable(state));
-  if (failed > 0) {
-    throw std::runtime_error(fmt::format("the hook failed for {} of {} runs", failed, runs.size()));
+  if (hooks.failed > 0) {
+    throw std::runtime_error(
+        fmt::format("the hook failed for {} of {} runs", hooks.failed, hooks.runs));
   }
 }
 

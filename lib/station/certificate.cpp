@@ -13,7 +13,9 @@
 #include "report/calibration_sections.h"
 #include "report/html.h"
 #include "rig/calibration_error.h"
+#include "rig/file.h"
 #include "rig/input_error.h"
+#include "station/publish_run.h"
 
 namespace vlp {
 namespace {
@@ -199,6 +201,15 @@ std::string certificate(const RunRecord& record, const Calibration& calibration)
                        html_section("Statement of conformity", conformity_part(record)) +
                        html_section("Traceability", traceability_part(record, calibration)) +
                        html_section("To be filled in by who issues it", part_to_fill_in()));
+}
+
+std::filesystem::path write_certificate(const RunRecord& record,
+                                        const std::filesystem::path& results) {
+  check_certifiable(record);
+  const std::filesystem::path folder = publish_run(record, {}, results);
+  std::filesystem::path file = folder / "certificate.html";
+  write_file(file, certificate(record, read_calibration(folder / calibration_name(record))));
+  return file;
 }
 
 }  // namespace vlp

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,5 +39,10 @@ void check_certifiable(const RunRecord& record);
 /// what conditions, is left to be filled in. Same record, same bytes. `calibration` is the
 /// record's. Throws as check_certifiable().
 std::string certificate(const RunRecord& record, const Calibration& calibration);
+
+/// Writes it as certificate.html beside the files of the run, which are written where they are
+/// missing (publish_run()); the file. Throws InputError.
+std::filesystem::path write_certificate(const RunRecord& record,
+                                        const std::filesystem::path& results);
 
 }  // namespace vlp

@@ -15,6 +15,7 @@
 #include "captures/digest.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "station/measuring_digest.h"
 #include "station/station_folders.h"
 
 namespace vlp {
@@ -43,7 +44,7 @@ void forget(const fs::path& file) {
 
 }  // namespace
 
-std::string golden_problem(const StationConfig& config) {
+std::string golden_problem(const StationConfig& config, GoldenAt at) {
   constexpr const char* verify = "'vlp-station verify' is due";
   if (!config.verify_due) return "";
   const fs::path file = note_of(config);
@@ -59,8 +60,8 @@ std::string golden_problem(const StationConfig& config) {
     return damaged(error.what());
   }
   std::istringstream words(text.substr(0, text.find('\n')));
-  std::string run, verdict, ended_utc, config_sha256;
-  words >> run >> verdict >> ended_utc >> config_sha256;
+  std::string run, verdict, ended_utc, measured_with;
+  words >> run >> verdict >> ended_utc >> measured_with;
   const bool failed = verdict == name_of(Verdict::fail);
   if ((!failed && verdict != name_of(Verdict::pass)) || ended_utc.empty()) {
     return damaged(file.string() + " is damaged");
@@ -68,16 +69,17 @@ std::string golden_problem(const StationConfig& config) {
   if (failed) {
     return fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify);
   }
-  if (config_sha256.empty()) {  // an older program's note
+  if (measured_with.empty()) {  // an older program's note
     return fmt::format("with which lamp map the golden unit was measured is not known (run {}): {}",
                        run, verify);
   }
-  if (config_sha256 != config.sha256) {
+  if (measured_with != measuring_digest(config)) {
     return fmt::format(
-        "station.yaml or a file that it names was changed since the golden unit was measured (run "
-        "{}): {}",
+        "what measures in station.yaml or a file that it names was changed since the golden unit "
+        "was measured (run {}): {}",
         run, verify);
   }
+  if (at == GoldenAt::verdict) return "";
   constexpr double second_per_hour = 3600;
   const double age_h = seconds_since(ended_utc) / second_per_hour;
   const auto& due = *config.verify_due;
@@ -100,7 +102,7 @@ void note_for_golden(const StationConfig& config, const RunRecord& record) {
   if (record.kind == "golden") {
     try {
       return write_file(file, fmt::format("{} {} {} {}\n", record.run, record.verdict,
-                                          record.ended_utc, record.config_sha256));
+                                          record.ended_utc, measuring_digest(config)));
     } catch (const InputError&) {
       forget(file);
       throw;

@@ -19,6 +19,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -214,12 +215,12 @@ std::string last_line(std::string text) {
 
 RunEvent failed(const std::string& why) { return new_event(kHookFailed, why); }
 
-const RunEvent* last_of(const RunRecord& record, const char* what) {
-  const RunEvent* last = nullptr;
-  for (const RunEvent& event : record.events) {
-    if (event.what == what) last = &event;
-  }
-  return last;
+/// How many events it is from the last of a kind to the end; nothing without one.
+std::optional<std::ptrdiff_t> from_end(const RunRecord& record, const char* what) {
+  const auto last = std::find_if(record.events.rbegin(), record.events.rend(),
+                                 [&](const RunEvent& event) { return event.what == what; });
+  if (last == record.events.rend()) return std::nullopt;
+  return last - record.events.rbegin();
 }
 
 /// Whether the file that is open is still the one of that name.
@@ -276,13 +277,15 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
 }
 
 bool hook_is_open(const RunRecord& record) {
-  return last_of(record, kHookWanted) != nullptr && last_of(record, kHookDone) == nullptr;
+  const auto wanted = from_end(record, kHookWanted), done = from_end(record, kHookDone);
+  return wanted && (!done || *wanted < *done);
 }
 
 std::string hook_problem(const RunRecord& record) {
   if (!hook_is_open(record)) return "";
-  const RunEvent* last = last_of(record, kHookFailed);
-  return last == nullptr ? "was not run to its end" : "failed: " + last->text;
+  const auto wanted = from_end(record, kHookWanted), failed = from_end(record, kHookFailed);
+  if (!failed || *wanted < *failed) return "was not run to its end";
+  return "failed: " + record.events[record.events.size() - 1 - std::size_t(*failed)].text;
 }
 
 HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)

@@ -14,7 +14,8 @@ namespace vlp {
 /// that never came to its end is known by it.
 RunEvent hook_wanted(const Hook& hook, const std::string& operator_name);
 
-/// Whether a hook was wanted for a run and has not been done.
+/// Whether a hook was wanted for a run, at its verdict or when it was voided, and has not been done
+/// since.
 bool hook_is_open(const RunRecord& record);
 /// Why a hook is open, for people in one line; empty when it is not.
 std::string hook_problem(const RunRecord& record);

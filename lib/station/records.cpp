@@ -412,7 +412,7 @@ std::vector<std::string> Records::with_open_hook(const std::string& station) {
                  << "SELECT DISTINCT events.run FROM events JOIN runs ON runs.run = events.run "
                     "WHERE events.what = :wanted AND (:station = '' OR runs.station = :of) AND NOT "
                     "EXISTS (SELECT 1 FROM events ended WHERE ended.run = events.run AND "
-                    "ended.what = :done) ORDER BY events.run",
+                    "ended.what = :done AND ended.event > events.event) ORDER BY events.run",
              soci::into(run), soci::use(wanted), soci::use(station), soci::use(station),
              soci::use(done));
         open.execute();

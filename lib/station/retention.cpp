@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/retention.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <optional>
 #include <string>
@@ -59,6 +61,25 @@ void add_if_expired(Retained& found, Records& records, const std::string& statio
   }
 }
 
+void delete_content(const ExpiredFolder& expired) {
+  std::error_code error;
+  std::vector<fs::path> entries;
+  for (fs::directory_iterator entry(expired.folder, error);
+       !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    entries.push_back(entry->path());
+  }
+  for (auto entry = entries.begin(); !error && entry != entries.end(); ++entry) {
+    fs::remove_all(*entry, error);
+  }
+  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
+}
+
+void delete_folder(const ExpiredFolder& expired) {
+  std::error_code error;
+  fs::remove(expired.folder, error);
+  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
+}
+
 }  // namespace
 
 Retained look_for_expired(const StationConfig& config, Records& records) {
@@ -84,23 +105,20 @@ Retained look_for_expired(const StationConfig& config, Records& records) {
   return found;
 }
 
-void delete_content(const ExpiredFolder& expired) {
-  std::error_code error;
-  std::vector<fs::path> entries;
-  for (fs::directory_iterator entry(expired.folder, error);
-       !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    entries.push_back(entry->path());
+void delete_expired(const ExpiredFolder& expired, Spool& spool) {
+  delete_content(expired);
+  const auto& events = expired.run.events;
+  const bool told = std::any_of(events.begin(), events.end(),
+                                [&](const RunEvent& event) { return event.what == expired.what; });
+  if (!told) {
+    constexpr double megabyte = 1e6;
+    RunRecord run = expired.run;
+    run.events.push_back(new_event(
+        expired.what,
+        fmt::format("kept {} days, {:.1f} MB", expired.days, double(expired.bytes) / megabyte)));
+    spool.keep(run);
   }
-  for (auto entry = entries.begin(); !error && entry != entries.end(); ++entry) {
-    fs::remove_all(*entry, error);
-  }
-  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
-}
-
-void delete_folder(const ExpiredFolder& expired) {
-  std::error_code error;
-  fs::remove(expired.folder, error);
-  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
+  delete_folder(expired);
 }
 
 }  // namespace vlp

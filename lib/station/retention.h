@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "station/records.h"
+#include "station/spool.h"
 #include "station/station_config.h"
 
 namespace vlp {
@@ -35,10 +36,9 @@ struct Retained {
 /// nor are runs of other stations and symbolic links.
 Retained look_for_expired(const StationConfig& config, Records& records);
 
-/// Deletes all that is in the folder; links are not followed. Throws InputError. The folder stays,
-/// so that a program that is killed before it has told of it finds the folder again.
-void delete_content(const ExpiredFolder& expired);
-/// Deletes the folder, which is empty. Throws InputError.
-void delete_folder(const ExpiredFolder& expired);
+/// Deletes the folder of a run; links are not followed. Its record tells of it as soon as nothing
+/// is in the folder, which goes last, so that a program that is killed before it has told of it
+/// finds the folder again. Throws InputError.
+void delete_expired(const ExpiredFolder& expired, Spool& spool);
 
 }  // namespace vlp

@@ -16,6 +16,7 @@
 #include "session/session_folder.h"
 #include "station/guidance.h"
 #include "station/lamp_faults.h"
+#include "station/lens_fault.h"
 #include "station/station_steps.h"
 #include "station/turn_map.h"
 
@@ -324,6 +325,11 @@ Refusals refusals(const UnitStep& state, const StationConfig& config) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, reason);
   }
   const int blurred = reasons.contains("blurred") ? reasons.at("blurred") : 0;
+  const auto most = [&](const char* reason) {
+    return reasons.contains(reason) && 2 * reasons.at(reason) > refused;
+  };
+  if (most("too dark")) text += ": more exposure, gain or light";
+  if (most("overexposed")) text += ": less exposure, gain or light";
   return {fmt::format("{} of {} images refused: {}", refused, state.images.size(), text),
           2 * blurred > refused && blurred >= enough_to_blame(config)};
 }
@@ -411,7 +417,8 @@ bool add_causes_of(const Unit& unit, StationStep step, const std::vector<Checked
   return true;
 }
 
-/// What the captures of all steps tell of the lamps, and those of the check of its points.
+/// What the captures of all steps tell of the lamps and of the lens that saw them, and those of the
+/// check of its points.
 std::vector<std::string> station_faults_of(const Unit& unit) {
   const auto known = unit.calibration();
   if (!known) return {};
@@ -423,8 +430,12 @@ std::vector<std::string> station_faults_of(const Unit& unit) {
   auto faults = lamp_faults(frames, unit.config().lamps, *known);
   auto unseen = unseen_lamps(frames, unit.config().lamps);
   std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
+  if (!faults.empty()) return faults;
+  if (std::string fault = lens_fault(frames, unit.config().lamps, *known); !fault.empty()) {
+    return {std::move(fault)};
+  }
   const UnitStep& check = unit.step(StationStep::check);
-  if (!faults.empty() || !check.result || !check.result->ok()) return faults;
+  if (!check.result || !check.result->ok()) return {};
   return place_faults(frames_of(check), unit.config().lamps, *known, captures_in(check.folder));
 }
 

@@ -14,6 +14,7 @@
 #include "detection/image_file.h"
 #include "rig/input_error.h"
 #include "station/image_blur.h"
+#include "station/image_signal.h"
 
 namespace vlp {
 namespace {
@@ -26,8 +27,8 @@ UnitImage looked_at(const std::filesystem::path& file, const Camera& type, const
     result.sha256 = sha256_of_file(file);
     const cv::Mat image = read_image(file);
     if (image.cols != type.imager_px[0] || image.rows != type.imager_px[1]) {
-      result.refused = fmt::format("is {} x {} px, the camera has {} x {}", image.cols, image.rows,
-                                   type.imager_px[0], type.imager_px[1]);
+      result.refused = fmt::format("another size: {} x {} px, the camera has {} x {}", image.cols,
+                                   image.rows, type.imager_px[0], type.imager_px[1]);
       return result;
     }
     look(image, result);
@@ -63,6 +64,24 @@ cv::Rect part_with_tags(const SeenBoard& seen, const cv::Mat& image) {
 /// More of a board than this at full scale moves its edges.
 constexpr double kMostWhite = 0.25;
 
+/// Less than this, in standard deviations of the noise, makes centres of lamps and stripes that are
+/// those of the noise.
+constexpr double kLeastSignal = 10;
+
+/// Why an image in which nothing stands out of the noise is of no use; empty for any other.
+std::string exposure_refusal(const cv::Mat& image) {
+  constexpr double percent = 100, half = 0.5;
+  const ImageSignal signal = image_signal(image);
+  if (signal.over_noise >= kLeastSignal) return "";
+  if (signal.bright_share > half) {
+    return fmt::format("overexposed: all of the image is at {:.0f} % of the full scale",
+                       percent * signal.bright_share);
+  }
+  return fmt::format(
+      "too dark: the brightest is {:.0f} times the noise over the darkest, {:.0f} wanted",
+      signal.over_noise, kLeastSignal);
+}
+
 /// Why a board in an image cannot be used; empty when it can.
 std::string board_refusal(const SeenBoard& seen, const ImageBlur& blur, double white,
                           const StationConfig& config) {
@@ -81,7 +100,7 @@ std::string board_refusal(const SeenBoard& seen, const ImageBlur& blur, double w
   }
   if (seen.tags.empty() && !seen.foreign.empty()) return "tags of another board";
   if (seen.tags.empty()) return "no tags of the board";
-  if (seen.tags.size() < least_tags) return fmt::format("only {} tags", seen.tags.size());
+  if (seen.tags.size() < least_tags) return fmt::format("too few tags: {}", seen.tags.size());
   return "";
 }
 
@@ -102,6 +121,8 @@ UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& 
 UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& config,
                         const LampDetector& detector) {
   return looked_at(file, config.type, [&](const cv::Mat& image, UnitImage& result) {
+    result.refused = exposure_refusal(image);
+    if (!result.refused.empty()) return;
     // A lamp fills its box to a share of pi / 4, and is dark for half of the time.
     constexpr double least_white = 0.65;
     int overexposed = 0;
@@ -121,13 +142,13 @@ UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& 
     if (result.lamps.size() >= 2) return;
     if (overexposed > 0) {
       result.refused = fmt::format(
-          "overexposed: {} of {} lights are at full scale all over, {} of "
-          "the lamps seen",
+          "overexposed: {} of {} lights are at full scale all over, {} of the lamps seen",
           overexposed, result.lights_unknown, result.lamps.size());
       return;
     }
-    result.refused = fmt::format("{} of the lamps seen ({} cut by the image's edge, {} unlike any)",
-                                 result.lamps.size(), result.lights_cut, result.lights_unknown);
+    result.refused =
+        fmt::format("too few lamps: {} seen, {} cut by the image's edge, {} lights unlike any",
+                    result.lamps.size(), result.lights_cut, result.lights_unknown);
   });
 }
 

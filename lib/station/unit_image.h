@@ -47,8 +47,9 @@ struct UnitImage {
 UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& config,
                         const BoardDetector& detector);
 
-/// The same of lamps: refused when it cannot be read or shows fewer than two of them; said is
-/// whether they are at full scale all over, where no stripes can be seen.
+/// The same of lamps: refused when it cannot be read, nothing in it stands out of the noise, be it
+/// too dark or all white (image_signal.h), or it shows fewer than two of them; said is whether they
+/// are at full scale all over, where no stripes can be seen.
 UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& config,
                         const LampDetector& detector);
 

@@ -281,7 +281,7 @@ kinds() {
   render --only rotation,dispersion,check
   cp -r "$work/good/boards" "$work/unit/"
   find "$work/unit/boards" -name '*.png' -exec sh -c 'for f; do echo y >>"$f"; done' sh {} +
-  tried swapped-units "$seed" 'the lamps do not turn about one axis'
+  tried swapped-units "$seed" 'the lamps are seen through another lens than the boards'
   # The capture tool writes each view of four again and again.
   unit_again
   (cd "$work/unit/boards" && for image in 00[0-3]?.png; do

@@ -43,7 +43,7 @@ TEST_F(StationShift, PassesNoUnitWhileItsGoldenUnitIsDue) {
               ContainsRegex("is not judged: image [a-z]+/[^ ]+ was used in golden run "
                             "[0-9TZa-f-]+: measure it anew"));
   EXPECT_THAT(run_program(no_image).output, Not(HasSubstr("golden"))) << "no INVALID run is noted";
-  // Due while a unit is on the station: at its verdict.
+  // Due while a unit is on the station: after it. Failed meanwhile: it does not pass.
   const auto note =
       std::find_if(fs::directory_iterator(folder / "station/spool"), {}, [](const auto& entry) {
         return entry.path().filename().string().starts_with(".golden-");
@@ -52,13 +52,27 @@ TEST_F(StationShift, PassesNoUnitWhileItsGoldenUnitIsDue) {
       run_program("(until [ -d " + (captures("0001") / "boards").string() +
                   " ]; do sleep 0.05; done; echo unit >>" + note.string() + ") & " +
                   run("0001", "--idle-s 1.5") + "; code=$?; wait; exit $code");
-  EXPECT_THAT(meanwhile.errors, Not(HasSubstr("warning: 1 units since")));
-  EXPECT_THAT(meanwhile.output, HasSubstr("Cause    1 units since the golden unit was measured"));
+  EXPECT_THAT(
+      meanwhile.errors,
+      ContainsRegex("warning: 1 units since the golden unit was measured [(]run [^ ]+[)]: "
+                    "'vlp-station verify' is due before the next unit; this one was begun"));
+  EXPECT_THAT(meanwhile.output, AllOf(HasSubstr("INVALID"), Not(HasSubstr("golden"))));
+  EXPECT_THAT(run_program(no_image).output, HasSubstr("Cause    1 units since the golden unit"));
+  const auto set_note = [&](const std::string& script) {
+    return "sed -i '" + script + "' " + note.string();
+  };
+  ASSERT_EQ(run_program(set_note("2d")).exit_code, 0);
+  const auto failed = run_program("(until [ -d " + (captures("0001") / "boards").string() +
+                                  " ]; do sleep 0.05; done; " + set_note("1s/PASS/FAIL/") + ") & " +
+                                  run("0001", "--idle-s 1.5") + "; code=$?; wait; exit $code");
+  EXPECT_THAT(failed.errors, Not(HasSubstr("no unit passes")));
+  EXPECT_THAT(failed.output, HasSubstr("Cause    the golden unit failed (run"));
+  ASSERT_EQ(run_program(set_note("1s/FAIL/PASS/")).exit_code, 0);
   // Of another station.
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.05, 0.28, 1.6]");
   const auto changed = run_program(no_image);
   EXPECT_THAT(changed.errors, HasSubstr("was changed since the golden unit was measured (run 20"));
-  EXPECT_THAT(changed.output, ContainsRegex("Cause    station.yaml or a file that it names was"));
+  EXPECT_THAT(changed.output, HasSubstr("Cause    what measures in station.yaml or a file"));
 }
 
 /// Unit after unit without a terminal: a line each. What becomes of one ends nothing.

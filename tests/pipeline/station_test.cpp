@@ -22,6 +22,13 @@ class Station : public SmallStation {
   fs::path only_results(const std::string& camera) const {
     return fs::directory_iterator(folder / "station/results" / camera)->path();
   }
+  /// Other captures, of the scene as it is now, with the boards that are there.
+  void render_after_the_boards(const std::string& only) const {
+    fs::rename(folder / "unit/boards", folder / "boards");
+    fs::remove_all(folder / "unit");
+    render(only);
+    fs::rename(folder / "boards", folder / "unit/boards");
+  }
 };
 
 TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
@@ -318,6 +325,35 @@ TEST_F(Station, NamesOverexposure) {
   const auto boards = run_program(batch("0001"));
   EXPECT_EQ(boards.exit_code, 3);
   EXPECT_THAT(boards.output, HasSubstr("images refused: 4 overexposed"));
+}
+
+/// Lamps that cannot be told from the noise, and a ceiling that is white all over.
+TEST_F(Station, NamesLampImagesOfTheWrongExposure) {
+  render("boards");
+  change("scene.yaml", "ambient_e_per_s: 1.0e+6", "ambient_e_per_s: 1.0e+10");
+  render_after_the_boards("rotation");
+  EXPECT_THAT(run_program(batch("0001")).errors,
+              HasSubstr("camera 0001 is not judged: rotation (0/12): 12 of 12 images refused: 12 "
+                        "overexposed: less exposure, gain or light"));
+  change("scene.yaml", "ambient_e_per_s: 1.0e+10", "ambient_e_per_s: 1.0e+4");
+  for (int lamp = 0; lamp < 6; ++lamp) change("scene.yaml", "s: 2.0e+8", "s: 1.5e+6");
+  render_after_the_boards("rotation");
+  EXPECT_THAT(run_program(batch("0001")).errors,
+              HasSubstr("camera 0001 is not judged: rotation (0/12): 12 of 12 images refused: 12 "
+                        "too dark: more exposure, gain or light"));
+}
+
+/// The lamps do not turn about one axis, and the fixes scatter: because of that.
+TEST_F(Station, NamesLampsThatAnotherCameraTook) {
+  render("boards");
+  change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
+  render_after_the_boards("rotation,dispersion,check");
+  const auto result = run_program(batch("0001"));
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(
+      result.errors,
+      ContainsRegex("is not judged: the lamps are seen through another lens than the "
+                    "boards: they show a focal length of 508[.].* px and the centre [(]407"));
 }
 
 struct LensFault {

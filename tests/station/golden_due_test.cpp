@@ -41,7 +41,9 @@ class GoldenDue : public testing::Test {
   GoldenDue() {
     config.station = "a/station";
     config.spool = folder / "spool";
-    config.sha256 = "aa";
+    config.type.imager_px = {800, 600};
+    config.type.lens_model = LensModel::opencv8;
+    config.type.intrinsics = {520, 520, 399.5, 299.5, 0, 0, 0, 0, 0, 0, 0, 0};
     config.verify_due = VerifyDue{24, 2};
   }
   void note(const std::string& kind, const std::string& verdict,
@@ -51,7 +53,6 @@ class GoldenDue : public testing::Test {
     run.kind = kind;
     run.verdict = verdict;
     run.ended_utc = ended_utc;
-    run.config_sha256 = config.sha256;
     note_for_golden(config, run);
   }
   std::string problem() const { return golden_problem(config); }
@@ -93,6 +94,24 @@ TEST_F(GoldenDue, AfterSoManyHours) {
   EXPECT_EQ(problem(), "");
 }
 
+/// Of a unit that was begun before.
+TEST_F(GoldenDue, NotAtAVerdictForWhatRanOutMeanwhile) {
+  const auto at_verdict = [&] { return golden_problem(config, GoldenAt::verdict); };
+  EXPECT_THAT(at_verdict(), HasSubstr("not measured"));
+  note("golden", "PASS", "2026-01-01T00:00:00Z");
+  EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
+  EXPECT_EQ(at_verdict(), "");
+  note("golden", "PASS");
+  note("unit", "PASS");
+  note("unit", "PASS");
+  EXPECT_THAT(problem(), StartsWith("2 units since"));
+  EXPECT_EQ(at_verdict(), "");
+  config.lamps.lamps.push_back({1, {0, 0, 2}, 0.18, 1600, 0.5});
+  EXPECT_THAT(at_verdict(), StartsWith("what measures in station.yaml"));
+  note("golden", "FAIL");
+  EXPECT_THAT(at_verdict(), StartsWith("the golden unit failed"));
+}
+
 TEST_F(GoldenDue, AfterItFailed) {
   note("golden", "PASS");
   note("golden", "FAIL");
@@ -105,15 +124,17 @@ TEST_F(GoldenDue, AfterItFailed) {
 TEST_F(GoldenDue, AfterTheStationWasChanged) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
-  config.sha256 = "bb";
+  config.sha256 = "of other comments";
+  EXPECT_EQ(problem(), "");
+  config.lamps.lamps.push_back({1, {0, 0, 2}, 0.18, 1600, 0.5});
   EXPECT_EQ(problem(),
-            "station.yaml or a file that it names was changed since the golden unit was measured "
-            "(run RUN): 'vlp-station verify' is due");
+            "what measures in station.yaml or a file that it names was changed since the golden "
+            "unit was measured (run RUN): 'vlp-station verify' is due");
   note("unit", "FAIL");
-  EXPECT_THAT(problem(), StartsWith("station.yaml or a file"));
-  config.sha256 = "aa";
+  EXPECT_THAT(problem(), StartsWith("what measures in station.yaml"));
+  config.lamps.lamps.clear();
   EXPECT_EQ(problem(), "") << "as it was again";
-  config.sha256 = "bb";
+  config.lamps.lamps.push_back({1, {0, 0, 2}, 0.18, 1600, 0.5});
   note("golden", "PASS");
   EXPECT_EQ(problem(), "");
 }

@@ -169,6 +169,12 @@ TEST_F(HookTest, IsOpenUntilItIsDone) {
   run.events.push_back(new_event(kHookDone, ""));
   EXPECT_FALSE(hook_is_open(run));
   EXPECT_EQ(hook_problem(run), "");
+  // Wanted again, for a run that was voided.
+  run.events.push_back(new_event(kHookWanted, "label it"));
+  EXPECT_TRUE(hook_is_open(run));
+  EXPECT_EQ(hook_problem(run), "was not run to its end");
+  run.events.push_back(new_event(kHookDone, ""));
+  EXPECT_FALSE(hook_is_open(run));
 }
 
 TEST_F(HookTest, OfARunIsRunByOneProgram) {

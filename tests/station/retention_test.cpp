@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "rig/input_error.h"
+#include "station/spool.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -92,14 +93,17 @@ TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
   const Retained found = look_for_expired(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].bytes, 1000U);
-  EXPECT_THROW(delete_folder(found.expired[0]), InputError);
-  delete_content(found.expired[0]);
-  EXPECT_TRUE(fs::is_empty(images));
-  delete_folder(found.expired[0]);
-  EXPECT_THROW(delete_content(found.expired[0]), InputError);
+  Spool spool(folder / "spool", (folder / "records.db").string());
+  delete_expired(found.expired[0], spool);
   EXPECT_FALSE(fs::exists(images));
   EXPECT_TRUE(fs::exists(elsewhere / "check/0.png"));
-  EXPECT_TRUE(records.find(kOld));
+  spool.deliver();
+  const auto told = records.find(kOld);
+  ASSERT_TRUE(told);
+  ASSERT_THAT(told->events, SizeIs(1));
+  EXPECT_EQ(told->events[0].what, kImagesDeleted);
+  EXPECT_EQ(told->events[0].text, "kept 90 days, 0.0 MB");
+  EXPECT_THROW(delete_expired(found.expired[0], spool), InputError) << "it is not there";
 }
 
 }  // namespace
