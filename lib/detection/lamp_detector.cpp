@@ -185,7 +185,8 @@ void LampDetector::measure(const cv::Mat& lines, const Background& background, L
     return judge(striped_part(without_glow(signal)));
   }
   const DiscImage disc{low, high, shape_.turned(light.pixel)};
-  auto better = shape_.light_of(refined(lines, light.outline, disc, background), background);
+  auto outline = refined(lines, light.outline, disc, background);
+  auto better = shape_.light_of(std::move(outline.points), background, outline.mottled);
   if (better && 2 * better->outline.size() > light.outline.size()) {
     better->roundness = light.roundness;
     better->outside = light.outside;

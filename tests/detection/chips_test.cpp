@@ -17,23 +17,22 @@ Score score_with(const std::optional<Chips>& chips, const std::optional<Halo>& h
   return Captures(std::move(scene), "check").score(12);
 }
 
-/// Chips draw neighbouring points of the outline the same way: sigma_px takes them for independent.
-void expect_good(const Score& score, double most_rms_px) {
+void expect_good(const Score& score) {
   EXPECT_GT(score.lamps, 180);
   EXPECT_EQ(score.missed, 0);
   EXPECT_EQ(score.wrong, 0);
-  EXPECT_LT(score.rms_px(), most_rms_px);
-  EXPECT_LT(score.worst_px, 0.4);
+  EXPECT_LT(score.rms_px(), 0.045);
+  EXPECT_LT(score.worst_px, 0.25);
   EXPECT_GT(score.chi_square / score.lamps, 0.7);
-  EXPECT_LT(score.chi_square / score.lamps, 3);
+  EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
 TEST(Chips, BehindADiffuserLeaveTheCentre) {
-  expect_good(score_with(Chips{0.3, 0.03, 0.02}, std::nullopt), 0.07);
+  expect_good(score_with(Chips{0.3, 0.03, 0.02}, std::nullopt));
 }
 
 TEST(Chips, BehindADiffuserWithAHaloLeaveTheCentre) {
-  expect_good(score_with(Chips{0.3, 0.03, 0.02}, Halo{0.03, 0.02}), 0.09);
+  expect_good(score_with(Chips{0.3, 0.03, 0.02}, Halo{0.03, 0.02}));
 }
 
 }  // namespace

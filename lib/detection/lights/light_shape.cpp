@@ -3,6 +3,7 @@
 #include "detection/lights/light_shape.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -56,6 +57,33 @@ double slenderness(const Matrix2& rim_from_circle) {
   return (half_square + difference) / area;
 }
 
+/// How many points err together: the sum of the products of their errors with those of their
+/// neighbours and their own, over that of their squares. Of points that err each by itself the fit,
+/// which takes off three unknowns, leaves products of -3 / n of the mean square.
+double points_together(const std::vector<Eigen::Vector2d>& points,
+                       const std::vector<EdgePoint>& outline, const std::vector<bool>& counted,
+                       const RobustEllipse& fit) {
+  constexpr double neighbours_px = 4, unknowns = 3;
+  const Matrix2 circle_from_rim = fit.rim_from_circle.inverse();
+  std::vector<double> errors(points.size(), 0);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (counted[i]) errors[i] = (circle_from_rim * (points[i] - fit.center)).norm() - 1;
+  }
+  double squares = 0, products = 0, pairs = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    squares += errors[i] * errors[i];
+    for (std::size_t j = 0; j < i && counted[i]; ++j) {
+      if (!counted[j] || (outline[i].pixel - outline[j].pixel).norm() >= neighbours_px) continue;
+      products += 2 * errors[i] * errors[j];
+      pairs += 2;
+    }
+  }
+  if (!(squares > 0)) return 1;
+  const auto count = double(std::count(counted.begin(), counted.end(), true));
+  const double taken = unknowns / count * pairs / count;
+  return std::max(1.0, 1 + products / squares + taken);
+}
+
 /// A circle is an ellipse, too.
 RobustEllipse as_ellipse(RobustCircle fit) {
   return {fit.circle.center, fit.circle.radius * Matrix2::Identity(), fit.center_covariance,
@@ -88,7 +116,7 @@ std::optional<Eigen::Vector2d> LightShape::pixel_of(const Eigen::Vector2d& plane
 }
 
 std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
-                                          const Background& background) const {
+                                          const Background& background, bool mottled) const {
   std::vector<Eigen::Vector2d> points, pixels;
   double brightest = 0;
   std::erase_if(outline, [&](const EdgePoint& edge) {
@@ -137,15 +165,16 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
     light.high = light.high.cwiseMax(*rim);
   }
   light.radius_px = std::sqrt(fit->rim_from_circle.determinant()) / per_px;
-  const double sigma_px = std::sqrt(fit->center_covariance.trace() / 2) / per_px;
+  const std::vector<bool> shown = on_circle(outline, fit->inliers);
+  const double together = mottled ? points_together(points, outline, shown, *fit) : 1;
+  const double sigma_px = std::sqrt(together * fit->center_covariance.trace() / 2) / per_px;
   if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
   light.sigma_px = std::max(kMinSigma_px, sigma_px);
   light.roundness = double(fit->count) / double(outline.size());
-  const std::vector<bool> shown = on_circle(outline, fit->inliers);
   for (std::size_t i = 0; i < outline.size(); ++i) {
     if (shown[i]) light.outline.push_back(outline[i]);
   }
-  if (circle) light.sums = {points, weights, shown, *circle, line_slope_at(*circle)};
+  if (circle) light.sums = {points, weights, shown, *circle, line_slope_at(*circle), together};
   light.rise_px = median_rise_px(light.outline);
   return light;
 }

@@ -37,9 +37,11 @@ class LightShape {
  public:
   explicit LightShape(const DetectorCamera& camera) : camera_(camera) {}
 
-  /// The light with that outline, or most of it: everything but kind, lamp and stripes. Nothing
-  /// when it is not round, or its centre is not known to a pixel or so.
-  std::optional<Light> light_of(std::vector<EdgePoint> outline, const Background& background) const;
+  /// The light with that outline, or most of it: everything but kind, lamp and stripes. Of a
+  /// mottled light, see RefinedOutline, the sigma counts neighbouring points by how many err
+  /// together. Nothing when it is not round, or its centre is not known to a pixel or so.
+  std::optional<Light> light_of(std::vector<EdgePoint> outline, const Background& background,
+                                bool mottled = false) const;
 
   /// Moves the centre to where it is with the outline as oval as that, and states its sigma_px.
   void shift(const Oval& oval, Light& light) const;

@@ -29,6 +29,13 @@ struct DiscImage {
   Eigen::Vector2d low, high, center;
 };
 
+struct RefinedOutline {
+  std::vector<EdgePoint> points;
+  /// Whether the light's level inside varies from place to place, as LED chips behind a diffuser
+  /// make it. What it does next to the outline neighbouring points have in common.
+  bool mottled;
+};
+
 /// The points again, now that the light is known to be a disc, whose rim is taken as the upright
 /// ellipse in its box: the level is taken at the same depth below the outline everywhere, where a
 /// row cuts it at a flat angle further in, and extrapolated to it as that of a disc which darkens
@@ -36,8 +43,16 @@ struct DiscImage {
 /// moves the half of the level outwards by s^2 level' / level - s^2 / (2 r), level' inwards and r
 /// the rim's radius of curvature, which is undone to first order. Points where a row cuts flatter
 /// than 20 degrees are left out.
-std::vector<EdgePoint> refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
-                               const DiscImage& disc, const Background& background);
+///
+/// A light is mottled when what lines through its levels leave goes on from pixel to pixel beyond
+/// chance. The level at its rim is not that further in: there x, the rim, is fitted to the pixels
+/// from 3 s before it to 3 s + 1 px behind it, t = i - x, with the level o outside,
+///
+///     level(i) = o (1 - F(t / s)) + a F(t / s) + b (t F(t / s) + s f(t / s)),
+///
+/// a blurred step to a level that rises evenly; F, f: the normal distribution and its density.
+RefinedOutline refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
+                       const DiscImage& disc, const Background& background);
 
 /// Of each row the first begin and the last end: the outline of a light that something in the way
 /// splits.

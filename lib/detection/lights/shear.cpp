@@ -61,8 +61,8 @@ Motion motion_of(const std::vector<Shown>& lights) {
 
 OutlineSums::OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
                          const std::vector<bool>& counted, const Circle& circle,
-                         const Eigen::Vector2d& line_slope)
-    : circle_(circle), line_slope_(line_slope) {
+                         const Eigen::Vector2d& line_slope, double together)
+    : circle_(circle), line_slope_(line_slope), together_(together) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!counted[i]) continue;
     const Eigen::Vector2d away = (points[i] - circle_.center) / circle_.radius;
@@ -94,7 +94,7 @@ std::optional<OutlineSums::Estimate> OutlineSums::solved(const std::optional<Ova
   };
   const auto variance_left = [&](const Vector5& p) {
     const double left = squares_ - 2 * gradient_.dot(p) + p.dot(normal_ * p);
-    return std::max(left, 1e-12 * weight_) / (count_ - unknowns);
+    return together_ * std::max(left, 1e-12 * weight_) / (count_ - unknowns);
   };
   constexpr double first = 1e-4;  // of the radius, squared
   auto estimate = solve(first);

@@ -35,11 +35,13 @@ class OutlineSums {
   OutlineSums() = default;
   /// points, weights: of the whole outline; counted: those that the sums are of. line_slope: of the
   /// number of the line in which the shutter reads a point near the circle, over the point's x, y.
+  /// together: how many points err together.
   OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
               const std::vector<bool>& counted, const Circle& circle,
-              const Eigen::Vector2d& line_slope);
+              const Eigen::Vector2d& line_slope, double together = 1);
 
-  /// With the oval known beforehand, or not at all. The variance is that of what is left. Nothing
+  /// With the oval known beforehand, or not at all. The variance is that of what is left,
+  /// times the points that err together. Nothing
   /// when the points do not tell.
   std::optional<Estimate> solved(const std::optional<Oval>& known) const;
 
@@ -52,7 +54,7 @@ class OutlineSums {
   Eigen::Vector2d line_slope_ = Eigen::Vector2d::Zero();
   Matrix5 normal_ = Matrix5::Zero();
   Vector5 gradient_ = Vector5::Zero();
-  double squares_ = 0, weight_ = 0;
+  double squares_ = 0, weight_ = 0, together_ = 1;
   int count_ = 0;
 };
 

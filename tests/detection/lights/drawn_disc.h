@@ -74,7 +74,8 @@ inline std::vector<EdgePoint> outline_in(const cv::Mat& image) {
 
 inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {
   return refined(image, outline_in(image), {disc.low(), disc.high(), disc.center},
-                 background_of(image));
+                 background_of(image))
+      .points;
 }
 
 /// Where rows cut the outline more steeply than that.
