@@ -126,8 +126,8 @@ std::optional<Displacements> solved(const LampMap& map, const std::vector<Ceilin
   const Eigen::MatrixXd closed =
       found.projector * normal * found.projector + open * open.transpose();
   const auto [weights, directions] = symmetric_eigen(closed);
-  constexpr double tied = 1e-9;
-  if (!(weights.minCoeff() > tied)) return std::nullopt;
+  constexpr double tied = 1e-12;
+  if (!(weights.minCoeff() > tied * weights.maxCoeff())) return std::nullopt;
   const Eigen::MatrixXd inverse =
       directions * weights.cwiseInverse().asDiagonal() * directions.transpose();
   found.moved_m = inverse * (found.projector * gradient);

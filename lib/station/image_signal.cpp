@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace vlp {
 namespace {
@@ -22,15 +23,27 @@ double noise_of(const cv::Mat& image) {
   return std::max(rounding, std::sqrt(std::numbers::pi / 2) * mean / six);
 }
 
+/// The darkest and the brightest median of a pixel and its neighbours on both sides.
+std::pair<double, double> extremes(const cv::Mat& image, const cv::Point& side) {
+  if (image.cols < 3 || image.rows < 3) return {0, 0};
+  const cv::Rect inner(side, cv::Size(image.cols - 2 * side.x, image.rows - 2 * side.y));
+  const cv::Mat before = image(inner - side), here = image(inner), after = image(inner + side);
+  const cv::Mat low = cv::min(before, here), high = cv::max(before, here);
+  const cv::Mat median = cv::max(low, cv::min(high, after));
+  double dark = 0, bright = 0;
+  cv::minMaxLoc(median, &dark, &bright);
+  return {dark, bright};
+}
+
 }  // namespace
 
 ImageSignal image_signal(const cv::Mat& image) {
   constexpr double full_8 = 255, full_16 = 65535;
-  cv::Mat smooth;
-  cv::medianBlur(image, smooth, 3);
-  double dark = 0, bright = 0;
-  cv::minMaxLoc(smooth, &dark, &bright);
-  return {bright / (image.depth() == CV_8U ? full_8 : full_16), (bright - dark) / noise_of(image)};
+  const auto [dark_along, bright_along] = extremes(image, {1, 0});
+  const auto [dark_across, bright_across] = extremes(image, {0, 1});
+  const double dark = std::min(dark_along, dark_across);
+  const double bright = std::max(bright_along, bright_across);
+  return {dark / (image.depth() == CV_8U ? full_8 : full_16), (bright - dark) / noise_of(image)};
 }
 
 }  // namespace vlp

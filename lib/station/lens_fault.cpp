@@ -47,10 +47,10 @@ double corner_shift_px(const Camera& a, const Camera& b) {
   for (const double u : {0., double(a.imager_px[0])}) {
     for (const double v : {0., double(a.imager_px[1])}) {
       // Of the ray that is seen there; distortion is the same in both.
-      const double x = (u - a.intrinsics[2]) / a.intrinsics[0];
-      const double y = (v - a.intrinsics[3]) / a.intrinsics[1];
-      worst_px = std::max(worst_px, std::hypot(b.intrinsics[0] * x + b.intrinsics[2] - u,
-                                               b.intrinsics[1] * y + b.intrinsics[3] - v));
+      const Eigen::Vector2d corner(u, v);
+      const Eigen::Vector2d ray = (corner - a.center_px()).cwiseQuotient(a.focal_px());
+      worst_px =
+          std::max(worst_px, (b.focal_px().cwiseProduct(ray) + b.center_px() - corner).norm());
     }
   }
   return worst_px;
@@ -60,6 +60,9 @@ double corner_shift_px(const Camera& a, const Camera& b) {
 
 std::string lens_fault(std::span<const Frame> frames, const LampMap& map,
                        const Calibration& calibration) {
+  constexpr std::size_t least_captures =
+      10;  // of fewer a free lens takes up what other faults leave
+  if (frames.size() < least_captures) return "";
   const AdjustmentResult as_stated = adjusted(frames, map, calibration);
   const AdjustmentResult freed = adjusted(frames, map, with_free_focus(calibration));
   if (!as_stated.ok() || !freed.ok()) return "";

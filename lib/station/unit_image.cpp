@@ -65,17 +65,17 @@ cv::Rect part_with_tags(const SeenBoard& seen, const cv::Mat& image) {
 constexpr double kMostWhite = 0.25;
 
 /// Less than this, in standard deviations of the noise, makes centres of lamps and stripes that are
-/// those of the noise.
-constexpr double kLeastSignal = 10;
+/// those of the noise, which alone has about 6.
+constexpr double kLeastSignal = 12;
 
 /// Why an image in which nothing stands out of the noise is of no use; empty for any other.
 std::string exposure_refusal(const cv::Mat& image) {
-  constexpr double percent = 100, half = 0.5;
+  constexpr double percent = 100, white = 0.85;
   const ImageSignal signal = image_signal(image);
   if (signal.over_noise >= kLeastSignal) return "";
-  if (signal.bright_share > half) {
-    return fmt::format("overexposed: all of the image is at {:.0f} % of the full scale",
-                       percent * signal.bright_share);
+  if (signal.dark_share > white) {
+    return fmt::format("overexposed: all of the image is at {:.0f} % of the full scale or more",
+                       percent * signal.dark_share);
   }
   return fmt::format(
       "too dark: the brightest is {:.0f} times the noise over the darkest, {:.0f} wanted",

@@ -172,9 +172,11 @@ template <typename Level>
 std::optional<double> blurred_edge(const Profile<Level>& profile, double at, double width,
                                    double level, double dark) {
   constexpr int rounds = 4;
-  constexpr double reach = 3, further_in_px = 1, far = 2;
-  const int begin = static_cast<int>(std::ceil(at - reach * width));
-  const int end = static_cast<int>(std::floor(at + reach * width + further_in_px));
+  constexpr double reach = 3, least_reach_px = 2, further_in_px = 1, far = 2;
+  const double reach_px =
+      std::max(reach * width, least_reach_px);  // four unknowns want more pixels
+  const int begin = static_cast<int>(std::ceil(at - reach_px));
+  const int end = static_cast<int>(std::floor(at + reach_px + further_in_px));
   if (!profile.has(begin) || !profile.has(end)) return std::nullopt;
   double edge = at, outside = 0, inside = level, slope = 0;
   for (int round = 0; round < rounds; ++round) {
