@@ -39,8 +39,8 @@ Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, 
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
   const Eigen::MatrixXd scaled = columns * inverse_sd.asDiagonal();
-  const auto eigen = symmetric_eigen(
-      Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
+  const auto eigen =
+      symmetric_eigen(Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
   constexpr double rounding = 1e-12;
   const Eigen::ArrayXd values = eigen.values;
   const Eigen::VectorXd whitening =
