@@ -18,6 +18,10 @@ Score score_with(const std::optional<Chips>& chips, const std::optional<Halo>& h
 }
 
 void expect_good(const Score& score) {
+  testing::Test::RecordProperty("rms_px", testing::PrintToString(score.rms_px()));
+  testing::Test::RecordProperty("worst_px", testing::PrintToString(score.worst_px));
+  testing::Test::RecordProperty("chi_square",
+                                testing::PrintToString(score.chi_square / score.lamps));
   EXPECT_GT(score.lamps, 180);
   EXPECT_EQ(score.missed, 0);
   EXPECT_EQ(score.wrong, 0);
