@@ -11,7 +11,7 @@
 namespace vlp {
 
 /// A straight way at constant speed.
-struct Drive {
+struct StraightDrive {
   Eigen::Vector2d from_m, to_m;
   double speed_m_per_s;
 };
@@ -23,11 +23,11 @@ struct Vibration {
 /// Captures of the lamps. On spots: at each height, at each spot, at each yaw, so many times; the
 /// last changes fastest. On a drive: at each height, at each yaw, so many passes along it, with a
 /// capture every interval.
-struct LampCaptures {
+struct LampShots {
   std::vector<double> heights_m;
   /// Where the axis stands, or comes by on its drive.
   std::vector<Eigen::Vector2d> spots_m;
-  std::optional<Drive> drive;
+  std::optional<StraightDrive> drive;
   std::vector<double> yaws_rad;
   /// Each yaw is off by up to so much, at random.
   double yaw_jitter_rad;
@@ -61,7 +61,7 @@ struct BoardViews {
 struct CaptureSet {
   std::string folder;
   double exposure_s;
-  std::optional<LampCaptures> lamps;
+  std::optional<LampShots> lamps;
   std::optional<BoardViews> board;
 };
 

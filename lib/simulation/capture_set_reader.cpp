@@ -29,7 +29,7 @@ void check_height(const YamlValue& item, double height_m, const Scene& scene) {
 }
 
 void read_heights(const YamlValue& list, const Scene& scene, const Room& room,
-                  LampCaptures& captures) {
+                  LampShots& captures) {
   for (const YamlValue& item : list.list()) {
     const double height_m = item.number_within(-200, 200, "m");
     check_height(item, height_m, scene);
@@ -41,7 +41,7 @@ void read_heights(const YamlValue& list, const Scene& scene, const Room& room,
   if (captures.heights_m.empty()) throw list.error("holds no height");
 }
 
-void read_yaws(YamlMap& map, LampCaptures& captures) {
+void read_yaws(YamlMap& map, LampShots& captures) {
   captures.yaw_jitter_rad = 0;
   const auto yaws = map.optional("yaws_deg"), turn = map.optional("turn");
   if (yaws.has_value() == turn.has_value()) {
@@ -62,7 +62,7 @@ void read_yaws(YamlMap& map, LampCaptures& captures) {
   for (int i = 0; i < count; ++i) captures.yaws_rad.push_back(rad_from_deg(360.0 * i / count));
 }
 
-void read_lean(YamlMap map, LampCaptures& captures) {
+void read_lean(YamlMap map, LampShots& captures) {
   const auto ramp = [&](const std::string& key) {
     const auto value = map.optional(key);
     if (!value) return std::pair(0.0, 0.0);
@@ -82,9 +82,9 @@ void read_lean(YamlMap map, LampCaptures& captures) {
   map.finish();
 }
 
-LampCaptures read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room) {
+LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room) {
   if (scene.lamps.empty()) throw map.error("the scene has no lamps");
-  LampCaptures captures;
+  LampShots captures;
   captures.interval_s = map.required("interval_s").number_within(1e-6, 1e5, "s");
   read_places(map, scene, room, captures);
   read_heights(map.required("heights_m"), scene, room, captures);

@@ -44,17 +44,17 @@ std::vector<Eigen::Vector2d> read_grid(const YamlValue& value, const Room& room,
   return spots;
 }
 
-Drive read_drive(const YamlValue& value, const Room& room, double lever_arm_m) {
+StraightDrive read_drive(const YamlValue& value, const Room& room, double lever_arm_m) {
   YamlMap map = value.map();
-  const Drive drive{read_spot(map.required("from_m"), room, lever_arm_m),
-                    read_spot(map.required("to_m"), room, lever_arm_m),
-                    map.required("speed_m_per_s").number_within(1e-6, 20, "m/s")};
+  const StraightDrive drive{read_spot(map.required("from_m"), room, lever_arm_m),
+                            read_spot(map.required("to_m"), room, lever_arm_m),
+                            map.required("speed_m_per_s").number_within(1e-6, 20, "m/s")};
   map.finish();
   if (drive.from_m == drive.to_m) throw value.error("has no length");
   return drive;
 }
 
-std::vector<Eigen::Vector2d> places_along(const Drive& drive, double interval_s,
+std::vector<Eigen::Vector2d> places_along(const StraightDrive& drive, double interval_s,
                                           const YamlValue& value) {
   const Eigen::Vector2d way = drive.to_m - drive.from_m;
   const double step_m = drive.speed_m_per_s * interval_s;
@@ -68,7 +68,7 @@ std::vector<Eigen::Vector2d> places_along(const Drive& drive, double interval_s,
 
 }  // namespace
 
-void read_places(YamlMap& map, const Scene& scene, const Room& room, LampCaptures& captures) {
+void read_places(YamlMap& map, const Scene& scene, const Room& room, LampShots& captures) {
   const double lever_arm_m = scene.mount.lever_arm_m.norm();
   const auto spots = map.optional("spots_m"), grid = map.optional("grid");
   const auto drive = map.optional("drive");

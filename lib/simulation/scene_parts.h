@@ -38,7 +38,7 @@ Picture read_picture(YamlMap map, const Sensor& sensor);
 SceneBoard read_scene_board(YamlMap map);
 ArchiveSpreads read_archive_spreads(YamlMap map);
 /// Where the axis stands at each capture: spots, a grid or a drive, all in the room.
-void read_places(YamlMap& map, const Scene& scene, const Room& room, LampCaptures& captures);
+void read_places(YamlMap& map, const Scene& scene, const Room& room, LampShots& captures);
 /// Heights are checked against the lamps, too.
 CaptureSet read_capture_set(YamlMap map, const Scene& scene, const Room& room);
 

@@ -31,7 +31,7 @@ struct Step {
   double driven_s;
 };
 
-Step step_of(const LampCaptures& captures, std::size_t index) {
+Step step_of(const LampShots& captures, std::size_t index) {
   const std::size_t spots = captures.spots_m.size(), yaws = captures.yaws_rad.size();
   const auto repeat = static_cast<std::size_t>(captures.repeat);
   if (captures.drive) {
@@ -83,13 +83,13 @@ Eigen::Isometry3d BoardShot::camera_from_board(double time_s) const {
 
 std::size_t shots_in(const CaptureSet& set) {
   if (set.board) return static_cast<std::size_t>(set.board->count);
-  const LampCaptures& lamps = *set.lamps;
+  const LampShots& lamps = *set.lamps;
   return lamps.heights_m.size() * lamps.spots_m.size() * lamps.yaws_rad.size() *
          static_cast<std::size_t>(lamps.repeat);
 }
 
 LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
-  const LampCaptures& captures = *set.lamps;
+  const LampShots& captures = *set.lamps;
   cv::RNG random = random_of(scene.seed, set.folder, index);
   const Step step = step_of(captures, index);
   const double jitter_rad = captures.yaw_jitter_rad * random.uniform(-1.0, 1.0);

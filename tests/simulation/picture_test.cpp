@@ -155,7 +155,7 @@ TEST(PictureFile, IsAJpegOfItsQuality) {
 
 TEST(PictureFile, IsNamedByItsKind) {
   Scene scene = plain_scene();
-  const LampCaptures captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
+  const LampShots captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
   const CaptureSet set{"one", 5e-5, captures, {}};
   EXPECT_EQ(lamp_shot(scene, set, 0).image, "0000.png");
   scene.picture = Picture{2.2, {}, 90};

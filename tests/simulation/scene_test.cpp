@@ -123,7 +123,7 @@ TEST(Scene, HasTheSpotsInTheOrderOfTheFile) {
 }
 
 TEST(Scene, GoesThroughAGridRowByRowFromItsFirstCorner) {
-  const LampCaptures captures = *scene_of(kSceneYaml).sets.at(1).lamps;
+  const LampShots captures = *scene_of(kSceneYaml).sets.at(1).lamps;
   const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
                                        {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};
   ASSERT_EQ(captures.spots_m.size(), expected.size());
@@ -140,7 +140,7 @@ TEST(Scene, GoesThroughAGridRowByRowFromItsFirstCorner) {
 }
 
 TEST(Scene, HasThePlacesAlongALineUpToItsEnd) {
-  const LampCaptures captures = *scene_of(kSceneYaml).sets.at(2).lamps;
+  const LampShots captures = *scene_of(kSceneYaml).sets.at(2).lamps;
   EXPECT_EQ(captures.drive->speed_m_per_s, 0.5);
   // 0.894 m in steps of 0.125 m.
   ASSERT_EQ(captures.spots_m.size(), 8U);

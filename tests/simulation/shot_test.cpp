@@ -15,7 +15,7 @@ namespace vlp {
 namespace {
 
 CaptureSet turning() {
-  LampCaptures captures{{0, 0.3}, {{0.1, 0.2}, {0.3, 0.4}}, {}, {0, 2, 4}, 0.2, 0, 2, 0.5, false};
+  LampShots captures{{0, 0.3}, {{0.1, 0.2}, {0.3, 0.4}}, {}, {0, 2, 4}, 0.2, 0, 2, 0.5, false};
   return {"turning", 5e-5, captures, {}};
 }
 
@@ -67,7 +67,7 @@ TEST(LampShots, KeepThePhaseOfALampThatHasOneAndLetOthersRun) {
 TEST(LampShots, MoveAlongALineAtItsSpeed) {
   const Scene scene = plain_scene();
   CaptureSet set = turning();
-  set.lamps->drive = Drive{{0, 0}, {0.3, 0.4}, 0.1};
+  set.lamps->drive = StraightDrive{{0, 0}, {0.3, 0.4}, 0.1};
   const Pose before = lamp_shot(scene, set, 0).motion.pose(-1);
   const Pose after = lamp_shot(scene, set, 0).motion.pose(1);
   EXPECT_TRUE((after.position_m - before.position_m).isApprox(Eigen::Vector3d(0.12, 0.16, 0)));
@@ -75,8 +75,8 @@ TEST(LampShots, MoveAlongALineAtItsSpeed) {
 
 TEST(LampShots, OfADriveAreWhereTheCaptureBeforeGoes) {
   const Scene scene = plain_scene();
-  const Drive drive{{0, 0}, {0.3, 0.4}, 0.1};
-  LampCaptures captures{{0, 0.3}, {}, drive, {0, 2}, 0, 0.4, 2, 0.5, false};
+  const StraightDrive drive{{0, 0}, {0.3, 0.4}, 0.1};
+  LampShots captures{{0, 0.3}, {}, drive, {0, 2}, 0, 0.4, 2, 0.5, false};
   for (int i = 0; i <= 10; ++i) captures.spots_m.emplace_back(0.03 * i, 0.04 * i);
   const CaptureSet set{"drive", 5e-5, captures, {}};
   ASSERT_EQ(shots_in(set), 88);
