@@ -15,7 +15,8 @@ namespace vlp {
 /// they do not. All captures are adjusted together (calibration/adjustment/adjustment.h), without
 /// their places, once with the lens as far as its covariance lets it, once with focal lengths and
 /// centre free: it is another lens when the residuals are then less than a third, and some corner
-/// of the image is a pixel or more elsewhere. Nothing where the captures do not determine it.
+/// of the image is a pixel or more elsewhere. Nothing where the captures do not determine it,
+/// or are fewer than ten.
 std::string lens_fault(std::span<const Frame> frames, const LampMap& map,
                        const Calibration& calibration);
 
