@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/lights/robust_circle.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -26,10 +27,6 @@ std::optional<Circle> through(const Eigen::Vector2d& a, const Eigen::Vector2d& b
   return Circle{a + center, center.norm()};
 }
 
-double distance(const Circle& circle, const Eigen::Vector2d& point) {
-  return (point - circle.center).norm() - circle.radius;
-}
-
 /// The circle through three of the points that has most points close to it, and few outside:
 /// inside may be the edge of what hides a part of a light, outside is no light.
 std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, double tolerance) {
@@ -37,10 +34,9 @@ std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, do
   std::optional<Circle> best;
   double most = kLeast - 1;
   const std::size_t n = points.size();
-  Eigen::Vector2d low = points[0], high = points[0];
-  for (const Eigen::Vector2d& point : points)
-    low = low.cwiseMin(point), high = high.cwiseMax(point);
-  const double largest = (high - low).norm();
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& point : points) box.extend(point);
+  const double largest = box.diagonal().norm();
   std::uint32_t state = 1;
   const auto next = [&] {
     state = state * 1664525 + 1013904223;
@@ -50,14 +46,20 @@ std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, do
     const std::size_t a = next(), b = next(), c = next();
     const auto circle = through(points[a], points[b], points[c]);
     if (!circle || circle->radius > largest) continue;
+    const auto squared = [&](double off) {
+      return std::pow(std::max(0.0, circle->radius + off), 2);
+    };
+    const double low = squared(-tolerance), high = squared(tolerance);
+    const double outer = squared(3 * tolerance);
     int close = 0, outside = 0;
     for (const Eigen::Vector2d& point : points) {
-      const double off = distance(*circle, point);
-      close += std::abs(off) < tolerance;
-      outside += off > 3 * tolerance;
+      const double square = (point - circle->center).squaredNorm();
+      close += square > low && square < high;
+      outside += square > outer;
     }
     const double score = close - outside / 2.0;
     if (score > most) most = score, best = circle;
+    if (close == static_cast<int>(n)) break;  // none has more
   }
   return best;
 }
