@@ -207,7 +207,8 @@ void LampDetector::correct_shear(std::vector<Light>& lights) const {
   const auto shear = Shear::common(sums);
   if (!shear) return;
   for (Light& light : lights) {
-    if (has_sharp_circle(light)) shape_.shift(shear->oval_of(light.sums), light);
+    if (!has_sharp_circle(light)) continue;
+    shape_.shift(shear->oval_of(light.sums), shear->motion_at(light.sums), light);
   }
 }
 

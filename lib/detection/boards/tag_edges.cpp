@@ -73,7 +73,8 @@ struct Edge {
 struct Parabola {
   Eigen::Vector2d middle, along, across;
   double half_px;
-  Eigen::Vector3d abc;
+  Eigen::Vector3d abc = Eigen::Vector3d::Zero();
+  double blur_px = 0.8;
 
   /// Of 0 on it, and its gradient.
   double off(const Eigen::Vector2d& x, Eigen::Vector2d& gradient) const {
@@ -121,18 +122,19 @@ void start_edge_levels(const std::vector<EdgePixel>& pixels, double gamma, Edge:
   p[5] = (out - in) / 2;
 }
 
-/// The sum of the squares that are left over; infinite when the pixels look otherwise.
+/// From where the edge is. The sum of the squares that are left over; infinite when the pixels look
+/// otherwise.
 double fit(Parabola& edge, const cv::Mat1b& image, const Band& band, double gamma) {
   constexpr std::size_t least_pixels = 24;
   constexpr int most_steps = 15;
-  constexpr double usual_blur_px = 0.8, least_blur_px = 0.05, most_blur_px = 6;
+  constexpr double least_blur_px = 0.05, most_blur_px = 6;
   constexpr double enough = 1e-3;  // grey levels squared
   constexpr double least_contrast = 3, unlike = 0.35;
   const auto pixels = pixels_beside(image, edge, band);
   constexpr double no_edge = std::numeric_limits<double>::infinity();
   if (pixels.size() < least_pixels) return no_edge;
   Edge::Parameters p = Edge::Parameters::Zero();
-  p[3] = usual_blur_px;
+  p.head<4>() << edge.abc, edge.blur_px;
   start_edge_levels(pixels, gamma, p);
   const Edge step{pixels, gamma};
   ceres::TinySolver<Edge> solver;
@@ -140,6 +142,7 @@ double fit(Parabola& edge, const cv::Mat1b& image, const Band& band, double gamm
   solver.options.function_tolerance = enough;
   solver.Solve(step, &p);
   edge.abc = p.head<3>();
+  edge.blur_px = p[3];
   const double squares = 2 * solver.summary.final_cost;
   const double rms = std::sqrt(squares / static_cast<double>(pixels.size()));
   const bool good = p.allFinite() && p[3] > least_blur_px && p[3] < most_blur_px &&
@@ -168,8 +171,9 @@ struct TagEdges {
   double squares = 0;
 };
 
+/// The first time; or again with another gamma.
 TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& stripes,
-                double gamma) {
+                double gamma, const TagEdges* before = nullptr) {
   // The stripe's other side is kept away from by 2 px: it is blurred, too.
   constexpr double least_px = 1.5, most_px = 4.5, away_px = 2;
   const auto& corners = tag.corners_px;
@@ -184,6 +188,7 @@ TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& s
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d from = corners[k], to = corners[(k + 1) % 4];
     Parabola& edge = found.edges[k];
+    if (before) edge = before->edges[k];
     edge.middle = (from + to) / 2;
     edge.half_px = (to - from).norm() / 2;
     edge.along = (to - from) / (2 * edge.half_px);
@@ -230,12 +235,13 @@ std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> ta
   double as_it_is = 0, behind_curve = 0;
   for (const std::size_t i : widest) {
     as_it_is += found[i].squares;
-    behind_curve += fitted(tags[i], image, stripes, usual_gamma).squares;
+    behind_curve += fitted(tags[i], image, stripes, usual_gamma, &found[i]).squares;
   }
   const bool curved = behind_curve < better * as_it_is;
   std::vector<std::optional<SeenTag>> exact;
   for (std::size_t i = 0; i < tags.size(); ++i) {
-    if (curved) found[i] = fitted(tags[i], image, stripes, usual_gamma);
+    const bool fits = std::isfinite(found[i].squares);
+    if (curved) found[i] = fitted(tags[i], image, stripes, usual_gamma, fits ? &found[i] : nullptr);
     exact.push_back(crossed(tags[i], found[i]));
   }
   return exact;

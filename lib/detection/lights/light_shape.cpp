@@ -37,11 +37,15 @@ double median_rise_px(const std::vector<EdgePoint>& outline) {
 std::vector<bool> on_circle(const std::vector<EdgePoint>& outline,
                             const std::vector<bool>& inliers) {
   constexpr double reach_px = 4;
+  std::vector<Eigen::Vector2d> others;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    if (!inliers[i]) others.push_back(outline[i].pixel);
+  }
   std::vector<bool> clear = inliers;
   for (std::size_t i = 0; i < outline.size(); ++i) {
-    for (std::size_t j = 0; j < outline.size() && clear[i]; ++j) {
-      clear[i] = inliers[j] || (outline[j].pixel - outline[i].pixel).norm() >= reach_px;
-    }
+    clear[i] = clear[i] && std::none_of(others.begin(), others.end(), [&](const auto& other) {
+                 return (other - outline[i].pixel).squaredNorm() < reach_px * reach_px;
+               });
   }
   const auto count = [](const std::vector<bool>& points) {
     return std::count(points.begin(), points.end(), true);
@@ -187,11 +191,29 @@ Eigen::Vector2d LightShape::line_slope_at(const Circle& circle) const {
   return Eigen::Vector2d(line(1, 0) - line(-1, 0), line(0, 1) - line(0, -1)) / circle.radius;
 }
 
-void LightShape::shift(const Oval& oval, Light& light) const {
+Eigen::Vector2d LightShape::read_off(const Circle& circle,
+                                     const Eigen::Vector2d& motion_per_line) const {
+  constexpr int directions = 16;
+  const auto center = pixel_of(circle.center);
+  Eigen::Vector2d off = Eigen::Vector2d::Zero();
+  for (int i = 0; i < directions; ++i) {
+    const double angle = 2 * std::numbers::pi / directions * i;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    const auto rim = pixel_of(circle.center + circle.radius * direction);
+    if (!center || !rim) return Eigen::Vector2d::Zero();
+    const double later = turned(*rim).y() - turned(*center).y();
+    off += 2.0 / directions * motion_per_line.dot(direction) * later * direction;
+  }
+  return off;
+}
+
+void LightShape::shift(const Oval& oval, const Eigen::Vector2d& motion_per_line,
+                       Light& light) const {
   const auto estimate = light.sums.solved(oval);
   if (!estimate) return;
   const Circle& circle = light.sums.circle();
-  const auto pixel = pixel_of(circle.center + circle.radius * estimate->p.head<2>());
+  const auto pixel = pixel_of(circle.center + circle.radius * estimate->p.head<2>() -
+                              read_off(circle, motion_per_line));
   if (!pixel) return;
   light.pixel = *pixel;
   const double sigma_px =

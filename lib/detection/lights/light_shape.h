@@ -43,8 +43,9 @@ class LightShape {
   std::optional<Light> light_of(std::vector<EdgePoint> outline, const Background& background,
                                 bool mottled = false) const;
 
-  /// Moves the centre to where it is with the outline as oval as that, and states its sigma_px.
-  void shift(const Oval& oval, Light& light) const;
+  /// Moves the centre to where it is with the outline as oval as that, of a light that moves so far
+  /// of the level plane per line, and states its sigma_px.
+  void shift(const Oval& oval, const Eigen::Vector2d& motion_per_line, Light& light) const;
 
   /// The points that lie outside a light.
   std::vector<EdgePoint> outside(const Light& light, const std::vector<EdgePoint>& outline) const;
@@ -63,6 +64,12 @@ class LightShape {
  private:
   /// By how many lines the shutter reads a point later than the centre, over its x, y.
   Eigen::Vector2d line_slope_at(const Circle& circle) const;
+
+  /// How far the centre of a circle's outline is off because the lens bends the lines that it is
+  /// read in, so that the outline is read later, or sooner, on the whole than the centre: in
+  /// direction a by m (l(a) - l) with the motion m and the lines l, of which the circle's centre
+  /// takes over the part along a that goes with cos a and sin a.
+  Eigen::Vector2d read_off(const Circle& circle, const Eigen::Vector2d& motion_per_line) const;
 
   DetectorCamera camera_;
 };

@@ -138,4 +138,9 @@ Oval Shear::oval_of(const OutlineSums& light) const {
   return {oval, from_motion * covariance_ * from_motion.transpose() + unlike(oval)};
 }
 
+Eigen::Vector2d Shear::motion_at(const OutlineSums& light) const {
+  const Eigen::Vector2d& at = light.circle().center;
+  return 2 * (motion_.head<2>() + motion_[2] * Eigen::Vector2d(-at.y(), at.x()));
+}
+
 }  // namespace vlp

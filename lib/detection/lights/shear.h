@@ -71,6 +71,8 @@ class Shear {
 
   /// Of a light there.
   Oval oval_of(const OutlineSums& light) const;
+  /// By how much of the level plane a light there moves per line.
+  Eigen::Vector2d motion_at(const OutlineSums& light) const;
 
  private:
   Shear(const Eigen::Vector3d& motion, const Eigen::Matrix3d& covariance)

@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/blurred_step.h"
+
+#include <algorithm>
+#include <array>
+
+namespace vlp {
+namespace {
+
+constexpr int kPerUnit = 64;
+constexpr double kLargest = 6;  // beyond, erf is 1 to the last digit
+
+struct Place {
+  double value, slope;
+};
+
+const auto& places() {
+  static const auto all = [] {
+    std::array<Place, static_cast<std::size_t>(kLargest) * kPerUnit + 1> result{};
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      const double x = double(i) / kPerUnit;
+      result[i] = {std::erf(x), 2 * std::numbers::inv_sqrtpi * std::exp(-x * x)};
+    }
+    return result;
+  }();
+  return all;
+}
+
+}  // namespace
+
+ErrorFunction::ErrorFunction(double x) {
+  const double size = std::min(kLargest, std::abs(x));  // of no number, too
+  const auto nearest = static_cast<std::size_t>(size * kPerUnit + 0.5);
+  const auto& [at, g] = places()[nearest];
+  // The slope's derivatives, over the slope: Hermite's polynomials.
+  const double a = double(nearest) / kPerUnit, d = size - a, square = a * a;
+  const double first = -2 * a, second = 4 * square - 2, third = a * (12 - 8 * square);
+  const double fourth = 12 + square * (16 * square - 48);
+  value = std::copysign(
+      at + g * d * (1 + d / 2 * (first + d / 3 * (second + d / 4 * (third + d / 5 * fourth)))), x);
+  slope = g * (1 + d * (first + d / 2 * (second + d / 3 * (third + d / 4 * fourth))));
+}
+
+}  // namespace vlp
