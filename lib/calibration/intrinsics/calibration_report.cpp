@@ -19,20 +19,6 @@
 
 namespace vlp {
 
-namespace {
-
-IntrinsicsInput every_other(const IntrinsicsSolution& solution, const IntrinsicsInput& input,
-                            std::size_t first) {
-  IntrinsicsInput half = input;
-  half.views.clear();
-  for (std::size_t i = first; i < solution.views.size(); i += 2) {
-    half.views.push_back(input.views[solution.views[i]]);
-  }
-  return half;
-}
-
-}  // namespace
-
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
   const ProjectionUncertainty uncertainty(solution);
   const Lens lens = solution.lens();
@@ -71,8 +57,8 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
     report.uncertainty_worst_at = pixel;
   }
   report.uncertainty_mean_px /= std::max(inside, 1.0);
-  const IntrinsicsSolution even = solve_intrinsics(every_other(solution, input, 0));
-  const IntrinsicsSolution odd = solve_intrinsics(every_other(solution, input, 1));
+  const IntrinsicsSolution even = solve_every_other(solution, 0);
+  const IntrinsicsSolution odd = solve_every_other(solution, 1);
   if (!even.ok() || !odd.ok()) return report;
   // Of a splined lens, half of the views leave holes, which tell nothing of it.
   std::vector<ProjectionUncertainty> halves;

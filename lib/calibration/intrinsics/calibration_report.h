@@ -29,9 +29,10 @@ struct CalibrationReport {
   /// What the lens should be apart from the true one, as projection_difference() says it, rms per
   /// axis: by the noise, and by covariance_by_views(). Of a splined lens over the region.
   double expected_rms_px, expected_by_views_rms_px;
-  /// Between the lens of every other view and that of the rest: twice expected_rms_px when the lens
-  /// model fits and the corners' errors are independent; more when they are not. Of a splined lens
-  /// where both halves have corners. Nothing when a half does not determine a lens.
+  /// Between the lens of every other view and that of the rest (solve_every_other()): twice
+  /// expected_rms_px when the lens model fits and the corners' errors are independent; more when
+  /// they are not. Of a splined lens where both halves have corners. Nothing when a half does not
+  /// determine a lens.
   std::optional<ProjectionDifference> halves;
 };
 /// Precondition: solution.ok(). Two more solves.

@@ -34,6 +34,22 @@ std::string_view explanation_of(IntrinsicsStatus status) {
   return "";
 }
 
+void IntrinsicsSolution::set_fit() {
+  double squares = 0;
+  corners = outliers = 0;
+  const auto residuals = residuals_of(problem);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    const double weight = problem.points[i].z();
+    if (weight > 0) {
+      squares += weight * weight * residuals[i].squaredNorm();
+      ++corners;
+    } else if (weight != BoardProblem::kUnseen) {
+      ++outliers;
+    }
+  }
+  rms_px = std::sqrt(squares / (2 * std::max(1, corners)));
+}
+
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
   constexpr std::size_t most_starts = 4;
   if (input.views.size() < IntrinsicsSolver::kLeastViews)
@@ -47,11 +63,41 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
         !solver.leave_out_outliers() || !solver.weigh_regularization()) {
       continue;
     }
-    if (solver.all_alike()) return failure(IntrinsicsStatus::all_alike);
     IntrinsicsSolution solution = solver.solution();
+    if (all_alike(solution.problem)) return failure(IntrinsicsStatus::all_alike);
     if (2 * solution.views.size() > input.views.size()) return solution;
   }
   return failure(IntrinsicsStatus::no_solution);
+}
+
+IntrinsicsSolution solve_every_other(const IntrinsicsSolution& whole, std::size_t first) {
+  const BoardProblem& all = whole.problem;
+  const std::size_t parts = all.poses.size() / whole.views.size();
+  const std::size_t points = parts * all.points_of_a_board();
+  IntrinsicsSolution half = whole;
+  half.views.clear();
+  half.edge_shifts_px.clear();
+  half.problem.poses.clear();
+  half.problem.points.clear();
+  const auto take = [](const auto& from, std::size_t view, std::size_t count, auto& to) {
+    const auto begin = from.begin() + static_cast<std::ptrdiff_t>(view * count);
+    to.insert(to.end(), begin, begin + static_cast<std::ptrdiff_t>(count));
+  };
+  for (std::size_t view = first; view < whole.views.size(); view += 2) {
+    take(whole.views, view, 1, half.views);
+    take(whole.edge_shifts_px, view, 1, half.edge_shifts_px);
+    take(all.poses, view, parts, half.problem.poses);
+    take(all.points, view, points, half.problem.points);
+  }
+  if (half.views.size() < IntrinsicsSolver::kLeastViews) {
+    return failure(IntrinsicsStatus::too_few_views);
+  }
+  if (!solve(half.problem, half.solved_for) || !is_lens(half.problem.intrinsics)) {
+    return failure(IntrinsicsStatus::no_solution);
+  }
+  if (all_alike(half.problem)) return failure(IntrinsicsStatus::all_alike);
+  half.set_fit();
+  return half;
 }
 
 std::vector<Eigen::Vector2d> residuals_of(const BoardProblem& problem) {

@@ -57,6 +57,8 @@ struct IntrinsicsSolution {
   int corners, outliers;
 
   bool ok() const { return status == IntrinsicsStatus::ok; }
+  /// What `problem` leaves: rms_px, corners, outliers.
+  void set_fit();
   Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
   /// Intrinsics (of a splined lens but for the core), and the warp or not.
   SolveFor solved_for{true, true, true, false};
@@ -74,6 +76,11 @@ struct IntrinsicsSolution {
 /// Planar flips cannot live: both poses of every view are tried with each lens (view_pose()).
 /// Depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
+
+/// Of every other view of a solution, from that solution on: their lens, poses and warp are solved
+/// for again, with the shifts of edges, the outliers and a warp or none as all views told them.
+/// Precondition: whole.ok().
+IntrinsicsSolution solve_every_other(const IntrinsicsSolution& whole, std::size_t first);
 
 /// Residuals of a problem's points, seen minus projected, outliers too; NaN where nothing was seen.
 std::vector<Eigen::Vector2d> residuals_of(const BoardProblem& problem);

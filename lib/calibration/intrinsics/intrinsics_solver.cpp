@@ -145,40 +145,15 @@ bool IntrinsicsSolver::leave_out_outliers() {
 
 IntrinsicsSolution IntrinsicsSolver::solution() const {
   IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, {}, 0, 0, 0};
-  double squares = 0;
   result.solved_for = solved_for_;
   for (const std::size_t view : used_) result.edge_shifts_px.push_back(edge_shifts_px_[view]);
-  const auto residuals = residuals_of(problem_);
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const double weight = problem_.points[i].z();
-    if (weight > 0) {
-      squares += weight * weight * residuals[i].squaredNorm();
-      ++result.corners;
-    } else if (weight != BoardProblem::kUnseen) {
-      ++result.outliers;
-    }
-  }
-  result.rms_px = std::sqrt(squares / (2 * std::max(1, result.corners)));
+  result.set_fit();
   return result;
-}
-
-bool IntrinsicsSolver::all_alike() const {
-  constexpr double least_rad = 0.09;  // five degrees
-  double widest_rad = 0;
-  for (const BoardPose& a : problem_.poses) {
-    for (const BoardPose& b : problem_.poses) {
-      const double cosine = normal_of(a).dot(normal_of(b));
-      widest_rad = std::max(widest_rad, std::acos(std::clamp(cosine, -1.0, 1.0)));
-    }
-  }
-  return widest_rad < least_rad;
 }
 
 bool IntrinsicsSolver::solve(SolveFor what) {
   what.distortions = what.distortions && problem_.intrinsics.size() > 4;
-  return vlp::solve(problem_, what) && problem_.intrinsics[0] > 0 && problem_.intrinsics[1] > 0 &&
-         std::all_of(problem_.intrinsics.begin(), problem_.intrinsics.end(),
-                     [](double value) { return std::isfinite(value); });
+  return vlp::solve(problem_, what) && is_lens(problem_.intrinsics);
 }
 
 namespace {
@@ -282,6 +257,24 @@ bool IntrinsicsSolver::take_back() {
     }
   }
   return dropped_.size() < before;
+}
+
+bool all_alike(const BoardProblem& problem) {
+  constexpr double least_rad = 0.09;  // five degrees
+  double widest_rad = 0;
+  for (const BoardPose& a : problem.poses) {
+    for (const BoardPose& b : problem.poses) {
+      const double cosine = normal_of(a).dot(normal_of(b));
+      widest_rad = std::max(widest_rad, std::acos(std::clamp(cosine, -1.0, 1.0)));
+    }
+  }
+  return widest_rad < least_rad;
+}
+
+bool is_lens(const std::vector<double>& intrinsics) {
+  return intrinsics[0] > 0 && intrinsics[1] > 0 &&
+         std::all_of(intrinsics.begin(), intrinsics.end(),
+                     [](double value) { return std::isfinite(value); });
 }
 
 }  // namespace vlp

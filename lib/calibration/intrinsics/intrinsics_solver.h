@@ -30,8 +30,6 @@ class IntrinsicsSolver {
   bool leave_out_outliers();
 
   IntrinsicsSolution solution() const;
-  /// No two boards are tilted differently, by five degrees or more.
-  bool all_alike() const;
 
  private:
   Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
@@ -58,5 +56,11 @@ class IntrinsicsSolver {
   std::vector<IntrinsicsSolution::Dropped> dropped_;
   BoardProblem problem_{};
 };
+
+/// No two boards are tilted differently, by five degrees or more.
+bool all_alike(const BoardProblem& problem);
+
+/// Whether a solve gave a lens.
+bool is_lens(const std::vector<double>& intrinsics);
 
 }  // namespace vlp
