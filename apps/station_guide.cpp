@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "station/golden_due.h"
 #include "station/station_screen.h"
 
 namespace vlp {
@@ -44,6 +45,15 @@ bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bo
   });
 }
 
+/// A unit begins with its first image, which may come long after its serial was scanned.
+void ask_for_golden(Unit& unit, const Terminal& terminal) {
+  std::string why = golden_problem(unit.config());
+  if (!why.empty() && why != unit.distrusted() && !terminal.interactive()) {
+    spdlog::warn("{}; no unit passes", why);
+  }
+  unit.distrust(std::move(why));
+}
+
 }  // namespace
 
 void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
@@ -52,9 +62,13 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
   constexpr int look_every_ms = 50;
   Clock::time_point last = Clock::now();
   Log log(terminal.interactive());
-  bool changed = true;
+  bool changed = true, begun = false;
   while (unit.current() && !unit.hopeless()) {
     const auto arrivals = watched.look(static_cast<std::size_t>(options.threads));
+    if (!begun && !arrivals.empty()) {
+      begun = true;
+      ask_for_golden(unit, terminal);
+    }
     log.tell(unit, arrivals);
     changed = changed || !arrivals.empty();
     if (changed && terminal.interactive()) {

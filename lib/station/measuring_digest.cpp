@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <initializer_list>
 #include <utility>
 
@@ -48,7 +49,9 @@ void add_board(const Board& board, Lines& lines) {
              {"top_left_white", board.top_left_white ? 1 : 0}});
 }
 
-void add_lamps(const LampMap& map, Lines& lines) {
+void add_lamps(LampMap map, Lines& lines) {
+  std::sort(map.lamps.begin(), map.lamps.end(),
+            [](const Lamp& a, const Lamp& b) { return a.id < b.id; });
   for (const Lamp& lamp : map.lamps) {
     lines.add({{"lamp", lamp.id},
                {"x_m", lamp.position_m.x()},

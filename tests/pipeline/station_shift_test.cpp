@@ -62,6 +62,15 @@ TEST_F(StationShift, PassesNoUnitWhileItsGoldenUnitIsDue) {
     return "sed -i '" + script + "' " + note.string();
   };
   ASSERT_EQ(run_program(set_note("2d")).exit_code, 0);
+  // Due before the first image of a unit that was scanned in time.
+  const std::string check = (captures("0001") / "check").string();
+  const auto late =
+      run_program("(until [ -d " + check + " ]; do sleep 0.05; done; echo unit >>" + note.string() +
+                  "; cp " + (folder / "unit/check/0000.png").string() + " " + check + ") & " +
+                  run("0001", "--idle-s 1.5") + "; code=$?; wait; exit $code");
+  EXPECT_THAT(late.errors, ContainsRegex("units since the golden unit .*; no unit passes\n"));
+  EXPECT_THAT(late.output, HasSubstr("Cause    1 units since the golden unit"));
+  ASSERT_EQ(run_program(set_note("2d")).exit_code, 0);
   const auto failed = run_program("(until [ -d " + (captures("0001") / "boards").string() +
                                   " ]; do sleep 0.05; done; " + set_note("1s/PASS/FAIL/") + ") & " +
                                   run("0001", "--idle-s 1.5") + "; code=$?; wait; exit $code");

@@ -76,7 +76,7 @@ TEST_F(MeasuringDigest, IsOfWhatMeasures) {
 TEST_F(MeasuringDigest, IsNotOfWhatDoesNot) {
   const std::string before = digest();
   const std::string config_sha256 = read_station(folder / "station.yaml").sha256;
-  const auto is_same = [&](const char* file, const char* from, const char* to) {
+  const auto is_same = [&](const char* file, const std::string& from, const std::string& to) {
     EXPECT_EQ(digest_with(file, from, to), before) << from << " -> " << to;
   };
   is_same("station.yaml", "station: station-1", "# as of today\nstation: station-1");
@@ -88,6 +88,12 @@ TEST_F(MeasuringDigest, IsNotOfWhatDoesNot) {
   is_same("station.yaml", "results: results", "results: other");
   is_same("lamps.yaml", "[0, 0.28, 1.6]", "[0.0, 0.280, 1.6e0]");
   is_same("lamps.yaml", "lamps:", "# surveyed again\nlamps:");
+  const std::string second =
+      "  - {id: 2, position_m: [0, -0.32, 1.6], diameter_m: 0.18, frequency_hz: 2000, duty: 0.5}\n";
+  const std::string third =
+      "  - {id: 3, position_m: [0.6, -0.3, 1.6], diameter_m: 0.18, frequency_hz: 2500, duty: "
+      "0.5}\n";
+  is_same("lamps.yaml", second + third, third + second);
   is_same("board.yaml", "tag_size_m: 0.02", "tag_size_m: 2.0e-2");
   is_same("camera_type.yaml", "3.0e-05", "0.00003");
   change("station.yaml", "captures: captures", "captures: captures  # a comment");
