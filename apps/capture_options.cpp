@@ -110,13 +110,14 @@ std::vector<std::string> inputs_of(const CaptureOptions& options) {
 
 LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
                        const std::optional<Calibration>& calibration) {
-  return {options.images,      lamps,
-          options.lamps,       calibration,
-          options.calibration, options.row_time_s,
-          options.classifier,  options.readout,
-          options.exposure_s,  options.annotate,
-          options.threads,     options.max_mpx,
-          options.every};
+  return {options.images,          lamps,
+          options.lamps,           calibration,
+          options.calibration,     options.row_time_s,
+          options.classifier,      options.readout,
+          options.exposure_s,      options.annotate,
+          options.threads,         options.max_mpx,
+          options.every,           options.captures,
+          options.yaw_in_robot_rad};
 }
 
 void tell_of_lights(const std::vector<LightsOfImage>& lights) {

@@ -33,6 +33,9 @@ struct CaptureOptions {
   double max_mpx = kUsualMaxMpx;
   /// Of a video every so many-th frame.
   int every = 1;
+  /// As LampImages have them.
+  std::optional<CapturesTable> captures;
+  double yaw_in_robot_rad = 0;
 };
 
 /// What --help says of the options that every program has which takes captures of lamps.

@@ -49,14 +49,14 @@ void report(const Levelling& result, const Camera& camera) {
 
 }  // namespace
 
-void rotate_by_lamps(const CLI::App& app, const CaptureOptions& images,
-                     const LevelOptions& options) {
+void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOptions& options) {
   const std::string& refined_map = options.refined_map;
   const fs::path captures = captures_file(images, options);
   std::vector<std::string> inputs = inputs_of(images);
   inputs.push_back(captures.string());
   check_output(images.output, inputs);
   check_further_output("--refine-map", refined_map, images.output, inputs);
+  images.captures.emplace();  // level is what is found
   LampCaptures input = read_captures_of(images);
   check_lamps(input.frames, input.lamps, input.lamps_file);
   input.motions =

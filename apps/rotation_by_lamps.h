@@ -21,7 +21,6 @@ struct LevelOptions {
 
 /// vlp-rotation --method lamps: levels the camera from captures taken anywhere
 /// (calibration/levelling.h).
-void rotate_by_lamps(const CLI::App& app, const CaptureOptions& images,
-                     const LevelOptions& options);
+void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOptions& options);
 
 }  // namespace vlp

@@ -10,7 +10,7 @@ namespace vlp {
 
 /// vlp-rotation --method axis|joint|circle: captures of a turn on the spot
 /// (calibration/rotation/spot_captures.h). `plot` is empty when there is to be no picture.
-void rotate_on_spot(const CLI::App& app, const CaptureOptions& images, const std::string& method,
+void rotate_on_spot(const CLI::App& app, CaptureOptions images, const std::string& method,
                     const std::string& plot);
 
 }  // namespace vlp

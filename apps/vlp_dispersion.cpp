@@ -104,7 +104,7 @@ void print_summary(const DispersionFit& fit, std::size_t captures) {
   }
 }
 
-void run(const CLI::App& app, const Options& options) {
+void run(const CLI::App& app, Options options) {
   std::vector<std::string> inputs = inputs_of(options.images);
   if (!options.captures.empty()) inputs.push_back(options.captures);
   for (const char* table : {"captures.csv", "truth.csv"}) {
@@ -113,9 +113,11 @@ void run(const CLI::App& app, const Options& options) {
   }
   check_output(options.images.output, inputs);
   check_further_output("--plot", options.plot, options.images.output, inputs);
+  const CapturesTable captures = captures_of(options);
+  options.images.captures = captures;
   const LampCaptures input = read_captures_of(options.images);
   check_lamps(input.frames, input.lamps, input.lamps_file);
-  const KnownPlaces places = places_of(options, input.frames, captures_of(options));
+  const KnownPlaces places = places_of(options, input.frames, captures);
   const DispersionResult found =
       solve_dispersion(input, places, kMethods.at(options.method), kCircles.at(options.circle),
                        history_entry(app, inputs));

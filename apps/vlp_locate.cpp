@@ -147,11 +147,15 @@ LocateInput see_leaning(const Options& options, const CapturesTable& captures) {
   return input;
 }
 
-LocateInput read_input(const Options& options) {
+LocateInput read_input(Options options) {
   const bool images = std::filesystem::is_directory(options.images.images);
   const bool leans =
       options.lean_sd_deg.value_or(0) > 0 || options.inclination_sigma_deg.value_or(0) > 0;
   const CapturesTable captures = captures_of(options);
+  options.images.captures = captures;
+  if (const auto& mount = options.camera_on_robot) {
+    options.images.yaw_in_robot_rad = rad_from_deg((*mount)[3]);
+  }
   if (images && leans) return see_leaning(options, captures);
   return input_of(options, captures, read_captures_of(options.images));
 }

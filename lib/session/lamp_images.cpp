@@ -14,6 +14,8 @@
 #include "detection/video.h"
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"
+#include "session/leaning_captures.h"
+#include "session/session_folder.h"
 #include "session/skipped_images.h"
 
 namespace vlp {
@@ -184,6 +186,10 @@ LampSearch::LampSearch(const LampImages& lamp_images, StepResult& result)
     if (!stated) stated = input.camera->camera.readout;
   }
   from_videos = {input.every, input.max_mpx, run.imager_px};
+  if (input.camera && !is_video_name(input.folder)) {
+    run.levels = levels_told(input.captures ? *input.captures : captures_table(input.folder),
+                             *input.camera, input.yaw_in_robot_rad);
+  }
   camera.readout = readout_of(images, stated, result, from_videos);
   if (!input.annotate.empty()) run.annotate = picture_folder(input);
 }
@@ -249,7 +255,7 @@ CaptureDetections see_lamps_again(const LampImages& input, const LevelsOfImages&
   std::erase_if(images, [&](const fs::path& image) {
     return levels.find(image.filename().string()) == levels.end();
   });
-  search.run.levels = levels;
+  for (const auto& [image, level] : levels) search.run.levels.insert_or_assign(image, level);
   return search.run_over(images, {}, said_before);
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "detection/detect_captures.h"
 #include "detection/detect_lights.h"
@@ -44,6 +45,11 @@ struct LampImages {
   double max_mpx = kUsualMaxMpx;
   /// Of a video every so many-th frame.
   int every = 1;
+  /// Of the images, whose inclination counts when there is a camera; nothing: captures.csv of the
+  /// folder.
+  std::optional<CapturesTable> captures = {};
+  /// Of the camera, for inclinations of the robot.
+  double yaw_in_robot_rad = 0;
 };
 
 /// The lamps in each image that can be used.
@@ -57,8 +63,8 @@ struct SeenLamps : StepResult {
 };
 
 /// Throws InputError: no row time, no frequency, no image or none that can be used, a classifier of
-/// other lamps or of another row time. undetermined: no lamp is identified. Warns of lamps of the
-/// map that are too much alike.
+/// other lamps or of another row time, a captures.csv that cannot be read. undetermined: no lamp is
+/// identified. Warns of lamps of the map that are too much alike.
 SeenLamps see_lamps(const LampImages& input, const StepProgress& progress = {});
 
 /// The lamps in those of the images once more, with what is known by now of how their cameras

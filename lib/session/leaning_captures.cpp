@@ -8,12 +8,21 @@
 #include <string>
 #include <utility>
 
+#include "detection/lamp_detector.h"
 #include "geometry/angles.h"
 #include "positioning/correction.h"
 #include "positioning/inclination_rotation.h"
 
 namespace vlp {
 namespace {
+
+/// As a detector has it, which asks for no more than where the zenith is.
+Eigen::Matrix3d level_of(const Inclination& inclination, double yaw_in_robot_rad,
+                         const Eigen::Matrix3d& base_from_camera) {
+  const Eigen::Matrix3d level_from_base =
+      inclination_rotation(inclination, yaw_in_robot_rad).level_from_base;
+  return level_from_zenith((level_from_base * base_from_camera).inverse().col(2));
+}
 
 /// A capture whose lean is to be found.
 struct Leaning {
@@ -115,9 +124,7 @@ class Looks {
 
   Eigen::Matrix3d level_of(const Fix& fix) const {
     const double yaw_in_robot_rad = input_.how.mount ? input_.how.mount->yaw_in_robot_rad : 0;
-    const Eigen::Matrix3d level_from_base =
-        inclination_rotation(fix.body->inclination, yaw_in_robot_rad).level_from_base;
-    return level_from_zenith((level_from_base * base_from_camera_).inverse().col(2));
+    return vlp::level_of(fix.body->inclination, yaw_in_robot_rad, base_from_camera_);
   }
 
   static bool stays(const Fix& before, const Fix& after) {
@@ -138,6 +145,17 @@ class Looks {
 };
 
 }  // namespace
+
+LevelsOfImages levels_told(const CapturesTable& captures, const Calibration& calibration,
+                           double yaw_in_robot_rad) {
+  const Eigen::Matrix3d base_from_camera = detector_camera(calibration).level_from_camera;
+  LevelsOfImages levels;
+  for (const auto& [image, known] : captures) {
+    if (!known.inclination) continue;
+    levels.emplace(image, level_of(*known.inclination, yaw_in_robot_rad, base_from_camera));
+  }
+  return levels;
+}
 
 LevelsOfImages look_at_leaning(LocateInput& input, const LookAgain& look) {
   return Looks(input, look).settle();

@@ -14,6 +14,11 @@ namespace vlp {
 /// Looks at those images again, in their level planes: a frame of each, by name.
 using LookAgain = std::function<std::vector<Frame>(const LevelsOfImages&)>;
 
+/// The level planes of the images whose inclination the table tells: lamps are discs of them, not
+/// of the plane that is level when the robot is.
+LevelsOfImages levels_told(const CapturesTable& captures, const Calibration& calibration,
+                           double yaw_in_robot_rad);
+
 /// Lamps are discs of the level plane, and centres that were looked for in another one are off. Of
 /// captures whose lean is to be estimated (LocateInput) it turns, from the fix, into the plane that
 /// is level by it, until the fix stays where it is to a tenth of its standard deviations. Where the

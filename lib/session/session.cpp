@@ -305,9 +305,12 @@ class SessionRun {
     });
   }
 
+  /// captures: as LampImages have them.
   SeenLamps see(const fs::path& folder, const LampMap& lamps, const Calibration& calibration,
-                const fs::path& calibration_file) const {
+                const fs::path& calibration_file,
+                const std::optional<CapturesTable>& captures = std::nullopt) const {
     LampImages images{folder, lamps, lamps_file(), calibration, calibration_file};
+    images.captures = captures;
     if (const auto classifier = session_.classifier()) images.classifier_file = *classifier;
     images.threads = options_.threads;
     return see_lamps(images, observer_.progress);
@@ -332,7 +335,9 @@ class SessionRun {
     return step("rotation", inputs, picture_setting(), [&] {
       LampCaptures captures{
           {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(camera_file)};
-      SeenLamps seen = see(session_.rotation(), captures.lamps, captures.calibration, camera_file);
+      // Whatever is told of its inclination: the axis that is found is level.
+      SeenLamps seen = see(session_.rotation(), captures.lamps, captures.calibration, camera_file,
+                           CapturesTable());
       if (!seen.ok()) return Work{seen};
       captures.frames = std::move(seen.frames);
       RotationResult found = solve_rotation(captures, RotationMethod::axis, history("", inputs));

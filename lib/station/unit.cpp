@@ -13,6 +13,7 @@
 #include "captures/digest.h"
 #include "detection/images_in_parallel.h"
 #include "rig/input_error.h"
+#include "session/leaning_captures.h"
 #include "session/session_folder.h"
 #include "station/guidance.h"
 #include "station/lamp_faults.h"
@@ -32,7 +33,9 @@ Unit::~Unit() = default;
 
 void Unit::reread(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
-  at(step).result.reset();
+  UnitStep& state = at(step);
+  if (!state.images.empty() && levels_of(step) != state.levels) state.look_again();
+  state.result.reset();
   forget_after(step);
 }
 
@@ -111,15 +114,32 @@ void Unit::count_refusals(StationStep step) {
   state.refused_in_a_row = used ? 0 : state.refused_in_a_row + refused;
 }
 
+/// Of the captures whose inclination is told, but for those of the turn, whose axis is level.
+LevelsOfImages Unit::levels_of(StationStep step) const {
+  if (step != StationStep::dispersion && step != StationStep::check) return {};
+  try {
+    return levels_told(captures_table(this->step(step).folder), *calibration_before(step), 0);
+  } catch (const InputError&) {  // the step will say so
+    return {};
+  }
+}
+
 void Unit::look(StationStep step, const std::vector<fs::path>& files) {
   std::vector<UnitImage> images(files.size());
   std::optional<LampDetector> lamps;
   if (step != StationStep::boards) {
     lamps.emplace(config_.lamps, detector_camera(*calibration_before(step)));
   }
+  const LevelsOfImages& levels = at(step).levels = levels_of(step);
   images_in_parallel(files.size(), threads_, [&](std::size_t i) {
-    images[i] = lamps ? look_at_lamps(files[i], config_, *lamps)
-                      : look_at_board(files[i], config_, *boards_);
+    const auto level = levels.find(files[i].filename().string());
+    if (!lamps) {
+      images[i] = look_at_board(files[i], config_, *boards_);
+    } else if (level == levels.end()) {
+      images[i] = look_at_lamps(files[i], config_, *lamps);
+    } else {
+      images[i] = look_at_lamps(files[i], config_, lamps->leaning(level->second));
+    }
   });
   for (UnitImage& image : images) {
     const std::string owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : "";
@@ -216,10 +236,7 @@ void Unit::forget_after(StationStep step) {
   for (const StationStep later : kStationSteps) {
     if (later <= step) continue;
     UnitStep& state = at(later);
-    for (const auto& [name, image] : state.images) {
-      if (!image.discarded) state.waiting.push_back(image.file);
-    }
-    std::erase_if(state.images, [](const auto& image) { return !image.second.discarded; });
+    state.look_again();
     state.result.reset();
     state.enough = false;
   }

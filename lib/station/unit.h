@@ -84,6 +84,7 @@ class Unit {
   static std::size_t index(StationStep step) { return static_cast<std::size_t>(step); }
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
   void look(StationStep step, const std::vector<std::filesystem::path>& files);
+  LevelsOfImages levels_of(StationStep step) const;
   void take(StationStep step, UnitImage image);
   std::vector<Cause> causes_of_images() const;
   void count_refusals(StationStep step);

@@ -10,6 +10,7 @@
 #include "detection/image_file.h"
 #include "detection/images_in_parallel.h"
 #include "rig/input_error.h"
+#include "session/leaning_captures.h"
 #include "session/session_folder.h"
 #include "station/lamp_faults.h"
 #include "station/station_steps.h"
@@ -52,8 +53,12 @@ class Verification {
 
   void lamps(StationStep each) {
     const LampDetector detector(config_.lamps, detector_camera(golden_.calibration));
-    UnitStep step = step_of(folder_ / name_of(each), threads_, [&](const fs::path& file) {
-      return look_at_lamps(file, config_, detector);
+    const fs::path folder = folder_ / name_of(each);
+    const auto levels = levels_told(captures_table(folder), golden_.calibration, 0);
+    UnitStep step = step_of(folder, threads_, [&](const fs::path& file) {
+      const auto level = levels.find(file.filename().string());
+      return look_at_lamps(file, config_,
+                           level == levels.end() ? detector : detector.leaning(level->second));
     });
     const auto frames = frames_of(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());

@@ -132,6 +132,31 @@ TEST_F(Leaning, IsAsGoodAsItsPixelsAllow) {
   }
 }
 
+/// A sensor's inclination, in captures.csv, tells in which plane lamps are discs.
+TEST_F(Leaning, IsAsGoodAsItsSensorAllows) {
+  for (const int lean_deg : {5, 15}) add_set(lean_deg);
+  render();
+  for (const int lean_deg : {5, 15}) {
+    Errors errors;
+    for (const std::string axis : {"roll", "pitch"}) {
+      const std::string set = fmt::format("{}{}", axis, lean_deg);
+      std::string table = "image,roll_rad,pitch_rad\n";
+      for (const TruthRow& row : read_truth(folder / "out" / set / "truth.csv")) {
+        const double lean_rad = lean_deg * std::numbers::pi / 180;
+        table += fmt::format("{},{},{}\n", row.image, axis == "roll" ? lean_rad : 0,
+                             axis == "pitch" ? lean_rad : 0);
+      }
+      folder.file("out/" + set + "/captures.csv", table);
+      EXPECT_EQ(locate(set, "").exit_code, 0);
+      add_errors(set, errors);
+    }
+    SCOPED_TRACE(lean_deg);
+    EXPECT_EQ(errors.fixes, errors.captures);
+    errors.check(1.5);
+    RecordProperty(fmt::format("told_deg_{}", lean_deg), errors.words());
+  }
+}
+
 TEST_F(Leaning, ShowsTheLookThatCounts) {
   add_set(15);
   render();

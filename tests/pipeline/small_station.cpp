@@ -64,6 +64,15 @@ std::vector<fs::path> SmallStation::images(const std::string& step) const {
   return images;
 }
 
+std::string SmallStation::with_inclinations(const std::string& step) const {
+  std::istringstream lines(TemporaryFolder::content_of(folder / "unit" / step / "captures.csv"));
+  std::string table, line;
+  while (std::getline(lines, line)) {
+    table += line + (table.empty() ? ",roll_rad,pitch_rad\n" : ",0.0002,-0.0001\n");
+  }
+  return table;
+}
+
 void SmallStation::drop(const fs::path& image, const fs::path& step) const {
   const fs::path making = step / ("." + image.filename().string());
   fs::copy_file(image, making, fs::copy_options::overwrite_existing);

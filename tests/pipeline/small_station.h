@@ -51,6 +51,8 @@ class SmallStation : public testing::Test {
   void take_again() const;
   /// The images of a step of the unit, by name.
   std::vector<std::filesystem::path> images(const std::string& step) const;
+  /// captures.csv of a step of the unit, with a small inclination of each capture.
+  std::string with_inclinations(const std::string& step) const;
   /// An image into a step's folder as a capture tool would do it: under another name first.
   void drop(const std::filesystem::path& image, const std::filesystem::path& step) const;
   /// The folders of a camera with the tables, as the fixture of a station writes them.

@@ -111,6 +111,7 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
 /// The station feeds images one by one to the steps that vlp-calibrate takes a folder through.
 TEST_F(Station, GivesWhatVlpCalibrateGives) {
   render();
+  folder.file("unit/check/captures.csv", with_inclinations("check"));
   ASSERT_EQ(run_program(batch()).exit_code, 0);
   for (const char* name : {"lamps.yaml", "board.yaml"}) {
     fs::copy_file(folder / "station" / name, folder / "unit" / name,

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-station run while images arrive: the same result, refusals, tables that come late.
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
 #include "small_station.h"
@@ -89,6 +90,29 @@ TEST_F(WatchedStation, WaitsForTheTablesOfPlaces) {
       run_program("(sleep 4; mv " + folder.file("places", places).string() + " " + table.string() +
                   ") & timeout 60 " + run("a", "") + "; code=$?; wait; exit $code");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
+}
+
+/// Inclinations that come after the images: these are looked at again in the planes that are level
+/// by them, as those are that were told beforehand.
+TEST_F(WatchedStation, LooksAgainWhenItIsToldOfInclinations) {
+  render();
+  const std::string told = with_inclinations("dispersion");
+  ASSERT_EQ(run_program(batch("untold")).exit_code, 0);
+  take_again();
+  folder.file("unit/dispersion/captures.csv", told);
+  ASSERT_EQ(run_program(batch("a")).exit_code, 0);
+  take_again();
+  prepare("b");
+  const auto late = captures("b") / "dispersion/captures.csv";
+  std::ofstream(late) << told.substr(0, told.size() - 12);  // cut short
+  drop_all("b");
+  const auto result =
+      run_program("(sleep 4; mv " + folder.file("told", told).string() + " " + late.string() +
+                  ") & timeout 60 " + run("b", "") + "; code=$?; wait; exit $code");
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_NE(comparable_calibration("a"), "");
+  EXPECT_EQ(comparable_calibration("b"), comparable_calibration("a"));
+  EXPECT_NE(comparable_calibration("untold"), comparable_calibration("a"));
 }
 
 }  // namespace
