@@ -184,10 +184,10 @@ struct Linearized : Normal<S::kCount> {
   }
 };
 
-/// Below any noise and above rounding: of the distance, of a radian, of a metre or a radian per
-/// second.
+/// What is left after such a step is its square, or a thousandth where pixels err: below any noise.
+/// Of the distance, of a radian, of a metre or a radian per second.
 bool negligible(const BodyVector& step, double scale_m) {
-  constexpr double small_step = 1e-10, small_rate = 1e-8;
+  constexpr double small_step = 1e-7, small_rate = 1e-6;
   return step.head<3>().norm() <= small_step * scale_m && std::abs(step[kBodyYaw]) <= small_step &&
          step.segment<3>(kBodyVelocity).cwiseAbs().maxCoeff() <= small_rate &&
          step.tail<2>().cwiseAbs().maxCoeff() <= small_step;
