@@ -109,7 +109,7 @@ LampDetector LampDetector::leaning(const std::optional<Eigen::Matrix3d>& level_f
     camera.level_from_camera = *level_from_camera;
   } else {
     camera.lens.reset();
-    camera.most_slender = 4;  // 75 degrees off its axis
+    camera.most_slender = 12;  // 85 degrees off its axis
   }
   return {lamps_, camera, classifier_};
 }

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/lights/robust_ellipse.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "detection/lights/m_estimate.h"
@@ -73,6 +75,39 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
   const Eigen::Vector2d semi_axes = axes.values.cwiseInverse().cwiseSqrt();
   fit.rim_from_circle =
       unit * Matrix2(axes.vectors * semi_axes.asDiagonal() * axes.vectors.transpose());
+  return fit;
+}
+
+std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d> points,
+                                                 std::span<const double> weights,
+                                                 double tolerance) {
+  if (points.empty()) return std::nullopt;
+  const auto count = static_cast<double>(points.size());
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& point : points) middle += point / count;
+  Matrix2 scatter = Matrix2::Zero();
+  for (const Eigen::Vector2d& point : points) {
+    scatter += (point - middle) * (point - middle).transpose() / count;
+  }
+  const auto root_of = [](const Matrix2& square) -> Matrix2 {
+    const auto axes = symmetric_eigen(Eigen::Matrix2d(square));
+    return axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal() *
+           axes.vectors.transpose();
+  };
+  // Points all around an ellipse scatter by its semi-axes over the root of 2.
+  const Matrix2 to_points = std::numbers::sqrt2 * root_of(scatter);
+  const double mean_scale = std::sqrt(to_points.determinant());
+  if (!(mean_scale > 0)) return std::nullopt;
+  const Matrix2 from_points = to_points.inverse();
+  std::vector<Eigen::Vector2d> scaled;
+  scaled.reserve(points.size());
+  for (const Eigen::Vector2d& point : points) scaled.emplace_back(from_points * (point - middle));
+  auto fit = fit_robust_ellipse(scaled, weights, tolerance / mean_scale);
+  if (!fit) return std::nullopt;
+  const Matrix2 rim = to_points * fit->rim_from_circle;
+  fit->center = middle + to_points * fit->center;
+  fit->rim_from_circle = root_of(rim * rim.transpose());
+  fit->center_covariance = to_points * fit->center_covariance * to_points.transpose();
   return fit;
 }
 

@@ -32,4 +32,9 @@ struct RobustEllipse {
 std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d> points,
                                                 std::span<const double> weights, double tolerance);
 
+/// The same of one that may be as slender as it likes, if most of it is seen: after the points are
+/// scaled along the axes of their scatter, which makes it nearly a circle.
+std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d> points,
+                                                 std::span<const double> weights, double tolerance);
+
 }  // namespace vlp
