@@ -27,7 +27,8 @@ std::optional<double> optional_within(YamlMap& map, const std::string& key, doub
   return value ? std::optional(value->number_within(min, max, unit)) : std::nullopt;
 }
 
-/// Of a lamp that is one; a disc has none of the keys of a rectangle.
+}  // namespace
+
 std::optional<LampRectangle> read_rectangle(YamlMap& map) {
   const auto shape = map.optional("shape");
   const auto size = map.optional("size_m"), yaw = map.optional("yaw_rad");
@@ -38,7 +39,7 @@ std::optional<LampRectangle> read_rectangle(YamlMap& map) {
   }
   if (word != "rectangle") throw shape->unknown("disc, rectangle");
   if (const auto diameter = map.optional("diameter_m")) {
-    throw diameter->error("is of a disc, and this lamp is a rectangle: it has a size_m");
+    throw diameter->error("is of a disc, and this is a rectangle: it has a size_m");
   }
   const YamlValue sides = map.required("size_m");
   const LampRectangle rectangle{
@@ -47,8 +48,6 @@ std::optional<LampRectangle> read_rectangle(YamlMap& map) {
   for (const YamlValue& side : sides.list()) side.number_within(kSmallest_m, kLargest_m, "m");
   return rectangle;
 }
-
-}  // namespace
 
 Lamp read_lamp(YamlMap& map) {
   Lamp lamp;

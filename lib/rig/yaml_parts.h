@@ -15,6 +15,8 @@ namespace vlp {
 /// fields of what it returns and leaves finish() to the caller, who may have keys of its own.
 /// Throws InputError.
 Lamp read_lamp(YamlMap& map);
+/// The keys of a shape, see datasets/README.md; nothing of a disc, which has none of a rectangle's.
+std::optional<LampRectangle> read_rectangle(YamlMap& map);
 Board read_board(YamlMap& map);
 Camera read_camera(YamlMap& map);
 

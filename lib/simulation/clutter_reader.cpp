@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "rig/yaml_parts.h"
 #include "simulation/scene_parts.h"
 
 namespace vlp {
@@ -22,7 +23,9 @@ Reflection read_reflection(YamlMap map, const std::vector<SceneLamp>& lamps, con
   const auto lamp = std::find_if(lamps.begin(), lamps.end(),
                                  [&](const SceneLamp& each) { return each.id == wanted; });
   if (lamp == lamps.end()) throw id.error("there is no lamp " + std::to_string(wanted));
-  const Reflection reflection{read_glow(map, room), std::size_t(lamp - lamps.begin())};
+  Reflection reflection{read_glow(map, room, read_rectangle(map)),
+                        std::size_t(lamp - lamps.begin())};
+  reflection.glow.edge_share = 0;
   map.finish();
   return reflection;
 }

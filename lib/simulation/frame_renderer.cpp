@@ -132,7 +132,15 @@ class LampFrame {
   }
   /// `target` is the window's part of an image.
   void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
-    if (glow.rectangle) return draw(panel_of(glow), glow.radiance_e_per_s, window, target);
+    if (glow.rectangle) {
+      const Panel panel = panel_of(glow);
+      if (glow.edge_share == 1) return draw(panel, glow.radiance_e_per_s, window, target);
+      cv::Mat1f own = window.image(0);
+      draw(panel, glow.radiance_e_per_s, window, own);
+      fade(panel, glow.edge_share, window, own);
+      target += own;
+      return;
+    }
     const Eigen::Isometry3d glow_from_world(Eigen::Translation3d(-glow.position_m));
     const TargetFromCamera glow_from_camera = target_from_camera(glow_from_world);
     if (glow.recess || glow.chips || glow.halo) {
@@ -141,6 +149,25 @@ class LampFrame {
     }
     add_shape(rays_, window, glow_from_camera, Disc(glow.diameter_m / 2, glow.edge_share),
               glow.radiance_e_per_s, target);
+  }
+  /// See Glow; what is left is taken at each pixel's middle.
+  void fade(const Panel& panel, double edge_share, const PixelWindow& window,
+            cv::Mat1f& own) const {
+    const TargetFromCamera panel_from_camera = target_from_camera(panel_from_world(panel));
+    const Eigen::Array2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
+    for (int line = window.line_begin; line < window.line_end; ++line) {
+      const Eigen::Isometry3d pose = panel_from_camera(line);
+      for (int place = window.place_begin; place < window.place_end; ++place) {
+        float& value = own(line - window.line_begin, place - window.place_begin);
+        if (value == 0) continue;
+        const Eigen::Vector3d middle =
+            rays_.corner(line, place) + rays_.corner(line + 1, place + 1);
+        const Eigen::Vector2d at_m = plane_hit(pose.translation(), pose.linear() * middle);
+        const Eigen::Array2d off = 2 * at_m.array() / size_m - 1;
+        const Eigen::Array2d left = (1 - (1 - edge_share) * off.square()).max(0);
+        value *= static_cast<float>(left.prod());
+      }
+    }
   }
   void draw(const Panel& panel, double value, cv::Mat1f& image) const {
     const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);

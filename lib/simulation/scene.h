@@ -60,8 +60,9 @@ struct Chips {
 
 /// A horizontal disc of light. Its radiance at the distance r of its centre is
 ///   radiance (1 - (1 - edge_share) (2 r / diameter)^2),
-/// and its chips add to it; or that of its recess, of which the disc is the rim. Or a rectangle
-/// that is lit evenly, and has nothing of what a disc has.
+/// and its chips add to it; or that of its recess, of which the disc is the rim. Or a rectangle,
+/// with such a factor for the distance from the middle along each of its sides, and nothing else of
+/// what a disc has.
 struct Glow {
   Eigen::Vector3d position_m;
   double diameter_m;
@@ -86,8 +87,8 @@ struct SceneLamp {
   Eigen::Vector3d map_error_m;
 };
 
-/// The light of a lamp thrown back by a shiny floor onto the ceiling: fades towards its rim and
-/// flickers with its lamp.
+/// The light of a lamp thrown back by a shiny floor onto the ceiling: fades to nothing at its
+/// rim, or sides, and flickers with its lamp.
 struct Reflection {
   Glow glow;
   std::size_t lamp;  // in Scene::lamps

@@ -50,7 +50,7 @@ Chips read_chips(YamlMap map, const Glow& disc) {
 
 Glow read_glow(YamlMap& map, const Room& room, const std::optional<LampRectangle>& rectangle) {
   const YamlValue position = map.required("position_m");
-  Glow glow{read_point(position), 0, 0, 0};
+  Glow glow{read_point(position), 0, 0, rectangle ? 1.0 : 0.0};
   if (!rectangle) glow.diameter_m = map.required("diameter_m").number_within(1e-3, 10, "m");
   glow.radiance_e_per_s = read_radiance(map, "radiance_e_per_s");
   glow.rectangle = rectangle;

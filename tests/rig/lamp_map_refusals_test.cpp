@@ -52,7 +52,7 @@ TEST(LampMapRefusals, NameWhatARectangleLacksAndADiscDoesNotHave) {
   EXPECT_THAT(refusal_of_lamp(lamp + "shape: rectangle"),
               HasSubstr(place + ": key 'size_m' is missing"));
   EXPECT_EQ(refusal_of_lamp(lamp + "shape: rectangle, size_m: [1.2, 0.1], diameter_m: 0.2"),
-            place + ".diameter_m: is of a disc, and this lamp is a rectangle: it has a size_m");
+            place + ".diameter_m: is of a disc, and this is a rectangle: it has a size_m");
   EXPECT_THAT(refusal_of_lamp(lamp + "shape: square, size_m: [1, 1]"),
               HasSubstr(place + ".shape: 'square' is "));
   EXPECT_THAT(refusal_of_lamp(lamp + "shape: rectangle, size_m: [1.2]"),

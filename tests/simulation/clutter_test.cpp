@@ -3,6 +3,8 @@
 /// Lights that are no lamps, and things in the way.
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "simulation/plain_scene.h"
 #include "simulation/truth.h"
 
@@ -71,6 +73,22 @@ TEST_F(ClutterTest, SteadyLampsHaveNoStripesAndReflectionsTheirLamps) {
   EXPECT_NEAR(always(300, 300), 1500, 0.01);
   EXPECT_NEAR(always(300, 500), 1000, 2);
   EXPECT_LT(always(300, 517), 250) << "a reflection fades";
+}
+
+TEST_F(ClutterTest, ReflectionsOfRectanglesFadeTowardsTheirSides) {
+  Glow glow{{0.3, 0, 1.6}, 0, 2e7, 0};
+  glow.rectangle = LampRectangle{{0.12, 0.06}, std::numbers::pi / 2};
+  scene_.lamps[0].glow.radiance_e_per_s = 0;
+  scene_.clutter.reflections = {{glow, 0}};
+  const cv::Mat1f image = rendered();
+  // 20 px wide and 40 px high; of parabolas two thirds are left each way.
+  EXPECT_NEAR(brightness_of(image).sum, 800 * 1000 * 4 / 9.0, 1500);
+  EXPECT_NEAR(image(299, 499), 1000, 4);
+  EXPECT_NEAR(image(299, 504) / image(299, 499), 0.75, 0.06) << "half way to a long side";
+  EXPECT_NEAR(image(309, 499) / image(299, 499), 0.75, 0.03) << "half way to a short side";
+  EXPECT_LT(image(299, 508), 300);
+  EXPECT_EQ(image(299, 512), 0);
+  EXPECT_EQ(image(322, 499), 0);
 }
 
 TEST_F(ClutterTest, AnOccluderHidesWhatIsBehindIt) {

@@ -163,10 +163,9 @@ TEST(SceneFigures, OfARectangleAreThoseOfTheLampMap) {
               testing::StartsWith("scene.yaml:10: lamps[0]: key 'edge_share' is unknown here"));
   EXPECT_THAT(with(shape + ", chips: {share: 0.3, pitch_m: 0.03, width_m: 0.02}"),
               testing::StartsWith("scene.yaml:10: lamps[0]: key 'chips' is unknown here"));
-  EXPECT_EQ(
-      with(shape + ", diameter_m: 0.2"),
-      "scene.yaml:10: lamps[0].diameter_m: is of a disc, and this lamp is a rectangle: it has "
-      "a size_m");
+  EXPECT_EQ(with(shape + ", diameter_m: 0.2"),
+            "scene.yaml:10: lamps[0].diameter_m: is of a disc, and this is a rectangle: it has "
+            "a size_m");
   EXPECT_THAT(with("shape: rectangle, yaw_rad: 0"), testing::HasSubstr("size_m"));
 }
 
@@ -233,6 +232,15 @@ TEST(SceneFigures, OfAReflectionNameALampThatIsThere) {
   EXPECT_EQ(refusal_with("of_lamp: 5", "of_lamp: -5"),
             "scene.yaml:15: clutter.reflections[0].of_lamp: should be a whole number within 0 and "
             "2147483647, not '-5'");
+}
+
+TEST(SceneFigures, OfAReflectionAreThoseOfItsShape) {
+  const std::string place = "scene.yaml:15: clutter.reflections[0]";
+  EXPECT_EQ(refusal_with("diameter_m: 0.22", "shape: rectangle, size_m: [0.6, 0.1]"), "");
+  EXPECT_EQ(refusal_with("diameter_m: 0.22", "size_m: [0.6, 0.1]"),
+            place + ".size_m: is of a rectangle: say 'shape: rectangle', too");
+  EXPECT_EQ(refusal_with("diameter_m: 0.22", "diameter_m: 0.22, shape: rectangle"),
+            place + ".diameter_m: is of a disc, and this is a rectangle: it has a size_m");
 }
 
 TEST(SceneFigures, OfSteadyLampsAndBoardsAreChecked) {

@@ -83,6 +83,16 @@ TEST(Scene, HasTheClutterAndTheBoard) {
   EXPECT_EQ(scene.board->surround_e_per_s, 6e5);
 }
 
+TEST(Scene, HasReflectionsOfRectangles) {
+  const Scene scene = scene_of(
+      scene_with("diameter_m: 0.22", "shape: rectangle, size_m: [0.6, 0.1], yaw_rad: 0.2"));
+  const Glow& glow = scene.clutter.reflections.at(0).glow;
+  ASSERT_TRUE(glow.rectangle);
+  EXPECT_EQ(glow.rectangle->size_m, Eigen::Vector2d(0.6, 0.1));
+  EXPECT_EQ(glow.rectangle->yaw_rad, 0.2);
+  EXPECT_EQ(glow.edge_share, 0) << "it fades towards its sides";
+}
+
 TEST(Scene, HasRecessesAndHalos) {
   const Scene scene = scene_of(kSceneYaml);
   EXPECT_FALSE(scene.lamps[0].glow.recess);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct DrawnDisc {
   double change = 0;                   // of the level, from the centre to the right rim
   double fall = 0;                     // of the level, with the square of the radius, at the rim
   std::vector<int> dark_columns = {};  // of a bar before it
+  /// More of the level above chips, of which so many pixels are from one to the next.
+  double chips = 0, pitch_px = 6;
 
   Eigen::Vector2d low() const { return center - Eigen::Vector2d(radius_px, radius_px); }
   Eigen::Vector2d high() const { return center + Eigen::Vector2d(radius_px, radius_px); }
@@ -41,7 +44,10 @@ struct DrawnDisc {
         const Eigen::Vector2d place(column, row);
         const double inside_px = -off((place.array() + 0.5) / finer - 0.5);
         const double lost = fall * std::pow(1 - inside_px / radius_px, 2);
-        sharp(row, column) = std::clamp(0.5 + finer * inside_px, 0.0, 1.0) * (1 - lost);
+        const double wave = 2 * std::numbers::pi / (finer * pitch_px);
+        const double above = std::cos(wave * column) * std::cos(wave * row);
+        const double chip = 1 + chips * std::max(0.0, above);
+        sharp(row, column) = std::clamp(0.5 + finer * inside_px, 0.0, 1.0) * (1 - lost) * chip;
       }
     }
     const double sigma = finer * std::sqrt(blur_px * blur_px - pixels_own);
@@ -72,10 +78,13 @@ inline std::vector<EdgePoint> outline_in(const cv::Mat& image) {
   return all;
 }
 
-inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {
+inline RefinedOutline refined_outline_in(const cv::Mat& image, const DrawnDisc& disc) {
   return refined(image, outline_in(image), {disc.low(), disc.high(), disc.center},
-                 background_of(image))
-      .points;
+                 background_of(image));
+}
+
+inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {
+  return refined_outline_in(image, disc).points;
 }
 
 /// Where rows cut the outline more steeply than that.

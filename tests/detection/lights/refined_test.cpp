@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <utility>
 
 #include "detection/lights/drawn_disc.h"
 
@@ -77,6 +79,51 @@ TEST(RefinedOutline, IsNotDrawnInByBlurNorByADarkRim) {
       EXPECT_NEAR(mean_px, 0, 0.6 * drawn_in_px) << radius_px << ", " << fall;
     }
   }
+}
+
+/// With noise of that standard deviation, in grey levels.
+cv::Mat noisy(const cv::Mat& image, double noise, std::uint64_t seed) {
+  cv::RNG random(seed);
+  cv::Mat1f levels;
+  image.convertTo(levels, CV_32F);
+  for (float& level : levels) level += static_cast<float>(random.gaussian(noise));
+  cv::Mat result;
+  levels.convertTo(result, image.depth());
+  return result;
+}
+
+TEST(RefinedOutline, IsThatOfAMottledLightWhereChipsShineThrough) {
+  for (const double radius_px : {24.0, 38.4}) {
+    for (const double chips : {0.1, 0.3, 0.6}) {
+      for (const double pitch_px : {5.0, 9.0}) {
+        SCOPED_TRACE(testing::Message() << radius_px << ", " << chips << ", " << pitch_px);
+        const DrawnDisc disc{
+            .radius_px = radius_px, .level = 0.5, .chips = chips, .pitch_px = pitch_px};
+        EXPECT_TRUE(refined_outline_in(disc.image(CV_16U), disc).mottled);
+        EXPECT_TRUE(refined_outline_in(noisy(disc.image(CV_8U), 1, 3), disc).mottled);
+      }
+    }
+  }
+}
+
+TEST(RefinedOutline, IsNotMottledByNoiseByAChangeOrByADarkRim) {
+  std::uint64_t seed = 0;
+  for (const double noise : {0.0, 0.5, 2.0, 6.0}) {
+    for (const auto& [change, fall] : {std::pair(0.0, 0.0), {0.3, 0.0}, {0.0, 0.3}, {0.15, 0.15}}) {
+      for (const double radius_px : {24.0, 38.4}) {
+        SCOPED_TRACE(testing::Message() << noise << ", " << change << ", " << fall);
+        const DrawnDisc disc{.radius_px = radius_px, .level = 0.6, .change = change, .fall = fall};
+        EXPECT_FALSE(refined_outline_in(noisy(disc.image(CV_8U), noise, ++seed), disc).mottled);
+      }
+    }
+  }
+}
+
+TEST(RefinedOutline, OfAMottledLightLiesOnTheCircle) {
+  const DrawnDisc disc{.level = 0.5, .chips = 0.3};
+  const auto points = refined_in(disc.image(CV_16U), disc);
+  EXPECT_GT(points.size(), 100U);
+  EXPECT_LT(rms_off(disc, points), 0.12);
 }
 
 TEST(RefinedOutline, IsRefinedWithoutItsFlatParts) {
