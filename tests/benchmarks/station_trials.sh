@@ -91,6 +91,8 @@ faulty() {
 
   scene_of "$1" 514.8 525.2 5 0.7
   render
+  rm -rf "$work/good"
+  cp -r "$work/unit" "$work/good"
   local lamps=$work/station/lamps.yaml lamp=$((1 + $1 % 6)) other=$((1 + ($1 + 1 + $1 % 5) % 6))
   # The lamp is where the scene has it, and is 2 to 6 cm off in the map.
   awk -v id="$lamp" -v off=0.0$((2 + $1 % 5)) -F'[][]' '$0 ~ "id: " id "," {
@@ -103,7 +105,9 @@ faulty() {
   second_hz=$(sed -n "s/.*id: $other,.*frequency_hz: \([0-9]*\).*/\1/p" "$lamps")
   sed -i -e "/id: $lamp,/s/$first_hz/$second_hz/" -e "/id: $other,/s/$second_hz/$first_hz/" "$lamps"
   [ "$lamp" -lt "$other" ] || { local swap=$lamp; lamp=$other other=$swap; }
+  unit_again
   tried swapped "$1" "lamps $lamp and $other"
+  unit_again
   cp datasets/station/lamps.yaml "$lamps"
   sed -i 's/first_id: 0/first_id: 30/' "$work/station/board.yaml"
   tried board "$1" 'wrong board'
