@@ -140,28 +140,29 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
                 const std::string& reason) {
   Voided result{known.find(run)};
   RunRecord& record = result.run;
+  const auto& station = known.station();
+  const bool own = station && record.station == station->station;
+  std::optional<HookLock> lock;
+  if (own && station->hook) {
+    lock.emplace(known.spool()->folder(), record.run);
+    // Its end would be taken for that of the hook that is told of the voiding.
+    if (!lock->held()) {
+      throw InputError(record.run, "its hook is being run: void it when that has ended");
+    }
+    record = known.find(run);  // another may have voided it before the lock was had
+  }
   if (const RunEvent* event = voided(record)) {
     throw std::invalid_argument(
         fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text));
   }
   const std::string who = printable(operator_name);
   record.events.push_back(new_event(kVoided, printable(reason), who));
-  const auto& station = known.station();
   if (!station) {
     known.records().keep(record);
     return result;
   }
   Spool& spool = *known.spool();
-  const bool own = record.station == station->station;
-  std::optional<HookLock> lock;
-  if (own && station->hook) {
-    lock.emplace(spool.folder(), record.run);
-    // Its end would be taken for that of the hook that is told of the voiding.
-    if (!lock->held()) {
-      throw InputError(record.run, "its hook is being run: void it when that has ended");
-    }
-    record.events.push_back(hook_wanted(*station->hook, who));
-  }
+  if (lock) record.events.push_back(hook_wanted(*station->hook, who));
   spool.keep(record);
   if (own && record.kind == "golden") forget_golden(*station, record.run);
   spool.deliver();
