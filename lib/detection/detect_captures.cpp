@@ -21,11 +21,9 @@ struct CaptureOutcome {
 
 CaptureOutcome outcome_of(const LampDetector& detector, const SourceImage& source,
                           const DetectRun& run) {
-  const auto level = run.levels.find(source.file.filename().string());
+  const auto leaning = leaning_detector(detector, run.levels, source.file.filename().string());
   ImageLights found =
-      level == run.levels.end()
-          ? detect_image(detector, source, run.imager_px, run.max_mpx)
-          : detect_image(detector.leaning(level->second), source, run.imager_px, run.max_mpx);
+      detect_image(leaning ? *leaning : detector, source, run.imager_px, run.max_mpx);
   CaptureOutcome outcome;
   outcome.file = source.file;
   outcome.time_s = source.time_s;
@@ -45,6 +43,14 @@ CaptureOutcome outcome_of(const LampDetector& detector, const SourceImage& sourc
 }
 
 }  // namespace
+
+std::optional<LampDetector> leaning_detector(const LampDetector& detector,
+                                             const LevelsOfImages& levels,
+                                             const std::string& image) {
+  const auto level = levels.find(image);
+  if (level == levels.end()) return std::nullopt;
+  return detector.leaning(level->second);
+}
 
 CaptureDetections detect_captures(const LampDetector& detector, ImageSource& images,
                                   const DetectRun& run,

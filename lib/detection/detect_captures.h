@@ -35,6 +35,11 @@ struct CaptureDetections {
 /// level_from_camera of images, by name; nothing: nobody knows (LampDetector::leaning).
 using LevelsOfImages = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
+/// The detector for the image of that name, unless it is the one that all have.
+std::optional<LampDetector> leaning_detector(const LampDetector& detector,
+                                             const LevelsOfImages& levels,
+                                             const std::string& image);
+
 struct DetectRun {
   /// Images at a time.
   int threads;

@@ -184,10 +184,11 @@ struct Linearized : Normal<S::kCount> {
   }
 };
 
-/// What is left after such a step is its square, or a thousandth where pixels err: below any noise.
-/// Of the distance, of a radian, of a metre or a radian per second.
-bool negligible(const BodyVector& step, double scale_m) {
-  constexpr double small_step = 1e-7, small_rate = 1e-6;
+/// What is left after such a whole step is its square, or a thousandth where pixels err: below any
+/// noise. A halved one is to be so small itself. Of the distance, of a radian, of a metre or a
+/// radian per second.
+bool negligible(const BodyVector& step, double scale_m, bool whole) {
+  const double small_step = whole ? 1e-7 : 1e-10, small_rate = whole ? 1e-6 : 1e-8;
   return step.head<3>().norm() <= small_step * scale_m && std::abs(step[kBodyYaw]) <= small_step &&
          step.segment<3>(kBodyVelocity).cwiseAbs().maxCoeff() <= small_rate &&
          step.tail<2>().cwiseAbs().maxCoeff() <= small_step;
@@ -235,7 +236,7 @@ std::optional<BodyFix> solve(std::span<const BodySighting> sightings, const Eige
     if (!step.allFinite()) return std::nullopt;
     for (int halving = 0;; ++halving, step /= 2) {
       const BodyState next_state = moved(at.state, step);
-      if (negligible(step, scale_m)) {
+      if (negligible(step, scale_m, halving == 0)) {
         const auto lamps = static_cast<double>(sightings.size());
         std::optional<BodyFix> fix = finished<S>(normal, factor, weights, next_state, lamps);
         if (!fix->covariance.allFinite()) fix.reset();

@@ -186,9 +186,14 @@ LampSearch::LampSearch(const LampImages& lamp_images, StepResult& result)
     if (!stated) stated = input.camera->camera.readout;
   }
   from_videos = {input.every, input.max_mpx, run.imager_px};
-  if (input.camera && !is_video_name(input.folder)) {
-    run.levels = levels_told(input.captures ? *input.captures : captures_table(input.folder),
-                             *input.camera, input.yaw_in_robot_rad);
+  if (input.camera) {
+    CapturesTable captures;
+    if (input.captures) {
+      captures = *input.captures;
+    } else if (!is_video_name(input.folder)) {
+      captures = captures_table(input.folder);
+    }
+    run.levels = levels_told(captures, *input.camera, input.yaw_in_robot_rad);
   }
   camera.readout = readout_of(images, stated, result, from_videos);
   if (!input.annotate.empty()) run.annotate = picture_folder(input);

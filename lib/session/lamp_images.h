@@ -68,7 +68,7 @@ struct SeenLamps : StepResult {
 SeenLamps see_lamps(const LampImages& input, const StepProgress& progress = {});
 
 /// The lamps in those of the images once more, with what is known by now of how their cameras
-/// leaned. Precondition: see_lamps() could use them, with the same input.
+/// leaned. Precondition: see_lamps() could use them, with the same input, which is no video.
 CaptureDetections see_lamps_again(const LampImages& input, const LevelsOfImages& levels);
 
 /// Along what the shutter reads: as `stated`, or else as the images show; a note, or a warning when

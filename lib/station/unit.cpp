@@ -23,6 +23,16 @@
 
 namespace vlp {
 
+namespace {
+
+/// As UnitImage has it.
+Eigen::Matrix3d level_in(const LevelsOfImages& levels, const std::string& image) {
+  const auto level = levels.find(image);
+  return level == levels.end() ? Eigen::Matrix3d::Zero().eval() : level->second.value();
+}
+
+}  // namespace
+
 Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads)
     : config_(config),
       camera_id_(std::move(camera_id)),
@@ -33,10 +43,25 @@ Unit::~Unit() = default;
 
 void Unit::reread(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
-  UnitStep& state = at(step);
-  if (!state.images.empty() && levels_of(step) != state.levels) state.look_again();
-  state.result.reset();
+  look_again(step);
+  at(step).result.reset();
   forget_after(step);
+}
+
+/// At the images whose inclination is told otherwise by now. They were counted when they came.
+void Unit::look_again(StationStep step) {
+  const LevelsOfImages levels = levels_of(step);
+  UnitStep& state = at(step);
+  std::vector<fs::path> again;
+  for (const auto& [name, image] : state.images) {
+    if (!image.discarded && level_in(levels, name) != image.level) again.push_back(image.file);
+  }
+  if (again.empty() || !calibration_before(step)) return;
+  const int refused = state.refused_together;
+  const bool used = state.used_together;
+  look(step, again);
+  state.refused_together = refused;
+  state.used_together = used;
 }
 
 void Unit::advance(bool all_in) {
@@ -117,8 +142,10 @@ void Unit::count_refusals(StationStep step) {
 /// Of the captures whose inclination is told, but for those of the turn, whose axis is level.
 LevelsOfImages Unit::levels_of(StationStep step) const {
   if (step != StationStep::dispersion && step != StationStep::check) return {};
+  const auto calibration = calibration_before(step);
+  if (!calibration) return {};
   try {
-    return levels_told(captures_table(this->step(step).folder), *calibration_before(step), 0);
+    return levels_told(captures_table(this->step(step).folder), *calibration, 0);
   } catch (const InputError&) {  // the step will say so
     return {};
   }
@@ -130,16 +157,16 @@ void Unit::look(StationStep step, const std::vector<fs::path>& files) {
   if (step != StationStep::boards) {
     lamps.emplace(config_.lamps, detector_camera(*calibration_before(step)));
   }
-  const LevelsOfImages& levels = at(step).levels = levels_of(step);
+  const LevelsOfImages levels = levels_of(step);
   images_in_parallel(files.size(), threads_, [&](std::size_t i) {
-    const auto level = levels.find(files[i].filename().string());
     if (!lamps) {
       images[i] = look_at_board(files[i], config_, *boards_);
-    } else if (level == levels.end()) {
-      images[i] = look_at_lamps(files[i], config_, *lamps);
-    } else {
-      images[i] = look_at_lamps(files[i], config_, lamps->leaning(level->second));
+      return;
     }
+    const std::string name = files[i].filename().string();
+    const auto leaning = leaning_detector(*lamps, levels, name);
+    images[i] = look_at_lamps(files[i], config_, leaning ? *leaning : *lamps);
+    images[i].level = level_in(levels, name);
   });
   for (UnitImage& image : images) {
     const std::string owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : "";
@@ -236,7 +263,10 @@ void Unit::forget_after(StationStep step) {
   for (const StationStep later : kStationSteps) {
     if (later <= step) continue;
     UnitStep& state = at(later);
-    state.look_again();
+    for (const auto& [name, image] : state.images) {
+      if (!image.discarded) state.waiting.push_back(image.file);
+    }
+    std::erase_if(state.images, [](const auto& image) { return !image.second.discarded; });
     state.result.reset();
     state.enough = false;
   }

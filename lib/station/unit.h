@@ -11,9 +11,10 @@
 #include <utility>
 #include <vector>
 
+#include "detection/detect_captures.h"
 #include "evaluation/gate.h"
 #include "session/step_history.h"
-#include "station/station_step.h"
+#include "station//station_step.h"
 #include "station/unit_step.h"
 #include "station/verdict.h"
 
@@ -85,6 +86,7 @@ class Unit {
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
   void look(StationStep step, const std::vector<std::filesystem::path>& files);
   LevelsOfImages levels_of(StationStep step) const;
+  void look_again(StationStep step);
   void take(StationStep step, UnitImage image);
   std::vector<Cause> causes_of_images() const;
   void count_refusals(StationStep step);

@@ -34,7 +34,9 @@ struct UnitImage {
   /// Of the step `boards`; there also when the image is refused, but for one that shows no board.
   std::optional<BoardView> view = {};
   std::optional<double> blur_px = {};
-  /// Of the other steps.
+  /// Of the other steps. level_from_camera that they were looked for with; zero: the calibrated
+  /// one.
+  Eigen::Matrix3d level = Eigen::Matrix3d::Zero();
   std::vector<Detection> lamps = {};
   int lights_cut = 0, lights_unknown = 0;
   /// Of those whose stripes are plain, but like no lamp's, with the row time of the camera's type.

@@ -23,13 +23,6 @@ int UnitStep::used() const {
   }));
 }
 
-void UnitStep::look_again() {
-  for (const auto& [name, image] : images) {
-    if (!image.discarded) waiting.push_back(image.file);
-  }
-  std::erase_if(images, [](const auto& image) { return !image.second.discarded; });
-}
-
 std::vector<BoardView> views_of(const UnitStep& boards) {
   std::vector<BoardView> views;
   for (const auto& [name, image] : boards.images) {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "captures/detections_table.h"
-#include "detection/detect_captures.h"
 #include "session/step_result.h"
 #include "station/step_picture.h"
 #include "station/unit_image.h"
@@ -25,8 +24,6 @@ struct UnitStep {
   std::map<std::string, UnitImage> images = {};
   /// Images that wait for the step before.
   std::vector<std::filesystem::path> waiting = {};
-  /// Of those whose inclination is told, as they were looked at.
-  LevelsOfImages levels = {};
   /// There are as many as the station wants.
   bool enough = false;
   /// What the images come to, once there are enough of them.
@@ -42,8 +39,6 @@ struct UnitStep {
   std::string last = {};
 
   bool done() const { return enough && result && result->ok(); }
-  /// All but those that were taken away wait to be looked at anew.
-  void look_again();
   int used() const;
 };
 

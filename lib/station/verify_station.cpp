@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "detection/image_file.h"
+#include "detection/detect_captures.h"
 #include "detection/images_in_parallel.h"
 #include "rig/input_error.h"
 #include "session/leaning_captures.h"
@@ -56,9 +57,8 @@ class Verification {
     const fs::path folder = folder_ / name_of(each);
     const auto levels = levels_told(captures_table(folder), golden_.calibration, 0);
     UnitStep step = step_of(folder, threads_, [&](const fs::path& file) {
-      const auto level = levels.find(file.filename().string());
-      return look_at_lamps(file, config_,
-                           level == levels.end() ? detector : detector.leaning(level->second));
+      const auto leaning = leaning_detector(detector, levels, file.filename().string());
+      return look_at_lamps(file, config_, leaning ? *leaning : detector);
     });
     const auto frames = frames_of(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());

@@ -103,12 +103,14 @@ TEST_F(WatchedStation, LooksAgainWhenItIsToldOfInclinations) {
   ASSERT_EQ(run_program(batch("a")).exit_code, 0);
   take_again();
   prepare("b");
+  const std::string said = folder.file("said", "").string();
   const auto late = captures("b") / "dispersion/captures.csv";
   std::ofstream(late) << told.substr(0, told.size() - 12);  // cut short
   drop_all("b");
-  const auto result =
-      run_program("(sleep 4; mv " + folder.file("told", told).string() + " " + late.string() +
-                  ") & timeout 60 " + run("b", "") + "; code=$?; wait; exit $code");
+  const auto result = run_program("(until grep -q 'dispersion 0011.png: taken' " + said +
+                                  "; do sleep 0.1; done; mv " + folder.file("told", told).string() +
+                                  " " + late.string() + ") & timeout 60 " + run("b", "") + " 2>" +
+                                  said + "; code=$?; wait; exit $code");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_NE(comparable_calibration("a"), "");
   EXPECT_EQ(comparable_calibration("b"), comparable_calibration("a"));

@@ -92,7 +92,7 @@ IntrinsicsSolution solve_every_other(const IntrinsicsSolution& whole, std::size_
   if (half.views.size() < IntrinsicsSolver::kLeastViews) {
     return failure(IntrinsicsStatus::too_few_views);
   }
-  if (!solve(half.problem, half.solved_for) || !is_lens(half.problem.intrinsics)) {
+  if (!solve_for_lens(half.problem, half.solved_for)) {
     return failure(IntrinsicsStatus::no_solution);
   }
   if (all_alike(half.problem)) return failure(IntrinsicsStatus::all_alike);

@@ -151,10 +151,7 @@ IntrinsicsSolution IntrinsicsSolver::solution() const {
   return result;
 }
 
-bool IntrinsicsSolver::solve(SolveFor what) {
-  what.distortions = what.distortions && problem_.intrinsics.size() > 4;
-  return vlp::solve(problem_, what) && is_lens(problem_.intrinsics);
-}
+bool IntrinsicsSolver::solve(SolveFor what) { return solve_for_lens(problem_, what); }
 
 namespace {
 
@@ -271,8 +268,10 @@ bool all_alike(const BoardProblem& problem) {
   return widest_rad < least_rad;
 }
 
-bool is_lens(const std::vector<double>& intrinsics) {
-  return intrinsics[0] > 0 && intrinsics[1] > 0 &&
+bool solve_for_lens(BoardProblem& problem, SolveFor what) {
+  const std::vector<double>& intrinsics = problem.intrinsics;
+  what.distortions = what.distortions && intrinsics.size() > 4;
+  return solve(problem, what) && intrinsics[0] > 0 && intrinsics[1] > 0 &&
          std::all_of(intrinsics.begin(), intrinsics.end(),
                      [](double value) { return std::isfinite(value); });
 }

@@ -60,7 +60,7 @@ class IntrinsicsSolver {
 /// No two boards are tilted differently, by five degrees or more.
 bool all_alike(const BoardProblem& problem);
 
-/// Whether a solve gave a lens.
-bool is_lens(const std::vector<double>& intrinsics);
+/// solve(), without the distortions of a model that has none; whether it gave a lens.
+bool solve_for_lens(BoardProblem& problem, SolveFor what);
 
 }  // namespace vlp

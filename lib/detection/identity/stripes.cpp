@@ -22,7 +22,7 @@ using Lanes = Eigen::Array4d;
 
 /// The share of the variance that a sine of each frequency (per line) and a constant explain.
 Lanes explained(const std::vector<double>& signal, double mean, double variance,
-                      const Lanes& frequencies) {
+                const Lanes& frequencies) {
   const Lanes step = 2 * std::numbers::pi * frequencies;
   const Lanes turn_c = step.cos(), turn_s = step.sin();
   Lanes c = Lanes::Ones(), s = Lanes::Zero();
@@ -45,8 +45,7 @@ Lanes explained(const std::vector<double>& signal, double mean, double variance,
   const Lanes ss = (n - sum_cc) / 2 - sum_s * sum_s / n;
   const Lanes cs = sum_cs / 2 - sum_c * sum_s / n;
   const Lanes determinant = cc * ss - cs * cs;
-  const Lanes share =
-      (ss * a * a - 2 * cs * a * b + cc * b * b) / determinant / (n * variance);
+  const Lanes share = (ss * a * a - 2 * cs * a * b + cc * b * b) / determinant / (n * variance);
   return (determinant > 1e-6 * n * n).select(share, 0);
 }
 

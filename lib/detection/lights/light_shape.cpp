@@ -151,8 +151,10 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
     }
   } else {
     constexpr double nearly_round = 3;
-    fit = camera_.most_slender > nearly_round ? fit_slender_ellipse(points, weights, tolerance)
-                                              : fit_robust_ellipse(points, weights, tolerance);
+    fit = fit_robust_ellipse(points, weights, tolerance);
+    if (!fit && camera_.most_slender > nearly_round) {
+      fit = fit_slender_ellipse(points, weights, tolerance);
+    }
   }
   if (!fit || fit->count < static_cast<int>(kLeastOutlinePoints)) return std::nullopt;
   if (!camera_.lens && slenderness(fit->rim_from_circle) > camera_.most_slender)

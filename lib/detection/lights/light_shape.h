@@ -68,7 +68,8 @@ class LightShape {
   /// How far the centre of a circle's outline is off because the lens bends the lines that it is
   /// read in, so that the outline is read later, or sooner, on the whole than the centre: in
   /// direction a by m (l(a) - l) with the motion m and the lines l, of which the circle's centre
-  /// takes over the part along a that goes with cos a and sin a.
+  /// takes over the part along a that goes with cos a and sin a: of a whole outline, which parts
+  /// are taken for, too.
   Eigen::Vector2d read_off(const Circle& circle, const Eigen::Vector2d& motion_per_line) const;
 
   DetectorCamera camera_;

@@ -65,6 +65,7 @@ TEST(Shear, OfACameraThatDrivesAndTurnsIsThatOfItsMotion) {
   const Vector2d motion = room.motion_at(at), expected = 300 * Vector2d(-motion.y(), motion.x());
   EXPECT_GT(expected.norm(), 0.005);
   EXPECT_THAT(oval.oval, IsNear(expected, 3e-4));
+  EXPECT_THAT(shear->motion_at(room.seen(at, 2 * pi, random)), IsNear(motion, 1e-6));
 }
 
 TEST(Shear, PutsTheCentreOfAPartWhereThatOfTheWholeIs) {
