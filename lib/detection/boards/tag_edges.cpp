@@ -171,7 +171,7 @@ struct TagEdges {
   double squares = 0;
 };
 
-/// The first time; or again with another gamma.
+/// With `before`, of another gamma, from where that has the edges.
 TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& stripes,
                 double gamma, const TagEdges* before = nullptr) {
   // The stripe's other side is kept away from by 2 px: it is blurred, too.
@@ -240,8 +240,7 @@ std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> ta
   const bool curved = behind_curve < better * as_it_is;
   std::vector<std::optional<SeenTag>> exact;
   for (std::size_t i = 0; i < tags.size(); ++i) {
-    const bool fits = std::isfinite(found[i].squares);
-    if (curved) found[i] = fitted(tags[i], image, stripes, usual_gamma, fits ? &found[i] : nullptr);
+    if (curved) found[i] = fitted(tags[i], image, stripes, usual_gamma);
     exact.push_back(crossed(tags[i], found[i]));
   }
   return exact;
