@@ -31,7 +31,9 @@ cv::Mat1f vignetting_of(const PixelRays& rays, double power) {
           rays.corner(line, place).normalized() + rays.corner(line, place + 1).normalized() +
           rays.corner(line + 1, place).normalized() + rays.corner(line + 1, place + 1).normalized();
       const double cosine = ray.normalized().z();
-      image(line, place) = cosine > 0 ? static_cast<float>(std::pow(cosine, power)) : 0;
+      // Beyond 90 degrees off the axis only a lens without vignetting sees; NaN: no ray.
+      const double share = cosine > 0 ? std::pow(cosine, power) : power == 0 && cosine <= 0 ? 1 : 0;
+      image(line, place) = static_cast<float>(share);
     }
   }
   return image;

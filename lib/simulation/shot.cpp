@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "camera/lens.h"
 #include "geometry/frames.h"
@@ -41,6 +42,19 @@ Step step_of(const LampShots& captures, std::size_t index) {
   }
   const std::size_t turned = index / repeat;
   return {turned / yaws / spots, turned / yaws % spots, turned % yaws, 0};
+}
+
+/// The ray of the pixel `off` the middle, or of the last one before it that has a ray.
+std::optional<Lens::Ray> last_ray(const Lens& lens, const Eigen::Vector2d& middle,
+                                  const Eigen::Vector2d& off) {
+  constexpr int halvings = 30;
+  auto ray = lens.unproject(middle + off);
+  double within = 0, beyond = 1;
+  for (int halving = 0; !ray && halving < halvings; ++halving) {
+    const double between = (within + beyond) / 2;
+    (lens.unproject(middle + between * off) ? within : beyond) = between;
+  }
+  return ray ? ray : lens.unproject(middle + within * off);
 }
 
 }  // namespace
@@ -132,14 +146,12 @@ BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t inde
   cv::RNG random = random_of(scene.seed, set.folder, index);
   const auto share = [&] { return random.uniform(-1.0, 1.0); };
 
-  // The board's middle, and the board facing the camera; then turned in place. Towards the middle
-  // of the image from where the lens has no ray.
+  // The board's middle, and the board facing the camera; then turned in place. Where the lens has
+  // no ray, at its last one on the way there.
   const Eigen::Vector2d half((scene.camera.imager_px[0] - 1) / 2.0,
                              (scene.camera.imager_px[1] - 1) / 2.0);
-  Eigen::Vector2d off{share(), share()};
-  off = views.spread * off.cwiseProduct(half);
-  auto ray = lens.unproject(half + off);
-  for (int halving = 0; !ray && halving < 20; ++halving) ray = lens.unproject(half + (off /= 2));
+  const Eigen::Vector2d off = views.spread * Eigen::Vector2d{share(), share()}.cwiseProduct(half);
+  const auto ray = last_ray(lens, half, off);
   const Eigen::Vector3d sight =
       ray ? ray->direction.normalized() : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
   const double distance_m = random.uniform(views.distance_m.first, views.distance_m.second);

@@ -149,5 +149,27 @@ INSTANTIATE_TEST_SUITE_P(
                     View{stereographic_camera(), {0, 0}, false, "Stereographic"}),
     [](const auto& instance) { return std::string(instance.param.name); });
 
+/// The level of a white wall at a pixel, through a fisheye that sees to 104 degrees off its axis.
+double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
+  Scene scene = plain_scene();
+  scene.camera = {
+      "fisheye", {800, 800}, LensModel::fisheye, {290, 290, 399.5, 399.5, -0.1, 0, 0, 0},
+      {},        3e-5,       Readout::rows};
+  scene.optics.vignetting_power = vignetting_power;
+  scene.board = plain_board();
+  const cv::Mat1f image =
+      FrameRenderer(scene).board_electrons(board_shot(scene, board_views(1, 5, 0, 0, 0), 0));
+  return image(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
+}
+
+// 350 px from the centre are 95 degrees, 360 px beyond the last ray.
+TEST(BoardWall, IsSeenBeyondNinetyDegreesByALensWithoutVignetting) {
+  const double on_axis = level_at({400, 100}, 0);
+  EXPECT_GT(on_axis, 0);
+  EXPECT_EQ(level_at({749, 400}, 0), on_axis);
+  EXPECT_EQ(level_at({765, 400}, 0), 0);
+  EXPECT_EQ(level_at({749, 400}, 1), 0);
+}
+
 }  // namespace
 }  // namespace vlp

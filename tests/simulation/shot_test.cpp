@@ -128,6 +128,30 @@ TEST(BoardShots, StayWithinTheLimitsOfTheirViews) {
   EXPECT_NEAR(most_off, 0.5, 0.01);
 }
 
+// A circle of 353 px in an image of 800 x 600, whose corners have no ray.
+TEST(BoardShots, GoToTheLastRayOfALensThatDoesNotFillTheImage) {
+  Scene scene = plain_scene();
+  scene.camera = {
+      "fisheye", {800, 600}, LensModel::fisheye, {290, 290, 399.5, 299.5, -0.1, 0, 0, 0},
+      {},        3e-5,       Readout::rows};
+  scene.board = plain_board();
+  const CaptureSet set = board_views(300, 0.3, 0, 0, 1);
+  const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
+  const double last_rad = std::sqrt(1 / 0.3);
+  int at_the_rim = 0;
+  for (std::size_t i = 0; i < 300; ++i) {
+    Eigen::Vector3d middle_m(0, 0, 0);
+    middle_m.head<2>() = tag_field_m(scene.board->print) / 2;
+    const Eigen::Vector3d sight = board_shot(scene, set, i).camera_from_board(0) * middle_m;
+    const double off_axis_rad = std::atan2(sight.head<2>().norm(), sight.z());
+    EXPECT_LE(off_axis_rad, last_rad + 1e-6);
+    if (off_axis_rad > last_rad - 1e-3) ++at_the_rim;
+  }
+  // Beyond the circle lie 21 % of the image.
+  EXPECT_GT(at_the_rim, 0.15 * 300);
+  EXPECT_LT(at_the_rim, 0.27 * 300);
+}
+
 TEST(CarrierMotion, LeansTheCameraAndVibrates) {
   const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
   CarrierMotion motion{{1, 2, 0.5}, {0.5, 0}, 0.3, 0.2, mount};

@@ -38,6 +38,13 @@ struct BoardProblem {
   /// corners that are better known its share of all squares would be the larger, and draw the lens
   /// off.
   double noise_px = 1;
+  /// Rays in the camera and where the lens has to see them, each as good as a corner: they hold the
+  /// frame of a splined lens, whose control points make up for any turn of it.
+  struct Held {
+    Eigen::Vector2d pixel;
+    Eigen::Vector3d ray;
+  };
+  std::vector<Held> held = {};
 
   std::size_t points_of_a_board() const {
     return static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);

@@ -58,9 +58,11 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
   starts.resize(std::min(starts.size(), most_starts));
   for (const double focal_px : starts) {
     IntrinsicsSolver solver(input);
-    if (!solver.start(focal_px) || !solver.refine() || !solver.weigh_regularization() ||
-        !solver.take_out_shifts() || !solver.bend() || !solver.weigh_regularization() ||
-        !solver.leave_out_outliers() || !solver.weigh_regularization()) {
+    if (!solver.start(focal_px)) continue;
+    solver.start_symmetric();
+    if (!solver.refine() || !solver.weigh_regularization() || !solver.take_out_shifts() ||
+        !solver.bend() || !solver.weigh_regularization() || !solver.leave_out_outliers() ||
+        !solver.weigh_regularization() || !solver.turn_to_axis()) {
       continue;
     }
     IntrinsicsSolution solution = solver.solution();

@@ -67,12 +67,19 @@ struct IntrinsicsSolution {
 /// Solves for lens, poses and the board's warp, with no guess of the focal length:
 ///  1. a focal length of a geometric series, STEREOGRAPHIC, that fits the views' poses best;
 ///  2. STEREOGRAPHIC with every pose, and the poses again with that lens, until they stay;
-///  3. the model wanted, regularized as mrcal does it, and the poses again (of a splined lens with
-///     the core of stage 2, and then regularized for the noise that is left, instead of a pixel,
-///     which would draw it off by more than the noise does); views that fit no pose are dropped;
+///  3. the model wanted, regularized as mrcal does it, and the poses again (of a splined lens from
+///     OPENCV_FISHEYE, whose centre is its centre, and then regularized for the noise that is left,
+///     instead of a pixel, which would draw it off by more than the noise does); views that fit no
+///     pose are dropped;
 ///  4. the shift of the tags' edges taken out (edge_shifts()), and the model again, at most twice;
 ///  5. the board's warp (WarpChoice), and then the shifts of a board that bends;
-///  6. all of it without outliers.
+///  6. all of it without outliers;
+///  7. a splined lens turned to its axis.
+/// The control points of a splined lens make up for any turn of the camera, so that its frame is a
+/// convention: that of the OPENCV_FISHEYE which fits the same corners best, to 0.006 degrees, so
+/// that +Z is the axis of the lens, seen at (cx, cy) to a tenth of a pixel or so, and +X the
+/// image's. Rays of that frame hold it in the solve (BoardProblem::held). A lens that no
+/// OPENCV_FISHEYE comes near keeps the frame in which its control points have least to do.
 /// Planar flips cannot live: both poses of every view are tried with each lens (view_pose()).
 /// Depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);

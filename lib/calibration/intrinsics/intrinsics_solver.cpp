@@ -11,6 +11,9 @@
 #include <Eigen/Geometry>
 
 #include "calibration/intrinsics/edge_shift.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/rotation_vector.h"
+#include "calibration/intrinsics/spline_fit.h"
 #include "calibration/intrinsics/view_pose.h"
 #include "camera/spline_grid.h"
 #include "geometry/median.h"
@@ -22,6 +25,13 @@ namespace {
 Eigen::Vector3d normal_of(const BoardPose& pose) {
   return Eigen::AngleAxisd(pose.rotation.norm(), pose.rotation.normalized()) *
          Eigen::Vector3d::UnitZ();
+}
+
+void turn(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
+  for (BoardPose& pose : poses) {
+    const Eigen::AngleAxisd rotation(new_from_old * rotation_by(pose.rotation));
+    pose = {rotation.angle() * rotation.axis(), new_from_old * pose.translation_m};
+  }
 }
 
 }  // namespace
@@ -43,6 +53,58 @@ bool IntrinsicsSolver::start(double focal_px) {
     if (!solve({true, false, false, false})) return false;
     lens = this->lens();
     if (std::abs(lens.focal_px().x() / before_px - 1) < settled) break;
+  }
+  return true;
+}
+
+void IntrinsicsSolver::start_symmetric() {
+  if (!is_splined(input_.lens_model)) return;
+  IntrinsicsSolver symmetric = *this;
+  symmetric.input_.lens_model = LensModel::fisheye;
+  if (!symmetric.refine()) return;  // STEREOGRAPHIC has to do
+  symmetric_ = symmetric.problem_.intrinsics;
+  const Lens fisheye = symmetric.lens();
+  for (const std::size_t view : used_) {
+    if (const auto pose = view_pose(input_.views[view], fisheye)) {
+      seeds_.poses[view] = pose->camera_from_board;
+    }
+  }
+  problem_.intrinsics = splined_like(fisheye, input_.imager_px, input_.lens_model,
+                                     core_like(fisheye, seen_px(symmetric.problem_)));
+  problem_.lens_model = input_.lens_model;
+  // The axis, and two rays beside it against a turn about it.
+  for (const double beside : {0.0, -0.25, 0.25}) {
+    const Eigen::Vector2d pixel =
+        fisheye.center_px() + Eigen::Vector2d(beside * input_.imager_px[0], 0);
+    if (const auto ray = fisheye.unproject(pixel)) problem_.held.push_back({pixel, ray->direction});
+  }
+  assemble(lens());
+}
+
+bool IntrinsicsSolver::turn_to_axis() {
+  constexpr int rounds = 4;
+  constexpr double settled_rad = 1e-4;  // 0.006 degrees
+  if (symmetric_.empty()) return true;
+  for (int round = 0; round < rounds; ++round) {
+    const auto pixels = seen_px(problem_);
+    BoardProblem symmetric = problem_;
+    symmetric.lens_model = LensModel::fisheye;
+    symmetric.intrinsics = symmetric_;
+    const auto start = b_from_a(lens(), Lens(LensModel::fisheye, symmetric_), pixels);
+    if (!start) return true;
+    turn(symmetric.poses, *start);
+    if (!vlp::solve(symmetric, {true, true, solved_for_.warp, false})) return true;
+    const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
+    symmetric_ = symmetric.intrinsics;
+    const auto new_from_old = b_from_a(lens(), fisheye, pixels);
+    if (!new_from_old) return true;
+    const double turned_rad = Eigen::AngleAxisd(*new_from_old).angle();
+    if (turned_rad < settled_rad) return true;
+    for (auto& [pixel, ray] : problem_.held) {
+      if (const auto seen = lens().project(new_from_old->transpose() * ray)) pixel = *seen;
+    }
+    turn(problem_.poses, *new_from_old);
+    if (!solve(solved_for_)) return false;
   }
   return true;
 }

@@ -18,6 +18,8 @@ class IntrinsicsSolver {
 
   /// Stage 2, from a focal length.
   bool start(double focal_px);
+  /// Of a splined lens the start of stage 3, the symmetric one; no stage of others.
+  void start_symmetric();
   /// Stage 3.
   bool refine();
   /// Of a splined lens, the regularization made for the noise of the corners; no stage of others.
@@ -28,6 +30,8 @@ class IntrinsicsSolver {
   bool bend();
   /// Stage 6.
   bool leave_out_outliers();
+  /// Stage 7, of a splined lens.
+  bool turn_to_axis();
 
   IntrinsicsSolution solution() const;
 
@@ -55,6 +59,9 @@ class IntrinsicsSolver {
   std::vector<std::size_t> used_;
   std::vector<IntrinsicsSolution::Dropped> dropped_;
   BoardProblem problem_{};
+  /// Of a splined lens, the parameters of OPENCV_FISHEYE for the same corners; empty when it does
+  /// not fit them.
+  std::vector<double> symmetric_;
 };
 
 /// No two boards are tilted differently, by five degrees or more.

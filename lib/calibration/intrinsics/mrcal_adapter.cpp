@@ -17,6 +17,7 @@ extern "C" {
 
 #include <cstdio>
 #include <mutex>
+#include <span>
 #include <stdexcept>
 
 #include "calibration/intrinsics/board_problem.h"
@@ -30,8 +31,10 @@ static_assert(sizeof(Eigen::Vector2d) == sizeof(mrcal_calobject_warp_t));
 
 /// mrcal's arguments for a problem.
 struct Arguments {
-  Arguments(const BoardProblem& problem, const SolveFor& what)
-      : frames(static_cast<int>(problem.poses.size())) {
+  /// held: the rays that are, as points that do not move.
+  Arguments(const BoardProblem& problem, const SolveFor& what,
+            std::span<const BoardProblem::Held> held = {})
+      : frames(static_cast<int>(problem.poses.size())), fixed(static_cast<int>(held.size())) {
     const std::string name(name_of(problem.lens_model));
     if (!mrcal_lensmodel_from_name(&lens, name.c_str())) {
       throw std::runtime_error("mrcal does not know " + name);
@@ -43,16 +46,28 @@ struct Arguments {
     selections.do_apply_regularization = what.distortions;
     selections.do_apply_outlier_rejection = what.without_outliers;
     for (int frame = 0; frame < frames; ++frame) observations.push_back({{0, -1}, frame});
-    measurements = mrcal_num_measurements(frames, 0, problem.cols, problem.rows, 1, 0, frames, 0, 0,
-                                          selections, &lens);
-    states = mrcal_num_states(1, 0, frames, 0, 0, frames, selections, &lens);
+    for (const auto& [pixel, ray] : held) {
+      mrcal_observation_point_t seen{{0, -1}, static_cast<int>(points.size()), {}};
+      seen.px.x = pixel.x(), seen.px.y = pixel.y(), seen.px.z = 1 / problem.noise_px;
+      seen_points.push_back(seen);
+      mrcal_point3_t unit{};
+      Eigen::Map<Eigen::Vector3d>(unit.xyz) = ray.normalized();
+      points.push_back(unit);
+    }
+    constants.point_min_range = 0.1;  // 1 is between
+    constants.point_max_range = 10;
+    measurements = mrcal_num_measurements(frames, fixed, problem.cols, problem.rows, 1, 0, frames,
+                                          fixed, fixed, selections, &lens);
+    states = mrcal_num_states(1, 0, frames, fixed, fixed, frames, selections, &lens);
   }
 
-  int frames;
+  int frames, fixed;
   mrcal_lensmodel_t lens{};
   mrcal_problem_selections_t selections{};
   mrcal_problem_constants_t constants{};
   std::vector<mrcal_observation_board_t> observations;
+  std::vector<mrcal_point3_t> points;
+  std::vector<mrcal_observation_point_t> seen_points;
   int measurements, states;
 };
 
@@ -111,7 +126,7 @@ class Silence {
 }  // namespace
 
 bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what) {
-  const Arguments the(problem, what);
+  Arguments the(problem, what, problem.held);
   if (the.measurements < the.states) return false;
   Eigen::VectorXd state(the.states), residuals(the.measurements);
   auto points = weighted_points(problem);
@@ -119,10 +134,11 @@ bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what) {
   const mrcal_stats_t stats = mrcal_optimize(
       state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()),
       problem.intrinsics.data(), nullptr, reinterpret_cast<mrcal_pose_t*>(problem.poses.data()),
-      nullptr, reinterpret_cast<mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, the.frames,
-      0, 0, the.observations.data(), nullptr, the.frames, 0,
-      reinterpret_cast<mrcal_point3_t*>(points.data()), &the.lens, problem.imager_px.data(),
-      the.selections, &the.constants, problem.spacing_m, problem.cols, problem.rows, false, false);
+      the.points.data(), reinterpret_cast<mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0,
+      the.frames, the.fixed, the.fixed, the.observations.data(), the.seen_points.data(), the.frames,
+      the.fixed, reinterpret_cast<mrcal_point3_t*>(points.data()), &the.lens,
+      problem.imager_px.data(), the.selections, &the.constants, problem.spacing_m, problem.cols,
+      problem.rows, false, false);
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (points[i].z() < 0 && problem.points[i].z() > 0) problem.points[i].z() *= -1;
   }

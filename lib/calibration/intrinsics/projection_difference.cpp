@@ -27,6 +27,18 @@ Eigen::Matrix3d b_from_a(const std::vector<Pair>& pairs) {
 
 }  // namespace
 
+std::optional<Eigen::Matrix3d> b_from_a(const Lens& a, const Lens& b,
+                                        std::span<const Eigen::Vector2d> pixels) {
+  std::vector<Pair> pairs;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const auto from_a = a.unproject(pixel), from_b = b.unproject(pixel);
+    if (!from_a || !from_b) continue;
+    pairs.push_back({pixel, from_a->direction.normalized(), from_b->direction.normalized(), 1});
+  }
+  if (pairs.size() < 3) return {};
+  return b_from_a(pairs);
+}
+
 std::vector<Eigen::Vector2d> pixel_grid(const std::array<int, 2>& imager_px) {
   constexpr int cols = 41;
   const int rows =

@@ -6,6 +6,7 @@
 #include <array>
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "camera/lens.h"
@@ -14,6 +15,11 @@ namespace vlp {
 
 /// Pixels all over an image, its edges among them, about 1/40 of its width apart.
 std::vector<Eigen::Vector2d> pixel_grid(const std::array<int, 2>& imager_px);
+
+/// The rotation that takes the rays of `a` at the pixels to those of `b` with the least squares,
+/// where both have one; nothing for fewer than three.
+std::optional<Eigen::Matrix3d> b_from_a(const Lens& a, const Lens& b,
+                                        std::span<const Eigen::Vector2d> pixels);
 
 struct ProjectionDifference {
   double mean_px, worst_px;

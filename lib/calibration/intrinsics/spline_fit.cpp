@@ -39,7 +39,8 @@ void keep_straight(Equations& equations, const SplineGrid& grid) {
 }  // namespace
 
 std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& imager_px,
-                                 LensModel model, const std::vector<double>& core) {
+                                 LensModel model, const std::vector<double>& core,
+                                 const Eigen::Matrix3d& lens_from_splined) {
   constexpr int of_a_piece = 4;
   constexpr double near = 0.05;  // of the image, around it
   const SplineGrid grid = grid_of(model);
@@ -54,7 +55,8 @@ std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& ima
     for (int column = 0; column <= columns; ++column) {
       const Eigen::Array2d share(double(column) / columns, double(row) / rows);
       const Eigen::Vector2d u = straight.reach().array() * (2 * share - 1);
-      const auto pixel = lens.project({u.x(), u.y(), 1 - u.squaredNorm() / 4});
+      const Eigen::Vector3d ray(u.x(), u.y(), 1 - u.squaredNorm() / 4);
+      const auto pixel = lens.project(lens_from_splined * ray);
       if (!pixel || (pixel->array() < -near * size_px).any() ||
           (pixel->array() > (1 + near) * size_px).any()) {
         continue;
@@ -85,6 +87,20 @@ std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& ima
     parameters.insert(parameters.end(), {found(i, 0), found(i, 1)});
   }
   return parameters;
+}
+
+std::vector<double> core_like(const Lens& lens, std::span<const Eigen::Vector2d> pixels) {
+  Eigen::Array2d products(0, 0), squares(0, 0);
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const auto ray = lens.unproject(pixel);
+    if (!ray) continue;
+    const Eigen::Vector3d& x = ray->direction;
+    const Eigen::Array2d u = x.head<2>() * (2 / (x.norm() + x.z()));
+    products += u * (pixel - lens.center_px()).array();
+    squares += u.square();
+  }
+  const Eigen::Array2d focal_px = products / squares;
+  return {focal_px.x(), focal_px.y(), lens.center_px().x(), lens.center_px().y()};
 }
 
 }  // namespace vlp

@@ -3,17 +3,25 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "camera/lens.h"
 
 namespace vlp {
 
-/// The parameters of a splined lens that puts rays where `lens` does, by least squares over the
-/// rays of all the grid's pieces that `lens` has in the image or near it. The core is given, which
-/// control points make up for; those that no ray tells of go on straight. Preconditions:
-/// is_splined(model), and the core is fx, fy, cx, cy.
-std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& imager_px,
-                                 LensModel model, const std::vector<double>& core);
+/// The parameters of a splined lens that puts rays where `lens` puts them turned into its frame, by
+/// least squares over the rays of all the grid's pieces that `lens` has in the image or near it.
+/// The core is given, which control points make up for; those that no ray tells of go on straight.
+/// Preconditions: is_splined(model), and the core is fx, fy, cx, cy.
+std::vector<double> splined_like(
+    const Lens& lens, const std::array<int, 2>& imager_px, LensModel model,
+    const std::vector<double>& core,
+    const Eigen::Matrix3d& lens_from_splined = Eigen::Matrix3d::Identity());
+
+/// The core with which control points have least to make up for, by least squares over the pixels,
+/// when a lens and a splined one share the camera's frame: the lens' centre, and the focal lengths
+/// of the stereographic lens around it. Precondition: the lens has rays at some of the pixels.
+std::vector<double> core_like(const Lens& lens, std::span<const Eigen::Vector2d> pixels);
 
 }  // namespace vlp

@@ -41,6 +41,12 @@ TEST(SplinedWideLens, IsKnownBeyondNinetyDegrees) {
   EXPECT_LT(report.uncertainty_mean_px, 0.05);
   ASSERT_TRUE(report.halves);
   EXPECT_LT(report.halves->mean_px, 0.1);
+  // The frame is that of the true lens, which is symmetric.
+  const auto turn = b_from_a(wide_lens(), solution.lens(), seen_px(solution.problem));
+  ASSERT_TRUE(turn);
+  EXPECT_LT(Eigen::AngleAxisd(*turn).angle() * 180 / std::numbers::pi, 0.02);
+  EXPECT_NEAR(solution.lens().center_px().x(), 501, 0.2);
+  EXPECT_NEAR(solution.lens().center_px().y(), 498, 0.2);
   const ProjectionUncertainty uncertainty(solution);
   EXPECT_EQ(uncertainty.intrinsics_covariance().topRows<4>().norm(), 0);
 }
