@@ -9,11 +9,18 @@ namespace {
 
 TEST(Downlights, AreFoundByTheirRims) {
   const Score score = Captures("downlights", "check").score(1);
-  EXPECT_GE(score.lamps, 154);  // measured: 157 of 160 wholly in view
+  testing::Test::RecordProperty("rms_px", testing::PrintToString(score.rms_px()));
+  testing::Test::RecordProperty("worst_px", testing::PrintToString(score.worst_px));
+  testing::Test::RecordProperty("chi_square",
+                                testing::PrintToString(score.chi_square / score.lamps));
+  EXPECT_GE(score.lamps, 159);  // measured: all 160
+  EXPECT_LE(score.missed, 1);
   EXPECT_EQ(score.wrong, 0);
-  EXPECT_LT(score.rms_px(), 0.25);
-  EXPECT_LT(score.worst_px, 1);
+  EXPECT_LT(score.rms_px(), 0.1);
+  EXPECT_LT(score.worst_px, 0.5);
+  EXPECT_GT(score.chi_square / score.lamps, 0.7);
   EXPECT_LT(score.chi_square / score.lamps, 1.5) << "sigma_px bears the errors out";
+  EXPECT_LT(score.worst_ratio, 6);
 }
 
 }  // namespace

@@ -22,6 +22,8 @@ namespace vlp {
 struct Score {
   int lamps = 0, missed = 0, wrong = 0;
   double squares = 0, worst_px = 0, chi_square = 0;
+  /// Of an error to the sigma_px that is stated.
+  double worst_ratio = 0;
   /// Of those hidden in part.
   int hidden = 0;
   double hidden_chi_square = 0;
@@ -100,6 +102,7 @@ class Captures {
       ++score.lamps;
       score.squares += error_px * error_px;
       score.worst_px = std::max(score.worst_px, error_px);
+      score.worst_ratio = std::max(score.worst_ratio, error_px / sigma_px);
       score.chi_square += chi_square;
     }
     score.wrong += static_cast<int>(found.size());

@@ -53,6 +53,10 @@ struct Light {
   double sigma_px;
   /// Of a rectangle that of the disc of its area.
   double radius_px;
+  /// Of one that is round, in the plane of LightShape: the outline is where
+  /// |unit_from_plane (p - plane_center)| = 1.
+  Eigen::Vector2d plane_center;
+  Matrix2 unit_from_plane;
   /// The corners of the box around the outline, top left and bottom right.
   Eigen::Vector2d low, high;
   Stripes stripes;

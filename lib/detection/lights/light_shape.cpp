@@ -172,6 +172,8 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
     light.low = light.low.cwiseMin(*rim);
     light.high = light.high.cwiseMax(*rim);
   }
+  light.plane_center = fit->center;
+  light.unit_from_plane = fit->rim_from_circle.inverse();
   light.radius_px = std::sqrt(fit->rim_from_circle.determinant()) / per_px;
   const std::vector<bool> shown = on_circle(outline, fit->inliers);
   const double together = mottled ? points_together(points, outline, shown, *fit) : 1;

@@ -149,9 +149,15 @@ Sides through(const std::vector<Eigen::Vector2d>& points, Sides sides, double wi
   return sides;
 }
 
-/// The rectangle's corners before its edges are looked at; nothing when the outline has another
-/// shape.
-std::optional<Corners> first_corners(const std::vector<Eigen::Vector2d>& points, double per_px) {
+/// The rectangle's corners before its edges are looked at, and the share of the points next to its
+/// sides; nothing when the outline has another shape.
+struct FirstCorners {
+  Corners corners;
+  double near;
+};
+
+std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& points,
+                                          double per_px) {
   constexpr double near_px = 2, least_share = 0.7;
   constexpr double coarse_share = 0.08;
   Corners corners = rectangle_around(points, per_px);
@@ -169,7 +175,61 @@ std::optional<Corners> first_corners(const std::vector<Eigen::Vector2d>& points,
     return off(sides[nearest(sides, point)], point) < near_px * per_px;
   });
   if (double(near) < least_share * double(points.size())) return std::nullopt;
-  return corners;
+  return FirstCorners{corners, double(near) / double(points.size())};
+}
+
+/// The same of a slender one that a lens bends which nobody knows: its corners are those of the
+/// best of many that are bent back, which leaves its ends where they are.
+std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& points) {
+  constexpr double most_px = 6, step_px = 0.5, least_aspect = 3;
+  const Sides around = sides_of(rectangle_around(points, 1));
+  if (aspect_of(around) < least_aspect) return std::nullopt;
+  const bool first =
+      (around[0].to - around[0].from).norm() > (around[1].to - around[1].from).norm();
+  const Side& side = around[first ? 0 : 1];
+  const double length = (side.to - side.from).norm();
+  std::optional<FirstCorners> best;
+  std::vector<Eigen::Vector2d> straight = points;
+  for (double bow_px = -most_px; bow_px <= most_px; bow_px += step_px) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double along = 2 * (points[i] - side.from).dot(side.way()) / length - 1;
+      straight[i] = points[i] - bow_px * (1 - along * along) * side.inwards();
+    }
+    const auto corners = first_corners(straight, 1);
+    if (corners && (!best || corners->near > best->near)) best = corners;
+  }
+  return best;
+}
+
+/// The image of the centre under a lens that nobody knows: p (1 + k |p|^2), p from the image's
+/// middle. To first order of k an edge of the half-length h that stands off the middle by p bows by
+/// -k h^2 p . n across it, and the diagonals cross k (a^2 + b^2) p off the centre, a and b half of
+/// the sides. What is known of k beforehand is that of an equidistant lens of 115 degrees from
+/// corner to corner, give or take.
+struct Unbent {
+  Eigen::Vector2d shift;
+  double sd_px;
+};
+
+Unbent unbent(const std::array<StraightEdge, 4>& edges, const Eigen::Vector2d& center,
+              const Eigen::Vector2d& middle) {
+  constexpr double bow_sd = 2, of_shift = 0.1;  // over that of the ends; higher orders
+  const double focal_px = middle.norm(), known_sd = 1 / (3 * focal_px * focal_px);
+  double information = 1 / (known_sd * known_sd), moment = 0;
+  Eigen::Vector2d by_k = Eigen::Vector2d::Zero();
+  for (const StraightEdge& edge : edges) {
+    const Eigen::Vector2d way = edge.side.to - edge.side.from, in = edge.side.inwards();
+    const double half_square = way.squaredNorm() / 4;
+    const Eigen::Vector2d at = (edge.side.from + edge.side.to) / 2 - middle;
+    const double slope = -half_square * at.dot(in);
+    const double variance = bow_sd * bow_sd * edge.covariance_px.trace() / 2;
+    information += slope * slope / variance;
+    moment += slope * edge.bow_px / variance;
+    by_k -= half_square / 2 * (center - middle);
+  }
+  const double k = moment / information;
+  const double sd_px = std::hypot(1 / std::sqrt(information), of_shift * k) * by_k.norm();
+  return {k * by_k, sd_px / std::numbers::sqrt2};
 }
 
 /// Around what lies so deep inside, (u, v); empty when the lens does not describe it.
@@ -248,16 +308,23 @@ bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
 
 /// `points` are the outline in the plane.
 std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& sides, double per_px,
-                              const std::vector<Eigen::Vector2d>& points, const LightShape& shape) {
+                              const std::vector<Eigen::Vector2d>& points,
+                              const Eigen::Vector2d& middle, const LightShape& shape) {
   constexpr double stray_px = 3;
   if (!rectangular(sides)) return std::nullopt;
   const auto center = center_of(sides);
   if (!center || !has_corners(points, sides, *center)) return std::nullopt;
   const auto covariance = center_covariance(edges, per_px, shape);
-  const auto pixel = shape.pixel_of(*center);
+  auto pixel = shape.pixel_of(*center);
   const auto around = face_of(sides, 0, shape);
   if (!pixel || !covariance || around.empty()) return std::nullopt;
   Light light{};
+  double lens_sd_px = 0;
+  if (!shape.has_lens()) {
+    const Unbent behind = unbent(edges, *center, shape.turned(middle));
+    *pixel += behind.shift;
+    lens_sd_px = behind.sd_px;
+  }
   light.pixel = light.low = light.high = *pixel;
   for (const Eigen::Vector2d& at : around) {
     light.low = light.low.cwiseMin(at);
@@ -272,13 +339,12 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& s
     light.roundness = std::min(light.roundness, edge.share);
     light.outline.insert(light.outline.end(), edge.points.begin(), edge.points.end());
   }
-  // What bends the edges moves the centre as far.
-  const double sigma_px = std::hypot(std::sqrt(covariance->trace() / 2), bow_px);
+  const double sigma_px = std::hypot(std::sqrt(covariance->trace() / 2), lens_sd_px);
   if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
   light.sigma_px = std::max(kMinSigma_px, sigma_px);
   const auto strays = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
     return std::any_of(sides.begin(), sides.end(), [&](const Side& side) {
-      return (at - side.from).dot(side.inwards()) < -stray_px * per_px;
+      return (at - side.from).dot(side.inwards()) < -(stray_px + bow_px) * per_px;
     });
   });
   light.outside = double(strays) / double(points.size());
@@ -345,9 +411,15 @@ std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
     in_image.extend(edge.pixel);
   }
   const double per_px = in_plane.diagonal().norm() / in_image.diagonal().norm();
-  auto corners = first_corners(points, per_px);
-  if (!corners) return std::nullopt;
+  auto first = first_corners(points, per_px);
+  if (!shape.has_lens()) {
+    const auto bent = bent_corners(points);
+    if (bent && (!first || bent->near > first->near)) first = bent;
+  }
+  if (!first) return std::nullopt;
+  std::optional<Corners> corners = first->corners;
 
+  double bow_px = 0;
   std::array<StraightEdge, 4> edges;
   struct Pass {
     double inset_px;
@@ -358,14 +430,14 @@ std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
     const double narrow =
         std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
     if (!(narrow > least_px * per_px) || aspect_of(sides) > most_slender) return std::nullopt;
-    const double inset = std::min(inset_px * per_px, narrow / 3);
+    const double inset = std::min((inset_px + bow_px) * per_px, narrow / 3);
     const auto chords = chords_within(shape.turned(face_of(sides, inset, shape)), lines.size());
     if (chords.size() < least_lines) return std::nullopt;
     // Lines that follow one another, or levels would be taken for those of others.
     const int rows = chords.back().row - chords.front().row + 1;
     if (rows != static_cast<int>(chords.size())) return std::nullopt;
     const LineLevels levels(lines, chords, background);
-    search.reach_px = std::min(search.reach_px, narrow / per_px / 2);
+    search.reach_px = std::min(search.reach_px + bow_px, narrow / per_px / 2);
     Sides found;
     for (std::size_t i = 0; i < 4; ++i) {
       auto edge =
@@ -374,10 +446,13 @@ std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
       edges[i] = std::move(*edge);
       found[i] = edges[i].side;
     }
+    bow_px = 0;
+    for (const StraightEdge& edge : edges) bow_px = std::max(bow_px, std::abs(edge.bow_px));
     corners = rectangular(found) ? corners_of(found) : std::nullopt;
     if (!corners) return std::nullopt;
   }
-  return light_of(edges, sides_of(*corners), per_px, points, shape);
+  const Eigen::Vector2d middle((lines.cols - 1) / 2.0, (lines.rows - 1) / 2.0);
+  return light_of(edges, sides_of(*corners), per_px, points, middle, shape);
 }
 
 }  // namespace vlp

@@ -15,8 +15,9 @@
 namespace vlp {
 
 /// A light that is a rectangle, a panel or a tube, by its four edges, straight in rays behind the
-/// lens; without a lens in the image, with what they bow there in sigma_px. `outline` is that of
-/// outline_of().
+/// lens; without a lens in the image, where what they bow tells how far from the centre the
+/// diagonals cross; that is taken off, and how surely it is known is in sigma_px. `outline` is that
+/// of outline_of().
 ///
 /// From the rectangle of the least area around the outline, turned to what lines say of its sides,
 /// each side goes to its edge, see straight_edge_at(). The centre is where the diagonals cross: of

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "detection/lights/rim_fit.h"
 #include "geometry/median.h"
 
 namespace vlp {
@@ -43,6 +44,11 @@ class Face {
   const cv::Rect& box() const { return box_; }
   /// Lines of bright stripes.
   const std::vector<int>& lit_lines() const { return lit_; }
+  std::vector<int> lit_lines_of_image() const {
+    std::vector<int> lines = lit_;
+    for (int& line : lines) line += box_.y;
+    return lines;
+  }
   bool has(int column) const { return column >= window_ && column + window_ <= box_.width; }
 
   /// Mean level before the border between a column and the one before it, and after it.
@@ -252,12 +258,47 @@ double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
   return double(outline.size()) / std::max(1.0, stripes);
 }
 
+/// The light by the steps next to its outline, in which sides of another contrast are as far out as
+/// others, and the sigma of its centre; whether most of them show one.
+bool fit_to_steps(const cv::Mat& image, const std::vector<int>& lit_lines,
+                  const Background& background, const LightShape& shape, Light& light,
+                  double& sigma_px) {
+  constexpr int rounds = 3;
+  constexpr double first_blur_px = 0.9, most = 0.6;
+  // Cameras for people code light^(1 / 2.2), nearly, and those that do not have hardly the depth to
+  // show a rim; give or take, which the centre by another one tells.
+  constexpr double gamma = 2, other_gamma = 1.8;
+  StepPicture picture{first_blur_px, gamma};
+  for (int round = 1; round < rounds; ++round) {
+    auto steps = fit_rim_steps(image, light, lit_lines, background, picture, round > 1, shape);
+    if (!shift_of(steps.pieces, shape.has_lens())) return false;
+    picture.blur_px = steps.blur_px;
+    auto better = shape.light_of(std::move(steps.points), background);
+    if (!better || 2 * better->outline.size() < light.outline.size()) return false;
+    light = std::move(*better);
+  }
+  const auto steps = fit_rim_steps(image, light, lit_lines, background, picture, true, shape);
+  const auto shift = shift_of(steps.pieces, shape.has_lens());
+  picture.gamma = other_gamma;
+  const auto other =
+      shift_of(fit_rim_steps(image, light, lit_lines, background, picture, true, shape).pieces,
+               shape.has_lens());
+  if (!shift || !other) return false;
+  light.pixel += shape.turned(shift->px);
+  sigma_px = std::sqrt(shift->covariance.trace() / 2 + (shift->px - other->px).squaredNorm() / 2);
+  return shift->agreeing > most * double(steps.looked_at);
+}
+
 }  // namespace
 
 bool unevenly_lit(const cv::Mat& image, const Blob& blob, const std::vector<EdgePoint>& outline,
                   const Background& background) {
-  constexpr double much = 3;
+  constexpr double much = 3, least_ends = 0.2;
+  constexpr int least_width = 8;
   if (outline.empty()) return false;
+  const auto wide = std::count_if(blob.runs.begin(), blob.runs.end(),
+                                  [](const Run& run) { return run.width() >= least_width; });
+  if (double(outline.size()) < least_ends * 2 * double(wide)) return true;
   std::vector<double> levels;
   levels.reserve(outline.size());
   for (const EdgePoint& point : outline) levels.push_back(point.level);
@@ -300,14 +341,17 @@ std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Backgrou
     light = std::move(better);
     low = shape.turned(light->low), high = shape.turned(light->high);
   }
-  // The other ring may be the rim.
-  const double odds = 1 / (1 + std::exp((best.sum - other.sum) / one_point));
+  double sigma_px = light->sigma_px * std::sqrt(points_of_a_stripe(light->outline));
+  const bool fitted =
+      fit_to_steps(image, face.lit_lines_of_image(), background, shape, *light, sigma_px);
+  // The other ring may be the rim, unless most of this one has a step.
+  const double odds = fitted ? 0 : 1 / (1 + std::exp((best.sum - other.sum) / one_point));
   const double away = std::pow(best.u - other.u, 2) + std::pow(best.v - other.v, 2);
-  light->sigma_px = std::sqrt(std::pow(light->sigma_px, 2) * points_of_a_stripe(light->outline) +
-                              odds * away / 2);
+  light->sigma_px = std::sqrt(sigma_px * sigma_px + odds * away / 2);
   light->uneven = true;
   light->roundness = std::min(1.0, double(light->outline.size()) / double(crossings));
-  const bool clear = best.sum > clear_step * double(crossings) && light->roundness > least_shown;
+  const bool clear =
+      fitted || (best.sum > clear_step * double(crossings) && light->roundness > least_shown);
   return Rim{std::move(*light), clear};
 }
 

@@ -35,9 +35,11 @@ struct Rim {
 ///
 /// The rim is the circle whose crossings with the lit lines have the largest sum of e (Daugman 1993
 /// has this of irises, with levels), then the ellipse through the steps near it. It is clear when e
-/// is a third on average and half of the crossings show a step; nothing below 0.28. The sigma of
-/// its centre is that of the ellipse, the points of a stripe counted as one, and where another
-/// circle has nearly that sum, the distance to it by the odds that it is the rim.
+/// is a third on average and half of the crossings show a step; nothing below 0.28. Then steps are
+/// fitted to the pixels next to it, see fit_rim_steps(): the rim is where they are, and clear where
+/// most of it has one. The sigma of its centre is theirs, with what another tone curve would make
+/// of it; of a rim that is not clear by them and where another circle has nearly that sum, the
+/// distance to it by the odds that it is the rim, too.
 std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Background& background,
                           const LightShape& shape);
 

@@ -188,9 +188,14 @@ class Samples {
 };
 
 /// What is known of the level along a side that is so long beforehand: it changes by a tenth in 100
-/// px, and bends by half of that, give or take. Of short sides the pixels do not tell.
+/// px, and bends by half of that, give or take. Of short sides the pixels do not tell. So much a
+/// lens of that focal length bends it at most: one of 115 degrees from corner to corner.
 template <int N>
-CurveDistance<N> expected(const Model<N>& model, std::size_t which, double length_px) {
+constexpr std::size_t kExpected = N > kBow ? 3 : 2;
+
+template <int N>
+CurveDistance<N> expected(const Model<N>& model, std::size_t which, double length_px,
+                          double focal_px) {
   constexpr double noise = 0.01, change = 0.1 / 100, bend = 0.05 / 100;
   CurveDistance<N> result{0, Eigen::Matrix<double, N, 1>::Zero()};
   if (which == 0) {
@@ -198,10 +203,14 @@ CurveDistance<N> expected(const Model<N>& model, std::size_t which, double lengt
     result.error = weight * (model.x[kLevelTo] - model.x[kLevelFrom]);
     result.slope[kLevelTo] = weight;
     result.slope[kLevelFrom] = -weight;
-  } else {
+  } else if (which == 1) {
     const double weight = noise / (bend * length_px);
     result.error = weight * model.x[kLevelBend];
     result.slope[kLevelBend] = weight;
+  } else if constexpr (N > kBow) {
+    const double weight = noise / (length_px * length_px / (12 * focal_px));
+    result.error = weight * model.x[kBow];
+    result.slope[kBow] = weight;
   }
   return result;
 }
@@ -210,7 +219,8 @@ CurveDistance<N> expected(const Model<N>& model, std::size_t which, double lengt
 /// than dark ones (White 1980), and by the levels of lines, each wrong for all of its pixels.
 template <int N>
 std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vector<Sample>& samples,
-                                          const std::vector<bool>& inliers, double length_px) {
+                                          const std::vector<bool>& inliers, double length_px,
+                                          double focal_px) {
   Normal<std::size_t(N)> normal;
   double count = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -218,8 +228,8 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
     normal.add_row(model.residual(samples[i]).slope, 0);
     ++count;
   }
-  for (const std::size_t which : {std::size_t(0), std::size_t(1)}) {
-    normal.add_row(expected(model, which, length_px).slope, 0);
+  for (std::size_t which = 0; which < kExpected<N>; ++which) {
+    normal.add_row(expected(model, which, length_px, focal_px).slope, 0);
   }
   const Cholesky<std::size_t(N)> factor(normal);
   if (!factor.determines(1e-12) || !(count > N)) return std::nullopt;
@@ -253,13 +263,14 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
 }
 
 template <int N>
-std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per_px) {
+std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per_px,
+                                double focal_px) {
   constexpr std::array tolerances = {5.0, 5.0, 5.0, 5.0, 2.0, 1.0, 0.5, 0.3, 0.3, 0.3};
   constexpr double first_blur_px = 1.5, sharpest_px = 0.3, softest_px = 6;
   constexpr double most_move_px = 1.5, farthest_px = 8, least_step = 0.4, most_sd_px = 0.5;
   constexpr double near = 3, least_lit = 0.3, explained = 0.15, least_share = 0.8;
   const std::vector<Sample>& samples = all.samples;
-  const std::vector<double> weights(samples.size() + 2, 1);
+  const std::vector<double> weights(samples.size() + kExpected<N>, 1);
   const double length_px = (all.at(1) - all.at(0)).norm();
   Model<N> model{Eigen::Matrix<double, N, 1>::Zero()};
   model.x[kBlur] = first_blur_px;
@@ -268,7 +279,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   for (const double tolerance : tolerances) {
     last = m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
       return i < samples.size() ? model.residual(samples[i])
-                                : expected(model, i - samples.size(), length_px);
+                                : expected(model, i - samples.size(), length_px, focal_px);
     });
     if (!last) return std::nullopt;
     auto step = last->step;
@@ -282,7 +293,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   const auto& x = model.x;
   const double least_level = std::min(x[kLevelFrom], x[kLevelTo]);
   if (!(least_level - x[kOutside] > least_step)) return std::nullopt;
-  const auto covariance = covariance_of_ends(model, samples, last->inliers, length_px);
+  const auto covariance = covariance_of_ends(model, samples, last->inliers, length_px, focal_px);
   if (!covariance) return std::nullopt;
 
   const Eigen::Vector2d inwards = side.inwards() * per_px;
@@ -313,7 +324,9 @@ std::optional<StraightEdge> straight_edge_at(const cv::Mat& lines, const Side& s
   constexpr std::size_t least = 40;
   const Samples all(lines, side, levels, dark, per_px, search, shape);
   if (all.samples.size() < least) return std::nullopt;
-  auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px) : fit<kBow + 1>(all, side, per_px);
+  const double focal_px = std::hypot(lines.cols, lines.rows) / 2;
+  auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, focal_px)
+                               : fit<kBow + 1>(all, side, per_px, focal_px);
   if (!edge) return std::nullopt;
   const Side& found = edge->side;
   const auto points = static_cast<int>((all.at(1) - all.at(0)).norm());

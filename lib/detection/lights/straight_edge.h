@@ -56,7 +56,8 @@ struct EdgeSearch {
 /// of the local step is passed, and a dark line says nothing of it. The place of both ends, blur,
 /// L (of which short sides tell little: it is taken to change by a tenth in 100 px, give or take)
 /// and h are those with the least residuals of all pixels near the side (Gauss-Newton,
-/// Tukey's biweight), d in rays behind the lens; without a lens a bow is one more unknown.
+/// Tukey's biweight), d in rays behind the lens; without a lens a bow is one more unknown,
+/// known beforehand to what a lens of 115 degrees from corner to corner bends a side so long.
 /// The covariance is by the scatter of the pixels and by what the levels of lines are worth, see
 /// LineLevels. Nothing where that leaves an end uncertain by more than half a pixel, or where most
 /// pixels do not look like an edge.

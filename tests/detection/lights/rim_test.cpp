@@ -75,6 +75,39 @@ TEST(Rim, IsThatOfADownlightWhereverItsCoreIs) {
   EXPECT_GT(chi_square / count, 0.1);
 }
 
+/// As a camera for people codes light.
+cv::Mat coded(const cv::Mat& image) {
+  cv::Mat1b curve(1, 256);
+  for (int i = 0; i < 256; ++i) {
+    curve(i) = cv::saturate_cast<std::uint8_t>(255 * std::pow(i / 255.0, 1 / 2.2));
+  }
+  cv::Mat result;
+  cv::LUT(image, curve, result);
+  return result;
+}
+
+TEST(Rim, IsNotDrawnTowardsTheCoreByAToneCurve) {
+  double towards_px = 0, squares = 0, chi_square = 0, worst = 0;
+  int count = 0;
+  for (const double period : {12.0, 17.0, 26.0, 33.0}) {
+    for (int i = 0; i < 12; ++i) {
+      const double angle = i * std::numbers::pi / 6 + 0.2;
+      const DrawnLamp lamp = downlight(angle, period);
+      const auto rim = rim_in(coded(drawn({lamp}, kSize, CV_8U, 1, std::uint64_t(++count))));
+      ASSERT_TRUE(rim);
+      const Vector2d error = rim->light.pixel - lamp.center;
+      towards_px += error.dot(Vector2d(std::cos(angle), std::sin(angle)));
+      squares += error.squaredNorm();
+      chi_square += error.squaredNorm() / 2 / std::pow(rim->light.sigma_px, 2);
+      worst = std::max(worst, error.norm() / rim->light.sigma_px);
+    }
+  }
+  EXPECT_NEAR(towards_px / count, 0, 0.03);
+  EXPECT_LT(std::sqrt(squares / count), 0.1);
+  EXPECT_LT(chi_square / count, 1.5);
+  EXPECT_LT(worst, 6);
+}
+
 TEST(Rim, IsSeenOfLargeDownlightsToo) {
   for (const double scale : {3.0, 7.0}) {
     DrawnLamp lamp = downlight(0.7, 40);
