@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "detection/image_file.h"
 #include "detection/detect_captures.h"
+#include "detection/image_file.h"
 #include "detection/images_in_parallel.h"
 #include "rig/input_error.h"
 #include "session/leaning_captures.h"
