@@ -11,7 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include "calibration/intrinsics/projection_difference.h"
 #include "captures/truth_table.h"
+#include "rig/calibration.h"
 #include "support/program.h"
 #include "support/schema.h"
 #include "support/temporary_folder.h"
@@ -79,6 +81,41 @@ TEST_P(Accuracy, KeepsToItsGates) {
 INSTANTIATE_TEST_SUITE_P(Rigs, Accuracy, testing::Values("paper-rig", "paper-rig-faulty"));
 
 /// Small images, few captures; a line of the paper's.
+// In the room of `wide`, from boards that are seen beyond 90 degrees off the axis.
+TEST_F(Calibrate, FindsASplinedLensOf190DegreesAndItsAxis) {
+  std::string scene = TemporaryFolder::content_of(kDatasets + "wide/scene.yaml");
+  for (const auto& [what, by] : std::vector<std::pair<std::string, std::string>>{
+           {"imager_px: .*", "imager_px: [1000, 1000]"},
+           {"lens_model: .*", "lens_model: OPENCV_FISHEYE"},
+           {"intrinsics: .*", "intrinsics: [290, 291, 501, 498, 0.03, -0.012, 0.004, -0.0006]"},
+           {"vignetting_power: 1", "vignetting_power: 0"},
+           {"views: .*",
+            "views: {count: 40, distance_m: [0.1, 0.2], tilt_deg: 35, roll_deg: 180, spread: 1}"},
+           {"turn: \\{count: 40, jitter_deg: 4\\}", "turn: {count: 12, jitter_deg: 4}"},
+           {"columns: 6, rows: 6", "columns: 3, rows: 2"}}) {
+    scene = std::regex_replace(scene, std::regex(what), by);
+  }
+  render(folder.file("scene.yaml", scene).string(), "boards,rotation,dispersion,check");
+  const auto run = calibrate(
+      "--no-report --row-time-s 2.5e-5 --readout columns "
+      "--lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=17_Ny=17_fov_x_deg=230");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const Camera truth = read_calibration(folder / "a session/true_calibration.yaml").camera;
+  const Camera found = read_calibration(folder / "results/calibration.yaml").camera;
+  const Lens lens(truth.lens_model, truth.intrinsics);
+  const auto difference = projection_difference(
+      lens, Lens(found.lens_model, found.intrinsics), truth.imager_px, [&](const auto& pixel) {
+        const auto ray = lens.unproject(pixel);
+        return ray && ray->direction.z() > 0 ? 1.0 : INFINITY;
+      });
+  ASSERT_TRUE(difference);
+  EXPECT_LT(difference->mean_px, 0.03);
+  const auto json = nlohmann::json::parse(result("session.json"));
+  EXPECT_NEAR(json["calibration"]["tilt_deg"].get<double>(), 0.9, 0.03);
+  const auto evaluation = nlohmann::json::parse(result("evaluation.json"));
+  EXPECT_LT(evaluation["horizontal"]["mean_mm"].get<double>(), 0.11);  // measured: 0.07
+}
+
 class SmallSession : public Calibrate {
  protected:
   void SetUp() override {

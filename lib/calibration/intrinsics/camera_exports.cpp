@@ -50,7 +50,7 @@ std::string opencv_matrix(const char* name, int rows, const std::vector<double>&
 std::string ros_camera_info(const Camera& camera) {
   const LensModel model = camera.lens_model;
   if (model == LensModel::stereographic || model == LensModel::opencv12 || is_splined(model)) {
-    refuse(camera, "ROS", "LENSMODEL_OPENCV8");
+    refuse(camera, "ROS", "LENSMODEL_OPENCV8 or OPENCV_FISHEYE");
   }
   const bool rational = model == LensModel::opencv8, fisheye = model == LensModel::fisheye;
   const std::size_t count = rational ? 8 : fisheye ? 4 : 5;
@@ -90,7 +90,7 @@ std::string kalibr_camchain(const Camera& camera) {
 
 std::string opencv_camera(const Camera& camera) {
   if (camera.lens_model == LensModel::stereographic || is_splined(camera.lens_model)) {
-    refuse(camera, "OpenCV", "LENSMODEL_OPENCV8");
+    refuse(camera, "OpenCV", "LENSMODEL_OPENCV8 or OPENCV_FISHEYE");
   }
   std::string text = "%YAML:1.0\n---\nimage_width: " + std::to_string(camera.imager_px[0]);
   text.append("\nimage_height: ").append(std::to_string(camera.imager_px[1])).append("\n");
