@@ -44,9 +44,9 @@ measured() {  # NAME COMMAND...
       >"$folder/measured/$name.said" 2>&1
   } 2>"$folder/measured/$name.time" &
   run=$!
-  trap 'kill -- "-$(cat "$folder/measured/$name.session")" 2>/dev/null' EXIT
+  trap "kill -- -\$(cat '$folder/measured/$name.session') 2>/dev/null" EXIT
   while sleep 0.5 && kill -0 $run 2>/dev/null; do
-    now=$(ps -o rss= --sid "$(cat "$folder/measured/$name.session")" | awk '{ sum += $1 } END { print int(sum / 1024) }')
+    now=$(ps -o rss= --sid "$(cat "$folder/measured/$name.session")" | awk '{ sum += $1 } END { print int(sum / 1024) }') || continue  # it has just ended
     [ "$now" -le "$largest" ] || largest=$now
   done
   wait $run
