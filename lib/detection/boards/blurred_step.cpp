@@ -15,11 +15,14 @@ struct Place {
   double value, slope;
 };
 
+/// Of the interval that a place is for.
+double middle_of(std::size_t place) { return (double(place) + 0.5) / kPerUnit; }
+
 const auto& places() {
   static const auto all = [] {
     std::array<Place, static_cast<std::size_t>(kLargest) * kPerUnit + 1> result{};
     for (std::size_t i = 0; i < result.size(); ++i) {
-      const double x = double(i) / kPerUnit;
+      const double x = middle_of(i);
       result[i] = {std::erf(x), 2 * std::numbers::inv_sqrtpi * std::exp(-x * x)};
     }
     return result;
@@ -31,10 +34,10 @@ const auto& places() {
 
 ErrorFunction::ErrorFunction(double x) {
   const double size = std::min(kLargest, std::abs(x));  // of no number, too
-  const auto nearest = static_cast<std::size_t>(size * kPerUnit + 0.5);
+  const auto nearest = static_cast<std::size_t>(size * kPerUnit);
   const auto& [at, g] = places()[nearest];
   // The slope's derivatives, over the slope: Hermite's polynomials.
-  const double a = double(nearest) / kPerUnit, d = size - a, square = a * a;
+  const double a = middle_of(nearest), d = size - a, square = a * a;
   const double first = -2 * a, second = 4 * square - 2, third = a * (12 - 8 * square);
   const double fourth = 12 + square * (16 * square - 48);
   value = std::copysign(
