@@ -73,7 +73,8 @@ int main(int argc, char** argv) {
   vlp::CaptureOptions options;
   app.add_option("images", options.images,
                  "Folder of images: PNG, JPEG, BMP, TIFF or PGM; or a video: AVI, MP4, MOV, MKV or "
-                 "WebM")
+                 "WebM. With --calibration inclinations of the camera in the folder's captures.csv "
+                 "count")
       ->required();
   app.add_option("--lamps", options.lamps,
                  "Lamp map, lamps.yaml, with frequencies unless there is a classifier")
