@@ -341,6 +341,8 @@ std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Backgrou
     light = std::move(better);
     low = shape.turned(light->low), high = shape.turned(light->high);
   }
+  // Before the steps are fitted, of which there are others.
+  const double shown = std::min(1.0, double(light->outline.size()) / double(crossings));
   double sigma_px = light->sigma_px * std::sqrt(points_of_a_stripe(light->outline));
   const bool fitted =
       fit_to_steps(image, face.lit_lines_of_image(), background, shape, *light, sigma_px);
@@ -349,7 +351,7 @@ std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Backgrou
   const double away = std::pow(best.u - other.u, 2) + std::pow(best.v - other.v, 2);
   light->sigma_px = std::sqrt(sigma_px * sigma_px + odds * away / 2);
   light->uneven = true;
-  light->roundness = std::min(1.0, double(light->outline.size()) / double(crossings));
+  light->roundness = shown;
   const bool clear =
       fitted || (best.sum > clear_step * double(crossings) && light->roundness > least_shown);
   return Rim{std::move(*light), clear};
