@@ -52,10 +52,11 @@ unshare --mount true 2>/dev/null || refuse $no_root "this machine lets nobody mo
 seconds_since() { echo $(((${EPOCHREALTIME//[!0-9]/} - $1) / 1000000)); }
 
 child='' temporary=''
+log=$(mktemp)  # of debootstrap
 clean_up() {
   [ -z "$child" ] || kill -9 "$child" 2>/dev/null || true
   wait
-  rm -f "$root.log"
+  rm -f "$log"
   [ -z "$temporary" ] || rm -rf --one-file-system "$root"
 }
 trap clean_up EXIT
@@ -70,8 +71,8 @@ if [ -e "$root/made" ]; then
   [ "$(<"$root/made")" = "$release" ] || refuse 2 "$root: is of another release than $release"
 else
   begin=${EPOCHREALTIME//[!0-9]/}
-  if ! debootstrap --include=git,ca-certificates "$release" "$root" >"$root.log" 2>&1; then
-    tail -n 5 "$root.log" >&2
+  if ! debootstrap --include=git,ca-certificates "$release" "$root" >"$log" 2>&1; then
+    tail -n 5 "$log" >&2
     refuse $no_root "no root of $release could be made; see above"
   fi
   echo "$release" >"$root/made"

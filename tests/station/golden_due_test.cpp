@@ -58,7 +58,7 @@ class GoldenDue : public testing::Test {
   std::string problem() const { return golden_problem(config); }
 
   TemporaryFolder folder;
-  StationConfig config;
+  StationConfig config{};
 };
 
 TEST_F(GoldenDue, HasToBeMeasuredFirst) {

@@ -50,7 +50,7 @@ class KnownRunsTest : public testing::Test {
   }
 
   TemporaryFolder folder;
-  StationConfig config;
+  StationConfig config{};
 };
 
 TEST_F(KnownRunsTest, AreThoseOfTheRecordsAndThoseThatWait) {

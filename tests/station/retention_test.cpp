@@ -43,7 +43,7 @@ class RetentionTest : public testing::Test {
   }
   TemporaryFolder folder;
   Records records{(folder / "records.db").string()};
-  StationConfig config;
+  StationConfig config{};
 };
 
 TEST_F(RetentionTest, FindsWhatIsOlderThanItIsKept) {

@@ -17,7 +17,7 @@ struct StationSteps : testing::Test {
     config.enough.check_captures = 36;
     config.enough.dispersion_captures = 36;
   }
-  StationConfig config;
+  StationConfig config{};
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
   std::vector<Frame> frames = read_detections(kExample + "detections.csv");
   CapturesTable places = read_captures(kExample + "truth.csv");

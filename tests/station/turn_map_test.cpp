@@ -22,7 +22,7 @@ struct TurnMapTest : testing::Test {
     config.enough.turn_captures = 12;
     config.enough.turn_heights = 2;
   }
-  StationConfig config;
+  StationConfig config{};
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
   std::vector<Frame> frames = read_detections(kExample + "turning.csv");
 };
