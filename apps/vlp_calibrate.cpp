@@ -10,17 +10,21 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "app.h"
 #include "capture_options.h"
 #include "evaluation/gate.h"
 #include "progress.h"
+#include "run_each.h"
 #include "session/session.h"
 #include "step_outcome.h"
 
 namespace vlp {
 namespace {
+
+constexpr const char* kName = "vlp-calibrate";
 
 struct Options {
   std::string session, results, lens = "LENSMODEL_OPENCV8";
@@ -90,7 +94,7 @@ void print_summary(const SessionResult& result, const std::string& results) {
 void run(Options options) {
   options.how.choose_lens_model = options.lens == kChosenLens;
   if (const auto model = lens_model_from_name(options.lens)) options.how.lens_model = *model;
-  options.how.program = {"vlp-calibrate", VLP_VERSION};
+  options.how.program = {kName, VLP_VERSION};
   Log log;
   const SessionResult result =
       run_session(options.session, options.results, options.how, log.observer());
@@ -102,10 +106,7 @@ void run(Options options) {
   if (result.verdict == SessionVerdict::gate) throw GateNotMet(result.reason);
 }
 
-}  // namespace
-}  // namespace vlp
-
-int main(int argc, char** argv) {
+int calibrate(int argc, char** argv) {
   CLI::App app(
       "Calibrates a camera from a folder of its captures, checks it, and writes a report: the\n"
       "steps lens, row-time, rotation, dispersion, check, evaluate. A step whose inputs, options\n"
@@ -127,21 +128,21 @@ int main(int argc, char** argv) {
       "    --only boards,rotation,dispersion,check -o out/session\n"
       "  build/bin/vlp-calibrate out/session --row-time-s 3e-5 --readout rows \\\n"
       "    -o out/results\n",
-      "vlp-calibrate");
-  vlp::Options options;
+      kName);
+  Options options;
   auto& how = options.how;
-  how.threads = vlp::all_cores();
+  how.threads = all_cores();
   app.add_option("session", options.session, "Folder of the captures")->required();
   app.add_option("-o,--output", options.results,
                  "Folder for calibration.yaml, check-fixes.csv, evaluation.json, report.html, "
                  "session.json and what each step wrote; made when it is not there")
       ->required();
   app.add_option("--camera-id", how.camera_id, "Name of the camera (default: camera)");
-  vlp::add_lens_option(app, options.lens);
+  add_lens_option(app, options.lens);
   app.add_option("--row-time-s", how.row_time_s,
                  "Time from one row of the read-out to the next (default: found from rotation)")
       ->check(CLI::Range(1e-8, 1e-3));
-  vlp::add_readout_option(app, how.readout);
+  add_readout_option(app, how.readout);
   app.add_option("--gates", how.gates_file,
                  "Gates, vlp-gates/1, for a session that has no gates.yaml; of the lens there are "
                  "some in any case");
@@ -151,6 +152,18 @@ int main(int argc, char** argv) {
       ->option_text("STEP ...");
   app.add_option("--threads", how.threads, "Images at a time (default: one a core)")
       ->check(CLI::Range(1, 1024));
-  app.footer("Gates:\n" + vlp::gate_descriptions(vlp::session_metrics()));
-  return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
+  app.add_flag(
+      "--each", [](std::int64_t) { throw CLI::ValidationError("--each", "stands alone"); },
+      "Alone: do what stdin says, a line of JSON for each session; see apps/README.md");
+  app.footer("Gates:\n" + gate_descriptions(session_metrics()));
+  return run_app(app, argc, argv, [&] { run(options); });
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  if (argc != 2 || std::string_view(argv[1]) != "--each") return vlp::calibrate(argc, argv);
+  CLI::App app("", vlp::kName);
+  return vlp::run_app(app, 1, argv, [] { vlp::run_each(vlp::kName, vlp::calibrate); });
 }

@@ -6,6 +6,7 @@ A session that passes with something to look at, warnings, images skipped or lam
 "look", and `look` says at what.
 """
 import json
+import signal
 
 FIGURES = ["captures", "fixes", "missing_share", "mean_mm", "median_mm", "p90_mm", "max_mm", "rms_px"]
 TOLD = ["warnings", "images_skipped", "lamps_left_out", "look"]
@@ -20,7 +21,7 @@ FLEET += [column for name in TRACKED for column in (name, f"sd_{name}")] + [*RES
 LAMPS = ["room", "map", "lamp", "camera", "session", "date", "captures", "map_x_m", "map_y_m"]
 LAMPS += ["offset_x_mm", "offset_y_mm", "sd_offset_x_mm", "sd_offset_y_mm"]
 ALL = list(dict.fromkeys([*COLUMNS, *FLEET, "lamps", "glance"]))  # of a shard's rows
-TOOK_TOO_LONG = (124, 137)  # exit codes of timeout
+TOOK_TOO_LONG = -signal.SIGALRM
 # Files of vlp-calibrate that are kept, and their names there.
 KEPT = {
     "calibration.yaml": "calibration.yaml",
@@ -85,13 +86,13 @@ def calibration_of(session):
 
 def outcome_of(folder, name, ended, said):
     """The verdict: "pass", "look", "gate" or "no result", as session.json says; "crashed", when vlp-calibrate
-    ended without one. ended: its exit code, of timeout when it took too long; said: what it said at the end."""
+    ended without one. ended: its exit code, of a signal the negative number; said: what it said at the end."""
     camera, name_of_session = name.split("/")
     outcome = {"camera": camera, "session": name_of_session}
     try:
         session = json.loads((folder / "session.json").read_text())
     except FileNotFoundError:
-        words = "ran for more than an hour" if ended in TOOK_TOO_LONG else f"ended with exit code {ended}"
+        words = "ran for more than an hour" if ended == TOOK_TOO_LONG else f"ended with exit code {ended}"
         last = said.strip().splitlines()[-1:]
         return outcome | {"verdict": "crashed", "reason": ": ".join([f"vlp-calibrate {words}", *last])}
     told = told_by(session)

@@ -9,7 +9,6 @@ key and the session's row. A folder appears whole: it is made in .state/work and
 import fcntl
 import json
 import os
-import resource
 import shlex
 import shutil
 import subprocess
@@ -52,23 +51,49 @@ def current(name, key):
     return None
 
 
-def calibrate(run, name, work, lock):
-    """Runs vlp-calibrate on a session: what came of it, and its processor time. It holds the lock, too, and may
-    outlive us."""
+class Calibrate:
+    """vlp-calibrate --each: a process that splits one off for each session, so that its libraries are loaded once.
+    It holds the lock, too, and may outlive us by a session."""
+
+    def __init__(self, program, lock):
+        self.program, self.lock, self.process = program, lock, None
+
+    def __call__(self, arguments):
+        """Its exit code, or the negative number of the signal that ended it, its processor time in seconds, and
+        what it said at the end."""
+        if self.process is None:
+            self.process = subprocess.Popen([self.program, "--each"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                            pass_fds=[self.lock.fileno()], env=ENVIRONMENT)
+        request = json.dumps({"arguments": [str(argument) for argument in arguments], "limit_s": LONGEST_S})
+        try:
+            self.process.stdin.write(request.encode() + b"\n")
+            self.process.stdin.flush()
+            answer = self.process.stdout.readline()
+        except BrokenPipeError:
+            answer = b""
+        if answer.endswith(b"\n"):
+            answer = json.loads(answer)
+            return answer["exit_code"], answer["cpu_s"], answer["said"]
+        return self.end(), 0, ""
+
+    def end(self):
+        process, self.process = self.process, None
+        if process is not None:
+            process.communicate()
+            return process.returncode
+
+
+def calibrate(run, program, name, work):
+    """Runs vlp-calibrate on a session: what came of it, and its processor time."""
     folder = work / name
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "session.json").unlink(missing_ok=True)  # of a run that was interrupted
-    command = ["timeout", "--foreground", "--kill-after=60", str(LONGEST_S), Path(run["bin"]) / "vlp-calibrate"]
-    command += [Path(run["archive"]) / name, "-o", folder, "--quiet", "--no-report", "--threads", "1"]
-    command += [f"--camera-id={name.split('/')[0]}", *shlex.split(run["camera"])]
+    arguments = [Path(run["archive"]) / name, "-o", folder, "--quiet", "--no-report", "--threads", "1"]
+    arguments += [f"--camera-id={name.split('/')[0]}", *shlex.split(run["camera"])]
     if run["session_gates"]:
-        command += ["--gates", run["session_gates"]]
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, stderr=subprocess.PIPE, pass_fds=[lock.fileno()], env=ENVIRONMENT, check=False)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    words = done.stderr.decode(errors="replace").replace(run["archive"] + "/", "")
-    return outcome_of(folder, name, done.returncode, words), f"{seconds:.3f}"
+        arguments += ["--gates", run["session_gates"]]
+    ended, seconds, said = program(arguments)
+    return outcome_of(folder, name, ended, said.replace(run["archive"] + "/", "")), f"{seconds:.3f}"
 
 
 def same_file(source, target):
@@ -150,6 +175,7 @@ def rows_before(shard):
 def reprocess(run, shard, glances, lock, keep):
     """glances: {CAMERA/SESSION: glance at its files}; while that is the same the digest of the inputs is."""
     work = (STATE / "work" / shard).absolute()
+    program = Calibrate(Path(run["bin"]) / "vlp-calibrate", lock)
     before, rows, made = rows_before(shard), [], 0
     for name, glance in glances.items():
         row, known = None, before.get(name)
@@ -160,13 +186,14 @@ def reprocess(run, shard, glances, lock, keep):
             key = key_of(inputs, run)
             row = current(name, key)
         if row is None:
-            outcome, cost = calibrate(run, name, work, lock)
+            outcome, cost = calibrate(run, program, name, work)
             row = outcome | {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
             tell("costs", shard, name, cost, f"{time.time():.3f}")  # a session may come to another shard
             tell_run(shard, row, cost, publish(row, work, keep))
             shutil.rmtree(work / name)
             made += 1
         rows.append(row | {"glance": glance})
+    program.end()
     shutil.rmtree(work, ignore_errors=True)
     print(f"{len(rows)} sessions, {made} reprocessed")
     return rows

@@ -69,8 +69,13 @@ ln -s "$bin"/vlp-* "$results-bin"
 rm "$results-bin/vlp-calibrate"
 cat >"$results-bin/vlp-calibrate" <<PROGRAM
 #!/bin/bash
-[ ! -e "$results-crash" ] || [[ \$1 != *$good* ]] || kill -9 \$\$
-exec "$bin/vlp-calibrate" "\$@"
+[ "\$1" = --each ] || exec "$bin/vlp-calibrate" "\$@"
+while read -r line; do
+  if [ -e "$results-crash" ] && [[ \$line == *$good* ]]; then
+    kill -9 \$\$
+  fi
+  "$bin/vlp-calibrate" --each <<<"\$line"
+done
 PROGRAM
 chmod +x "$results-bin/vlp-calibrate"
 touch "$results-crash"

@@ -79,7 +79,8 @@ class Outcome(unittest.TestCase):
         self.assertEqual((found["verdict"], found["reason"]), ("crashed", "vlp-calibrate ended with exit code -9"))
         said = "vlp-calibrate: error: lens.yaml: cannot be written: No space left on device\n"
         self.assertTrue(self.outcome(2, said)["reason"].endswith("No space left on device"))
-        self.assertIn("an hour", self.outcome(124)["reason"])
+        self.assertIn("an hour", self.outcome(-14)["reason"])
+        self.assertNotIn("an hour", self.outcome(-9)["reason"])
 
 
 class Summary(unittest.TestCase):

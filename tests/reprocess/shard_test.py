@@ -46,12 +46,13 @@ class Shard(unittest.TestCase):
             self.addCleanup(os.chdir, os.getcwd())
             os.chdir(folder)
             run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "archive": folder, "version": "1"}
+            run["bin"] = folder
             for name, text in (("c/1", "one"), ("c/2", "two")):
                 (Path(name) / "boards").mkdir(parents=True)
                 (Path(name) / "boards/0.png").write_text(text)
             made = []
 
-            def calibrate(run, name, work, lock):
+            def calibrate(run, program, name, work):
                 (work / name).mkdir(parents=True)
                 made.append(name)
                 return {"camera": "c", "session": name[-1], "verdict": "pass"}, "0.5"
@@ -75,6 +76,25 @@ class Shard(unittest.TestCase):
             self.assertEqual(reprocess(s1="a", s2="d"), (["1"], ["1"]))
             run["toolbox"] = "u"
             self.assertEqual(reprocess(s1="a", s2="d"), (["1", "2"], ["1", "2"]))
+
+    def test_a_program_that_dies_is_started_again_for_the_next_session(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = Path(folder) / "vlp-calibrate"
+            program.write_text("""#!/bin/bash
+[ "$*" = --each ] || exit 7
+read -r line
+[[ $line != *dies* ]] || kill -9 $$
+while echo '{"exit_code": 3, "cpu_s": 0.25, "said": "'$BASHPID'"}' && read -r line; do true; done
+exit 5
+""")
+            program.chmod(0o755)
+            with open(Path(folder) / "lock", "w") as lock:
+                calibrate = shard.Calibrate(program, lock)
+                self.assertEqual(calibrate(["dies"]), (-9, 0, ""))
+                one, two = calibrate(["lives"]), calibrate([Path("lives")])
+                self.assertEqual(one[:2], (3, 0.25))
+                self.assertEqual(one, two)  # the same process
+                self.assertEqual(calibrate.end(), 5)  # which had nothing more to read
 
     def test_former_results_stay_by_their_keys_so_many(self):
         with tempfile.TemporaryDirectory() as folder:

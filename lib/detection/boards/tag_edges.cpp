@@ -38,35 +38,51 @@ double light_behind(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
-/// Parameters: the parabola's three, blur, middle, contrast, light along and across.
-struct Edge {
+/// Parameters: the parabola's three, blur, middle, contrast, light along and across. A step that is
+/// taken is asked for twice, with its derivatives the second time: they are kept from the first.
+class Edge {
+ public:
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 8 };
   using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
+  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>;
 
-  const std::vector<EdgePixel>& pixels;
-  double gamma;
+  Edge(const std::vector<EdgePixel>& pixels, double gamma)
+      : pixels_(pixels), gamma_(gamma), residuals_(rows()), jacobian_(rows(), +NUM_PARAMETERS) {}
 
-  int NumResiduals() const { return static_cast<int>(pixels.size()); }
+  int NumResiduals() const { return static_cast<int>(pixels_.size()); }
 
   bool operator()(const double* p, double* residuals, double* jacobian) const {
-    const auto rows = static_cast<Eigen::Index>(pixels.size());
-    for (Eigen::Index i = 0; i < rows; ++i) {
-      const auto& [w, v, grey] = pixels[static_cast<std::size_t>(i)];
-      const BlurredStep step(v - p[0] - w * (p[1] + w * p[2]), p[3]);
-      const double lit = 1 + p[6] * w + p[7] * v, unlit = p[4] + p[5] * step.value;
-      const Coded coded(unlit * lit, gamma);
-      residuals[i] = coded.level - grey;
-      if (jacobian == nullptr) continue;
-      const double by_distance = lit * p[5] * step.slope;
-      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>> all(jacobian, rows,
-                                                                            NUM_PARAMETERS);
-      all.row(i) << -by_distance, -by_distance * w, -by_distance * w * w, lit * p[5] * step.by_blur,
-          lit, lit * step.value, unlit * w, unlit * v;
-      if (gamma != 1) all.row(i) *= coded.slope;
-    }
+    const Eigen::Map<const Parameters> parameters(p);
+    if (parameters != at_) evaluate(parameters);
+    Eigen::Map<Eigen::VectorXd>(residuals, rows()) = residuals_;
+    if (jacobian) Eigen::Map<Jacobian>(jacobian, rows(), +NUM_PARAMETERS) = jacobian_;
     return true;
   }
+
+ private:
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(pixels_.size()); }
+
+  void evaluate(const Parameters& p) const {
+    at_ = p;
+    for (Eigen::Index i = 0; i < rows(); ++i) {
+      const auto& [w, v, grey] = pixels_[static_cast<std::size_t>(i)];
+      const BlurredStep step(v - p[0] - w * (p[1] + w * p[2]), p[3]);
+      const double lit = 1 + p[6] * w + p[7] * v, unlit = p[4] + p[5] * step.value;
+      const Coded coded(unlit * lit, gamma_);
+      residuals_[i] = coded.level - grey;
+      const double bright = lit * coded.slope, plain = unlit * coded.slope;
+      const double by_distance = bright * p[5] * step.slope;
+      jacobian_.row(i) << -by_distance, -by_distance * w, -by_distance * w * w,
+          bright * p[5] * step.by_blur, bright, bright * step.value, plain * w, plain * v;
+    }
+  }
+
+  const std::vector<EdgePixel>& pixels_;
+  double gamma_;
+  mutable Parameters at_ = Parameters::Constant(std::numeric_limits<double>::quiet_NaN());
+  mutable Eigen::VectorXd residuals_;
+  mutable Jacobian jacobian_;
 };
 
 /// Points x with across.(x - middle) = a + b w + c w^2, w = along.(x - middle) / half_px.
@@ -136,7 +152,7 @@ double fit(Parabola& edge, const cv::Mat1b& image, const Band& band, double gamm
   Edge::Parameters p = Edge::Parameters::Zero();
   p.head<4>() << edge.abc, edge.blur_px;
   start_edge_levels(pixels, gamma, p);
-  const Edge step{pixels, gamma};
+  const Edge step(pixels, gamma);
   ceres::TinySolver<Edge> solver;
   solver.options.max_num_iterations = most_steps;
   solver.options.function_tolerance = enough;

@@ -1,0 +1,92 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/core.h>
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "support/program.h"
+#include "support/schema.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using nlohmann::json;
+
+class RunEach : public testing::Test {
+ protected:
+  ProgramResult run(const std::string& lines) const {
+    std::ofstream(folder / "lines") << lines;
+    return run_program(fmt::format("vlp-calibrate --each <'{}'", (folder / "lines").string()));
+  }
+  /// Of a session, its results beside it.
+  std::string line(const std::string& session, int limit_s = 100) const {
+    const std::string at = (folder / session).string();
+    return json{{"arguments", {at, "-o", at + "-results"}}, {"limit_s", limit_s}}.dump() + "\n";
+  }
+  std::vector<json> answers(const std::string& output) const {
+    std::vector<json> all;
+    std::istringstream lines(output);
+    for (std::string answer; std::getline(lines, answer);) {
+      const auto file = folder / fmt::format("answer-{}.json", all.size());
+      std::ofstream(file) << answer;
+      EXPECT_EQ(problems_by_schema("answer", {file}), "");
+      all.push_back(json::parse(answer));
+    }
+    return all;
+  }
+
+  TemporaryFolder folder;
+};
+
+TEST_F(RunEach, AnswersEachAsVlpCalibrateAlone) {
+  const auto [code, output, errors] = run(line("nowhere's") + line("\n"));
+  EXPECT_EQ(code, 0);
+  EXPECT_EQ(errors, "");
+  const auto all = answers(output);
+  ASSERT_EQ(all.size(), 2U);
+  const auto alone = run_program(
+      fmt::format("vlp-calibrate \"{0}\" -o \"{0}-results\"", (folder / "nowhere's").string()));
+  EXPECT_EQ(all[0].at("exit_code"), alone.exit_code);
+  EXPECT_EQ(all[0].at("said"), alone.errors);
+  EXPECT_EQ(all[1].at("exit_code"), alone.exit_code);
+  EXPECT_GT(all[1].at("cpu_s"), 0);
+}
+
+TEST_F(RunEach, KillsAtTheLimitAndGoesOn) {
+  const auto session = folder / "endless";
+  std::filesystem::create_directories(session / "rotation");
+  std::ofstream(session / "lamps.yaml") << "format: vlp-lamps/1\n";
+  ASSERT_EQ(::mkfifo((session / "camera.yaml").c_str(), 0600), 0);  // nobody writes into it
+  const auto [code, output, errors] = run(line("endless", 1) + line("nowhere"));
+  EXPECT_EQ(code, 0);
+  const auto all = answers(output);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].at("exit_code"), -SIGALRM) << output;
+  EXPECT_EQ(all[1].at("exit_code"), 2);
+}
+
+TEST_F(RunEach, EndsAtALineThatIsNone) {
+  for (const std::string bad : {"x", "{}", R"({"arguments": "a", "limit_s": 1})",
+                                R"({"arguments": ["a"], "limit_s": "b"})"}) {
+    const auto [code, output, errors] = run(line("nowhere") + bad + "\n" + line("nowhere"));
+    EXPECT_EQ(code, 2);
+    EXPECT_EQ(answers(output).size(), 1U);
+    EXPECT_EQ(errors,
+              "vlp-calibrate: error: stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": "
+              "N}: " +
+                  bad + "\n");
+  }
+  EXPECT_EQ(run("").exit_code, 0);
+  const auto with_more = run_program("vlp-calibrate a -o b --each");
+  EXPECT_EQ(with_more.exit_code, 2);
+  EXPECT_EQ(with_more.errors,
+            "vlp-calibrate: error: --each: stands alone; see vlp-calibrate --help\n");
+}
+
+}  // namespace
+}  // namespace vlp
