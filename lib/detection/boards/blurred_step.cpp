@@ -18,24 +18,21 @@ struct Place {
 /// Of the interval that a place is for.
 double middle_of(std::size_t place) { return (double(place) + 0.5) / kPerUnit; }
 
-const auto& places() {
-  static const auto all = [] {
-    std::array<Place, static_cast<std::size_t>(kLargest) * kPerUnit + 1> result{};
-    for (std::size_t i = 0; i < result.size(); ++i) {
-      const double x = middle_of(i);
-      result[i] = {std::erf(x), 2 * std::numbers::inv_sqrtpi * std::exp(-x * x)};
-    }
-    return result;
-  }();
+const auto places = [] {
+  std::array<Place, static_cast<std::size_t>(kLargest) * kPerUnit + 1> all{};
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double x = middle_of(i);
+    all[i] = {std::erf(x), 2 * std::numbers::inv_sqrtpi * std::exp(-x * x)};
+  }
   return all;
-}
+}();
 
 }  // namespace
 
 ErrorFunction::ErrorFunction(double x) {
   const double size = std::min(kLargest, std::abs(x));  // of no number, too
   const auto nearest = static_cast<std::size_t>(size * kPerUnit);
-  const auto& [at, g] = places()[nearest];
+  const auto& [at, g] = places[nearest];
   // The slope's derivatives, over the slope: Hermite's polynomials.
   const double a = middle_of(nearest), d = size - a, square = a * a;
   const double first = -2 * a, second = 4 * square - 2, third = a * (12 - 8 * square);
