@@ -44,15 +44,22 @@ void CsvWriter::write_row(std::span<const std::string_view> fields) {
   }
   waiting_ += '\n';
   constexpr std::size_t enough = 1 << 16;
-  if (waiting_.size() < enough) return;
+  if (waiting_.size() >= enough) write_waiting();
+}
+
+void CsvWriter::write_waiting() {
   file_.write(waiting_);
   waiting_.clear();
 }
 
 void CsvWriter::save() {
-  file_.write(waiting_);
-  waiting_.clear();
+  write_waiting();
   file_.save();
+}
+
+void CsvWriter::save_unsynced() {
+  write_waiting();
+  file_.save_unsynced();
 }
 
 std::string fixed(double value, int digits) {

@@ -31,8 +31,11 @@ class CsvWriter {
   void row(std::initializer_list<std::string_view> fields);
   void row(const std::vector<std::string>& fields);
   void save();
+  /// See WholeFile.
+  void save_unsynced();
 
  private:
+  void write_waiting();
   void write_row(std::span<const std::string_view> fields);
 
   WholeFile file_;

@@ -131,9 +131,14 @@ void WholeFile::write(std::string_view content) {
 void WholeFile::save() {
   if (temporary_.empty()) return;
   if (::fsync(descriptor_) != 0) fail(path_);
+  save_unsynced();
+  sync_folder(target_.has_parent_path() ? target_.parent_path() : ".");
+}
+
+void WholeFile::save_unsynced() {
+  if (temporary_.empty()) return;
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(path_);
   temporary_.clear();
-  sync_folder(target_.has_parent_path() ? target_.parent_path() : ".");
 }
 
 WholeFile::~WholeFile() {

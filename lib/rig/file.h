@@ -25,6 +25,9 @@ class WholeFile {
   [[gnu::visibility("hidden")]] explicit WholeFile(const std::filesystem::path& path);
   [[gnu::visibility("hidden")]] void write(std::string_view content);
   [[gnu::visibility("hidden")]] void save();
+  /// Without waiting for the disk: a power cut may leave a part of it, and whoever reads it has to
+  /// notice. For what can be made again.
+  [[gnu::visibility("hidden")]] void save_unsynced();
 
   /// Without save() nothing has happened to `path`.
   [[gnu::visibility("hidden")]] ~WholeFile();

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 std::string settings_of(const Board& board) {
   std::string settings =
-      fmt::format("2 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+      fmt::format("3 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                   board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
                   board.border_bits, board.corner_squares, board.first_id, name_of(board.id_order));
   if (board.has_squares()) {
@@ -32,13 +32,14 @@ std::string settings_of(const Board& board) {
 }
 
 /// A row per tag, then one per foreign tag, then one per point, with its place; the first row, with
-/// id -1, holds the image's size and the four counts.
+/// id -1, holds the image's size and the counts, by which a file that a power cut left in part is
+/// known.
 void write_view(const fs::path& file, const BoardView& view) {
   CsvWriter csv(file, {"id", "u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"});
   csv.row({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
            std::to_string(view.seen.foreign.size()), std::to_string(view.seen.unusable),
-           std::to_string(view.seen.overexposed), std::to_string(view.seen.points.size()), "0",
-           "0"});
+           std::to_string(view.seen.overexposed), std::to_string(view.seen.points.size()),
+           std::to_string(view.seen.tags.size()), "0"});
   for (const auto* tags : {&view.seen.tags, &view.seen.foreign}) {
     for (const SeenTag& tag : *tags) {
       const auto& [a, b, c, d] = tag.corners_px;
@@ -51,7 +52,7 @@ void write_view(const fs::path& file, const BoardView& view) {
     csv.row({std::to_string(point.index), shortest(point.pixel.x()), shortest(point.pixel.y()), "0",
              "0", "0", "0", "0", "0"});
   }
-  csv.save();
+  csv.save_unsynced();
 }
 
 BoardView read_view(const fs::path& file, const std::string& image) {
@@ -66,14 +67,15 @@ BoardView read_view(const fs::path& file, const std::string& image) {
   const auto rows = static_cast<std::size_t>(csv.rows());
   const auto foreign = static_cast<std::size_t>(at(0, "u1"));
   const auto points = static_cast<std::size_t>(at(0, "v2"));
-  if (foreign + points >= rows) throw InputError(file, "is not of the cache");
+  const auto tags_seen = static_cast<std::size_t>(at(0, "u3"));
+  if (1 + tags_seen + foreign + points != rows) throw InputError(file, "is not of the cache");
   const std::size_t tag_rows = rows - points;
   for (std::size_t row = tag_rows; row < rows; ++row) {
     view.seen.points.push_back(
         {static_cast<std::size_t>(at(row, "id")), {at(row, "u0"), at(row, "v0")}});
   }
   for (std::size_t row = 1; row < tag_rows; ++row) {
-    auto& tags = row < tag_rows - foreign ? view.seen.tags : view.seen.foreign;
+    auto& tags = row <= tags_seen ? view.seen.tags : view.seen.foreign;
     tags.push_back({static_cast<int>(at(row, "id")),
                     {{{at(row, "u0"), at(row, "v0")},
                       {at(row, "u1"), at(row, "v1")},
