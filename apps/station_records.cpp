@@ -16,7 +16,9 @@
 
 #include "app.h"
 #include "captures/printable.h"
+#include "progress.h"
 #include "rig/input_error.h"
+#include "station/archive_runs.h"
 #include "station/certificate.h"
 #include "station/control_chart.h"
 #include "station/export_runs.h"
@@ -287,8 +289,26 @@ void export_runs(const StationRecordsOptions& options) {
   fmt::print("{} runs\n", runs.size());
 }
 
+void import_archive(const StationRecordsOptions& options) {
+  const auto [runs, undated] = runs_of_archive(options.archive);
+  if (undated > 0) {
+    spdlog::warn(
+        "{} sessions are left out: when they were taken stands neither in archive.csv "
+        "nor in their names",
+        undated);
+  }
+  if (runs.empty()) throw Undetermined(options.archive + ": no session with a date");
+  Records records(options.records);
+  Progress progress("runs");
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    records.keep(runs[i]);
+    progress.update(i + 1, runs.size());
+  }
+  fmt::print("{} runs of station {}\n", runs.size(), runs.front().station);
+}
+
 void show_trend(const StationRecordsOptions& options) {
-  const MetricKind kind = unit_figure(options.figure);
+  const MetricKind kind = run_figure(options.figure);
   const auto known = known_runs(options);
   Records& records = known->records();
   RunFilter filter = comparable(options, *known);
@@ -320,8 +340,8 @@ void show_trend(const StationRecordsOptions& options) {
 }
 
 void show_capability(const StationRecordsOptions& options) {
-  std::vector<MetricKind> kinds = unit_metrics();
-  if (!options.figure.empty()) kinds = {unit_figure(options.figure)};
+  std::vector<MetricKind> kinds = run_figures();
+  if (!options.figure.empty()) kinds = {run_figure(options.figure)};
   const auto known = known_runs(options);
   Records& records = known->records();
   const RunFilter filter = comparable(options, *known);
@@ -352,7 +372,7 @@ void show_capability(const StationRecordsOptions& options) {
 }
 
 void show_study(const StationRecordsOptions& options) {
-  const MetricKind kind = unit_figure(options.figure);
+  const MetricKind kind = run_figure(options.figure);
   if (!options.references.empty()) return show_bias(kind, options);
   const auto known = known_runs(options);
   Records& records = known->records();

@@ -19,6 +19,8 @@ struct StationRecordsOptions {
   std::string operator_name, reason;
   /// Of verify-records: the last digest of an earlier one; may be empty.
   std::string noted;
+  /// Of import: results of reprocessing.
+  std::string archive;
   /// Of clean: delete, instead of telling what would be.
   bool remove = false;
   /// Of a control chart.
@@ -47,6 +49,9 @@ void void_run(const StationRecordsOptions& options);
 void verify_records(const StationRecordsOptions& options);
 /// vlp-station export: CSV, a line for each run, or JSON with all there is.
 void export_runs(const StationRecordsOptions& options);
+/// vlp-station import: the sessions of an archive, as reprocessing left them, as runs of a station
+/// that has the results' name. Those that are there already stay.
+void import_archive(const StationRecordsOptions& options);
 /// vlp-station trend: a figure over the runs, with a control chart's limits and rules, also as a
 /// picture; of units of the station that passed, unless the filter says otherwise. Throws
 /// GateNotMet for an alarm.

@@ -144,7 +144,8 @@ int main(int argc, char** argv) {
       "changed in\n"
       "the records. Runs wait in the station's 'spool' while the records cannot be reached; 'hook' "
       "runs the\n"
-      "station's hook again where it failed, 'clean' deletes what is kept no longer.\n"
+      "station's hook again where it failed, 'clean' deletes what is kept no longer,\n"
+      "'import' takes a reprocessed archive into records.\n"
       "vlp-station COMMAND --help tells more.\n\n"
       "Example, from the project's folder:\n"
       "  mkdir -p out && cp -rT datasets/station out/station\n"
@@ -201,6 +202,15 @@ int main(int argc, char** argv) {
   voided->add_option("--reason", records.reason, "Why")->required();
   auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
   exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
+  CLI::App* imported = app.add_subcommand(
+      "import",
+      "Take the sessions of a reprocessed archive into records, as runs of a station that has the "
+      "results' name: for trend, capability and study. Those that are there already stay");
+  imported->add_option("results", records.archive, "RESULTS of scripts/reprocess.sh")->required();
+  imported
+      ->add_option("--records", records.records,
+                   "A file of SQLite, made when it is not there, or postgresql://USER@HOST/NAME")
+      ->required();
   constexpr const char* which = "Which: rms_px, check_mean_mm, ...";
   auto* trend = vlp::add_records(
       app, "trend",
@@ -256,6 +266,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("clean")) vlp::clean_up(records);
     if (app.got_subcommand("void")) vlp::void_run(records);
     if (app.got_subcommand("verify-records")) vlp::verify_records(records);
+    if (app.got_subcommand("import")) vlp::import_archive(records);
     if (app.got_subcommand("export")) vlp::export_runs(records);
     if (app.got_subcommand("trend")) vlp::show_trend(records);
     if (app.got_subcommand("capability")) vlp::show_capability(records);

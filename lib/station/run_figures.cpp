@@ -10,8 +10,15 @@
 
 namespace vlp {
 
-MetricKind unit_figure(const std::string& name) {
-  const auto kinds = unit_metrics();
+std::vector<MetricKind> run_figures() {
+  auto kinds = unit_metrics();
+  const auto of_fixes = metric_kinds({MetricSource::evaluation});
+  kinds.insert(kinds.end(), of_fixes.begin(), of_fixes.end());
+  return kinds;
+}
+
+MetricKind run_figure(const std::string& name) {
+  const auto kinds = run_figures();
   const auto kind = std::find_if(kinds.begin(), kinds.end(),
                                  [&](const MetricKind& any) { return any.name == name; });
   if (kind != kinds.end()) return *kind;

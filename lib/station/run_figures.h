@@ -17,8 +17,11 @@
 /// What trends, capability and studies are made of: a figure over runs, with its gate.
 namespace vlp {
 
-/// The figure of units of this name. Throws std::invalid_argument, which names those there are.
-MetricKind unit_figure(const std::string& name);
+/// Those that runs have: unit_metrics(), and of the sessions of an archive (archive_runs.h) what
+/// errors their fixes have.
+std::vector<MetricKind> run_figures();
+/// The one of this name. Throws std::invalid_argument, which names those there are.
+MetricKind run_figure(const std::string& name);
 
 /// The values of runs that were judged, unless the filter asks for one verdict.
 std::vector<TrendPoint> judged_values(Records& records, const std::string& figure,

@@ -25,6 +25,8 @@ namespace vlp {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 /// As UnitImage has it.
 Eigen::Matrix3d level_in(const LevelsOfImages& levels, const std::string& image) {
   const auto level = levels.find(image);

@@ -73,6 +73,15 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   grep -q '6 images skipped; the first, 0006.png: cannot be read as an image: it is cut short' "$page" || fail "no skipped images"
   grep -q "$lost</td><td>lamps.yaml</td><td>lost its result" "$page" || fail "no inputs that changed"
   grep -q '^camera-00001,session-01,look,.*,6,,.*,2026-03-14,' "$looked/summary.csv" || fail "$(cat "$looked/summary.csv")"
+  for time in first again; do
+    "$bin/vlp-station" import "$looked" --records "$scratch/looked.db" >"$said" 2>"$scratch/errors" || fail "$(cat "$scratch/errors")"
+    grep -q '^1 runs of station looked-results' "$said" || fail "$time: $(cat "$said")"
+    grep -q ' 1 sessions are left out: when they were taken' "$scratch/errors" || fail "$time: $(cat "$scratch/errors")"
+  done
+  "$bin/vlp-station" list --records "$scratch/looked.db" >"$said"
+  grep -q '2026-03-14T00:00:00Z *PASS .* looked-results *camera-00001' "$said" || fail "$(cat "$said")"
+  "$bin/vlp-station" show --records "$scratch/looked.db" | grep -q '^mean_mm ' || fail "no figures"
+  rm "$scratch/looked.db"
   grep -q '^camera-00001,session-01,2026-03-14,hall,' "$looked/fleet.csv" || fail "$(cat "$looked/fleet.csv")"
   [ "$(grep -c '^hall,[0-9a-f]\{12\},[1-6],camera-00001,session-01,2026-03-14,' "$looked/lamps.csv")" = 6 ] || fail "six lamps"
 

@@ -57,9 +57,9 @@ TEST_F(RunFigures, HaveTheGateOfTheStationOrOfTheLastRun) {
   station.gates = {{"rms_px", 0.7}};
   EXPECT_EQ(gate_of("rms_px", &station, records, judged()), 0.7);
   EXPECT_FALSE(gate_of("tilt_deg", &station, records, judged()));
-  EXPECT_EQ(limits_of(unit_figure("rms_px"), 0.7).upper, 0.7);
-  EXPECT_FALSE(limits_of(unit_figure("rms_px"), 0.7).lower);
-  EXPECT_EQ(limits_of(unit_figure("coverage"), 0.7).lower, 0.7);
+  EXPECT_EQ(limits_of(run_figure("rms_px"), 0.7).upper, 0.7);
+  EXPECT_FALSE(limits_of(run_figure("rms_px"), 0.7).lower);
+  EXPECT_EQ(limits_of(run_figure("coverage"), 0.7).lower, 0.7);
 }
 
 TEST_F(RunFigures, OfTwoStationsAreNotMixed) {
@@ -86,8 +86,8 @@ TEST_F(RunFigures, OfAStudyAreOfUnitsThatWereRunMoreThanOnce) {
 }
 
 TEST(UnitFigure, IsNamedAmongThoseThereAre) {
-  EXPECT_STREQ(unit_figure("check_mean_mm").unit, "mm");
-  EXPECT_THAT([] { unit_figure("rms_mm"); },
+  EXPECT_STREQ(run_figure("check_mean_mm").unit, "mm");
+  EXPECT_THAT([] { run_figure("rms_mm"); },
               testing::ThrowsMessage<std::invalid_argument>(
                   AllOf(HasSubstr("there is no figure rms_mm"), HasSubstr("rms_px"))));
 }
