@@ -7,11 +7,12 @@ MOST_ROWS = 200  # of a table
 
 
 def table(columns, rows, where="summary.csv"):
-    head = "".join(f'<th scope="col">{escape(column)}</th>' for column in columns)
+    head = "".join(f'<th scope="col">{escape(column)}</th>' if column else "<td></td>" for column in columns)
     cells = ["".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows[:MOST_ROWS]]
     body = "".join(f"<tr>{row}</tr>\n" for row in cells)
     more = f"<p>and {len(rows) - MOST_ROWS} more, in {where}</p>" if len(rows) > MOST_ROWS else ""
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table></div>{more}\n'
+    scrolled = '<div class="wide" tabindex="0" role="region" aria-label="Table">'
+    return f"{scrolled}<table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table></div>{more}\n"
 
 
 def picture(data, words):

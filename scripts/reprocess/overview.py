@@ -136,7 +136,7 @@ def page(run, rows, counts, gates, fleet, parts):
     beyond = sessions_beyond_gates(counts, gates)
     html = '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
     html += '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    html += f"<title>Reprocessed archive</title><style>{STYLE}</style></head><body>\n<h1>Reprocessed archive</h1>\n"
+    html += f"<title>Reprocessed archive</title><style>{STYLE}</style></head><body><main>\n<h1>Reprocessed archive</h1>\n"
     if gates or beyond:
         html += f'<p class="verdict">{"FAIL" if missed or beyond else "PASS"}</p>\n'
     if beyond:
@@ -147,7 +147,7 @@ def page(run, rows, counts, gates, fleet, parts):
         words = [(g["name"], number(g["value"]), g["limit"], "met" if g["passed"] else "not met") for g in gates]
         html += table(["gate", "value", "at most", ""], words)
     html += f"<p>Version {escape(run['version'])}, toolbox {run['toolbox'][:12]}.</p>\n<h2>Sessions</h2>\n"
-    html += table(["", ""], [(name.replace("_", " "), number(value)) for name, value in counts.items()])
+    html += table(["figure", "value"], [(name.replace("_", " "), number(value)) for name, value in counts.items()])
     failed = [row for row in rows if row["verdict"] in ("no result", "crashed")]
     if failed:
         html += "<h2>Without a result</h2>\n" + table(["reason", "sessions"], reasons(failed))
@@ -156,7 +156,7 @@ def page(run, rows, counts, gates, fleet, parts):
     if missing:
         html += "<h2>A gate is not met</h2>\n"
         html += table(["session", "mean (mm)", "reason"], [(name_of(r), r["mean_mm"], r["reason"]) for r in missing])
-    return html + parts + "</body></html>\n"
+    return html + parts + "</main></body></html>\n"
 
 
 def main():

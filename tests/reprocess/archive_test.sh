@@ -44,5 +44,9 @@ cmp "$alone/check-fixes.csv" "$baseline/sessions/$name/fixes.csv"
 cmp "$alone/lens.cameramodel" "$baseline/sessions/$name/camera.cameramodel"
 cmp "$alone/calibration.yaml" "$baseline/sessions/$name/calibration.yaml"
 cmp "$alone/session.json" "$baseline/sessions/$name/session.json"
+code=0
+"${VLP_PYTHON:-/usr/bin/python3}" "$source_dir/tests/support/browser_check.py" "$baseline/overview.html" >"$said" || code=$?
+[ "$code" = 0 ] || [ "$code" = 77 ] || fail "$(cat "$said")"  # 77: no browser
+rm -f "$baseline/overview.pdf"
 if grep -q 'src="http\|<script' "$baseline/overview.html"; then fail "the overview is not self-contained"; fi
 rm -rf "$alone"
