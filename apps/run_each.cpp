@@ -4,12 +4,15 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -25,6 +28,8 @@ namespace {
 
 using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
+constexpr unsigned kLongest_s = 86400;
+
 struct Request {
   std::vector<std::string> arguments;
   unsigned limit_s;
@@ -33,17 +38,22 @@ struct Request {
 Request request_in(const std::string& line) {
   try {
     const auto json = nlohmann::json::parse(line);
-    return {json.at("arguments").get<std::vector<std::string>>(),
-            json.at("limit_s").get<unsigned>()};
-  } catch (const nlohmann::json::exception&) {
-    throw std::invalid_argument(
-        "stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": N}: " + line);
+    const auto& limit_s = json.at("limit_s");
+    if (limit_s.is_number_unsigned() && limit_s >= 1U && limit_s <= kLongest_s) {
+      return {json.at("arguments").get<std::vector<std::string>>(), limit_s.get<unsigned>()};
+    }
+  } catch (const nlohmann::json::exception&) {  // said below
   }
+  throw std::invalid_argument(
+      "stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": 1 to 86400}: " + line);
 }
 
 /// What the process does that was split off. It says all to `said`.
-[[noreturn]] void become(const char* name, Request request, std::FILE* said,
+[[noreturn]] void become(const char* name, Request request, std::FILE* said, pid_t parent,
                          const std::function<int(int, char**)>& program) {
+  // A process that nobody waits for any more would write where another begins.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) std::_Exit(kBadInput);
   // Not by freopen(), which would set back for us, too, how far the lines are read.
   const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   const bool ready = ::dup2(nothing, STDIN_FILENO) >= 0 &&
@@ -76,11 +86,12 @@ double seconds(const timeval& time) {
 
 std::string answer_to(const char* name, const Request& request,
                       const std::function<int(int, char**)>& program) {
-  const File said(std::tmpfile(), &std::fclose);
-  if (!said) throw std::runtime_error("no temporary file can be made");
-  const pid_t process = ::fork();
+  const int memory = ::memfd_create("said", MFD_CLOEXEC);
+  const File said(memory < 0 ? nullptr : ::fdopen(memory, "w+"), &std::fclose);
+  if (!said) throw std::runtime_error("there is no memory left for what a process says");
+  const pid_t parent = ::getpid(), process = ::fork();
   if (process < 0) throw std::runtime_error("no process can be split off");
-  if (process == 0) become(name, request, said.get(), program);
+  if (process == 0) become(name, request, said.get(), parent, program);
   int status = 0;
   rusage used{};
   while (::wait4(process, &status, 0, &used) < 0) {

@@ -12,7 +12,8 @@ namespace vlp {
 /// on stdout, is {"exit_code": 0, "cpu_s": 0.61, "said": "..."}: of a process that was killed the
 /// signal's number, negative (SIGALRM: the limit), its processor time, and the end of what it wrote
 /// to stdout and stderr. `program` is given what main() would be. Throws
-/// std::invalid_argument at a line that is none of these.
+/// std::invalid_argument at a line that is none of these, std::runtime_error when no process can be
+/// made.
 void run_each(const char* name, const std::function<int(int argc, char** argv)>& program);
 
 }  // namespace vlp

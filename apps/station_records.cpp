@@ -290,21 +290,35 @@ void export_runs(const StationRecordsOptions& options) {
 }
 
 void import_archive(const StationRecordsOptions& options) {
-  const auto [runs, undated] = runs_of_archive(options.archive);
+  const auto [sessions, undated, crashed] = sessions_of_archive(options.archive);
   if (undated > 0) {
     spdlog::warn(
         "{} sessions are left out: when they were taken stands neither in archive.csv "
         "nor in their names",
         undated);
   }
-  if (runs.empty()) throw Undetermined(options.archive + ": no session with a date");
+  if (crashed > 0) spdlog::warn("{} sessions are left out: their program crashed", crashed);
+  if (sessions.empty()) throw Undetermined(options.archive + ": no session with a date");
   Records records(options.records);
-  Progress progress("runs");
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    records.keep(runs[i]);
-    progress.update(i + 1, runs.size());
+  Progress progress("sessions");
+  std::size_t taken = 0;
+  std::vector<std::string> other;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const RunRecord& run = sessions[i].run;
+    if (const auto kept = records.find(run.run)) {
+      if (kept->config_sha256 != run.config_sha256) other.push_back(run.run);
+    } else {
+      records.keep(run_of(sessions[i]));
+      ++taken;
+    }
+    progress.update(i + 1, sessions.size());
   }
-  fmt::print("{} runs of station {}\n", runs.size(), runs.front().station);
+  say(fmt::format("station {}: {} runs taken, {} were there\n", sessions.front().run.station, taken,
+                  sessions.size() - taken - other.size()));
+  if (other.empty()) return;
+  throw std::invalid_argument(fmt::format(
+      "{} sessions, the first {}, have another result than these records have: take new records",
+      other.size(), other.front()));
 }
 
 void show_trend(const StationRecordsOptions& options) {

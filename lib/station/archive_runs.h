@@ -10,19 +10,31 @@
 
 namespace vlp {
 
-/// The sessions of an archive as runs, so that trends, capability and studies read archives, too.
-struct ArchiveRuns {
-  /// In the order of their dates.
-  std::vector<RunRecord> runs;
-  /// Sessions that are none of these, because nobody says when they were taken.
-  std::size_t undated = 0;
+/// A session of an archive as a run, so that trends, capability and studies read archives, too.
+struct ArchiveSession {
+  /// All but its figures and its calibration.
+  RunRecord run;
+  /// With what vlp-calibrate wrote.
+  std::filesystem::path folder;
 };
 
-/// Of RESULTS of scripts/reprocess.sh: summary.csv, and each session's session.json and
-/// calibration.yaml. The station is the archive, by the name of the folder of its results; kind
-/// "unit"; figures and gates are the session's; "pass" and "look" are PASS, "gate" is FAIL, no
-/// result is INVALID. A session has the same name of a run each time: its date, and a digest of its
-/// camera and name. Throws InputError for what reprocessing has not written.
-ArchiveRuns runs_of_archive(const std::filesystem::path& results);
+struct ArchiveSessions {
+  /// In the order of their dates.
+  std::vector<ArchiveSession> sessions;
+  /// Those that are none of these, because nobody says when they were taken, or because their
+  /// program crashed, which says nothing of the session.
+  std::size_t undated = 0, crashed = 0;
+};
+
+/// Of summary.csv in RESULTS of scripts/reprocess.sh. The station is the archive, by the name of
+/// the folder of its results; kind "unit"; "pass" and "look" are PASS, "gate" is FAIL, no result is
+/// INVALID; config_sha256 is the session's key: of its inputs, the toolbox and the options. A
+/// session has the same name of a run each time: its date, and a digest of station, camera and
+/// session. Throws InputError for what reprocessing has not written.
+ArchiveSessions sessions_of_archive(const std::filesystem::path& results);
+
+/// The run of a session, whole, with the figures and gates of its session.json. Throws InputError
+/// for what vlp-calibrate has not written.
+RunRecord run_of(const ArchiveSession& session);
 
 }  // namespace vlp

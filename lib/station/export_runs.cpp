@@ -24,22 +24,40 @@ std::string one_line(std::string text) {
   return joined;
 }
 
+const CheckedMetric* figure_of(const RunRecord& run, const MetricKind& kind) {
+  const auto figure = std::find_if(run.figures.begin(), run.figures.end(),
+                                   [&](const auto& each) { return each.name == kind.name; });
+  return figure == run.figures.end() ? nullptr : &*figure;
+}
+
+/// unit_metrics(), and what else there is in these runs.
+std::vector<MetricKind> columns_of(const std::vector<RunRecord>& runs) {
+  auto kinds = unit_metrics();
+  for (const MetricKind& kind : metric_kinds({MetricSource::evaluation})) {
+    const bool there = std::any_of(runs.begin(), runs.end(), [&](const RunRecord& run) {
+      return figure_of(run, kind) != nullptr;
+    });
+    if (there) kinds.push_back(kind);
+  }
+  return kinds;
+}
+
 void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
+  const auto kinds = columns_of(runs);
   std::vector<std::string> header;
   for (const RunField& field : run_fields()) {
     if (field.in_csv) header.emplace_back(field.name);
   }
-  for (const MetricKind& kind : unit_metrics()) header.emplace_back(kind.name);
+  for (const MetricKind& kind : kinds) header.emplace_back(kind.name);
   CsvWriter csv(file, header);
   for (const RunRecord& run : runs) {
     std::vector<std::string> row;
     for (const RunField& field : run_fields()) {
       if (field.in_csv) row.push_back(one_line(run.*field.text));
     }
-    for (const MetricKind& kind : unit_metrics()) {
-      const auto figure = std::find_if(run.figures.begin(), run.figures.end(),
-                                       [&](const auto& f) { return f.name == kind.name; });
-      const bool there = figure != run.figures.end() && figure->value;
+    for (const MetricKind& kind : kinds) {
+      const CheckedMetric* figure = figure_of(run, kind);
+      const bool there = figure != nullptr && figure->value;
       row.push_back(there ? significant(*figure->value, kDigits) : "");
     }
     csv.row(row);

@@ -51,9 +51,9 @@ def current(name, key):
     return None
 
 
-class Calibrate:
+class EachProcess:
     """vlp-calibrate --each: a process that splits one off for each session, so that its libraries are loaded once.
-    It holds the lock, too, and may outlive us by a session."""
+    It holds the lock, too, and may outlive us by a session; what it splits off does not outlive it."""
 
     def __init__(self, program, lock):
         self.program, self.lock, self.process = program, lock, None
@@ -83,7 +83,7 @@ class Calibrate:
             return process.returncode
 
 
-def calibrate(run, program, name, work):
+def calibrate(run, each, name, work):
     """Runs vlp-calibrate on a session: what came of it, and its processor time."""
     folder = work / name
     folder.mkdir(parents=True, exist_ok=True)
@@ -92,7 +92,7 @@ def calibrate(run, program, name, work):
     arguments += [f"--camera-id={name.split('/')[0]}", *shlex.split(run["camera"])]
     if run["session_gates"]:
         arguments += ["--gates", run["session_gates"]]
-    ended, seconds, said = program(arguments)
+    ended, seconds, said = each(arguments)
     return outcome_of(folder, name, ended, said.replace(run["archive"] + "/", "")), f"{seconds:.3f}"
 
 
@@ -175,7 +175,7 @@ def rows_before(shard):
 def reprocess(run, shard, glances, lock, keep):
     """glances: {CAMERA/SESSION: glance at its files}; while that is the same the digest of the inputs is."""
     work = (STATE / "work" / shard).absolute()
-    program = Calibrate(Path(run["bin"]) / "vlp-calibrate", lock)
+    each = EachProcess(Path(run["bin"]) / "vlp-calibrate", lock)
     before, rows, made = rows_before(shard), [], 0
     for name, glance in glances.items():
         row, known = None, before.get(name)
@@ -186,14 +186,14 @@ def reprocess(run, shard, glances, lock, keep):
             key = key_of(inputs, run)
             row = current(name, key)
         if row is None:
-            outcome, cost = calibrate(run, program, name, work)
+            outcome, cost = calibrate(run, each, name, work)
             row = outcome | {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
             tell("costs", shard, name, cost, f"{time.time():.3f}")  # a session may come to another shard
             tell_run(shard, row, cost, publish(row, work, keep))
             shutil.rmtree(work / name)
             made += 1
         rows.append(row | {"glance": glance})
-    program.end()
+    each.end()
     shutil.rmtree(work, ignore_errors=True)
     print(f"{len(rows)} sessions, {made} reprocessed")
     return rows

@@ -71,15 +71,19 @@ TEST_F(RunEach, KillsAtTheLimitAndGoesOn) {
 }
 
 TEST_F(RunEach, EndsAtALineThatIsNone) {
-  for (const std::string bad : {"x", "{}", R"({"arguments": "a", "limit_s": 1})",
-                                R"({"arguments": ["a"], "limit_s": "b"})"}) {
+  for (const std::string bad :
+       {"x", "{}", R"({"arguments": "a", "limit_s": 1})", R"({"arguments": ["a"], "limit_s": "b"})",
+        R"({"arguments": ["a"], "limit_s": 0})", R"({"arguments": ["a"], "limit_s": -1})",
+        R"({"arguments": ["a"], "limit_s": 4294967297})",
+        R"({"arguments": ["a"], "limit_s": 0.5})"}) {
     const auto [code, output, errors] = run(line("nowhere") + bad + "\n" + line("nowhere"));
     EXPECT_EQ(code, 2);
     EXPECT_EQ(answers(output).size(), 1U);
-    EXPECT_EQ(errors,
-              "vlp-calibrate: error: stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": "
-              "N}: " +
-                  bad + "\n");
+    EXPECT_EQ(
+        errors,
+        "vlp-calibrate: error: stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": 1 to "
+        "86400}: " +
+            bad + "\n");
   }
   EXPECT_EQ(run("").exit_code, 0);
   const auto with_more = run_program("vlp-calibrate a -o b --each");

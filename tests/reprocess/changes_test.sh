@@ -73,15 +73,24 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   grep -q '6 images skipped; the first, 0006.png: cannot be read as an image: it is cut short' "$page" || fail "no skipped images"
   grep -q "$lost</td><td>lamps.yaml</td><td>lost its result" "$page" || fail "no inputs that changed"
   grep -q '^camera-00001,session-01,look,.*,6,,.*,2026-03-14,' "$looked/summary.csv" || fail "$(cat "$looked/summary.csv")"
-  for time in first again; do
+  for runs in '1 runs taken, 0 were there' '0 runs taken, 1 were there'; do
     "$bin/vlp-station" import "$looked" --records "$scratch/looked.db" >"$said" 2>"$scratch/errors" || fail "$(cat "$scratch/errors")"
-    grep -q '^1 runs of station looked-results' "$said" || fail "$time: $(cat "$said")"
-    grep -q ' 1 sessions are left out: when they were taken' "$scratch/errors" || fail "$time: $(cat "$scratch/errors")"
+    grep -q "^station looked-results: $runs" "$said" || fail "$(cat "$said")"
+    grep -q ' 1 sessions are left out: when they were taken' "$scratch/errors" || fail "$(cat "$scratch/errors")"
   done
   "$bin/vlp-station" list --records "$scratch/looked.db" >"$said"
   grep -q '2026-03-14T00:00:00Z *PASS .* looked-results *camera-00001' "$said" || fail "$(cat "$said")"
   "$bin/vlp-station" show --records "$scratch/looked.db" | grep -q '^mean_mm ' || fail "no figures"
-  rm "$scratch/looked.db"
+  "$bin/vlp-station" export --records "$scratch/looked.db" -o "$scratch/looked.csv" >"$said"
+  head -n 1 "$scratch/looked.csv" | grep -q ',mean_mm,' || fail "no errors of fixes in $(cat "$scratch/looked.csv")"
+  # Another result: what is there stays, and it is said.
+  mkdir -p "$scratch/other"
+  cp -r "$looked" "$scratch/other/"
+  sed -i 's/^\(camera-00001.*,\)[0-9a-f]\{64\},\([0-9.]*\)$/\1another,\2/' "$scratch/other/looked-results/summary.csv"
+  code=0
+  "$bin/vlp-station" import "$scratch/other/looked-results" --records "$scratch/looked.db" >"$said" 2>"$scratch/errors" || code=$?
+  [ "$code" = 2 ] && grep -q '1 sessions, the first 20260314T000000Z-.* have another result' "$scratch/errors" || fail "$code $(cat "$scratch/errors")"
+  rm -r "$scratch/looked.db" "$scratch/looked.csv" "$scratch/other"
   grep -q '^camera-00001,session-01,2026-03-14,hall,' "$looked/fleet.csv" || fail "$(cat "$looked/fleet.csv")"
   [ "$(grep -c '^hall,[0-9a-f]\{12\},[1-6],camera-00001,session-01,2026-03-14,' "$looked/lamps.csv")" = 6 ] || fail "six lamps"
 

@@ -52,7 +52,7 @@ class Shard(unittest.TestCase):
                 (Path(name) / "boards/0.png").write_text(text)
             made = []
 
-            def calibrate(run, program, name, work):
+            def calibrate(run, each, name, work):
                 (work / name).mkdir(parents=True)
                 made.append(name)
                 return {"camera": "c", "session": name[-1], "verdict": "pass"}, "0.5"
@@ -89,12 +89,12 @@ exit 5
 """)
             program.chmod(0o755)
             with open(Path(folder) / "lock", "w") as lock:
-                calibrate = shard.Calibrate(program, lock)
-                self.assertEqual(calibrate(["dies"]), (-9, 0, ""))
-                one, two = calibrate(["lives"]), calibrate([Path("lives")])
+                each = shard.EachProcess(program, lock)
+                self.assertEqual(each(["dies"]), (-9, 0, ""))
+                one, two = each(["lives"]), each([Path("lives")])
                 self.assertEqual(one[:2], (3, 0.25))
                 self.assertEqual(one, two)  # the same process
-                self.assertEqual(calibrate.end(), 5)  # which had nothing more to read
+                self.assertEqual(each.end(), 5)  # which had nothing more to read
 
     def test_former_results_stay_by_their_keys_so_many(self):
         with tempfile.TemporaryDirectory() as folder:

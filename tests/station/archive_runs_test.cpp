@@ -23,11 +23,12 @@ using testing::SizeIs;
 class ArchiveRunsOf : public testing::Test {
  protected:
   ArchiveRunsOf() {
-    row("a,s1,look,2026-03-15,");
-    row("a,s2,pass,2026-03-14T09:30:00,");
-    row("b,s1,gate,2026-03-16,\"rms_px is 2 px, at most 1 px is asked for\"");
-    row("b,s2,no result,2026-03-17,rotation: is missing");
-    row("b,s3,pass,,");
+    row("a,s1,look,2026-03-15,,1.2.3,key");
+    row("a,s2,pass,2026-03-14T09:30:00,,1.2.3,key");
+    row("b,s1,gate,2026-03-16,\"rms_px is 2 px, at most 1 px is asked for\",1.2.3,key");
+    row("b,s2,no result,2026-03-17,rotation: is missing,1.2.3,key");
+    row("b,s3,pass,,,1.2.3,key");
+    row("b,s4,crashed,2026-03-18,vlp-calibrate ended with exit code -9,1.2.3,key");
     session("sessions/a/s1", 0.1);
     session("sessions/a/s2", 0.3);
     session("sessions/b/s1", 2);
@@ -50,19 +51,29 @@ class ArchiveRunsOf : public testing::Test {
                 R"({"name": "residual_ratio", "value": 1.25})";
     }
     write("archive/" + name + "/session.json",
-          R"({"version": "1.2.3", "metrics": [)" + metrics +
+          R"({"metrics": [)" + metrics +
               R"(], "gates": [{"name": "coverage", "limit": 0.4, "asked": "at least",)"
               R"( "value": null, "met": false}]})" +
               "\n");
   }
 
+  std::vector<RunRecord> runs() const {
+    std::vector<RunRecord> all;
+    for (const auto& session : sessions_of_archive(folder / "archive").sessions) {
+      all.push_back(run_of(session));
+    }
+    return all;
+  }
+
   TemporaryFolder folder;
-  std::string summary = "camera,session,verdict,date,reason\n";
+  std::string summary = "camera,session,verdict,date,reason,version,key\n";
 };
 
 TEST_F(ArchiveRunsOf, AreThoseWithADateInTheirOrder) {
-  const auto [runs, undated] = runs_of_archive(folder / "archive");
-  EXPECT_EQ(undated, 1U);
+  const auto archive = sessions_of_archive(folder / "archive");
+  EXPECT_EQ(archive.undated, 1U);
+  EXPECT_EQ(archive.crashed, 1U);
+  const auto runs = this->runs();
   ASSERT_THAT(runs, SizeIs(4));
   EXPECT_EQ(runs[0].ended_utc, "2026-03-14T09:30:00Z");
   EXPECT_EQ(begun_utc(runs[0].run), runs[0].ended_utc);
@@ -70,13 +81,15 @@ TEST_F(ArchiveRunsOf, AreThoseWithADateInTheirOrder) {
   EXPECT_THAT((std::vector{runs[0].verdict, runs[1].verdict, runs[2].verdict, runs[3].verdict}),
               ElementsAre("PASS", "PASS", "FAIL", "INVALID"));
   EXPECT_EQ(runs[0].station, "archive");
-  EXPECT_EQ(runs_of_archive(folder / "archive/").runs[0].station, "archive");
+  EXPECT_EQ(sessions_of_archive(folder / "archive/").sessions[0].run.station, "archive");
+  EXPECT_EQ(runs[0].config_sha256, "key");
   EXPECT_EQ(runs[1].calibration, "format: vlp-calibration/1\n");
   EXPECT_EQ(runs[2].first_cause(), "rms_px is 2 px, at most 1 px is asked for");
   EXPECT_EQ(runs[3].program, "vlp-calibrate 1.2.3");
   ASSERT_THAT(runs[2].figures, SizeIs(4));
   EXPECT_EQ(runs[2].figures[0].value, 2);
   EXPECT_FALSE(runs[2].figures[0].met());
+  EXPECT_EQ(runs[2].figures[0].asked, Direction::at_most);
   EXPECT_EQ(runs[2].figures[2].name, "residual_ratio");
   EXPECT_FALSE(runs[2].figures[2].limit);
   EXPECT_EQ(runs[2].figures[3].asked, Direction::at_least);
@@ -86,7 +99,7 @@ TEST_F(ArchiveRunsOf, AreThoseWithADateInTheirOrder) {
 TEST_F(ArchiveRunsOf, AreKeptOnceForTrendsAndCapability) {
   Records records((folder / "records.db").string());
   for (int time = 0; time < 2; ++time) {
-    for (const RunRecord& run : runs_of_archive(folder / "archive").runs) records.keep(run);
+    for (const RunRecord& run : runs()) records.keep(run);
   }
   EXPECT_THAT(records.list({}), SizeIs(4));
   EXPECT_THAT(values_of(judged_values(records, "rms_px", {})), ElementsAre(0.3, 0.1, 2));
@@ -97,10 +110,12 @@ TEST_F(ArchiveRunsOf, AreKeptOnceForTrendsAndCapability) {
 }
 
 TEST_F(ArchiveRunsOf, OfWhatIsNotWrittenByReprocessingAreRefused) {
-  EXPECT_THAT(refusal_of([&] { runs_of_archive(folder / "none"); }), HasSubstr("summary.csv"));
+  EXPECT_THAT(refusal_of([&] { sessions_of_archive(folder / "none"); }), HasSubstr("summary.csv"));
   write("archive/sessions/a/s1/session.json", "{\"metrics\": 1}\n");
-  EXPECT_THAT(refusal_of([&] { runs_of_archive(folder / "archive"); }),
+  EXPECT_THAT(refusal_of([&] { runs(); }),
               HasSubstr("a/s1/session.json: is not as vlp-calibrate writes it"));
+  std::filesystem::remove(folder / "archive/sessions/a/s1/session.json");
+  EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("a/s1/session.json: cannot be opened"));
 }
 
 }  // namespace

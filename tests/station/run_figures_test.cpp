@@ -85,7 +85,7 @@ TEST_F(RunFigures, OfAStudyAreOfUnitsThatWereRunMoreThanOnce) {
   EXPECT_THROW(reference_values(judged(), {{"c", 0.2}}), std::invalid_argument);
 }
 
-TEST(UnitFigure, IsNamedAmongThoseThereAre) {
+TEST(RunFigure, IsNamedAmongThoseThereAre) {
   EXPECT_STREQ(run_figure("check_mean_mm").unit, "mm");
   EXPECT_THAT([] { run_figure("rms_mm"); },
               testing::ThrowsMessage<std::invalid_argument>(

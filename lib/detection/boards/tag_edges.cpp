@@ -238,7 +238,9 @@ std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> ta
   constexpr std::size_t asked = 8;  // tags, the widest
   constexpr double usual_gamma = 2.2;
   constexpr double better = 0.99;  // of the squares, or it is chance
-  constexpr double clearly = 1.5;  // one or the other, so that no further tag is asked
+  // One or the other, so that no further tag is asked; a glare can be on one.
+  constexpr double clearly = 1.5;
+  constexpr int fewest = 3;
   std::vector<TagEdges> found;
   std::vector<std::size_t> widest;
   for (std::size_t i = 0; i < tags.size(); ++i) {
@@ -250,10 +252,12 @@ std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> ta
   });
   widest.resize(std::min(widest.size(), asked));
   double as_it_is = 0, behind_curve = 0;
+  int told = 0;
   for (const std::size_t i : widest) {
     as_it_is += found[i].squares;
     behind_curve += fitted(tags[i], image, stripes, usual_gamma, &found[i]).squares;
-    if (std::max(behind_curve, as_it_is) > clearly * std::min(behind_curve, as_it_is)) break;
+    const auto [less, more] = std::minmax(as_it_is, behind_curve);
+    if (++told >= fewest && more > clearly * less) break;
   }
   const bool curved = behind_curve < better * as_it_is;
   std::vector<std::optional<SeenTag>> exact;

@@ -26,8 +26,9 @@ struct EdgeStripes {
 ///
 /// Behind a tone curve, level = 255 (grey / 255)^(1 / gamma), an edge is steeper on its dark side,
 /// which draws the fit there, by more the narrower the stripes are. So gamma is 2.2, about that of
-/// cameras for people, when that fits the widest tags of the image better than 1. What is left of
-/// another curve is alike all over a view, and found when the lens is (edge_shifts()).
+/// cameras for people, when that fits the widest tags of the image better than 1: three, or up to
+/// eight as long as they leave it open. What is left of another curve is alike all over a view, and
+/// found when the lens is (edge_shifts()).
 ///
 /// Nothing for a tag of which an edge looks otherwise, or a corner is more than 1.5 px, and than 3
 /// % of the tag, from where it was.
