@@ -144,20 +144,21 @@ EvaluationInput input_of(const Options& options) {
 
 std::string report_of(const CLI::App& app, const Options& options, const EvaluationInput& input,
                       const EvaluateResult& found) {
-  EvaluationReport report{input, found, found.gates, {}, {}, {}, {}, {}};
+  EvaluationReport report{input, found, {}, {}, {}};
+  report.page.gates = found.gates;
   std::vector<std::string> inputs = inputs_of(options);
   if (!options.lamps.empty()) report.lamps = read_lamp_map(options.lamps);
-  if (!options.calibration.empty()) report.calibration = read_calibration(options.calibration);
+  if (!options.calibration.empty()) report.page.calibration = read_calibration(options.calibration);
   for (const auto& [fixes, x0_m, y0_m, x1_m, y1_m] : options.report.tracks) {
     report.drives.push_back(
         {{fixes, read_fixes(fixes)}, {Eigen::Vector2d{x0_m, y0_m}, Eigen::Vector2d{x1_m, y1_m}}});
     inputs.push_back(fixes);
   }
   for (const std::string& picture : options.report.pictures) {
-    report.pictures.push_back(read_report_picture(picture));
+    report.page.pictures.push_back(read_report_picture(picture));
     inputs.push_back(picture);
   }
-  report.history = history_entry(app, inputs);
+  report.page.evaluation = history_entry(app, inputs);
   return report_page(std::move(report));
 }
 

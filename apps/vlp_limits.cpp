@@ -16,6 +16,7 @@
 #include "app.h"
 #include "capture_options.h"
 #include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"
 #include "positioning/floor_summary.h"

@@ -90,7 +90,7 @@ void train(const Options& options) {
   check_kept(classifier);
   write_lamp_classifier(options.output, classifier);
   print_labelled(labelled, classifier);
-  print_confusion(cross_validated(labelled.lights));
+  print_confusion(cross_validated(labelled.lights, train_classifier));
   warn_of_inseparable(classifier);
 }
 

@@ -8,20 +8,14 @@
 #include <span>
 #include <vector>
 
-#include "distortion.h"
-#include "fisheye.h"
 #include "lens_model.h"
-#include "spline_surface.h"
 
 namespace vlp {
 
-/// A lens: camera rays to pixels and back. The centre of the top-left pixel is (0, 0).
-///   OPENCVn, PINHOLE   pixel = f * distorted(x/z, y/z) + c       (Distortion; none for PINHOLE)
-///   STEREOGRAPHIC      pixel = f * 2 (x, y) / (|p| + z) + c
-///   OPENCV_FISHEYE     pixel = f * d(a) (x, y) / |(x, y)| + c,  a = atan2(|(x, y)|, z)  (Fisheye)
-///   SPLINED_STEREOGRAPHIC_...  pixel = f * distorted(2 (x, y) / (|p| + z)) + c  (SplineSurface)
-/// with f = (fx, fy), c = (cx, cy). All but OPENCV_FISHEYE are mrcal's LENSMODEL_... of the same
-/// names (mrcal documentation, "Lens models"). Built once; const and safe to share between threads.
+class LensFamily;  // camera/lens_family.h
+
+/// A lens: camera rays to pixels and back, by the equations of lens_model.h. Built once; const and
+/// safe to share between threads.
 class Lens {
  public:
   /// `parameters` in mrcal's order. Throws std::invalid_argument when their number is not
@@ -35,9 +29,9 @@ class Lens {
   const Eigen::Vector2d& center_px() const { return center_px_; }
 
   /// The pixel of a point (any length unit but zero). Nothing for a point that the lens model
-  /// does not describe: at or behind the camera's plane z = 0 (STEREOGRAPHIC, OPENCV_FISHEYE:
+  /// does not describe: at or behind the camera's plane z = 0 (of models that see behind it:
   /// straight behind), beyond Distortion::valid_radius, Fisheye::valid_angle_rad or
-  /// SplineSurface::reach, or not finite.
+  /// SplineSurface::reach and their like, or not finite.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const;
 
   struct Projection {
@@ -60,8 +54,7 @@ class Lens {
   std::optional<ByParameters> by_parameters(const Eigen::Vector3d& x_in_camera) const;
 
   struct Ray {
-    /// Not of unit length: z = 1 but for STEREOGRAPHIC, OPENCV_FISHEYE and splined lenses, where
-    /// z <= 1 and may be negative.
+    /// Not of unit length: z = 1 for PINHOLE and OPENCVn, z <= 1, and may be negative, for others.
     Eigen::Vector3d direction;
     Eigen::Matrix<double, 3, 2> d_direction_d_pixel;
   };
@@ -72,21 +65,11 @@ class Lens {
   std::optional<Ray> unproject(const Eigen::Vector2d& pixel) const;
 
  private:
-  std::optional<Eigen::Vector2d> undistort(const Eigen::Vector2d& distorted,
-                                           Eigen::Matrix2d& d_distorted_d_z) const;
-
-  std::optional<Ray> unproject_fisheye(const Eigen::Vector2d& plane) const;
-  std::optional<Ray> unproject_splined(const Eigen::Vector2d& plane) const;
-
   LensModel model_;
   Eigen::Vector2d focal_px_;
   Eigen::Vector2d center_px_;
-  Distortion distortion_;
-  double valid_radius_squared_;
-  Fisheye fisheye_;
-  double valid_angle_rad_;
-  /// Of a splined lens only, shared between its copies.
-  std::shared_ptr<const SplineSurface> spline_;
+  /// What tells its model from others, shared between copies.
+  std::shared_ptr<const LensFamily> family_;
 };
 
 }  // namespace vlp

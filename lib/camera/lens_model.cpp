@@ -2,31 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera/lens_model.h"
 
-#include <array>
 #include <map>
 #include <mutex>
 
+#include "camera/lens_table.h"
 #include "camera/spline_grid.h"
 
 namespace vlp {
 namespace {
-
-struct Entry {
-  LensModel model;
-  std::string_view name;
-  std::size_t parameters;
-};
-
-// In the order of the enumeration.
-constexpr std::array<Entry, 7> kModels{{{LensModel::pinhole, "LENSMODEL_PINHOLE", 4},
-                                        {LensModel::stereographic, "LENSMODEL_STEREOGRAPHIC", 4},
-                                        {LensModel::opencv4, "LENSMODEL_OPENCV4", 8},
-                                        {LensModel::opencv5, "LENSMODEL_OPENCV5", 9},
-                                        {LensModel::opencv8, "LENSMODEL_OPENCV8", 12},
-                                        {LensModel::opencv12, "LENSMODEL_OPENCV12", 16},
-                                        {LensModel::fisheye, "OPENCV_FISHEYE", 8}}};
-
-const Entry& entry_of(LensModel model) { return kModels[static_cast<std::size_t>(model)]; }
 
 /// Names of splined lenses are made when they are asked for, and kept.
 std::string_view splined_name_of(LensModel model) {
@@ -41,12 +24,13 @@ std::string_view splined_name_of(LensModel model) {
 }  // namespace
 
 std::string_view name_of(LensModel model) {
-  return is_splined(model) ? splined_name_of(model) : entry_of(model).name;
+  return is_splined(model) ? splined_name_of(model)
+                           : lens_models()[static_cast<std::size_t>(model)].name;
 }
 
 std::optional<LensModel> lens_model_from_name(std::string_view name) {
-  for (const Entry& entry : kModels) {
-    if (entry.name == name) return entry.model;
+  for (const LensModelRow& row : lens_models()) {
+    if (row.name == name) return row.model;
   }
   if (const auto grid = spline_grid_from_name(name)) return splined_lens(*grid);
   return std::nullopt;
@@ -54,14 +38,14 @@ std::optional<LensModel> lens_model_from_name(std::string_view name) {
 
 std::string lens_model_names() {
   std::string names;
-  for (const Entry& entry : kModels) names.append(entry.name).append(", ");
+  for (const LensModelRow& row : lens_models()) names.append(row.name).append(", ");
   return names + "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190 and its like";
 }
 
 std::size_t parameter_count(LensModel model) {
   constexpr std::size_t core = 4;
-  return is_splined(model) ? core + 2 * grid_of(model).control_points()
-                           : entry_of(model).parameters;
+  return core +
+         (is_splined(model) ? 2 * grid_of(model).control_points() : distortions_of(model).size());
 }
 
 }  // namespace vlp

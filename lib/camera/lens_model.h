@@ -9,13 +9,21 @@
 
 namespace vlp {
 
-/// The lens models that the toolbox evaluates itself: those of mrcal, with their parameters in
-/// mrcal's order,
+/// The lens models that the toolbox evaluates itself, with f = (fx, fy), c = (cx, cy) and the point
+/// p = (x, y, z); the centre of the top-left pixel is (0, 0):
+///   PINHOLE         pixel = f * (x/z, y/z) + c
+///   STEREOGRAPHIC   pixel = f * 2 (x, y) / (|p| + z) + c
+///   OPENCVn         pixel = f * distorted(x/z, y/z) + c  (camera/distortion.h)
+///   OPENCV_FISHEYE  pixel = f * d(a) (x, y) / |(x, y)| + c,  a = atan2(|(x, y)|, z)
+///                   (camera/fisheye.h)
+/// and each of mrcal's splined lenses, by its name,
+///   lens_model_from_name("LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190"):
+///                   pixel = f * distorted(2 (x, y) / (|p| + z)) + c  (camera/spline_surface.h)
+/// All but OPENCV_FISHEYE are mrcal's LENSMODEL_... of the same names (mrcal documentation, "Lens
+/// models"). Parameters are in mrcal's order,
 ///   fx fy cx cy  then, for OPENCVn, the first n of  k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4,
-/// and OPENCV_FISHEYE, which mrcal does not have:  fx fy cx cy k1 k2 k3 k4  (camera/fisheye.h).
-/// Each of mrcal's splined lenses is one more, by its name,
-///   lens_model_from_name("LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190"),
-/// of fx fy cx cy and the control points, x and y in turn, row by row.
+///   for OPENCV_FISHEYE  k1 k2 k3 k4,  for splined lenses the control points, x and y in turn, row
+///   by row.
 enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv12, fisheye };
 
 /// mrcal's name, for example "LENSMODEL_OPENCV8", or "OPENCV_FISHEYE". It stays where it is.

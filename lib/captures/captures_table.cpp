@@ -4,6 +4,7 @@
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
+#include "captures/number_text.h"
 
 namespace vlp {
 namespace {

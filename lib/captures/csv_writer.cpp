@@ -4,17 +4,8 @@
 
 #include <csv.h>
 
-#include <array>
-#include <charconv>
-
 namespace vlp {
 namespace {
-
-std::string formatted(double value, std::chars_format format, int digits) {
-  std::array<char, 400> text;  // the longest double with a few digits after the point
-  const auto end = std::to_chars(text.begin(), text.end(), value, format, digits).ptr;
-  return {text.begin(), end};
-}
 
 std::string quoted(std::string_view field) {
   std::string text(2 * field.size() + 2, '\0');
@@ -60,14 +51,6 @@ void CsvWriter::save() {
 void CsvWriter::save_unsynced() {
   write_waiting();
   file_.save_unsynced();
-}
-
-std::string fixed(double value, int digits) {
-  return formatted(value, std::chars_format::fixed, digits);
-}
-
-std::string significant(double value, int digits) {
-  return formatted(value, std::chars_format::general, digits);
 }
 
 }  // namespace vlp

@@ -42,9 +42,4 @@ class CsvWriter {
   std::string waiting_;
 };
 
-/// A number with so many digits after the point.
-std::string fixed(double value, int digits);
-/// A number with so many significant digits.
-std::string significant(double value, int digits);
-
 }  // namespace vlp

@@ -6,6 +6,7 @@
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
+#include "captures/number_text.h"
 
 namespace vlp {
 

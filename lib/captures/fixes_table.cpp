@@ -10,6 +10,7 @@
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "captures/name_index.h"
 #include "rig/yaml_text.h"
 

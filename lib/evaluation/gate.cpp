@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "rig/yaml_reader.h"
 
 namespace vlp {

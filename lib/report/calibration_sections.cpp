@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "geometry/angles.h"
 #include "report/html.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "report/calibration_sections.h"
 #include "report/html.h"
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "camera/lens_table.h"
 #include "rig/calibration_error.h"
 #include "rig/yaml_parts.h"
 
@@ -203,9 +204,10 @@ HistoryEntry read_history_entry(YamlMap map) {
 }  // namespace
 
 std::vector<std::string> parameter_names(const Camera& camera, const Adjustment& adjustment) {
-  constexpr std::array lens{"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2",
-                            "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"};
-  std::vector<std::string> names(lens.begin(), lens.begin() + stated_intrinsics(camera));
+  std::vector<std::string> names{"fx", "fy", "cx", "cy"};
+  for (const auto& distortion : distortions_of(camera.lens_model)) {
+    names.emplace_back(distortion.name);
+  }
   names.insert(names.end(), {"zenith_x", "zenith_y", "lever_arm_x_m", "lever_arm_y_m"});
   for (const Adjustment::Place& lamp : adjustment.lamps) {
     const std::string prefix = "lamp_" + std::to_string(lamp.id);

@@ -10,7 +10,6 @@
 #include "evaluation/sample_size_warnings.h"
 #include "report/evaluation_figures.h"
 #include "report/evaluation_pictures.h"
-#include "report/report.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -76,18 +75,15 @@ EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Ga
 }
 
 std::string report_page(EvaluationReport subject) {
-  Report report;
-  report.gates = std::move(subject.gates);
+  Report& report = subject.page;
   report.caution = subject.result.caution;
   report.figures = report_figures(subject.result.evaluation);
   report.notes = report_notes(subject.result.evaluation);
   report.title = "Accuracy report: " + subject.input.fixes.file.filename().string();
-  report.calibration = std::move(subject.calibration);
   if (report.calibration && !report.calibration->camera.id.empty()) {
     report.title = "Accuracy report: " + report.calibration->camera.id;
   }
   for (const Drive& drive : subject.drives) add_drive(report, drive);
-  for (ReportPicture& picture : subject.pictures) report.pictures.push_back(std::move(picture));
   for (auto& picture :
        evaluation_pictures(subject.input, subject.result.evaluation, subject.lamps)) {
     report.pictures.push_back(std::move(picture));
@@ -96,7 +92,6 @@ std::string report_page(EvaluationReport subject) {
     auto budget = budget_picture(subject.input.fixes.rows, subject.lamps, *report.calibration);
     if (budget) report.pictures.push_back(std::move(*budget));
   }
-  report.evaluation = std::move(subject.history);
   report.evaluation->part = "evaluation";
   return report_html(report);
 }

@@ -8,7 +8,7 @@
 
 #include "evaluation/evaluation.h"
 #include "evaluation/gate.h"
-#include "report/report_picture.h"
+#include "report/report.h"
 #include "session/step_result.h"
 
 namespace vlp {
@@ -37,16 +37,14 @@ struct Drive {
 struct EvaluationReport {
   const EvaluationInput& input;
   const EvaluateResult& result;
-  /// All gates, of the steps before, too.
-  std::vector<CheckedMetric> gates;
   LampMap lamps;
-  std::optional<Calibration> calibration;
   std::vector<Drive> drives;
-  std::vector<ReportPicture> pictures;
-  HistoryEntry history;
+  /// What else it shows: all gates, of the steps before, too; the calibration, its pictures, how
+  /// the fixes were evaluated. report_page() adds title, figures, notes and pictures of the fixes.
+  Report page;
 };
 
-/// The report's page, report_html(). Throws InputError when no line can be fitted to a drive.
+/// report_html() of all of it. Throws InputError when no line can be fitted to a drive.
 std::string report_page(EvaluationReport report);
 
 }  // namespace vlp

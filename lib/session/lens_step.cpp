@@ -11,7 +11,7 @@
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
-#include "camera/spline_grid.h"
+#include "camera/spline_surface.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
 #include "report/plots/calibration_plots.h"

@@ -524,10 +524,13 @@ class SessionRun {
               write_file(out("evaluation.json"), json_of(found.evaluation, found.gates));
               if (!all.empty()) write_file(out("gates.xml"), junit_of(all));
               if (!options_.report) return;
-              write_file(
-                  out("report.html"),
-                  report_page({*input, found, all, read_lamp_map(lamps_file()), result_.calibration,
-                               drives, pictures(), history("", inputs)}));
+              Report page;
+              page.gates = all;
+              page.calibration = result_.calibration;
+              page.pictures = pictures();
+              page.evaluation = history("", inputs);
+              write_file(out("report.html"),
+                         report_page({*input, found, read_lamp_map(lamps_file()), drives, page}));
             }};
   }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "geometry/angles.h"
 #include "simulation/truth.h"
 

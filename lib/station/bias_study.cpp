@@ -11,7 +11,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "captures/csv_writer.h"
 #include "report/plots/gnuplot.h"
 #include "report/plots/plot_parts.h"
 #include "station/distributions.h"

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "positioning/common_errors.h"
 #include "report/calibration_sections.h"
 #include "report/html.h"

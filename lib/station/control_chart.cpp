@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "report/plots/gnuplot.h"
 #include "report/plots/plot_parts.h"
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "station/json_number.h"

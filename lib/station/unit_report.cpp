@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "report/report.h"
 
 namespace vlp {

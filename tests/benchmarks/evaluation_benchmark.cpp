@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "evaluation/evaluation.h"
 #include "support/random.h"
 

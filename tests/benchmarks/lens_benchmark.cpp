@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "camera/lens.h"
+#include "camera/spline_grid.h"
 #include "support/mrcal_oracle.h"
 #include "support/random.h"
 

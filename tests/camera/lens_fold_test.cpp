@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "camera/distortion.h"
 #include "camera/random_lens.h"
 #include "support/near.h"
 

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "camera/fisheye.h"
+
 namespace vlp {
 namespace {
 

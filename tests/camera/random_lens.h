@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "camera/lens.h"
+#include "camera/spline_surface.h"
 #include "support/mrcal_oracle.h"
 #include "support/random.h"
 

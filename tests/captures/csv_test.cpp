@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 
-#include <limits>
-
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
 #include "support/refused.h"
@@ -120,14 +118,6 @@ TEST_F(Csv, WritesWhatItReads) {
   for (std::size_t row = 0; row < fields.size(); ++row) {
     EXPECT_EQ(table.text(row, table.required("one")), fields[row]);
   }
-}
-
-TEST(CsvNumbers, HaveTheDigitsAskedFor) {
-  EXPECT_EQ(fixed(1.0 / 3, 4), "0.3333");
-  EXPECT_EQ(fixed(-2e-12, 9), "-0.000000000");
-  EXPECT_EQ(significant(1234.5678, 6), "1234.57");
-  EXPECT_EQ(significant(1.5e-7, 6), "1.5e-07");
-  EXPECT_GT(fixed(std::numeric_limits<double>::max(), 9).size(), 300);
 }
 
 }  // namespace

@@ -10,9 +10,9 @@
 #include <random>
 #include <thread>
 
-#include "rig/child_process.h"
 #include "rig/file.h"
 #include "rig/samples.h"
+#include "support/child_process.h"
 
 namespace vlp {
 namespace {
@@ -113,8 +113,7 @@ TEST(WriteFile, KilledAtAnyMomentLeavesTheOldFileOrTheNew) {
       for (std::size_t i = last + 1;; ++i) write_file(file, contents[i % 2]);
     });
     std::this_thread::sleep_for(time_of_two_writes * double(random() % 1000) / 1000);
-    ::kill(child, SIGKILL);
-    ::waitpid(child, nullptr, 0);
+    kill_child(child);
     const std::string found = folder.content_of(file);
     ASSERT_TRUE(found == contents[0] || found == contents[1]) << found.size() << " bytes";
     const std::size_t now = found == contents[0] ? 0 : 1;

@@ -13,8 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "rig/child_process.h"
 #include "station/export_runs.h"
+#include "support/child_process.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -133,8 +133,7 @@ TEST_F(HookTest, HoldsItsLockWhenItsStationIsKilled) {
     return is();
   };
   ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(folder / "begun"); }));
-  ::kill(station, SIGKILL);
-  ::waitpid(station, nullptr, 0);
+  kill_child(station);
   EXPECT_FALSE(HookLock(folder / ".", name).held());
   folder.file("end", "");
   EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).held(); }));

@@ -6,11 +6,8 @@
 
 #include <span>
 
-#include "captures/detections_table.h"
 #include "positioning/positioner.h"
-#include "rig/calibration.h"
-#include "rig/lamp_map.h"
-#include "support/datasets.h"
+#include "support/example_rig.h"
 
 namespace vlp {
 namespace {
@@ -19,12 +16,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// The example: five lamps seen from 36 places with 0.05 px of noise.
-struct LampFaults : testing::Test {
-  LampMap map = read_lamp_map(kExample + "lamps.yaml");
-  Calibration calibration = read_calibration(kExample + "calibration.yaml");
-  std::vector<Frame> frames = read_detections(kExample + "detections.csv");
-};
+struct LampFaults : ExampleRig {};
 
 TEST_F(LampFaults, AreNoneWhereTheMapFits) {
   EXPECT_THAT(lamp_faults(frames, map, calibration), IsEmpty());

@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-#include "support/datasets.h"
+#include "support/example_rig.h"
 
 namespace vlp {
 namespace {
@@ -16,12 +16,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// The example: five lamps seen from 36 places with 0.05 px of noise.
-struct LensFaultTest : testing::Test {
-  LampMap map = read_lamp_map(kExample + "lamps.yaml");
-  Calibration calibration = read_calibration(kExample + "calibration.yaml");
-  std::vector<Frame> frames = read_detections(kExample + "detections.csv");
-};
+struct LensFaultTest : ExampleRig {};
 
 TEST_F(LensFaultTest, IsNoneOfTheLensThatTheLampsWereSeenThrough) {
   EXPECT_EQ(lens_fault(frames, map, calibration), "");

@@ -4,7 +4,6 @@
 #include "station/spool.h"
 
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -13,10 +12,10 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "rig/child_process.h"
 #include "sample_records.h"
 #include "station/export_runs.h"
 #include "station/station_config.h"
+#include "support/child_process.h"
 #include "support/postgres_server.h"
 #include "support/refused.h"
 #include "support/schema.h"
@@ -172,11 +171,7 @@ void check_two_writers(const std::string& where) {
       }
     }));
   }
-  for (const pid_t child : children) {
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    EXPECT_EQ(status, 0);
-  }
+  EXPECT_TRUE(end_well(children));
   Records records(where);
   const auto runs = records.list({});
   EXPECT_THAT(runs, SizeIs(2 * each));

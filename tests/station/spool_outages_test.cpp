@@ -4,11 +4,9 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/mount.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
-#include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <set>
@@ -16,8 +14,8 @@
 #include <thread>
 
 #include "numbered_runs.h"
-#include "rig/child_process.h"
 #include "station/spool.h"
+#include "support/child_process.h"
 #include "support/postgres_server.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
@@ -116,9 +114,7 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
     });
     const int wait_us = static_cast<int>(1e6 * random.uniform(0, 0.25));
     std::this_thread::sleep_for(std::chrono::microseconds(wait_us));
-    ::kill(child, SIGKILL);
-    int status = 0;
-    ::waitpid(child, &status, 0);
+    kill_child(child);
   }
   Spool spool(folder / "spool", where);
   spool.prepare();
@@ -233,11 +229,7 @@ TEST(Spool, OfEightStationsOnOneServerLosesNothing) {
       }
     }));
   }
-  for (const pid_t child : children) {
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    EXPECT_EQ(status, 0);
-  }
+  EXPECT_TRUE(end_well(children));
   for (int station = 0; station < stations; ++station) {
     // Nobody had to wait longer than it may, unless this machine has much else to do.
     Spool spool = spool_of(station);

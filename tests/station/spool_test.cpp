@@ -10,7 +10,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <csignal>
 #include <cstdlib>
 #include <functional>
 #include <set>
@@ -18,9 +17,9 @@
 #include <thread>
 
 #include "numbered_runs.h"
-#include "rig/child_process.h"
 #include "station/database_name.h"
 #include "station/station_config.h"
+#include "support/child_process.h"
 #include "support/postgres_server.h"
 #include "support/random.h"
 #include "support/refused.h"
@@ -242,8 +241,7 @@ bool on_another_machine(const Action& action) {
     if (::sethostname(name.data(), name.size()) != 0) ::_exit(not_permitted);
     action();
   });
-  int status = 0;
-  ::waitpid(child, &status, 0);
+  const int status = status_of(child);
   const bool permitted = WEXITSTATUS(status) != not_permitted;
   EXPECT_TRUE(!permitted || status == 0);
   return permitted;
@@ -323,11 +321,7 @@ TEST(Spool, OfSeveralProgramsLosesNothing) {
       }
     }));
   }
-  for (const pid_t child : children) {
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    EXPECT_EQ(status, 0);
-  }
+  EXPECT_TRUE(end_well(children));
   spool.deliver();
   EXPECT_EQ(spool.state(), "");
   EXPECT_THAT(whole_runs(where), SizeIs(40));

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "captures/detections_table.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"

@@ -196,7 +196,7 @@ std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem) {
   return pixels;
 }
 
-bool has_mrcal(LensModel model) { return model != LensModel::fisheye; }
+bool has_mrcal(LensModel model) { return name_of(model).starts_with("LENSMODEL_"); }
 
 bool solve(BoardProblem& problem, const SolveFor& what) {
   return has_mrcal(problem.lens_model) ? solve_by_mrcal(problem, what)

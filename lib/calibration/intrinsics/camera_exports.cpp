@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "camera/spline_grid.h"
+#include "calibration/intrinsics/board_problem.h"
 #include "rig/yaml_text.h"
 
 namespace vlp {
@@ -36,6 +36,22 @@ std::vector<double> distortions_of(const Camera& camera, std::size_t least) {
                               std::string(name_of(camera.lens_model)) + "; take --lens " + known);
 }
 
+/// ROS's name of the distortion; nullptr where it has none.
+const char* ros_distortion(LensModel model) {
+  switch (model) {
+    case LensModel::pinhole:
+    case LensModel::opencv4:
+    case LensModel::opencv5:
+      return "plumb_bob";
+    case LensModel::opencv8:
+      return "rational_polynomial";
+    case LensModel::fisheye:
+      return "equidistant";
+    default:
+      return nullptr;
+  }
+}
+
 std::string opencv_matrix(const char* name, int rows, const std::vector<double>& values) {
   const std::size_t cols = values.size() / static_cast<std::size_t>(rows);
   std::string text(name);
@@ -49,21 +65,16 @@ std::string opencv_matrix(const char* name, int rows, const std::vector<double>&
 
 std::string ros_camera_info(const Camera& camera) {
   const LensModel model = camera.lens_model;
-  if (model == LensModel::stereographic || model == LensModel::opencv12 || is_splined(model)) {
-    refuse(camera, "ROS", "LENSMODEL_OPENCV8 or OPENCV_FISHEYE");
-  }
-  const bool rational = model == LensModel::opencv8, fisheye = model == LensModel::fisheye;
-  const std::size_t count = rational ? 8 : fisheye ? 4 : 5;
+  const char* const distortion = ros_distortion(model);
+  if (distortion == nullptr) refuse(camera, "ROS", "LENSMODEL_OPENCV8 or OPENCV_FISHEYE");
+  const std::size_t count = model == LensModel::opencv8 ? 8 : model == LensModel::fisheye ? 4 : 5;
   const auto& p = camera.intrinsics;
   std::string text = "image_width: " + std::to_string(camera.imager_px[0]);
   text.append("\nimage_height: ").append(std::to_string(camera.imager_px[1]));
   text.append("\ncamera_name: ").append(in_quotes(camera.id));
   text.append("\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: ")
       .append(list_of(matrix_of(camera)));
-  text.append("\ndistortion_model: ")
-      .append(rational  ? "rational_polynomial"
-              : fisheye ? "equidistant"
-                        : "plumb_bob");
+  text.append("\ndistortion_model: ").append(distortion);
   text.append("\ndistortion_coefficients:\n  rows: 1\n  cols: ").append(std::to_string(count));
   text.append("\n  data: ").append(list_of(distortions_of(camera, count)));
   text.append("\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: ");
@@ -89,7 +100,7 @@ std::string kalibr_camchain(const Camera& camera) {
 }
 
 std::string opencv_camera(const Camera& camera) {
-  if (camera.lens_model == LensModel::stereographic || is_splined(camera.lens_model)) {
+  if (ros_distortion(camera.lens_model) == nullptr && camera.lens_model != LensModel::opencv12) {
     refuse(camera, "OpenCV", "LENSMODEL_OPENCV8 or OPENCV_FISHEYE");
   }
   std::string text = "%YAML:1.0\n---\nimage_width: " + std::to_string(camera.imager_px[0]);
@@ -101,7 +112,7 @@ std::string opencv_camera(const Camera& camera) {
 }
 
 std::string mrcal_cameramodel(const Camera& camera) {
-  if (camera.lens_model == LensModel::fisheye) refuse(camera, "mrcal", "LENSMODEL_OPENCV8");
+  if (!has_mrcal(camera.lens_model)) refuse(camera, "mrcal", "LENSMODEL_OPENCV8");
   std::string text = "{\n    'lensmodel':  '";
   text.append(name_of(camera.lens_model)).append("',\n    'intrinsics': ");
   text.append(list_of(camera.intrinsics));

@@ -19,6 +19,7 @@
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/spline_fit.h"
+#include "camera/spline_grid.h"
 #include "geometry/symmetric.h"
 #include "rig/input_error.h"
 

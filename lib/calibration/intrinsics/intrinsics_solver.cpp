@@ -15,6 +15,7 @@
 #include "calibration/intrinsics/rotation_vector.h"
 #include "calibration/intrinsics/spline_fit.h"
 #include "calibration/intrinsics/view_pose.h"
+#include "camera/lens_table.h"
 #include "camera/spline_grid.h"
 #include "geometry/median.h"
 
@@ -111,17 +112,16 @@ bool IntrinsicsSolver::turn_to_axis() {
 
 bool IntrinsicsSolver::refine() {
   constexpr int rounds = 6;
+  constexpr std::size_t core = 4;
   problem_.lens_model = input_.lens_model;
   // Of a splined lens the core would move against all control points at once; mrcal keeps it, too.
   if (is_splined(input_.lens_model)) solved_for_.core = false;
-  if (input_.lens_model == LensModel::fisheye) {
-    // 2 tan(a / 2) = a (1 + a^2 / 12 + ...): the same lens.
-    problem_.intrinsics.insert(problem_.intrinsics.end(),
-                               {1 / 12.0, 1 / 120.0, 17 / 20160.0, 31 / 362880.0});
+  const std::size_t given = problem_.intrinsics.size();
+  problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
+  const auto distortions = distortions_of(input_.lens_model);
+  for (std::size_t i = given; i < core + distortions.size(); ++i) {
+    problem_.intrinsics[i] = distortions[i - core].start;
   }
-  // Zero would be a stationary point of some of them.
-  const double tiny = is_splined(input_.lens_model) ? 0 : 1e-6;
-  problem_.intrinsics.resize(parameter_count(input_.lens_model), tiny);
   bool settled = false;
   for (int round = 0; round < rounds; ++round) {
     if (!solve(solved_for_)) return false;

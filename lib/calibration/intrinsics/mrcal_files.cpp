@@ -10,7 +10,7 @@
 
 #include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/numpy_archive.h"
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "rig/file.h"
 #include "rig/yaml_text.h"
 

@@ -4,6 +4,8 @@
 
 #include <Eigen/SparseCholesky>
 
+#include "camera/spline_surface.h"
+
 namespace vlp {
 namespace {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "geometry/angles.h"
 
 namespace vlp {

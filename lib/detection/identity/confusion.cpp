@@ -46,14 +46,14 @@ Confusion confusion_of(const LampClassifier& classifier, std::span<const Labelle
   return confusion;
 }
 
-Confusion cross_validated(std::span<const LabelledLight> lights) {
+Confusion cross_validated(std::span<const LabelledLight> lights, const TrainClassifier& train) {
   Confusion confusion = empty_confusion(lights);
   for (int fold = 0; fold < kFolds; ++fold) {
     std::vector<LabelledLight> others, held_out;
     for (const LabelledLight& light : lights) {
       (light.image % kFolds == std::size_t(fold) ? held_out : others).push_back(light);
     }
-    const LampClassifier classifier = train_classifier(others);
+    const LampClassifier classifier = train(others);
     for (const LabelledLight& light : held_out) judge(classifier, light, confusion);
   }
   return confusion;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -29,8 +30,10 @@ Confusion confusion_of(const LampClassifier& classifier, std::span<const Labelle
 /// Parts that the lights are held out in.
 inline constexpr int kFolds = 5;
 
+using TrainClassifier = std::function<LampClassifier(std::span<const LabelledLight>)>;
+
 /// Each fifth of the images (every fifth one, so that the answer is always the same) judged by a
-/// classifier that was trained on the others. `lights` as for train_classifier().
-Confusion cross_validated(std::span<const LabelledLight> lights);
+/// classifier that `train` made of the others. `lights` as for train_classifier().
+Confusion cross_validated(std::span<const LabelledLight> lights, const TrainClassifier& train);
 
 }  // namespace vlp

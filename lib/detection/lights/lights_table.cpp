@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "captures/csv_writer.h"
+#include "captures/number_text.h"
 
 namespace vlp {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "captures/name_index.h"
 #include "rig/input_error.h"
 

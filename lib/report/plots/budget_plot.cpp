@@ -9,7 +9,7 @@
 #include <cassert>
 #include <numeric>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "report/plots/plot_parts.h"
 
 namespace vlp {

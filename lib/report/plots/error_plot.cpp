@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "report/plots/plot_parts.h"
 #include "report/plots/round_numbers.h"
 #include "report/plots/thinning.h"

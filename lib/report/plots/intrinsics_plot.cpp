@@ -6,7 +6,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 #include "report/plots/plot_parts.h"
 #include "report/plots/round_numbers.h"
 

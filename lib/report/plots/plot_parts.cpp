@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "report/plots/plot_parts.h"
 
-#include "captures/csv_writer.h"
+#include "captures/number_text.h"
 
 namespace vlp {
 

@@ -112,7 +112,7 @@ TEST(LampClassifier, DoesNotDependOnTheOrderOfTheLights) {
 }
 
 TEST(CrossValidation, JudgesEachLightOnce) {
-  const Confusion confusion = cross_validated(lights_of(kLamps, 40, 1));
+  const Confusion confusion = cross_validated(lights_of(kLamps, 40, 1), train_classifier);
   EXPECT_EQ(confusion.counts.sum(), 120);
   EXPECT_EQ(confusion.wrong(), 0);
   EXPECT_GE(confusion.right(), 117);
@@ -123,9 +123,19 @@ TEST(CrossValidation, HoldsOutWhatItJudges) {
   auto lights = lights_of(kLamps, 40, 1);
   std::erase_if(lights,
                 [](const LabelledLight& light) { return light.lamp == 9 && light.image % 5 != 0; });
-  const Confusion confusion = cross_validated(lights);
+  const Confusion confusion = cross_validated(lights, train_classifier);
   EXPECT_EQ(confusion.counts(2, 2), 0);
   EXPECT_EQ(confusion.counts(2, 3), 8);
+}
+
+TEST(CrossValidation, IsOfTheClassifierThatIsGiven) {
+  const auto mistaken = [](std::span<const LabelledLight> lights) {
+    LampClassifier classifier = train_classifier(lights);
+    std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);
+    return classifier;
+  };
+  const Confusion confusion = cross_validated(lights_of(kLamps, 40, 1), mistaken);
+  EXPECT_GE(confusion.wrong(), 78);
 }
 
 }  // namespace

@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <exception>
 #include <iostream>
 #include <string>
+#include <vector>
 
 namespace vlp {
 
@@ -25,6 +27,26 @@ pid_t start_child(Action action) {
     ::_exit(1);
   }
   ::_exit(0);
+}
+
+/// Waits until a child has ended; how, 0 when it did well.
+inline int status_of(pid_t child) {
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return status;
+}
+
+/// Waits until all have ended; whether each did well.
+inline bool end_well(const std::vector<pid_t>& children) {
+  bool well = true;
+  for (const pid_t child : children) well = status_of(child) == 0 && well;
+  return well;
+}
+
+/// Kills a child as no program can see coming, and waits until it is gone.
+inline void kill_child(pid_t child) {
+  ::kill(child, SIGKILL);
+  status_of(child);
 }
 
 /// What `action` throws in a process of its own, for what changes the whole process: its user,
@@ -49,9 +71,7 @@ std::string thrown_in_child(Action action) {
     message.append(block, static_cast<std::size_t>(size));
   }
   ::close(channel[0]);
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  return status == 0 ? message : "the child did not end well";
+  return status_of(child) == 0 ? message : "the child did not end well";
 }
 
 }  // namespace vlp

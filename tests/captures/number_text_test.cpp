@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/number_text.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+namespace vlp {
+namespace {
+
+TEST(NumberText, HasTheDigitsAskedFor) {
+  EXPECT_EQ(fixed(1.0 / 3, 4), "0.3333");
+  EXPECT_EQ(fixed(-2e-12, 9), "-0.000000000");
+  EXPECT_EQ(significant(1234.5678, 6), "1234.57");
+  EXPECT_EQ(significant(1.5e-7, 6), "1.5e-07");
+  EXPECT_GT(fixed(std::numeric_limits<double>::max(), 9).size(), 300);
+}
+
+}  // namespace
+}  // namespace vlp
