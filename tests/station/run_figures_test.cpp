@@ -87,9 +87,9 @@ TEST_F(RunFigures, OfAStudyAreOfUnitsThatWereRunMoreThanOnce) {
 
 TEST(RunFigure, IsNamedAmongThoseThereAre) {
   EXPECT_STREQ(run_figure("check_mean_mm").unit, "mm");
-  EXPECT_THAT([] { run_figure("rms_mm"); },
+  EXPECT_THAT([] { run_figure("rms_um"); },
               testing::ThrowsMessage<std::invalid_argument>(
-                  AllOf(HasSubstr("there is no figure rms_mm"), HasSubstr("rms_px"))));
+                  AllOf(HasSubstr("there is no figure rms_um"), HasSubstr("rms_px"))));
 }
 
 }  // namespace
