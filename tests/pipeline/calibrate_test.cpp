@@ -10,6 +10,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <sstream>
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "captures/truth_table.h"
@@ -189,6 +190,32 @@ TEST_F(SmallSession, EndsWithTheVerdictOfTheGatesEachTime) {
   const auto refused = calibrate();
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.errors, HasSubstr("gates.yaml:3: gates.coverage: should be a share"));
+}
+
+TEST_F(SmallSession, IsTheSameInAProcessThatIsSplitOff) {
+  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
+  const nlohmann::json line{{"arguments",
+                             {path("a session"), "-o", path("each"), "--no-report", "--row-time-s",
+                              "3e-5", "--readout", "rows"}},
+                            {"limit_s", 600}};
+  folder.file("lines", line.dump() + "\n" + line.dump() + "\n");
+  const auto each = run_program("vlp-calibrate --each <'" + path("lines") + "'");
+  EXPECT_EQ(each.exit_code, 0) << each.errors;
+  std::istringstream answers(each.output);
+  for (const bool as_before : {false, true}) {
+    std::string answer;
+    ASSERT_TRUE(std::getline(answers, answer));
+    const auto json = nlohmann::json::parse(answer);
+    EXPECT_EQ(json["exit_code"], 0) << answer;
+    const std::string said = json["said"];
+    EXPECT_EQ(said.find("verdict     pass"), said.rfind("verdict")) << said;
+    EXPECT_EQ(said.find("lens          as before") != std::string::npos, as_before) << said;
+  }
+  EXPECT_EQ(answers.get(), EOF);
+  for (const char* file : {"calibration.yaml", "check-fixes.csv", "session.json"}) {
+    EXPECT_EQ(TemporaryFolder::content_of(folder / (std::string("each/") + file)), result(file))
+        << file;
+  }
 }
 
 TEST_F(SmallSession, FollowsWhatIsInItsFolder) {
