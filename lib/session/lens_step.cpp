@@ -130,26 +130,69 @@ Camera camera_of(Camera camera, const BoardProblem& problem) {
   return camera;
 }
 
-/// What the grid of a splined lens lacks for boards that another model has; empty when it is wide
-/// enough.
-std::string words_of_grid(const SplineGrid& grid, const IntrinsicsSolution& of_other) {
-  const Lens lens = of_other.lens();
-  const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
+/// How far off the axis, in the stereographic plane of OPENCV_FISHEYE, boards are seen.
+struct SeenReach {
+  Eigen::Vector2d farthest{0, 0};
+  /// Boards, not only corners, that lie within the grid; and all of them.
+  std::size_t boards_within = 0, boards = 0;
+};
+
+SeenReach seen_reach(const IntrinsicsSolution& by_fisheye, const Eigen::Vector2d& grid_reach) {
+  const Lens lens = by_fisheye.lens();
+  const BoardProblem& problem = by_fisheye.problem;
+  const std::size_t points = problem.points_of_a_board();
+  SeenReach seen;
+  for (std::size_t board = 0; board < problem.poses.size(); ++board) {
+    Eigen::Vector2d of_board(0, 0);
+    for (std::size_t i = board * points; i < (board + 1) * points; ++i) {
+      if (!(problem.points[i].z() > 0)) continue;
+      const auto ray = lens.unproject(problem.points[i].head<2>());
+      if (!ray) continue;
+      const Eigen::Vector3d& x = ray->direction;
+      of_board = of_board.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
+    }
+    seen.farthest = seen.farthest.cwiseMax(of_board);
+    ++seen.boards;
+    if ((of_board.array() <= grid_reach.array()).all()) ++seen.boards_within;
+  }
+  return seen;
+}
+
+/// A grid of the same order and control points along x that goes a little beyond what is seen.
+SplineGrid wide_enough(const SplineGrid& grid, const Eigen::Vector2d& reach,
+                       const Eigen::Vector2d& farthest) {
+  constexpr double more = 1.05;
+  const Eigen::Vector2d needed = reach.cwiseMax(more * farthest);
+  SplineGrid wide = grid;
+  wide.fov_x_deg =
+      std::min(SplineGrid::kMostFov_deg,
+               static_cast<int>(std::ceil(4 * deg_from_rad(std::atan(needed.x() / 2)))));
+  const double edge = 2 * std::tan(rad_from_deg(wide.fov_x_deg) / 4);
+  wide.ny = std::min(
+      SplineGrid::kMostKnots,
+      grid.order + static_cast<int>(std::ceil((grid.nx - grid.order) * needed.y() / edge)));
+  return wide;
+}
+
+/// What the grid of a splined lens lacks for the views, by OPENCV_FISHEYE, when more than a tenth
+/// of them show the board beyond it, with which no solve succeeds but some take a minute; else
+/// empty.
+std::string why_grid_is_narrow(IntrinsicsInput input) {
+  constexpr double fits_px = 2;
+  const SplineGrid grid = grid_of(input.lens_model);
+  input.lens_model = LensModel::fisheye;
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  if (!solution.ok() || solution.rms_px > fits_px) return "";
   const Eigen::Vector2d reach =
       SplineSurface(grid, std::vector<double>(2 * grid.control_points())).reach();
-  Eigen::Vector2d seen(0, 0);
-  for (const Eigen::Vector2d& pixel : seen_px(of_other.problem)) {
-    const auto ray = lens.unproject(pixel);
-    if (!ray) continue;
-    const Eigen::Vector3d& x = ray->direction;
-    seen = seen.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
-  }
-  if ((seen.array() <= reach.array()).all()) return "";
+  const SeenReach seen = seen_reach(solution, reach);
+  if (10 * seen.boards_within >= 9 * seen.boards) return "";
+  const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
       "the control points of {} reach {:.0f} degrees off the axis to the sides and {:.0f} up and "
-      "down, but the board is seen {:.0f} and {:.0f} degrees off: take a larger fov_x_deg, or Ny",
-      name_of(grid), angle_deg(reach.x()), angle_deg(reach.y()), angle_deg(seen.x()),
-      angle_deg(seen.y()));
+      "down, but the board is seen {:.0f} and {:.0f} degrees off: take --lens {}",
+      name_of(grid), angle_deg(reach.x()), angle_deg(reach.y()), angle_deg(seen.farthest.x()),
+      angle_deg(seen.farthest.y()), name_of(wide_enough(grid, reach, seen.farthest)));
 }
 
 /// Why no lens of the model fits: the model, if another one does.
@@ -163,8 +206,6 @@ std::string why_none_fits(IntrinsicsInput input) {
     const IntrinsicsSolution solution = solve_intrinsics(input);
     if (!solution.ok() || solution.rms_px >= best_px) continue;
     best_px = solution.rms_px;
-    if (is_splined(wanted)) words = words_of_grid(grid_of(wanted), solution);
-    if (is_splined(wanted) && !words.empty()) continue;
     words = fmt::format("{} cannot be this lens, but {} fits to {:.2f} px: take --lens {}",
                         name_of(wanted), name_of(other), solution.rms_px, name_of(other));
   }
@@ -204,6 +245,14 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
     // When none fits, the camera's says why.
     if (result.choice) camera.lens_model = result.choice->model;
     views.solved.lens_model = views.held_out.lens_model = camera.lens_model;
+  }
+  if (is_splined(camera.lens_model)) {
+    const std::string narrow = why_grid_is_narrow(views.solved);
+    if (!narrow.empty()) {
+      result.fail(StepFailure::undetermined,
+                  fmt::format("{} views with the board: {}", views.solved.views.size(), narrow));
+      return result;
+    }
   }
   result.solution = solve_intrinsics(views.solved);
   const IntrinsicsSolution& solution = result.solution;

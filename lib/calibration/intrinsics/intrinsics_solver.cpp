@@ -133,9 +133,9 @@ bool IntrinsicsSolver::refine() {
   if (take_back()) {
     assemble(lens());
   } else if (settled) {
-    return true;
+    return sees_most();
   }
-  return solve(solved_for_);
+  return solve(solved_for_) && sees_most();
 }
 
 bool IntrinsicsSolver::weigh_regularization() {
@@ -257,6 +257,8 @@ void IntrinsicsSolver::assemble(const Lens& lens) {
     }
   }
 }
+
+bool IntrinsicsSolver::sees_most() const { return std::isfinite(upper_median(rms_of_views())); }
 
 std::vector<double> IntrinsicsSolver::rms_of_views() const {
   const auto residuals = residuals_of(problem_);

@@ -44,6 +44,9 @@ class IntrinsicsSolver {
   void assemble(const Lens& lens);
   /// Of the views used, in their order.
   std::vector<double> rms_of_views() const;
+  /// Whether the lens can see all corners of most views. mrcal solves for points behind the camera,
+  /// too, and goes on for long.
+  bool sees_most() const;
   /// Tries both poses of each view that fits badly, and drops the worst of those that stay bad.
   /// True when there is something to solve again.
   bool change_poses();

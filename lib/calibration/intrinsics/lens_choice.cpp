@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "calibration/intrinsics/calibration_report.h"
+#include "geometry/angles.h"
 #include "geometry/median.h"
 
 namespace vlp {
@@ -21,6 +22,23 @@ using Squares = std::vector<double>;
 /// By their number of parameters.
 constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
                              LensModel::opencv8, LensModel::opencv12};
+
+/// The angle of the corner farthest off the axis, when a lens that fits has it at 90 degrees or
+/// beyond; else 0.
+double beyond_right_angle_rad(IntrinsicsInput input) {
+  constexpr double fits_px = 2;
+  input.lens_model = LensModel::fisheye;
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  if (!solution.ok() || solution.rms_px > fits_px) return 0;
+  const Lens lens = solution.lens();
+  double least = 1;
+  for (const Eigen::Vector2d& pixel : seen_px(solution.problem)) {
+    if (const auto ray = lens.unproject(pixel)) {
+      least = std::min(least, ray->direction.normalized().z());
+    }
+  }
+  return least <= 0 ? std::acos(least) : 0;
+}
 
 /// The mean squared residual per axis of each view, from solves without it, infinite where it has
 /// no pose; nothing when a solve fails.
@@ -95,15 +113,17 @@ void leave_out_bad_views(std::vector<std::optional<Squares>>& of_models) {
 
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
   if (input.views.size() < kLeastViewsToChoose) return {};
+  LensChoice choice{};
+  choice.beyond_rad = beyond_right_angle_rad(input);
   std::vector<std::optional<Squares>> squares;
   for (const LensModel model : kModels) {
     IntrinsicsInput with_model = input;
     with_model.lens_model = model;
-    squares.push_back(judged(with_model));
+    const bool can_be = model == LensModel::fisheye || choice.beyond_rad == 0;
+    squares.push_back(can_be ? judged(with_model) : std::nullopt);
   }
   leave_out_bad_views(squares);
   constexpr double errors = 2;
-  LensChoice choice{};
   const Squares* best = nullptr;
   for (std::size_t i = 0; i < kModels.size(); ++i) {
     choice.tried.push_back({kModels[i]});
@@ -124,12 +144,18 @@ std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
 
 std::string words_of(const LensChoice& choice) {
   std::string taken, others;
+  if (choice.beyond_rad > 0) {
+    others = fmt::format(
+        "the board is seen up to {:.0f} degrees off the axis, where no "
+        "LENSMODEL_OPENCVn has rays",
+        deg_from_rad(choice.beyond_rad));
+  }
   for (const auto& [model, rms_px] : choice.tried) {
     const std::string left =
         std::isfinite(rms_px) ? fmt::format("{:.3f} px", rms_px) : std::string("no lens");
     if (model == choice.model) {
       taken = fmt::format("{}, {}", name_of(model), left);
-    } else {
+    } else if (choice.beyond_rad == 0) {
       others += fmt::format("{}{} {}", others.empty() ? "" : ", ", name_of(model), left);
     }
   }

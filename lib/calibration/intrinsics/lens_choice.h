@@ -26,6 +26,9 @@ struct LensChoice {
   LensModel model;
   /// The models tried, those with fewer parameters first, OPENCV4 before the fisheye.
   std::vector<TriedLens> tried;
+  /// How far off the axis the board is seen, by OPENCV_FISHEYE, when that is where no OPENCVn has
+  /// rays, at a right angle or beyond; else 0.
+  double beyond_rad = 0;
 };
 
 /// The lens model that the views call for, by cross-validation: the views go into three parts in
@@ -37,7 +40,8 @@ struct LensChoice {
 /// errors of that: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
 /// Classification and Regression Trees, 1984, 3.4.3, which with one error would take a model larger
 /// than the lens in one of six cases. Views that every model leaves three times the usual residual
-/// of do not count. input.lens_model is not looked at. Nothing when no model fits the views, or
+/// of do not count. No OPENCVn is solved for when OPENCV_FISHEYE fits and sees corners at 90 degrees
+/// off the axis or beyond. input.lens_model is not looked at. Nothing when no model fits the views, or
 /// there are fewer than kLeastViewsToChoose.
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input);
 

@@ -11,6 +11,7 @@
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "calibration/intrinsics/wide_views.h"
 
 namespace vlp {
 namespace {
@@ -99,6 +100,27 @@ TEST(ChooseLens, HeedsTheFewViewsThatShowTheDifference) {
 TEST(ChooseLens, NeedsSixViews) {
   EXPECT_FALSE(choose_lens(seen_through(radial_lens(), 5)));
   EXPECT_TRUE(choose_lens(seen_through(radial_lens(), 6)));
+}
+
+TEST(ChooseLens, GivesUpModelsWithoutRaysBeyondARightAngle) {
+  Random random(44);
+  const auto choice = choose_lens(wide_input(false, 24, random, kNoise_px));
+  ASSERT_TRUE(choice);
+  EXPECT_EQ(choice->model, LensModel::fisheye);
+  EXPECT_GT(choice->beyond_rad, 1.58);
+  EXPECT_LT(choice->beyond_rad, 2);
+  for (const TriedLens& tried : choice->tried) {
+    EXPECT_EQ(std::isfinite(tried.rms_px), tried.model == LensModel::fisheye);
+  }
+  EXPECT_EQ(choose_lens(seen_through(fisheye_lens(), 8))->beyond_rad, 0);
+}
+
+TEST(ChooseLens, SaysWhyOnlyAFisheyeCanBe) {
+  const LensChoice choice{
+      LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}, 1.7};
+  EXPECT_EQ(words_of(choice),
+            "OPENCV_FISHEYE, 0.051 px rms in views left out; the board is seen up to 97 degrees "
+            "off the axis, where no LENSMODEL_OPENCVn has rays");
 }
 
 TEST(ChooseLens, SaysWhichModelsCannotBe) {

@@ -25,37 +25,51 @@ struct WideBoards {
   bool all_over = false;
 };
 
-/// Views with the board anywhere up to 85 degrees off the axis, its far tags beyond 90.
+inline SyntheticViews wide_views(bool kalibr, const Eigen::Vector2d& warp_m = {0, 0}) {
+  SyntheticViews views{synthetic_board(kalibr), wide_lens(), kWideImager};
+  views.warp_m = warp_m;
+  return views;
+}
+
+/// The board anywhere up to 85 degrees off the axis, its far tags beyond 90; often too little of
+/// it.
+inline SeenBoard wide_view(const SyntheticViews& views, Random& random, double noise_px,
+                           const WideBoards& boards = {}) {
+  const double share = random.uniform(0, 1);
+  const double off_axis = 1.5 * (boards.all_over ? std::sqrt(share) : share);
+  const double around = random.uniform(-3.14, 3.14);
+  const double lean = random.uniform(-0.6, 0.6), lean_y = random.uniform(-0.6, 0.6);
+  const double roll = random.uniform(-3.14, 3.14);
+  const double distance_m = random.uniform(boards.nearest_m, boards.farthest_m);
+  const Eigen::Matrix3d towards =
+      Eigen::AngleAxisd(around, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
+      Eigen::AngleAxisd(off_axis, Eigen::Vector3d::UnitY());
+  const Eigen::Matrix3d rotation =
+      towards * Eigen::AngleAxisd(lean, Eigen::Vector3d::UnitX()).toRotationMatrix() *
+      Eigen::AngleAxisd(lean_y, Eigen::Vector3d::UnitY()) *
+      Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
+  SeenBoard seen = views.view(rotation, distance_m * towards.col(2), random, noise_px);
+  std::erase_if(seen.tags, [&](const SeenTag& tag) {
+    return std::ranges::any_of(tag.corners_px, [&](const Eigen::Vector2d& pixel) {
+      const auto ray = views.lens.unproject(pixel);
+      return !ray || std::acos(ray->direction.normalized().z()) > boards.reach_rad;
+    });
+  });
+  return seen;
+}
+
+inline bool enough_of(const SeenBoard& seen, const BoardLattice& lattice) {
+  return seen.tags.size() > 5 && lattice.enough(seen);
+}
+
 inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double noise_px,
                                   const Eigen::Vector2d& warp_m = {0, 0},
                                   const WideBoards& boards = {}) {
-  SyntheticViews views{synthetic_board(kalibr), wide_lens(), kWideImager};
-  views.warp_m = warp_m;
+  const SyntheticViews views = wide_views(kalibr, warp_m);
   IntrinsicsInput input{BoardLattice(views.board), {}, kWideImager, LensModel::fisheye};
   while (static_cast<int>(input.views.size()) < count) {
-    const double share = random.uniform(0, 1);
-    const double off_axis = 1.5 * (boards.all_over ? std::sqrt(share) : share);
-    const double around = random.uniform(-3.14, 3.14);
-    const double lean = random.uniform(-0.6, 0.6), lean_y = random.uniform(-0.6, 0.6);
-    const double roll = random.uniform(-3.14, 3.14);
-    const double distance_m = random.uniform(boards.nearest_m, boards.farthest_m);
-    const Eigen::Matrix3d towards =
-        Eigen::AngleAxisd(around, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
-        Eigen::AngleAxisd(off_axis, Eigen::Vector3d::UnitY());
-    const Eigen::Matrix3d rotation =
-        towards * Eigen::AngleAxisd(lean, Eigen::Vector3d::UnitX()).toRotationMatrix() *
-        Eigen::AngleAxisd(lean_y, Eigen::Vector3d::UnitY()) *
-        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
-    SeenBoard seen = views.view(rotation, distance_m * towards.col(2), random, noise_px);
-    std::erase_if(seen.tags, [&](const SeenTag& tag) {
-      return std::ranges::any_of(tag.corners_px, [&](const Eigen::Vector2d& pixel) {
-        const auto ray = views.lens.unproject(pixel);
-        return !ray || std::acos(ray->direction.normalized().z()) > boards.reach_rad;
-      });
-    });
-    if (seen.tags.size() > 5 && input.lattice.enough(seen)) {
-      input.views.push_back(input.lattice.corners(seen));
-    }
+    const SeenBoard seen = wide_view(views, random, noise_px, boards);
+    if (enough_of(seen, input.lattice)) input.views.push_back(input.lattice.corners(seen));
   }
   return input;
 }

@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// A splined lens whose control points end where the board is still seen.
+#include <gmock/gmock.h>
+
+#include "calibration/intrinsics/wide_views.h"
+#include "camera/spline_grid.h"
+#include "session/lens_step.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+LensResult solved_with(const SplineGrid& grid) {
+  constexpr std::size_t count = 20;
+  constexpr double noise_px = 0.05;
+  Random random(61);
+  const SyntheticViews views = wide_views(false);
+  const BoardLattice lattice(views.board);
+  LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
+  input.camera.lens_model = splined_lens(grid);
+  while (input.views.size() < count) {
+    const SeenBoard seen = wide_view(views, random, noise_px);
+    if (!enough_of(seen, lattice)) continue;
+    input.views.push_back({std::to_string(input.views.size()) + ".png", kWideImager, seen});
+  }
+  return solve_lens(input, {});
+}
+
+TEST(NarrowGrid, IsRefusedWithTheGridToTake) {
+  const LensResult result = solved_with({3, 12, 12, 100});
+  ASSERT_FALSE(result.ok());
+  EXPECT_THAT(result.why,
+              HasSubstr("control points of LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=12_"
+                        "fov_x_deg=100 reach 50 degrees off the axis to the sides and 50 up"));
+  EXPECT_THAT(result.why,
+              HasSubstr(": take --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
+}
+
+TEST(NarrowGrid, UpAndDownTakesMoreRows) {
+  const LensResult result = solved_with({3, 12, 5, 230});
+  ASSERT_FALSE(result.ok());
+  EXPECT_THAT(result.why, testing::ContainsRegex("take --lens LENSMODEL_SPLINED_"
+                                                 "STEREOGRAPHIC_order=3_Nx=12_Ny=10_"
+                                                 "fov_x_deg=230"));
+}
+
+}  // namespace
+}  // namespace vlp
