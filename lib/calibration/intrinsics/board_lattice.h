@@ -49,6 +49,13 @@ class BoardLattice {
   std::size_t index_of(std::size_t part, std::size_t point) const {
     return part * points() + point;
   }
+  /// Of which tag a point is, whose corners share its edges and so their errors; of a board of
+  /// squares each by itself.
+  std::size_t tag_of(std::size_t point) const {
+    if (squares_ || parts_ > 1) return point;
+    const auto cols = static_cast<std::size_t>(cols_);
+    return point / cols / 2 * (cols / 2) + point % cols / 2;
+  }
   /// The corners of a board of which a part is bent by so much.
   std::vector<Corner> bent(std::vector<Corner> corners,
                            const Eigen::Vector2d& warp_of_part_m) const;

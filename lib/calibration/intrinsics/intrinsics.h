@@ -69,8 +69,9 @@ struct IntrinsicsSolution {
 ///  2. STEREOGRAPHIC with every pose, and the poses again with that lens, until they stay;
 ///  3. the model wanted, regularized as mrcal does it, and the poses again (of a splined lens from
 ///     OPENCV_FISHEYE, whose centre is its centre, and then regularized for the noise that is left,
-///     instead of a pixel, which would draw it off by more than the noise does); views that fit no
-///     pose are dropped;
+///     instead of a pixel, which would draw it off by more than the noise does; without the tags of
+///     which OPENCV_FISHEYE leaves a corner elsewhere than its neighbours, to which it would bend
+///     near the rim); views that fit no pose are dropped;
 ///  4. the shift of the tags' edges taken out (edge_shifts()), and the model again, at most twice;
 ///  5. the board's warp (WarpChoice), and then the shifts of a board that bends;
 ///  6. all of it without outliers;

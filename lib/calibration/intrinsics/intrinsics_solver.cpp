@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -64,6 +65,7 @@ void IntrinsicsSolver::start_symmetric() {
   symmetric.input_.lens_model = LensModel::fisheye;
   if (!symmetric.refine()) return;  // STEREOGRAPHIC has to do
   symmetric_ = symmetric.problem_.intrinsics;
+  slips_ = symmetric.slips();
   const Lens fisheye = symmetric.lens();
   for (const std::size_t view : used_) {
     if (const auto pose = view_pose(input_.views[view], fisheye)) {
@@ -251,9 +253,12 @@ void IntrinsicsSolver::assemble(const Lens& lens) {
     for (std::size_t part = 0; part < lattice.parts(); ++part) {
       problem_.poses.push_back(lattice.pose_of_part(seeds_.poses[used_[i]], part));
     }
-    for (const auto& corner : input_.views[used_[i]]) {
-      const std::size_t board = i * lattice.parts() + corner.part;
-      problem_.points[board * lattice.points() + corner.point] << corner.pixel, corner.weight;
+    const auto& corners = input_.views[used_[i]];
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      const std::size_t board = i * lattice.parts() + corners[k].part;
+      const double sign = slips_.contains({used_[i], k}) ? -1 : 1;
+      problem_.points[board * lattice.points() + corners[k].point] << corners[k].pixel,
+          sign * corners[k].weight;
     }
   }
 }
@@ -275,6 +280,53 @@ std::vector<double> IntrinsicsSolver::rms_of_views() const {
     rms.push_back(std::isfinite(value) ? value : std::numeric_limits<double>::infinity());
   }
   return rms;
+}
+
+std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
+  constexpr std::size_t neighbours = 8;
+  constexpr double sigmas = 8, least_px = 0.1, median_of_normal = 0.6745;
+  const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
+  const auto residuals = residuals_of(problem_);
+  std::map<CornerOfView, double> apart_px;
+  std::vector<double> all_px;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    const auto& corners = input_.views[used_[i]];
+    const auto residual = [&](std::size_t k) -> const Eigen::Vector2d& {
+      return residuals[(i * parts + corners[k].part) * count + corners[k].point];
+    };
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      std::vector<std::pair<double, std::size_t>> near;
+      for (std::size_t other = 0; other < corners.size(); ++other) {
+        if (other == k || !residual(other).allFinite()) continue;
+        near.emplace_back((corners[other].in_board_m - corners[k].in_board_m).squaredNorm(), other);
+      }
+      if (near.size() < neighbours || !residual(k).allFinite()) continue;
+      std::partial_sort(near.begin(), near.begin() + neighbours, near.end());
+      double most_px = 0;
+      for (Eigen::Index axis = 0; axis < 2; ++axis) {
+        std::vector<double> beside;
+        for (std::size_t n = 0; n < neighbours; ++n) {
+          beside.push_back(residual(near[n].second)[axis]);
+        }
+        const double off_px = std::abs(residual(k)[axis] - upper_median(beside));
+        all_px.push_back(off_px);
+        most_px = std::max(most_px, off_px);
+      }
+      apart_px[{used_[i], k}] = most_px;
+    }
+  }
+  std::set<CornerOfView> found;
+  if (all_px.empty()) return found;
+  const double limit_px = std::max(least_px, sigmas * upper_median(all_px) / median_of_normal);
+  for (const auto& [slip, px] : apart_px) {
+    if (px <= limit_px) continue;
+    const auto& corners = input_.views[slip.first];
+    const std::size_t tag = input_.lattice.tag_of(corners[slip.second].point);
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      if (input_.lattice.tag_of(corners[k].point) == tag) found.insert({slip.first, k});
+    }
+  }
+  return found;
 }
 
 bool IntrinsicsSolver::change_poses() {

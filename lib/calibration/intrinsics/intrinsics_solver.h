@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
@@ -36,6 +38,9 @@ class IntrinsicsSolver {
   IntrinsicsSolution solution() const;
 
  private:
+  /// A view of the input and a corner of it.
+  using CornerOfView = std::pair<std::size_t, std::size_t>;
+
   Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
   bool solve(SolveFor what);
   /// Poses of every view through this lens; views without one wait for another lens.
@@ -47,6 +52,8 @@ class IntrinsicsSolver {
   /// Whether the lens can see all corners of most views. mrcal solves for points behind the camera,
   /// too, and goes on for long.
   bool sees_most() const;
+  /// Of the views used, the corners that lie elsewhere than their neighbours in their residuals.
+  std::set<CornerOfView> slips() const;
   /// Tries both poses of each view that fits badly, and drops the worst of those that stay bad.
   /// True when there is something to solve again.
   bool change_poses();
@@ -65,6 +72,8 @@ class IntrinsicsSolver {
   /// Of a splined lens, the parameters of OPENCV_FISHEYE for the same corners; empty when it does
   /// not fit them.
   std::vector<double> symmetric_;
+  /// Of a splined lens, corners that it would bend to where they are few: outliers from the start.
+  std::set<CornerOfView> slips_;
 };
 
 /// No two boards are tilted differently, by five degrees or more.
