@@ -40,9 +40,9 @@ struct LensChoice {
 /// errors of that: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
 /// Classification and Regression Trees, 1984, 3.4.3, which with one error would take a model larger
 /// than the lens in one of six cases. Views that every model leaves three times the usual residual
-/// of do not count. No OPENCVn is solved for when OPENCV_FISHEYE fits and sees corners at 90 degrees
-/// off the axis or beyond. input.lens_model is not looked at. Nothing when no model fits the views, or
-/// there are fewer than kLeastViewsToChoose.
+/// of do not count. No OPENCVn is solved for when OPENCV_FISHEYE fits and sees corners at 90
+/// degrees off the axis or beyond. input.lens_model is not looked at. Nothing when no model fits
+/// the views, or there are fewer than kLeastViewsToChoose.
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input);
 
 /// In words: the models with what they left, the one taken first.
