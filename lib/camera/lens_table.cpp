@@ -36,6 +36,7 @@ constexpr std::array<LensModelRow, 7> kModels{
      {LensModel::opencv8, "LENSMODEL_OPENCV8", kOpencvs.first(8)},
      {LensModel::opencv12, "LENSMODEL_OPENCV12", kOpencvs},
      {LensModel::fisheye, "OPENCV_FISHEYE", kFisheye}}};
+static_assert(kModels.size() == static_cast<std::size_t>(LensModel::fisheye) + 1);
 
 }  // namespace
 

@@ -92,7 +92,7 @@ std::string report_page(EvaluationReport subject) {
     auto budget = budget_picture(subject.input.fixes.rows, subject.lamps, *report.calibration);
     if (budget) report.pictures.push_back(std::move(*budget));
   }
-  report.evaluation->part = "evaluation";
+  if (report.evaluation) report.evaluation->part = "evaluation";
   return report_html(report);
 }
 

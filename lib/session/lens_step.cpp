@@ -162,21 +162,22 @@ SeenReach seen_reach(const IntrinsicsSolution& by_fisheye, const Eigen::Vector2d
 SplineGrid wide_enough(const SplineGrid& grid, const Eigen::Vector2d& reach,
                        const Eigen::Vector2d& farthest) {
   constexpr double more = 1.05;
+  constexpr double rounding = 1e-9;  // what is wide enough stays as it is
   const Eigen::Vector2d needed = reach.cwiseMax(more * farthest);
   SplineGrid wide = grid;
   wide.fov_x_deg =
       std::min(SplineGrid::kMostFov_deg,
-               static_cast<int>(std::ceil(4 * deg_from_rad(std::atan(needed.x() / 2)))));
+               static_cast<int>(std::ceil(4 * deg_from_rad(std::atan(needed.x() / 2)) - rounding)));
   const double edge = 2 * std::tan(rad_from_deg(wide.fov_x_deg) / 4);
-  wide.ny = std::min(
-      SplineGrid::kMostKnots,
-      grid.order + static_cast<int>(std::ceil((grid.nx - grid.order) * needed.y() / edge)));
+  wide.ny = std::min(SplineGrid::kMostKnots,
+                     grid.order + static_cast<int>(std::ceil(
+                                      (grid.nx - grid.order) * needed.y() / edge - rounding)));
   return wide;
 }
 
 /// What the grid of a splined lens lacks for the views, by OPENCV_FISHEYE, when more than a tenth
-/// of them show the board beyond it, with which no solve succeeds but some take a minute; else
-/// empty.
+/// of the boards in them (of a board of four parts each) reach beyond it: solves of such views
+/// fail, some after a minute. Else empty.
 std::string why_grid_is_narrow(IntrinsicsInput input) {
   constexpr double fits_px = 2;
   const SplineGrid grid = grid_of(input.lens_model);

@@ -61,14 +61,14 @@ void add_figures(const nlohmann::json& metrics, std::vector<CheckedMetric>& figu
 
 }  // namespace
 
-ArchiveSessions sessions_of_archive(const fs::path& results) {
+ReprocessedArchive sessions_of_archive(const fs::path& results) {
   const CsvTable summary(results / "summary.csv");
   const auto text = [&](std::size_t row, const char* column) {
     return std::string(summary.text(row, summary.required(column)));
   };
   const fs::path named = fs::absolute(results).lexically_normal();
   const fs::path last = named.has_filename() ? named.filename() : named.parent_path().filename();
-  ArchiveSessions archive;
+  ReprocessedArchive archive;
   for (std::size_t row = 0; row < summary.rows(); ++row) {
     const std::string date = text(row, "date"), verdict = text(row, "verdict");
     const bool crashed = verdict == "crashed";
@@ -96,7 +96,7 @@ ArchiveSessions sessions_of_archive(const fs::path& results) {
   return archive;
 }
 
-RunRecord run_of(const ArchiveSession& session) {
+RunRecord run_of(const ReprocessedSession& session) {
   RunRecord run = session.run;
   const fs::path file = session.folder / "session.json";
   const fs::path calibration = session.folder / "calibration.yaml";

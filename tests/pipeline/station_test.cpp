@@ -402,7 +402,7 @@ TEST_F(Station, RefusesWhatItCannotUse) {
   EXPECT_EQ(run_program(batch()).exit_code, 2);  // no folders
   EXPECT_EQ(run_program(run("../up", "--batch " + folder.file("a", "").string())).exit_code, 2);
   EXPECT_THAT(records("show").errors, HasSubstr("no such run"));
-  EXPECT_THAT(records("trend rms_mm").errors, HasSubstr("rms_px"));
+  EXPECT_THAT(records("trend rms_um").errors, HasSubstr("rms_px"));
   EXPECT_EQ(records("trend rms_px").exit_code, 3);
   EXPECT_THAT(records("verify --batch unit").errors, HasSubstr("golden"));
   EXPECT_THAT(run_program("vlp-station list --records " + (folder / "typo.db").string()).errors,

@@ -285,6 +285,8 @@ std::vector<double> IntrinsicsSolver::rms_of_views() const {
 std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
   constexpr std::size_t neighbours = 8;
   constexpr double sigmas = 8, least_px = 0.1, median_of_normal = 0.6745;
+  // Where OPENCV_FISHEYE is not the lens, neighbours differ among themselves, too.
+  constexpr double beside_sigmas = 5;
   const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   const auto residuals = residuals_of(problem_);
   std::map<CornerOfView, double> apart_px;
@@ -308,9 +310,13 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
         for (std::size_t n = 0; n < neighbours; ++n) {
           beside.push_back(residual(near[n].second)[axis]);
         }
-        const double off_px = std::abs(residual(k)[axis] - upper_median(beside));
+        const double middle = upper_median(beside);
+        for (double& value : beside) value = std::abs(value - middle);
+        const double spread = upper_median(beside) / median_of_normal;
+        const double off = std::abs(residual(k)[axis] - middle);
+        const double off_px = off * corners[k].weight;
         all_px.push_back(off_px);
-        most_px = std::max(most_px, off_px);
+        if (off > beside_sigmas * spread) most_px = std::max(most_px, off_px);
       }
       apart_px[{used_[i], k}] = most_px;
     }
@@ -326,6 +332,12 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
       if (input_.lattice.tag_of(corners[k].point) == tag) found.insert({slip.first, k});
     }
   }
+  // A view of which much has slipped is not made good by what is left of it.
+  std::map<std::size_t, std::size_t> of_view;
+  for (const auto& [view, corner] : found) ++of_view[view];
+  std::erase_if(found, [&](const CornerOfView& slip) {
+    return 4 * of_view[slip.first] > input_.views[slip.first].size();
+  });
   return found;
 }
 

@@ -73,7 +73,7 @@ TEST(SplinedWideLens, DoesNotBendToSlips) {
   }
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok()) << explanation_of(solution.status);
-  EXPECT_GE(solution.outliers, 10);
+  EXPECT_GE(solution.outliers, 20);  // the tags whole
   EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.15);
 }
