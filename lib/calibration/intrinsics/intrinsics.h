@@ -77,10 +77,12 @@ struct IntrinsicsSolution {
 ///  6. all of it without outliers;
 ///  7. a splined lens turned to its axis.
 /// The control points of a splined lens make up for any turn of the camera, so that its frame is a
-/// convention: that of the OPENCV_FISHEYE which fits the same corners best, to 0.006 degrees, so
-/// that +Z is the axis of the lens, seen at (cx, cy) to a tenth of a pixel or so, and +X the
-/// image's. Rays of that frame hold it in the solve (BoardProblem::held). A lens that no
-/// OPENCV_FISHEYE comes near keeps the frame in which its control points have least to do.
+/// convention: that of the OPENCV_FISHEYE which fits the same corners best, so that +Z is the axis
+/// of the lens, seen near (cx, cy), and +X the image's. Rays of that frame hold it in the solve
+/// (BoardProblem::held). It is turned there until less than 0.006 degrees are left, four times at
+/// most: after those, or when OPENCV_FISHEYE cannot be fitted again, it stays as it is, and nothing
+/// tells so. Where OPENCV_FISHEYE was not solved for at all, it is the frame in which the control
+/// points have least to do.
 /// Planar flips cannot live: both poses of every view are tried with each lens (view_pose()).
 /// Depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);

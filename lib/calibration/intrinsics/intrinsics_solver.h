@@ -32,7 +32,7 @@ class IntrinsicsSolver {
   bool bend();
   /// Stage 6.
   bool leave_out_outliers();
-  /// Stage 7, of a splined lens.
+  /// Stage 7, of a splined lens: true also when the turn has not settled.
   bool turn_to_axis();
 
   IntrinsicsSolution solution() const;
@@ -69,8 +69,8 @@ class IntrinsicsSolver {
   std::vector<std::size_t> used_;
   std::vector<IntrinsicsSolution::Dropped> dropped_;
   BoardProblem problem_{};
-  /// Of a splined lens, the parameters of OPENCV_FISHEYE for the same corners; empty when it does
-  /// not fit them.
+  /// Of a splined lens, the parameters of OPENCV_FISHEYE for the same corners, however well it fits
+  /// them; empty when it was not solved for.
   std::vector<double> symmetric_;
   /// Of a splined lens, corners that it would bend to where they are few: outliers from the start.
   std::set<CornerOfView> slips_;

@@ -16,6 +16,10 @@
 namespace vlp {
 namespace {
 
+/// From this level on a pixel is clipped, and tells only that its light is no less: a little below
+/// the brightest there can be, because of sharpening and compression.
+constexpr double kClipped = 0.98 * 255;
+
 /// Levels of an image as those of 8 bits: of more bits the brightest of a light is 255.
 class Levels {
  public:
@@ -45,6 +49,8 @@ class Levels {
 /// A pixel next to the rim: behind it; along it, in lines; its level.
 struct StepSample {
   double depth_px, along, level;
+
+  bool clipped() const { return level >= kClipped; }
 };
 
 /// Where a line crosses the outline, and how much deeper each column is there.
@@ -83,7 +89,7 @@ struct StepModel {
     const double light = out + in + std::pow(floor, gamma);
     const double shown = std::pow(light, 1 / gamma), by_light = shown / light / gamma;
     CurveDistance<kStepUnknowns> result;
-    result.error = shown - sample.level;
+    result.error = shown - std::min(sample.level, kClipped);
     result.slope[kAt] = -by_light * (p * out - at_out / s + q * in + at_in / s);
     result.slope[kOut] = by_light * out;
     result.slope[kOutSlope] = by_light * (out * (u + p * s * s) - at_out * s);
@@ -225,12 +231,19 @@ std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& 
                           Prior{kAlong, 0, along_sd},
                           Prior{kLogBlur, known_blur, blur_known ? 1e-3 : log_blur_sd}};
   const double tolerance = std::max({4.0, 0.2 * std::abs(in - out), 0.1 * in});
-  const std::vector<double> weights(piece.samples.size() + priors.size(), 1);
   std::optional<MEstimateStep<kStepUnknowns>> last;
   for (int round = 0; round < rounds; ++round) {
+    // A clipped pixel says nothing to a model in which it is clipped (Tobin 1958).
+    std::vector<CurveDistance<kStepUnknowns>> residuals;
+    for (const StepSample& sample : piece.samples) {
+      residuals.push_back(model.residual(sample));
+      if (sample.clipped() && residuals.back().error >= 0) residuals.pop_back();
+    }
+    if (residuals.size() < least) return std::nullopt;
+    const std::vector<double> weights(residuals.size() + priors.size(), 1);
     last = m_estimate_step<kStepUnknowns>(weights, tolerance, [&](std::size_t i) {
-      if (i < piece.samples.size()) return model.residual(piece.samples[i]);
-      const auto& [unknown, value, sd] = priors[i - piece.samples.size()];
+      if (i < residuals.size()) return residuals[i];
+      const auto& [unknown, value, sd] = priors[i - residuals.size()];
       CurveDistance<kStepUnknowns> prior{noise / sd * (model.x[unknown] - value),
                                          StepVector::Zero()};
       prior.slope[unknown] = noise / sd;

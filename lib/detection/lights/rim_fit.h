@@ -37,14 +37,17 @@ struct RimSteps {
 };
 
 /// The steps next to a light's outline. Of a piece, with the depth d of its pixels behind the
-/// outline and t along it, the light is
+/// outline and t along it, u = d - x, the light is
 ///
-///     exp(c t) (exp(o + p (d - x)) (1 - F((d - x) / s)) + exp(i + q (d - x)) F((d - x) / s))
+///     exp(c t) (exp(o + p u + p^2 s^2 / 2) F(-u / s - p s) + exp(i + q u + q^2 s^2 / 2)
+///               F(u / s + q s)) + floor^gamma:
 ///
-/// blurred: levels that rise on both sides, as a halo and a source deep in a reflector make them,
-/// and a step at x between, up or down; F the normal distribution. The levels are those of
-/// StepPicture, because half of a coded level is not half of the light: the larger the step, the
-/// further out it seems (lib/THEORY.md). The blur is fitted, too, unless `blur_known`.
+/// exp(o + p u) outside and exp(i + q u) inside, levels that rise on both sides, as a halo and a
+/// source deep in a reflector make them, with a step at x between, up or down, blurred by s, above
+/// what is dark; F the normal distribution. The levels are those of StepPicture, because half of a
+/// coded level is not half of the light: the larger the step, the further out it seems
+/// (lib/THEORY.md). A clipped pixel tells only that its light is no less. The blur is fitted, too,
+/// unless `blur_known`.
 RimSteps fit_rim_steps(const cv::Mat& image, const Light& light, const std::vector<int>& lit_lines,
                        const Background& background, const StepPicture& picture, bool blur_known,
                        const LightShape& shape);

@@ -108,6 +108,47 @@ TEST(Rim, IsNotDrawnTowardsTheCoreByAToneCurve) {
   EXPECT_LT(worst, 6);
 }
 
+/// As such a camera shows what is brighter than white as well.
+cv::Mat1b coded_and_clipped(const DrawnLamp& lamp, double noise, Random& random) {
+  cv::Mat1b image(kSize);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      const double light = 0.002 + lamp.light(Vector2d(column, row));
+      image(row, column) =
+          cv::saturate_cast<std::uint8_t>(255 * std::pow(light, 1 / 2.2) + noise * random.normal());
+    }
+  }
+  return image;
+}
+
+TEST(Rim, IsNotDrawnTowardsWallsThatAreBrighterThanWhite) {
+  Random random(1);
+  for (const double white : {0.8, 1.5, 2.0, 4.0}) {
+    double towards_px = 0, chi_square = 0, worst = 0;
+    int count = 0;
+    for (const double period : {17.0, 26.0}) {
+      for (int i = 0; i < 8; ++i) {
+        const double angle = i * std::numbers::pi / 4 + 0.2;
+        const Vector2d towards(std::cos(angle), std::sin(angle));
+        DrawnLamp lamp = downlight(angle, period);
+        lamp.level = white;
+        lamp.recess->core_off_px = 36 * towards;
+        lamp.recess->core_px = 24;
+        const auto rim = rim_in(coded_and_clipped(lamp, 1, random));
+        ASSERT_TRUE(rim);
+        const Vector2d error = rim->light.pixel - lamp.center;
+        towards_px += error.dot(towards);
+        chi_square += error.squaredNorm() / 2 / std::pow(rim->light.sigma_px, 2);
+        worst = std::max(worst, error.norm() / rim->light.sigma_px);
+        ++count;
+      }
+    }
+    EXPECT_NEAR(towards_px / count, 0, 0.06) << white;
+    EXPECT_LT(chi_square / count, 1.5) << white;
+    EXPECT_LT(worst, 6) << white;
+  }
+}
+
 TEST(Rim, IsSeenOfLargeDownlightsToo) {
   for (const double scale : {3.0, 7.0}) {
     DrawnLamp lamp = downlight(0.7, 40);
