@@ -106,7 +106,9 @@ void write_step(const std::filesystem::path& file, const KeptStep& step) {
                   {"key", step.key},
                   {"outputs", step.outputs},
                   {"result", json_of(step.result)}};
-  write_file(file, json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  WholeFile whole(file);
+  whole.write(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+  whole.save_unsynced();  // in part it is none, and the step is run again
 }
 
 }  // namespace vlp
