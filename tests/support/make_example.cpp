@@ -7,8 +7,8 @@
 #include <cstdio>
 
 #include "captures/csv_writer.h"
-#include "captures/number_text.h"
 #include "captures/detections_table.h"
+#include "captures/number_text.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"
 #include "support/synthetic_rig.h"

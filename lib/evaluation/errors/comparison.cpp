@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "captures/number_text.h"
 #include "captures/name_index.h"
+#include "captures/number_text.h"
 #include "rig/input_error.h"
 
 namespace vlp {
