@@ -359,7 +359,7 @@ void show_capability(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
   Records& records = known->records();
   const RunFilter filter = comparable(options, *known);
-  constexpr const char* head = "{:<22}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<22}{}\n";
+  constexpr const char* head = "{:<22}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}\n";
   std::string rows;
   for (const MetricKind& kind : kinds) {
     const auto points = judged_values(records, kind.name, filter);
