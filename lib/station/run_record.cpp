@@ -32,9 +32,12 @@ std::string utc_of(std::time_t time, const char* format) {
   return {text, std::strftime(text, sizeof text, format, &parts)};
 }
 
-std::string utc(const char* format) {
-  return utc_of(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now()), format);
+/// By the one clock of this file: std::time() lags behind it by a tick of the kernel.
+std::time_t now_s() {
+  return std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
 }
+
+std::string utc(const char* format) { return utc_of(now_s(), format); }
 
 /// The account that runs this program, and its machine.
 std::string account() {
@@ -101,7 +104,7 @@ double seconds_since(const std::string& utc) {
   std::tm parts{};
   const char* end = ::strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
   if (end == nullptr || *end != '\0') return std::numeric_limits<double>::quiet_NaN();
-  return std::difftime(std::time(nullptr), ::timegm(&parts));
+  return std::difftime(now_s(), ::timegm(&parts));
 }
 
 std::string now_utc() { return utc("%Y-%m-%dT%H:%M:%SZ"); }

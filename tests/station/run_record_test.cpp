@@ -16,6 +16,15 @@ TEST(LibraryVersions, NamesThoseThatTheResultRestsOn) {
   }
 }
 
+/// Where a second begins two clocks may differ by a tick.
+TEST(SecondsSince, IsNeverBelow0ForNow) {
+  const std::string begin = now_utc();
+  while (seconds_since(begin) < 2) {
+    const std::string now = now_utc();
+    ASSERT_GE(seconds_since(now), 0) << now;
+  }
+}
+
 TEST(RunName, TellsWhenTheRunBegan) {
   EXPECT_EQ(begun_utc("20261121T134501Z-0123456789abcdef"), "2026-11-21T13:45:01Z");
   EXPECT_EQ(begun_utc("run"), "");
