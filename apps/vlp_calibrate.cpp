@@ -15,6 +15,7 @@
 
 #include "app.h"
 #include "capture_options.h"
+#include "detection/boards/board_detector.h"
 #include "evaluation/gate.h"
 #include "progress.h"
 #include "run_each.h"
@@ -165,5 +166,8 @@ int calibrate(int argc, char** argv) {
 int main(int argc, char** argv) {
   if (argc != 2 || std::string_view(argv[1]) != "--each") return vlp::calibrate(argc, argv);
   CLI::App app("", vlp::kName);
-  return vlp::run_app(app, 1, argv, [] { vlp::run_each(vlp::kName, vlp::calibrate); });
+  return vlp::run_app(app, 1, argv, [] {
+    vlp::prepare_tag_family("tag36h11");  // that of most boards
+    vlp::run_each(vlp::kName, vlp::calibrate);
+  });
 }

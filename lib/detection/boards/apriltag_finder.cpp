@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <apriltag/apriltag.h>
 
+#include <map>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "detection/boards/tag_families.h"
@@ -17,16 +19,43 @@ constexpr double kPixelCenter = 0.5;
 /// one.
 constexpr int kLargePixels = 1'000'000;
 
+using DetectorPointer = std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)>;
+
+/// libapriltag's table of what corrects to which tag of a family: dear to make, only read, and the
+/// same whatever the border.
+class Corrections {
+ public:
+  explicit Corrections(const std::string& name) : family_(tag_family(name)) {
+    constexpr uint32_t large = 3000;  // gigabytes with two bits
+    apriltag_detector_add_family_bits(maker_.get(), family_.get(), family_->ncodes > large ? 1 : 2);
+  }
+  void* table() const { return family_->impl; }
+
+ private:
+  TagFamily family_;  // outlives the detector
+  DetectorPointer maker_{apriltag_detector_create(), apriltag_detector_destroy};
+};
+
+/// Made once in a process, and in one that others are split off for all of them.
+void* corrections_of(const std::string& family) {
+  static std::mutex making;
+  static std::map<std::string, Corrections> made;
+  const std::lock_guard lock(making);
+  return made.try_emplace(family, family).first->second.table();
+}
+
 struct Detector {
   explicit Detector(const Board& board) : family(tag_family(board.family)) {
     for (int extra = 1; extra < board.border_bits; ++extra) widen_border();
-    // The table of what corrects to what takes gigabytes for large families.
-    constexpr uint32_t large = 3000;
-    apriltag_detector_add_family_bits(detector.get(), family.get(), family->ncodes > large ? 1 : 2);
+    family->impl = corrections_of(board.family);
+    apriltag_detector_add_family(detector.get(), family.get());
     detector->nthreads = 1;
     detector->refine_edges = true;
     detector->quad_sigma = 0;  // it would write into the image
   }
+  ~Detector() { family->impl = nullptr; }  // not this detector's to free
+  Detector(const Detector&) = delete;
+  Detector& operator=(const Detector&) = delete;
   void widen_border() const {
     family->width_at_border += 2;
     family->total_width += 2;
@@ -37,8 +66,7 @@ struct Detector {
   }
 
   TagFamily family;  // outlives the detector
-  std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)> detector{
-      apriltag_detector_create(), apriltag_detector_destroy};
+  DetectorPointer detector{apriltag_detector_create(), apriltag_detector_destroy};
 };
 
 class ApriltagFinder : public TagFinder {
@@ -90,6 +118,8 @@ class ApriltagFinder : public TagFinder {
 };
 
 }  // namespace
+
+void prepare_tag_family(const std::string& name) { corrections_of(name); }
 
 std::unique_ptr<TagFinder> apriltag_finder(const Board& board) {
   return std::make_unique<ApriltagFinder>(board);
