@@ -11,18 +11,23 @@ namespace {
 constexpr int kPerUnit = 64;
 constexpr double kLargest = 6;  // beyond, erf is 1 to the last digit
 
-struct Place {
-  double value, slope;
-};
+/// erf(x) = c0 + c1 d + ... + c5 d^5, d from the middle of an interval.
+using Series = std::array<double, 6>;
 
-/// Of the interval that a place is for.
-double middle_of(std::size_t place) { return (double(place) + 0.5) / kPerUnit; }
+double middle_of(std::size_t interval) { return (double(interval) + 0.5) / kPerUnit; }
 
-const auto places = [] {
-  std::array<Place, static_cast<std::size_t>(kLargest) * kPerUnit + 1> all{};
+const auto intervals = [] {
+  std::array<Series, static_cast<std::size_t>(kLargest) * kPerUnit + 1> all{};
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const double x = middle_of(i);
-    all[i] = {std::erf(x), 2 * std::numbers::inv_sqrtpi * std::exp(-x * x)};
+    const double a = middle_of(i), square = a * a;
+    const double g = 2 * std::numbers::inv_sqrtpi * std::exp(-square);
+    // The slope's derivatives, over the slope: Hermite's polynomials.
+    all[i] = {std::erf(a),
+              g,
+              g * -2 * a / 2,
+              g * (4 * square - 2) / 6,
+              g * a * (12 - 8 * square) / 24,
+              g * (12 + square * (16 * square - 48)) / 120};
   }
   return all;
 }();
@@ -32,14 +37,10 @@ const auto places = [] {
 ErrorFunction::ErrorFunction(double x) {
   const double size = std::min(kLargest, std::abs(x));  // of no number, too
   const auto nearest = static_cast<std::size_t>(size * kPerUnit);
-  const auto& [at, g] = places[nearest];
-  // The slope's derivatives, over the slope: Hermite's polynomials.
-  const double a = middle_of(nearest), d = size - a, square = a * a;
-  const double first = -2 * a, second = 4 * square - 2, third = a * (12 - 8 * square);
-  const double fourth = 12 + square * (16 * square - 48);
-  value = std::copysign(
-      at + g * d * (1 + d / 2 * (first + d / 3 * (second + d / 4 * (third + d / 5 * fourth)))), x);
-  slope = g * (1 + d * (first + d / 2 * (second + d / 3 * (third + d / 4 * fourth))));
+  const Series& c = intervals[nearest];
+  const double d = size - middle_of(nearest);
+  value = std::copysign(c[0] + d * (c[1] + d * (c[2] + d * (c[3] + d * (c[4] + d * c[5])))), x);
+  slope = c[1] + d * (2 * c[2] + d * (3 * c[3] + d * (4 * c[4] + d * (5 * c[5]))));
 }
 
 }  // namespace vlp

@@ -15,20 +15,26 @@ struct ErrorFunction {
   double value, slope;
 };
 
+/// The standard deviation of a Gaussian point spread, and what many steps divide by.
+struct Blur {
+  explicit Blur(double px) : per_px(1 / px), per_scale(per_px / std::numbers::sqrt2) {}
+
+  double per_px, per_scale;
+};
+
 /// An edge as a lens with a Gaussian point spread shows it: from -1 to 1 with the distance from it.
 ///   value = erf(distance / (sqrt(2) blur))
 struct BlurredStep {
-  BlurredStep(double distance_px, double blur_px)
-      : BlurredStep(ErrorFunction(distance_px / (std::numbers::sqrt2 * blur_px)),
-                    distance_px / blur_px, std::numbers::sqrt2 * blur_px) {}
+  BlurredStep(double distance_px, const Blur& blur) {
+    const ErrorFunction erf(distance_px * blur.per_scale);
+    value = erf.value;
+    slope = erf.slope * blur.per_scale;
+    by_blur = -distance_px * blur.per_px * slope;
+  }
 
   double value;
   /// Derivatives by the distance and by the blur.
   double slope, by_blur;
-
- private:
-  BlurredStep(const ErrorFunction& erf, double blurs, double scale_px)
-      : value(erf.value), slope(erf.slope / scale_px), by_blur(-blurs * slope) {}
 };
 
 }  // namespace vlp

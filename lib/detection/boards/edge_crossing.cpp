@@ -34,13 +34,14 @@ struct Crossing {
     const Eigen::Vector2d along1(std::cos(p[2]), std::sin(p[2]));
     const Eigen::Vector2d along2(std::cos(p[3]), std::sin(p[3]));
     const Eigen::Vector2d normal1(-along1.y(), along1.x()), normal2(-along2.y(), along2.x());
+    const Blur blur(p[4]);
     const auto rows = static_cast<Eigen::Index>(pixels.size());
     for (Eigen::Index i = 0; i < rows; ++i) {
       const auto& [from_guess, grey] = pixels[static_cast<std::size_t>(i)];
       const Eigen::Vector2d at = from_guess - corner;
       const double u1 = along1.dot(at), u2 = along2.dot(at);
       const double v1 = normal1.dot(at), v2 = normal2.dot(at);
-      const BlurredStep one(v1 - p[9] * u1 * u1, p[4]), two(v2 - p[10] * u2 * u2, p[4]);
+      const BlurredStep one(v1 - p[9] * u1 * u1, blur), two(v2 - p[10] * u2 * u2, blur);
       const double lit = 1 + light.dot(at), pattern = one.value * two.value;
       const double unlit = p[5] + p[6] * pattern;
       residuals[i] = unlit * lit - grey;

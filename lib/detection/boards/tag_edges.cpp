@@ -65,9 +65,10 @@ class Edge {
 
   void evaluate(const Parameters& p) const {
     at_ = p;
+    const Blur blur(p[3]);
     for (Eigen::Index i = 0; i < rows(); ++i) {
       const auto& [w, v, grey] = pixels_[static_cast<std::size_t>(i)];
-      const BlurredStep step(v - p[0] - w * (p[1] + w * p[2]), p[3]);
+      const BlurredStep step(v - p[0] - w * (p[1] + w * p[2]), blur);
       const double lit = 1 + p[6] * w + p[7] * v, unlit = p[4] + p[5] * step.value;
       const Coded coded(unlit * lit, gamma_);
       residuals_[i] = coded.level - grey;

@@ -27,11 +27,11 @@ TEST(BlurredStep, HasTheSlopesOfDifferences) {
   constexpr double h = 1e-5;
   for (const double distance_px : {-2.0, -0.3, 0.0, 0.7, 3.0}) {
     for (const double blur_px : {0.3, 0.8, 2.0}) {
-      const BlurredStep step(distance_px, blur_px);
-      const double by_distance =
-          BlurredStep(distance_px + h, blur_px).value - BlurredStep(distance_px - h, blur_px).value;
-      const double by_blur =
-          BlurredStep(distance_px, blur_px + h).value - BlurredStep(distance_px, blur_px - h).value;
+      const BlurredStep step(distance_px, Blur(blur_px));
+      const double by_distance = BlurredStep(distance_px + h, Blur(blur_px)).value -
+                                 BlurredStep(distance_px - h, Blur(blur_px)).value;
+      const double by_blur = BlurredStep(distance_px, Blur(blur_px + h)).value -
+                             BlurredStep(distance_px, Blur(blur_px - h)).value;
       EXPECT_NEAR(step.slope, by_distance / (2 * h), 1e-8);
       EXPECT_NEAR(step.by_blur, by_blur / (2 * h), 1e-8);
     }
