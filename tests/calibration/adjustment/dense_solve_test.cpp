@@ -139,8 +139,11 @@ class DenseAdjustment {
     const Eigen::VectorXd intrinsics = intrinsics_ + lens_root_ * state.head(zenith_);
     const Lens lens(input_.calibration.camera.lens_model,
                     std::vector<double>(intrinsics.begin(), intrinsics.end()));
-    const Eigen::Quaterniond camera_from_base = Eigen::Quaterniond::FromTwoVectors(
-        Eigen::Vector3d::UnitZ(), Eigen::Vector3d(state[zenith_], state[zenith_ + 1], 1));
+    // The shortest turn from Z; Eigen's own costs the compiler a decomposition.
+    const Eigen::Vector3d zenith =
+        Eigen::Vector3d(state[zenith_], state[zenith_ + 1], 1).normalized();
+    const Eigen::Quaterniond camera_from_base =
+        Eigen::Quaterniond(1 + zenith.z(), -zenith.y(), zenith.x(), 0).normalized();
     const Eigen::Vector3d arm_m(state[zenith_ + 2], state[zenith_ + 3], 0);
     std::map<std::string, bool> axis_counted;
     for (std::size_t k = 0; k < own_.size(); ++k) {
