@@ -11,6 +11,7 @@
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
+#include "calibration/intrinsics/spline_fit.h"
 #include "camera/spline_surface.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
@@ -158,28 +159,12 @@ SeenReach seen_reach(const IntrinsicsSolution& by_fisheye, const Eigen::Vector2d
   return seen;
 }
 
-/// A grid of the same order and control points along x that goes a little beyond what is seen.
-SplineGrid wide_enough(const SplineGrid& grid, const Eigen::Vector2d& reach,
-                       const Eigen::Vector2d& farthest) {
-  constexpr double more = 1.05;
-  constexpr double rounding = 1e-9;  // what is wide enough stays as it is
-  const Eigen::Vector2d needed = reach.cwiseMax(more * farthest);
-  SplineGrid wide = grid;
-  wide.fov_x_deg =
-      std::min(SplineGrid::kMostFov_deg,
-               static_cast<int>(std::ceil(4 * deg_from_rad(std::atan(needed.x() / 2)) - rounding)));
-  const double edge = 2 * std::tan(rad_from_deg(wide.fov_x_deg) / 4);
-  wide.ny = std::min(SplineGrid::kMostKnots,
-                     grid.order + static_cast<int>(std::ceil(
-                                      (grid.nx - grid.order) * needed.y() / edge - rounding)));
-  return wide;
-}
-
-/// What the grid of a splined lens lacks for the views, by OPENCV_FISHEYE, when more than a tenth
-/// of the boards in them (of a board of four parts each) reach beyond it: solves of such views
-/// fail, some after a minute. Else empty.
-std::string why_grid_is_narrow(IntrinsicsInput input) {
-  constexpr double fits_px = 2;
+/// Why the grid of a splined lens is not for the views, by OPENCV_FISHEYE: more than a tenth of the
+/// boards in them (of a board of four parts each) reach beyond it, and solves of such views fail,
+/// some after a minute; or all of them lie within a piece of it. Else empty.
+std::string why_not_this_grid(IntrinsicsInput input) {
+  constexpr double fits_px = 2, more = 1.05;
+  const LensModel wanted = input.lens_model;
   const SplineGrid grid = grid_of(input.lens_model);
   input.lens_model = LensModel::fisheye;
   const IntrinsicsSolution solution = solve_intrinsics(input);
@@ -187,13 +172,19 @@ std::string why_grid_is_narrow(IntrinsicsInput input) {
   const Eigen::Vector2d reach =
       SplineSurface(grid, std::vector<double>(2 * grid.control_points())).reach();
   const SeenReach seen = seen_reach(solution, reach);
-  if (10 * seen.boards_within >= 9 * seen.boards) return "";
+  if (10 * seen.boards_within >= 9 * seen.boards) {
+    const Lens lens = solution.lens();
+    const auto core = core_like(lens, seen_px(solution.problem));
+    return splined_like(lens, input.imager_px, wanted, core)
+               ? ""
+               : why_too_wide(lens, input.imager_px, wanted);
+  }
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
       "the control points of {} reach {:.0f} degrees off the axis to the sides and {:.0f} up and "
       "down, but the board is seen {:.0f} and {:.0f} degrees off: take --lens {}",
       name_of(grid), angle_deg(reach.x()), angle_deg(reach.y()), angle_deg(seen.farthest.x()),
-      angle_deg(seen.farthest.y()), name_of(wide_enough(grid, reach, seen.farthest)));
+      angle_deg(seen.farthest.y()), name_of(reaching(grid, reach.cwiseMax(more * seen.farthest))));
 }
 
 /// Why no lens of the model fits: the model, if another one does.
@@ -248,10 +239,10 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
     views.solved.lens_model = views.held_out.lens_model = camera.lens_model;
   }
   if (is_splined(camera.lens_model)) {
-    const std::string narrow = why_grid_is_narrow(views.solved);
-    if (!narrow.empty()) {
+    const std::string why = why_not_this_grid(views.solved);
+    if (!why.empty()) {
       result.fail(StepFailure::undetermined,
-                  fmt::format("{} views with the board: {}", views.solved.views.size(), narrow));
+                  fmt::format("{} views with the board: {}", views.solved.views.size(), why));
       return result;
     }
   }

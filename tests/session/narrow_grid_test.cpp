@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A splined lens whose control points end where the board is still seen.
+/// A splined lens whose control points end where the board is still seen, or are too far apart.
 #include <gmock/gmock.h>
 
 #include "calibration/intrinsics/wide_views.h"
@@ -44,6 +44,33 @@ TEST(NarrowGrid, UpAndDownTakesMoreRows) {
   EXPECT_THAT(result.why, testing::ContainsRegex("take --lens LENSMODEL_SPLINED_"
                                                  "STEREOGRAPHIC_order=3_Nx=12_Ny=10_"
                                                  "fov_x_deg=230"));
+}
+
+TEST(WideGrid, IsRefusedWithTheGridToTake) {
+  constexpr std::size_t count = 12;
+  constexpr double noise_px = 0.02;
+  Random random(62);
+  SyntheticViews views{synthetic_board(false),
+                       {LensModel::pinhole, std::array{4600.0, 4600.0, 395.0, 301.0}}};
+  const BoardLattice lattice(views.board);
+  LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
+  while (input.views.size() < count) {
+    const SeenBoard seen = views.random_view(random, noise_px);
+    if (!lattice.enough(seen)) continue;
+    input.views.push_back({std::to_string(input.views.size()) + ".png", views.imager_px, seen});
+  }
+  input.camera.lens_model = splined_lens({3, 10, 10, 350});
+  const LensResult result = solve_lens(input, {});
+  ASSERT_FALSE(result.ok());
+  const std::string take =
+      " are too far apart for a lens that sees 5 degrees off the axis to the "
+      "sides and 4 up and down: take --lens ";
+  EXPECT_THAT(result.why, HasSubstr("views with the board: the control points of LENSMODEL_"));
+  EXPECT_THAT(result.why, HasSubstr(take));
+  const auto model = lens_model_from_name(result.why.substr(result.why.find(take) + take.size()));
+  ASSERT_TRUE(model) << result.why;
+  input.camera.lens_model = *model;
+  EXPECT_TRUE(solve_lens(input, {}).ok());
 }
 
 }  // namespace

@@ -230,7 +230,9 @@ FittedCamera with_lens_model(const Camera& camera, LensModel model) {
     if (camera.lens_model != LensModel::stereographic) {
       parameters = with_lens_model(camera, LensModel::stereographic).camera.intrinsics;
     }
-    parameters = splined_like(from, camera.imager_px, model, parameters);
+    const auto splined = splined_like(from, camera.imager_px, model, parameters);
+    if (!splined) throw std::invalid_argument(why_too_wide(from, camera.imager_px, model));
+    parameters = *splined;
   }
   constexpr int most_steps = 200;
   constexpr double settled = 1e-12;

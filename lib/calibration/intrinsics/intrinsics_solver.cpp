@@ -72,9 +72,12 @@ void IntrinsicsSolver::start_symmetric() {
       seeds_.poses[view] = pose->camera_from_board;
     }
   }
-  problem_.intrinsics = splined_like(fisheye, input_.imager_px, input_.lens_model,
-                                     core_like(fisheye, seen_px(symmetric.problem_)));
+  const std::vector<double> core = core_like(fisheye, seen_px(symmetric.problem_));
+  // Within one piece STEREOGRAPHIC of that core has to do.
+  problem_.intrinsics =
+      splined_like(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
   problem_.lens_model = input_.lens_model;
+  problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
   // The axis, and two rays beside it against a turn about it.
   for (const double beside : {0.0, -0.25, 0.25}) {
     const Eigen::Vector2d pixel =

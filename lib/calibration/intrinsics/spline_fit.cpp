@@ -2,9 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/spline_fit.h"
 
-#include <Eigen/SparseCholesky>
+#include <fmt/core.h>
 
+#include <Eigen/QR>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/intrinsics/projection_difference.h"
 #include "camera/spline_surface.h"
+#include "geometry/angles.h"
 
 namespace vlp {
 namespace {
@@ -38,11 +45,30 @@ void keep_straight(Equations& equations, const SplineGrid& grid) {
   }
 }
 
+/// Whether a surface without second differences has one value only at these places.
+bool tell_what_is_straight(const std::vector<Eigen::Vector2d>& places) {
+  constexpr Eigen::Index unknowns = 4;
+  if (std::ssize(places) < unknowns) return false;
+  Eigen::Array2d least = places.front(), most = least;
+  for (const Eigen::Vector2d& u : places) {
+    least = least.min(u.array());
+    most = most.max(u.array());
+  }
+  Eigen::MatrixX4d terms(std::ssize(places), unknowns);
+  for (Eigen::Index i = 0; i < terms.rows(); ++i) {
+    const Eigen::Array2d share =
+        (places[static_cast<std::size_t>(i)].array() - least) / (most - least).max(1e-9);
+    terms.row(i) << 1, share.x(), share.y(), share.prod();
+  }
+  return terms.colPivHouseholderQr().rank() == unknowns;
+}
+
 }  // namespace
 
-std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& imager_px,
-                                 LensModel model, const std::vector<double>& core,
-                                 const Eigen::Matrix3d& lens_from_splined) {
+std::optional<std::vector<double>> splined_like(const Lens& lens,
+                                                const std::array<int, 2>& imager_px,
+                                                LensModel model, const std::vector<double>& core,
+                                                const Eigen::Matrix3d& lens_from_splined) {
   constexpr int of_a_piece = 4;
   constexpr double near = 0.05;  // of the image, around it
   const SplineGrid grid = grid_of(model);
@@ -51,6 +77,7 @@ std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& ima
   const Eigen::Array2d size_px(imager_px[0], imager_px[1]);
   Equations equations;
   keep_straight(equations, grid);
+  std::vector<Eigen::Vector2d> places;
   const int columns = of_a_piece * (grid.nx - grid.order),
             rows = of_a_piece * (grid.ny - grid.order);
   for (int row = 0; row <= rows; ++row) {
@@ -63,6 +90,7 @@ std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& ima
           (pixel->array() > (1 + near) * size_px).any()) {
         continue;
       }
+      places.push_back(u);
       const SplineSurface::Weights at = straight.weights(u);
       for (int j = 0; j <= grid.order; ++j) {
         for (int i = 0; i <= grid.order; ++i) {
@@ -74,6 +102,7 @@ std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& ima
       equations.right.emplace_back(((pixel->array() - center_px) / focal_px).matrix() - u);
     }
   }
+  if (!tell_what_is_straight(places)) return {};
   const auto points = static_cast<Eigen::Index>(grid.control_points());
   Eigen::SparseMatrix<double> left(equations.next(), points);
   left.setFromTriplets(equations.entries.begin(), equations.entries.end());
@@ -83,12 +112,44 @@ std::vector<double> splined_like(const Lens& lens, const std::array<int, 2>& ima
   }
   const Eigen::SparseMatrix<double> normal = left.transpose() * left;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
+  if (factor.info() != Eigen::Success) return {};
   const Eigen::MatrixX2d found = factor.solve(left.transpose() * right);
+  if (!found.allFinite()) return {};
   std::vector<double> parameters = core;
   for (Eigen::Index i = 0; i < points; ++i) {
     parameters.insert(parameters.end(), {found(i, 0), found(i, 1)});
   }
   return parameters;
+}
+
+std::string why_too_wide(const Lens& lens, const std::array<int, 2>& imager_px, LensModel model) {
+  constexpr double more = 1.05;
+  Eigen::Vector2d farthest(0, 0);
+  for (const Eigen::Vector2d& pixel : pixel_grid(imager_px)) {
+    const auto ray = lens.unproject(pixel);
+    if (!ray) continue;
+    const Eigen::Vector3d& x = ray->direction;
+    farthest = farthest.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
+  }
+  const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
+  return fmt::format(
+      "the control points of {} are too far apart for a lens that sees {:.0f} degrees off the axis "
+      "to the sides and {:.0f} up and down: take --lens {}",
+      name_of(model), angle_deg(farthest.x()), angle_deg(farthest.y()),
+      name_of(reaching(grid_of(model), more * farthest)));
+}
+
+SplineGrid reaching(const SplineGrid& grid, const Eigen::Vector2d& u) {
+  constexpr double rounding = 1e-9;  // what is wide enough stays as it is
+  SplineGrid wide = grid;
+  wide.fov_x_deg =
+      static_cast<int>(std::clamp(std::ceil(4 * deg_from_rad(std::atan(u.x() / 2)) - rounding), 1.0,
+                                  double{SplineGrid::kMostFov_deg}));
+  const double edge = 2 * std::tan(rad_from_deg(wide.fov_x_deg) / 4);
+  wide.ny = std::clamp(
+      grid.order + static_cast<int>(std::ceil((grid.nx - grid.order) * u.y() / edge - rounding)),
+      grid.order + 1, SplineGrid::kMostKnots);
+  return wide;
 }
 
 std::vector<double> core_like(const Lens& lens, std::span<const Eigen::Vector2d> pixels) {
