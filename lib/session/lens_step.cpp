@@ -161,7 +161,7 @@ SeenReach seen_reach(const IntrinsicsSolution& by_fisheye, const Eigen::Vector2d
 
 /// Why the grid of a splined lens is not for the views, by OPENCV_FISHEYE: more than a tenth of the
 /// boards in them (of a board of four parts each) reach beyond it, and solves of such views fail,
-/// some after a minute; or all of them lie within a piece of it. Else empty.
+/// some after a minute. Or it has too few control points where the lens sees. Else empty.
 std::string why_not_this_grid(IntrinsicsInput input) {
   constexpr double fits_px = 2, more = 1.05;
   const LensModel wanted = input.lens_model;
@@ -177,7 +177,7 @@ std::string why_not_this_grid(IntrinsicsInput input) {
     const auto core = core_like(lens, seen_px(solution.problem));
     return splined_like(lens, input.imager_px, wanted, core)
                ? ""
-               : why_too_wide(lens, input.imager_px, wanted);
+               : why_too_coarse(lens, input.imager_px, wanted, core);
   }
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A splined lens whose control points end where the board is still seen, or are too far apart.
+/// A splined lens whose control points end where the board is still seen, or are too few.
 #include <gmock/gmock.h>
 
 #include "calibration/intrinsics/wide_views.h"
@@ -63,7 +63,7 @@ TEST(WideGrid, IsRefusedWithTheGridToTake) {
   const LensResult result = solve_lens(input, {});
   ASSERT_FALSE(result.ok());
   const std::string take =
-      " are too far apart for a lens that sees 5 degrees off the axis to the "
+      " are too few where the lens sees, 5 degrees off the axis to the "
       "sides and 4 up and down: take --lens ";
   EXPECT_THAT(result.why, HasSubstr("views with the board: the control points of LENSMODEL_"));
   EXPECT_THAT(result.why, HasSubstr(take));

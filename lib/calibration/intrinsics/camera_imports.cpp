@@ -231,7 +231,9 @@ FittedCamera with_lens_model(const Camera& camera, LensModel model) {
       parameters = with_lens_model(camera, LensModel::stereographic).camera.intrinsics;
     }
     const auto splined = splined_like(from, camera.imager_px, model, parameters);
-    if (!splined) throw std::invalid_argument(why_too_wide(from, camera.imager_px, model));
+    if (!splined) {
+      throw std::invalid_argument(why_too_coarse(from, camera.imager_px, model, parameters));
+    }
     parameters = *splined;
   }
   constexpr int most_steps = 200;

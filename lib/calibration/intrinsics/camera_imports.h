@@ -27,7 +27,7 @@ struct FittedCamera {
   double worst_px, share;
 };
 /// A camera that has the model already is given back as it is. Throws std::invalid_argument when
-/// the model has no lens near the camera's, or a splined one control points too far apart for it.
+/// the model has no lens near the camera's, or a splined one too few control points where it sees.
 FittedCamera with_lens_model(const Camera& camera, LensModel model);
 
 }  // namespace vlp

@@ -73,7 +73,7 @@ void IntrinsicsSolver::start_symmetric() {
     }
   }
   const std::vector<double> core = core_like(fisheye, seen_px(symmetric.problem_));
-  // Within one piece STEREOGRAPHIC of that core has to do.
+  // Of too few control points STEREOGRAPHIC of that core has to do.
   problem_.intrinsics =
       splined_like(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
   problem_.lens_model = input_.lens_model;

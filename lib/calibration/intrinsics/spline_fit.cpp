@@ -45,8 +45,8 @@ void keep_straight(Equations& equations, const SplineGrid& grid) {
   }
 }
 
-/// Whether a surface without second differences has one value only at these places.
-bool tell_what_is_straight(const std::vector<Eigen::Vector2d>& places) {
+/// Whether a surface without second differences is determined by its values at these places.
+bool determine_what_is_straight(const std::vector<Eigen::Vector2d>& places) {
   constexpr Eigen::Index unknowns = 4;
   if (std::ssize(places) < unknowns) return false;
   Eigen::Array2d least = places.front(), most = least;
@@ -60,7 +60,9 @@ bool tell_what_is_straight(const std::vector<Eigen::Vector2d>& places) {
         (places[static_cast<std::size_t>(i)].array() - least) / (most - least).max(1e-9);
     terms.row(i) << 1, share.x(), share.y(), share.prod();
   }
-  return terms.colPivHouseholderQr().rank() == unknowns;
+  constexpr double beyond_rounding = 1e-6;  // the shares are 0 to 1
+  Eigen::ColPivHouseholderQR<Eigen::MatrixX4d> decomposition(terms);
+  return decomposition.setThreshold(beyond_rounding).rank() == unknowns;
 }
 
 }  // namespace
@@ -102,7 +104,7 @@ std::optional<std::vector<double>> splined_like(const Lens& lens,
       equations.right.emplace_back(((pixel->array() - center_px) / focal_px).matrix() - u);
     }
   }
-  if (!tell_what_is_straight(places)) return {};
+  if (!determine_what_is_straight(places)) return {};
   const auto points = static_cast<Eigen::Index>(grid.control_points());
   Eigen::SparseMatrix<double> left(equations.next(), points);
   left.setFromTriplets(equations.entries.begin(), equations.entries.end());
@@ -122,7 +124,8 @@ std::optional<std::vector<double>> splined_like(const Lens& lens,
   return parameters;
 }
 
-std::string why_too_wide(const Lens& lens, const std::array<int, 2>& imager_px, LensModel model) {
+std::string why_too_coarse(const Lens& lens, const std::array<int, 2>& imager_px, LensModel model,
+                           const std::vector<double>& core) {
   constexpr double more = 1.05;
   Eigen::Vector2d farthest(0, 0);
   for (const Eigen::Vector2d& pixel : pixel_grid(imager_px)) {
@@ -131,24 +134,34 @@ std::string why_too_wide(const Lens& lens, const std::array<int, 2>& imager_px, 
     const Eigen::Vector3d& x = ray->direction;
     farthest = farthest.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
   }
+  SplineGrid finer = grid_of(model);
+  LensModel other = splined_lens(reaching(finer, more * farthest));
+  while (!splined_like(lens, imager_px, other, core) && 2 * finer.nx <= SplineGrid::kMostKnots) {
+    finer.nx *= 2;
+    other = splined_lens(reaching(finer, more * farthest));
+  }
+  const bool helps = splined_like(lens, imager_px, other, core).has_value();
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
-      "the control points of {} are too far apart for a lens that sees {:.0f} degrees off the axis "
-      "to the sides and {:.0f} up and down: take --lens {}",
+      "the control points of {} are too few where the lens sees, {:.0f} degrees off the axis to "
+      "the "
+      "sides and {:.0f} up and down: take {}",
       name_of(model), angle_deg(farthest.x()), angle_deg(farthest.y()),
-      name_of(reaching(grid_of(model), more * farthest)));
+      helps ? fmt::format("--lens {}", name_of(other)) : "another model");
 }
 
 SplineGrid reaching(const SplineGrid& grid, const Eigen::Vector2d& u) {
   constexpr double rounding = 1e-9;  // what is wide enough stays as it is
+  const auto whole_between = [](double least, double value, double most) {
+    return static_cast<int>(std::clamp(std::ceil(value - rounding), least, most));
+  };
   SplineGrid wide = grid;
   wide.fov_x_deg =
-      static_cast<int>(std::clamp(std::ceil(4 * deg_from_rad(std::atan(u.x() / 2)) - rounding), 1.0,
-                                  double{SplineGrid::kMostFov_deg}));
+      whole_between(1, 4 * deg_from_rad(std::atan(u.x() / 2)), SplineGrid::kMostFov_deg);
   const double edge = 2 * std::tan(rad_from_deg(wide.fov_x_deg) / 4);
-  wide.ny = std::clamp(
-      grid.order + static_cast<int>(std::ceil((grid.nx - grid.order) * u.y() / edge - rounding)),
-      grid.order + 1, SplineGrid::kMostKnots);
+  wide.ny = whole_between(grid.order + 1,
+                          grid.order + (grid.nx - grid.order) * std::min(u.y() / edge, 1e6),
+                          SplineGrid::kMostKnots);
   return wide;
 }
 

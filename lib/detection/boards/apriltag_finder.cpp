@@ -4,6 +4,7 @@
 
 #include <map>
 #include <mutex>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -28,6 +29,7 @@ class Corrections {
   explicit Corrections(const std::string& name) : family_(tag_family(name)) {
     constexpr uint32_t large = 3000;  // gigabytes with two bits
     apriltag_detector_add_family_bits(maker_.get(), family_.get(), family_->ncodes > large ? 1 : 2);
+    if (family_->impl == nullptr) throw std::bad_alloc();
   }
   void* table() const { return family_->impl; }
 
@@ -36,7 +38,7 @@ class Corrections {
   DetectorPointer maker_{apriltag_detector_create(), apriltag_detector_destroy};
 };
 
-/// Made once in a process, and in one that others are split off for all of them.
+/// Made once in a process; processes that are split off afterwards share it.
 void* corrections_of(const std::string& family) {
   static std::mutex making;
   static std::map<std::string, Corrections> made;

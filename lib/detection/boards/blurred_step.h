@@ -15,7 +15,7 @@ struct ErrorFunction {
   double value, slope;
 };
 
-/// The standard deviation of a Gaussian point spread, and what many steps divide by.
+/// Of a Gaussian point spread: the inverses of its standard deviation and of sqrt(2) times that.
 struct Blur {
   explicit Blur(double px) : per_px(1 / px), per_scale(per_px / std::numbers::sqrt2) {}
 

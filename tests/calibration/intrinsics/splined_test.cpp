@@ -87,8 +87,8 @@ TEST(SplinedWideLens, OfTooNarrowAGridHasOnlyTheViewsWithinIt) {
   EXPECT_FALSE(solution.ok());
 }
 
-// A lens that OPENCV_FISHEYE leaves half as much of again as the noise is: tags that are good stay,
-// and those of which an edge slipped go.
+// Slips are told behind OPENCV_FISHEYE, which does not quite fit this lens: no tag is left out for
+// that, and those of which an edge slipped are.
 TEST(SplinedNarrowLens, DoesNotTakeItsOwnShapeForSlips) {
   constexpr double noise_px = 0.02, slip_px = 2.5;
   constexpr std::size_t count = 40, of_tag = 4;
