@@ -144,8 +144,7 @@ std::string why_too_coarse(const Lens& lens, const std::array<int, 2>& imager_px
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
       "the control points of {} are too few where the lens sees, {:.0f} degrees off the axis to "
-      "the "
-      "sides and {:.0f} up and down: take {}",
+      "the sides and {:.0f} up and down: take {}",
       name_of(model), angle_deg(farthest.x()), angle_deg(farthest.y()),
       helps ? fmt::format("--lens {}", name_of(other)) : "another model");
 }
