@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/record_tables.h"
 
-#include <soci/postgresql/soci-postgresql.h>
-
 #include <array>
 #include <stdexcept>
 #include <string>
@@ -131,37 +129,6 @@ int version_of(soci::session& sql) {
                            ": use the newer vlp-station that wrote them");
 }
 
-void make_or_migrate(soci::session& sql) {
-  soci::transaction transaction(sql);
-  if (is_sqlite(sql)) {
-    // As a writer from the start: a reader who goes on to write may not wait for other writers.
-    sql << "COMMIT";
-    sql << "BEGIN IMMEDIATE";
-  }
-  if (version_of(sql) == 0) {
-    for (const std::string& table : tables()) sql << table;
-    sql << "INSERT INTO vlp_schema (version) SELECT CAST(:version AS INTEGER) WHERE NOT EXISTS "
-           "(SELECT 1 FROM vlp_schema)",
-        soci::use(kSchema);
-  }
-  // In PostgreSQL, too, one at a time from here on: who waited sees what the other did.
-  sql << "UPDATE vlp_schema SET version = version";
-  const int found = version_of(sql);
-  for (int version = found; version < kSchema; ++version) {
-    kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
-  }
-  // When all columns are there.
-  if (found < kFirstWithTrail) append_all(sql);
-  if (found < kSchema) sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchema);
-  transaction.commit();
-}
-
-/// What PostgreSQL says to one of two who make the same tables at once, when the other has.
-bool made_by_another(const soci::postgresql_soci_error& error) {
-  constexpr const char *unique_violation = "23505", *duplicate_table = "42P07";
-  return error.sqlstate() == unique_violation || error.sqlstate() == duplicate_table;
-}
-
 }  // namespace
 
 bool has_record_tables(soci::session& sql) {
@@ -170,12 +137,32 @@ bool has_record_tables(soci::session& sql) {
 }
 
 void make_record_tables(soci::session& sql) {
-  try {
-    make_or_migrate(sql);
-  } catch (const soci::postgresql_soci_error& error) {
-    if (!made_by_another(error)) throw;
-    make_or_migrate(sql);
+  soci::transaction transaction(sql);
+  // One at a time, and who waited sees what the other did.
+  if (is_sqlite(sql)) {
+    // As a writer from the start: a reader who goes on to write may not wait for other writers.
+    sql << "COMMIT";
+    sql << "BEGIN IMMEDIATE";
+  } else {
+    // CREATE TABLE IF NOT EXISTS alone fails, in several ways, beside another of the same table.
+    sql << "SELECT pg_advisory_xact_lock(" + std::to_string(kLockOfTables) + ")";
   }
+  if (version_of(sql) == 0) {
+    for (const std::string& table : tables()) sql << table;
+    sql << "INSERT INTO vlp_schema (version) SELECT CAST(:version AS INTEGER) WHERE NOT EXISTS "
+           "(SELECT 1 FROM vlp_schema)",
+        soci::use(kSchema);
+  }
+  // Waits for those who write already.
+  lock_trail(sql);
+  const int found = version_of(sql);
+  for (int version = found; version < kSchema; ++version) {
+    kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
+  }
+  // When all columns are there.
+  if (found < kFirstWithTrail) append_all(sql);
+  if (found < kSchema) sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchema);
+  transaction.commit();
 }
 
 }  // namespace vlp

@@ -10,9 +10,12 @@ namespace vlp {
 /// make_record_tables().
 bool has_record_tables(soci::session& sql);
 
+/// The advisory lock of PostgreSQL behind which tables are made and changed ("vlp").
+inline constexpr int kLockOfTables = 0x766c70;
+
 /// Makes the tables of the records when they are not there, the same in SQLite and PostgreSQL, and
-/// brings those of an earlier version up to date, wholly or not at all. Throws soci::soci_error,
-/// and std::runtime_error for tables of a later version.
+/// brings those of an earlier version up to date, wholly or not at all, one program at a time.
+/// Throws soci::soci_error, and std::runtime_error for tables of a later version.
 void make_record_tables(soci::session& sql);
 
 }  // namespace vlp

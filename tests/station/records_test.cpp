@@ -14,6 +14,7 @@
 
 #include "sample_records.h"
 #include "station/export_runs.h"
+#include "station/record_tables.h"
 #include "station/station_config.h"
 #include "support/child_process.h"
 #include "support/postgres_server.h"
@@ -370,6 +371,26 @@ TEST(Records, AreKeptInPostgres) {
             "pg_backend_pid() AND backend_type = 'client backend';\n");
   records.keep(sample(run_of(9), "c", 0.1));
   EXPECT_TRUE(records.find(run_of(9)));
+}
+
+TEST(Records, AreMadeByOneAtATimeInPostgres) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  const TemporaryFolder folder;
+  const auto begun = folder / "begun", go_on = folder / "go_on";
+  const std::string lock = std::to_string(kLockOfTables);
+  std::thread another([&] {
+    answer_of(server.uri(), "BEGIN;\nSELECT pg_advisory_xact_lock(" + lock + ");\n\\! touch " +
+                                begun.string() + "; while [ ! -e " + go_on.string() +
+                                " ]; do sleep 0.01; done\nCOMMIT;\n");
+  });
+  while (!std::filesystem::exists(begun)) std::this_thread::yield();
+  auto made = std::async(std::launch::async, [&] { Records records(server.uri()); });
+  EXPECT_EQ(made.wait_for(std::chrono::milliseconds(300)), std::future_status::timeout);
+  folder.file("go_on", "");
+  made.get();
+  another.join();
 }
 
 TEST(Records, RefuseAFileThatIsNoDatabase) {
