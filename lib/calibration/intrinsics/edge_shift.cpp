@@ -71,16 +71,17 @@ ShiftEquations equations_of(const std::vector<BoardLattice::Corner>& corners, co
 }  // namespace
 
 std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Corner>> views,
-                                   const Lens& lens) {
+                                   const Lens& lens, bool even) {
   // Corners of 0.05 px, shifts that differ by 0.1 px from view to view and within a view.
-  constexpr double weight = 0.25, none = 1e-6;
-  const Eigen::Vector4d even(none, weight, weight, weight);
+  constexpr double weight = 0.25, none = 1e-6, all = 1e9;
+  const double uneven = even ? all : weight;
+  const Eigen::Vector4d alone(none, uneven, uneven, uneven), beside(weight, uneven, uneven, uneven);
   std::vector<ShiftEquations> equations;
   std::vector<double> alone_px;
   for (const auto& corners : views) {
     equations.push_back(equations_of(corners, lens));
     if (equations.back().any) {
-      alone_px.push_back(equations.back().solved(Eigen::Vector4d::Zero(), even).by[0]);
+      alone_px.push_back(equations.back().solved(Eigen::Vector4d::Zero(), alone).by[0]);
     }
   }
   std::vector<EdgeShift> shifts(views.size());
@@ -88,7 +89,7 @@ std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Cor
   const Eigen::Vector4d usual(upper_median(alone_px), 0, 0, 0);
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (equations[i].any) {
-      shifts[i] = equations[i].solved(usual, Eigen::Vector4d::Constant(weight));
+      shifts[i] = equations[i].solved(usual, beside);
     } else if (!views[i].empty() && !views[i].front().inward.isZero(0)) {
       shifts[i].by = usual;
     }

@@ -30,10 +30,11 @@ struct EdgeShift {
 /// on all sides. Solved for with the pose of the board, by least squares of
 ///   seen - projected - shift inward
 /// (BoardLattice::Corner), which the gaps between the tags determine. A view of few corners goes
-/// with the median of the others, and its shift changes little. 0 where the edges cannot move:
-/// where touching squares make the corners.
+/// with the median of the others, and its shift changes little. `even`: it does not change over a
+/// view at all; otherwise it would take for itself what a board that is bent shows, as long as that
+/// is not known. 0 where the edges cannot move: where touching squares make the corners.
 std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Corner>> views,
-                                   const Lens& lens);
+                                   const Lens& lens, bool even = false);
 
 /// Moves the edges back; the mean of what they were moved by, in px.
 double take_out_shift(std::vector<BoardLattice::Corner>& corners, const EdgeShift& shift);

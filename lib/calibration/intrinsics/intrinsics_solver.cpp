@@ -156,14 +156,14 @@ bool IntrinsicsSolver::weigh_regularization() {
   return true;
 }
 
-bool IntrinsicsSolver::take_out_shifts() {
+bool IntrinsicsSolver::take_out_shifts(bool even) {
   constexpr int rounds = 2;
   constexpr double settled_px = 0.002;
   const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   for (int round = 0; round < rounds; ++round) {
     auto views = input_.views;
     for (auto& view : views) view = input_.lattice.bent(std::move(view), problem_.warp_m);
-    const auto shifts = edge_shifts(views, lens());
+    const auto shifts = edge_shifts(views, lens(), even);
     if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeShift& shift) {
           return shift.by.lpNorm<Eigen::Infinity>() < settled_px;
         })) {
@@ -198,7 +198,7 @@ bool IntrinsicsSolver::bend() {
     solved_for_.warp = false;
     return true;
   }
-  return take_out_shifts();  // the first shifts were those of a flat board
+  return true;
 }
 
 bool IntrinsicsSolver::leave_out_outliers() {

@@ -26,13 +26,13 @@ class IntrinsicsSolver {
   bool refine();
   /// Of a splined lens, the regularization made for the noise of the corners; no stage of others.
   bool weigh_regularization();
-  /// Stage 4: what edge_shifts() finds, twice at most, until it is below 0.002 px.
-  bool take_out_shifts();
-  /// Stage 5: the warp of the board, if it is to be; and the shifts of a board that bends.
+  /// Stages 4, `even`, and 6: what edge_shifts() finds, twice at most, until it is below 0.002 px.
+  bool take_out_shifts(bool even = false);
+  /// Stage 5: the warp of the board, if it is to be.
   bool bend();
-  /// Stage 6.
+  /// Stage 7.
   bool leave_out_outliers();
-  /// Stage 7, of a splined lens: true also when the turn has not settled.
+  /// Stage 8, of a splined lens: true also when the turn has not settled.
   bool turn_to_axis();
 
   IntrinsicsSolution solution() const;

@@ -38,12 +38,17 @@ double light_behind(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
-/// Parameters: the parabola's three, blur, middle, contrast, light along and across. A step that is
+/// Coefficients of a polynomial of an edge that is much bent; other edges have the first three.
+constexpr int kMostTerms = 4, kTerms = 3;
+using Coefficients = Eigen::Matrix<double, kMostTerms, 1>;
+
+/// Parameters: blur, middle, contrast, light along and across, the polynomial's. A step that is
 /// taken is asked for twice, with its derivatives the second time: they are kept from the first.
+template <int terms>
 class Edge {
  public:
   using Scalar = double;
-  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 8 };
+  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 5 + terms };
   using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
   using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>;
 
@@ -65,17 +70,21 @@ class Edge {
 
   void evaluate(const Parameters& p) const {
     at_ = p;
-    const Blur blur(p[3]);
+    const Blur blur(p[0]);
     for (Eigen::Index i = 0; i < rows(); ++i) {
       const auto& [w, v, grey] = pixels_[static_cast<std::size_t>(i)];
-      const BlurredStep step(v - p[0] - w * (p[1] + w * p[2]), blur);
-      const double lit = 1 + p[6] * w + p[7] * v, unlit = p[4] + p[5] * step.value;
+      double off = p[4 + terms];
+      for (int k = terms - 2; k >= 0; --k) off = p[5 + k] + w * off;
+      const BlurredStep step(v - off, blur);
+      const double lit = 1 + p[3] * w + p[4] * v, unlit = p[1] + p[2] * step.value;
       const Coded coded(unlit * lit, gamma_);
       residuals_[i] = coded.level - grey;
       const double bright = lit * coded.slope, plain = unlit * coded.slope;
-      const double by_distance = bright * p[5] * step.slope;
-      jacobian_.row(i) << -by_distance, -by_distance * w, -by_distance * w * w,
-          bright * p[5] * step.by_blur, bright, bright * step.value, plain * w, plain * v;
+      auto row = jacobian_.row(i);
+      row.template head<5>() << bright * p[2] * step.by_blur, bright, bright * step.value,
+          plain * w, plain * v;
+      double by_term = -bright * p[2] * step.slope;
+      for (int k = 0; k < terms; ++k, by_term *= w) row[5 + k] = by_term;
     }
   }
 
@@ -86,18 +95,28 @@ class Edge {
   mutable Jacobian jacobian_;
 };
 
-/// Points x with across.(x - middle) = a + b w + c w^2, w = along.(x - middle) / half_px.
-struct Parabola {
+double value_at(const Coefficients& terms, double w) {
+  return terms[0] + w * (terms[1] + w * (terms[2] + w * terms[3]));
+}
+
+/// Points x with across.(x - middle) = a + b w + c w^2 + ..., w = along.(x - middle) / half_px.
+struct EdgeCurve {
   Eigen::Vector2d middle, along, across;
   double half_px;
-  Eigen::Vector3d abc = Eigen::Vector3d::Zero();
+  Coefficients terms = Coefficients::Zero();
   double blur_px = 0.8;
+
+  /// How far outside a point is.
+  double off(const Eigen::Vector2d& x) const {
+    return across.dot(x - middle) - value_at(terms, along.dot(x - middle) / half_px);
+  }
 
   /// Of 0 on it, and its gradient.
   double off(const Eigen::Vector2d& x, Eigen::Vector2d& gradient) const {
     const double w = along.dot(x - middle) / half_px;
-    gradient = across - (abc[1] + 2 * abc[2] * w) / half_px * along;
-    return across.dot(x - middle) - abc.dot(Eigen::Vector3d(1, w, w * w));
+    const double slope = terms[1] + w * (2 * terms[2] + w * 3 * terms[3]);
+    gradient = across - slope / half_px * along;
+    return off(x);
   }
 };
 
@@ -105,29 +124,37 @@ struct Band {
   double inside_px, outside_px;
 };
 
-std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image, const Parabola& edge,
+/// The pixels along an edge of a tag, by where its edges are roughly.
+std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
+                                     const std::array<EdgeCurve, 4>& roughly, std::size_t k,
                                      const Band& band) {
-  constexpr double free_px = 2.5;  // of the corners, which are round
-  const double end_px = edge.half_px - free_px;
-  const Eigen::Vector2d wide = edge.along.cwiseAbs() * edge.half_px +
-                               edge.across.cwiseAbs() * std::max(band.inside_px, band.outside_px);
+  // Of the edges beside it, which are as blurred; so the corners, which are round, are away.
+  constexpr double free_px = 2.5;
+  const EdgeCurve &edge = roughly[k], &next = roughly[(k + 1) % 4],
+                  &previous = roughly[(k + 3) % 4];
+  const double reach_px = std::max(band.inside_px, band.outside_px) + edge.terms.lpNorm<1>();
+  const Eigen::Vector2d wide =
+      edge.along.cwiseAbs() * edge.half_px + edge.across.cwiseAbs() * reach_px;
   const Eigen::Array2i last(image.cols - 1, image.rows - 1);
   const Eigen::Vector2i low = (edge.middle - wide).array().ceil().cast<int>().max(0);
   const Eigen::Vector2i high = (edge.middle + wide).array().floor().cast<int>().min(last);
   std::vector<EdgePixel> pixels;
   for (int row = low.y(); row <= high.y(); ++row) {
     for (int column = low.x(); column <= high.x(); ++column) {
-      const Eigen::Vector2d at = Eigen::Vector2d(column, row) - edge.middle;
-      const double u = edge.along.dot(at), v = edge.across.dot(at);
-      if (std::abs(u) > end_px || v < -band.inside_px || v > band.outside_px) continue;
-      pixels.push_back({u / edge.half_px, v, static_cast<double>(image(row, column))});
+      const Eigen::Vector2d at(column, row);
+      const double w = edge.along.dot(at - edge.middle) / edge.half_px;
+      const double v = edge.across.dot(at - edge.middle), off = v - value_at(edge.terms, w);
+      if (off < -band.inside_px || off > band.outside_px) continue;
+      if (next.off(at) > -free_px || previous.off(at) > -free_px) continue;
+      pixels.push_back({w, v, static_cast<double>(image(row, column))});
     }
   }
   return pixels;
 }
 
 /// Middle and contrast of pixels, roughly: those well inside against those well outside.
-void start_edge_levels(const std::vector<EdgePixel>& pixels, double gamma, Edge::Parameters& p) {
+template <typename Parameters>
+void start_edge_levels(const std::vector<EdgePixel>& pixels, double gamma, Parameters& p) {
   double in = 0, out = 0, ins = 0, outs = 0;
   for (const EdgePixel& pixel : pixels) {
     (pixel.across_px < 0 ? in : out) += light_behind(pixel.grey, gamma);
@@ -135,40 +162,43 @@ void start_edge_levels(const std::vector<EdgePixel>& pixels, double gamma, Edge:
   }
   in /= std::max(ins, 1.0);
   out /= std::max(outs, 1.0);
-  p[4] = (in + out) / 2;
-  p[5] = (out - in) / 2;
+  p[1] = (in + out) / 2;
+  p[2] = (out - in) / 2;
 }
 
 /// From where the edge is. The sum of the squares that are left over; infinite when the pixels look
 /// otherwise.
-double fit(Parabola& edge, const cv::Mat1b& image, const Band& band, double gamma) {
+template <int terms>
+double fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels, double gamma) {
   constexpr std::size_t least_pixels = 24;
   constexpr int most_steps = 15;
   constexpr double least_blur_px = 0.05, most_blur_px = 6;
   constexpr double enough = 1e-3;  // grey levels squared
   constexpr double least_contrast = 3, unlike = 0.35;
-  const auto pixels = pixels_beside(image, edge, band);
   constexpr double no_edge = std::numeric_limits<double>::infinity();
   if (pixels.size() < least_pixels) return no_edge;
-  Edge::Parameters p = Edge::Parameters::Zero();
-  p.head<4>() << edge.abc, edge.blur_px;
+  using Step = Edge<terms>;
+  typename Step::Parameters p = Step::Parameters::Zero();
+  p[0] = edge.blur_px;
+  p.template tail<terms>() = edge.terms.head<terms>();
   start_edge_levels(pixels, gamma, p);
-  const Edge step(pixels, gamma);
-  ceres::TinySolver<Edge> solver;
+  const Step step(pixels, gamma);
+  ceres::TinySolver<Step> solver;
   solver.options.max_num_iterations = most_steps;
   solver.options.function_tolerance = enough;
   solver.Solve(step, &p);
-  edge.abc = p.head<3>();
-  edge.blur_px = p[3];
+  edge.terms.setZero();
+  edge.terms.head<terms>() = p.template tail<terms>();
+  edge.blur_px = p[0];
   const double squares = 2 * solver.summary.final_cost;
   const double rms = std::sqrt(squares / static_cast<double>(pixels.size()));
-  const bool good = p.allFinite() && p[3] > least_blur_px && p[3] < most_blur_px &&
-                    std::abs(p[5]) > least_contrast && rms < unlike * std::abs(p[5]);
+  const bool good = p.allFinite() && p[0] > least_blur_px && p[0] < most_blur_px &&
+                    std::abs(p[2]) > least_contrast && rms < unlike * std::abs(p[2]);
   return good ? squares : no_edge;
 }
 
 /// Newton's method, from a point near it.
-Eigen::Vector2d crossing(const Parabola& a, const Parabola& b, Eigen::Vector2d point) {
+Eigen::Vector2d crossing(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point) {
   constexpr int steps = 4;
   for (int i = 0; i < steps; ++i) {
     Eigen::Vector2d by_a, by_b, off;
@@ -182,37 +212,77 @@ Eigen::Vector2d crossing(const Parabola& a, const Parabola& b, Eigen::Vector2d p
 
 /// The edges of a tag, each fitted from corner to corner.
 struct TagEdges {
-  std::array<Parabola, 4> edges;
-  double width_px = INFINITY;  // of the shortest
+  using Four = std::array<EdgeCurve, 4>;
+
+  Four roughly, edges;
+  double width_px = INFINITY;  // where it is narrowest
+  double bow_px = 0;           // of the most bent
   /// Infinite where an edge is none.
   double squares = 0;
+
+  /// The sides of the quad, which libapriltag has.
+  explicit TagEdges(const SeenTag& tag) {
+    const auto& corners = tag.corners_px;
+    const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Eigen::Vector2d from = corners[k], to = corners[(k + 1) % 4];
+      EdgeCurve& edge = roughly[k];
+      edge.middle = (from + to) / 2;
+      edge.half_px = (to - from).norm() / 2;
+      edge.along = (to - from) / (2 * edge.half_px);
+      edge.across = {-edge.along.y(), edge.along.x()};
+      if (edge.across.dot(edge.middle - middle) < 0) edge.across = -edge.across;
+      for (const std::size_t other : {k + 2, k + 3}) {
+        width_px = std::min(width_px, edge.across.dot(from - corners[other % 4]));
+      }
+    }
+    edges = roughly;
+  }
+
+  template <int terms>
+  void fit_all(const cv::Mat1b& image, const EdgeStripes& stripes, double gamma) {
+    // The stripe's other side is kept away from by 2 px: it is blurred, too.
+    constexpr double least_px = 1.5, most_px = 4.5, away_px = 2;
+    const Band band{std::clamp(stripes.inside * width_px - away_px, least_px, most_px),
+                    std::clamp(stripes.outside * width_px - away_px, least_px, most_px)};
+    squares = bow_px = 0;
+    for (std::size_t k = 0; k < 4 && std::isfinite(squares); ++k) {
+      squares += fit<terms>(edges[k], pixels_beside(image, roughly, k, band), gamma);
+      bow_px = std::max(bow_px, std::abs(edges[k].terms[2]));
+    }
+  }
 };
 
-/// With `before`, of another gamma, from where that has the edges.
-TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& stripes,
-                double gamma, const TagEdges* before = nullptr) {
-  // The stripe's other side is kept away from by 2 px: it is blurred, too.
-  constexpr double least_px = 1.5, most_px = 4.5, away_px = 2;
-  const auto& corners = tag.corners_px;
-  TagEdges found;
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+double difference_px(const TagEdges::Four& a, const TagEdges::Four& b) {
+  double most_px = 0;
   for (std::size_t k = 0; k < 4; ++k) {
-    middle += corners[k] / 4;
-    found.width_px = std::min(found.width_px, (corners[(k + 1) % 4] - corners[k]).norm());
+    most_px = std::max(most_px, (a[k].terms - b[k].terms).lpNorm<Eigen::Infinity>());
   }
-  const Band band{std::clamp(stripes.inside * found.width_px - away_px, least_px, most_px),
-                  std::clamp(stripes.outside * found.width_px - away_px, least_px, most_px)};
-  for (std::size_t k = 0; k < 4; ++k) {
-    const Eigen::Vector2d from = corners[k], to = corners[(k + 1) % 4];
-    Parabola& edge = found.edges[k];
-    if (before) edge = before->edges[k];
-    edge.middle = (from + to) / 2;
-    edge.half_px = (to - from).norm() / 2;
-    edge.along = (to - from) / (2 * edge.half_px);
-    edge.across = {-edge.along.y(), edge.along.x()};
-    if (edge.across.dot(edge.middle - middle) < 0) edge.across = -edge.across;
-    found.squares += fit(edge, image, band, gamma);
+  return most_px;
+}
+
+/// Again, of the same pixels.
+void fit_again(TagEdges& found, const cv::Mat1b& image, const EdgeStripes& stripes, double gamma) {
+  constexpr double no_parabola_px = 1;
+  if (found.bow_px > no_parabola_px) {
+    found.fit_all<kMostTerms>(image, stripes, gamma);
+  } else {
+    found.fit_all<kTerms>(image, stripes, gamma);
+  }
+}
+
+TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& stripes,
+                double gamma) {
+  constexpr double bent_px = 0.5, settled_px = 0.05;
+  constexpr int most_rounds = 4;
+  TagEdges found(tag);
+  found.fit_all<kTerms>(image, stripes, gamma);
+  // A wide lens bends an edge out of a band along the quad's side, which ends beside the corners.
+  for (int round = 0; round < most_rounds && found.bow_px > bent_px; ++round) {
     if (!std::isfinite(found.squares)) break;
+    if (round > 0 && difference_px(found.edges, found.roughly) < settled_px) break;
+    found.roughly = found.edges;
+    fit_again(found, image, stripes, gamma);
   }
   return found;
 }
@@ -221,7 +291,8 @@ TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& s
 std::optional<SeenTag> crossed(const SeenTag& tag, const TagEdges& found) {
   constexpr double moved_px = 1.5, moved_share = 0.03;
   if (!std::isfinite(found.squares)) return {};
-  const double most_moved_px = std::max(moved_px, moved_share * found.width_px);
+  // A straight line through all of an edge ends beside it by two thirds of what that bends.
+  const double most_moved_px = std::max(moved_px, moved_share * found.width_px) + found.bow_px;
   SeenTag exact = tag;
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d& from = tag.corners_px[k];
@@ -256,7 +327,9 @@ std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> ta
   int told = 0;
   for (const std::size_t i : widest) {
     as_it_is += found[i].squares;
-    behind_curve += fitted(tags[i], image, stripes, usual_gamma, &found[i]).squares;
+    TagEdges other = found[i];
+    fit_again(other, image, stripes, usual_gamma);
+    behind_curve += other.squares;
     const auto [less, more] = std::minmax(as_it_is, behind_curve);
     if (++told >= fewest && more > clearly * less) break;
   }
