@@ -10,7 +10,9 @@ namespace vlp {
 /// make_record_tables().
 bool has_record_tables(soci::session& sql);
 
-/// The advisory lock of PostgreSQL behind which tables are made and changed ("vlp").
+/// The advisory lock of PostgreSQL behind which tables are made and changed ("vlp"). A program from
+/// before it does not ask for it: of two that begin with an empty database at one moment it can
+/// still make one fail, which then works when it is started again.
 inline constexpr int kLockOfTables = 0x766c70;
 
 /// Makes the tables of the records when they are not there, the same in SQLite and PostgreSQL, and

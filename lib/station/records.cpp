@@ -36,6 +36,8 @@ void set_up(soci::session& sql, int patience_s) {
     // One that stands still holds the trail for no longer than others wait for it.
     sql << "SET idle_in_transaction_session_timeout TO " +
                std::to_string(patience_s * of_patience_ms);
+    // Who waited for a lock sees what the other did.
+    sql << "SET SESSION CHARACTERISTICS AS TRANSACTION ISOLATION LEVEL READ COMMITTED";
     // What is committed is on the disk, whatever the server is told to do otherwise.
     sql << "SET synchronous_commit TO on";
     return;

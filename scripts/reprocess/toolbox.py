@@ -13,10 +13,10 @@ def toolbox(folder):
     """The version that vlp-calibrate states, and a digest of it and of what reads its results."""
     program = folder / PROGRAMS[0]
     # At the same time: a start takes a fifth of a second, of which the libraries are most.
-    each = subprocess.Popen([program, "--each"], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                            stderr=subprocess.DEVNULL)
-    stated = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
-    if each.wait() != 0:
+    nothing = subprocess.DEVNULL
+    with subprocess.Popen([program, "--each"], stdin=nothing, stdout=nothing, stderr=nothing) as each:
+        stated = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    if each.returncode != 0:
         raise ValueError(f"{program}: vlp-calibrate is too old for these scripts")
     files = [program, Path(__file__).parent / "outcome.py"]
     return {"version": stated.split()[-1], "toolbox": digest("".join(file_digest(file) for file in files))}

@@ -139,21 +139,30 @@ TEST_F(CornerFiles, GiveTheLensOfTheImagesToTheLastBit) {
   if (run_program("command -v mrcal-calibrate-cameras").exit_code != 0) {
     GTEST_SKIP() << "no mrcal-calibrate-cameras here";
   }
-  const auto mrcal = run_program(
-      "cd " + (folder / "mrcal").string() +
-      " && mrcal-calibrate-cameras --corners-cache corners.vnl --lensmodel LENSMODEL_OPENCV8 "
-      "--focal 520 --object-spacing 0.02 --object-width-n 12 --object-height-n 10 "
-      "--imagersize 800 600 --skip-outlier-rejection --outdir . '*.png'");
-  ASSERT_EQ(mrcal.exit_code, 0) << mrcal.errors;
+  // By chance mrcal's own start has the pose of a view wrong, for one focal length or another.
+  constexpr double right_px = 0.1;
+  double theirs_px = INFINITY;
+  for (const char* focal : {"480", "520", "560", "440"}) {
+    const auto mrcal = run_program(
+        "cd " + (folder / "mrcal").string() +
+        " && rm -f camera-0.cameramodel && mrcal-calibrate-cameras --corners-cache corners.vnl "
+        "--lensmodel LENSMODEL_OPENCV8 --object-spacing 0.02 --object-width-n 12 "
+        "--object-height-n 10 --imagersize 800 600 --skip-outlier-rejection --outdir . --focal " +
+        focal + " '*.png'");
+    const std::string before = "## RMS error: ";
+    const auto at = mrcal.errors.rfind(before);
+    ASSERT_NE(at, std::string::npos) << mrcal.errors;
+    theirs_px = std::stod(mrcal.errors.substr(at + before.size()));
+    if (theirs_px > right_px) continue;
+    ASSERT_EQ(mrcal.exit_code, 0) << mrcal.errors;
+    break;
+  }
+  ASSERT_LT(theirs_px, right_px);
   const Camera found = read_any_camera(folder / "mrcal/camera-0.cameramodel");
   const Lens theirs(found.lens_model, found.intrinsics);
   EXPECT_LT(projection_difference(theirs, here, imager_px, one)->worst_px, 0.01);
   // mrcal counts the corners that are not seen, too, and its regularization.
   constexpr double points = 12 * 10;
-  const std::string before = "## RMS error: ";
-  const auto at = mrcal.errors.rfind(before);
-  ASSERT_NE(at, std::string::npos) << mrcal.errors;
-  const double theirs_px = std::stod(mrcal.errors.substr(at + before.size()));
   EXPECT_NEAR(theirs_px / (std::sqrt(report.corners / (report.views * points)) * report.rms_px), 1,
               0.03);
 }

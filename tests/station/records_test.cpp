@@ -380,17 +380,20 @@ TEST(Records, AreMadeByOneAtATimeInPostgres) {
   const TemporaryFolder folder;
   const auto begun = folder / "begun", go_on = folder / "go_on";
   const std::string lock = std::to_string(kLockOfTables);
-  std::thread another([&] {
+  auto another = std::async(std::launch::async, [&] {
     answer_of(server.uri(), "BEGIN;\nSELECT pg_advisory_xact_lock(" + lock + ");\n\\! touch " +
                                 begun.string() + "; while [ ! -e " + go_on.string() +
                                 " ]; do sleep 0.01; done\nCOMMIT;\n");
   });
-  while (!std::filesystem::exists(begun)) std::this_thread::yield();
-  auto made = std::async(std::launch::async, [&] { Records records(server.uri()); });
-  EXPECT_EQ(made.wait_for(std::chrono::milliseconds(300)), std::future_status::timeout);
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!std::filesystem::exists(begun) && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  auto made = std::async(std::launch::async, [&] { return Records(server.uri()).list({}).size(); });
+  EXPECT_EQ(made.wait_for(std::chrono::milliseconds(500)), std::future_status::timeout);
   folder.file("go_on", "");
-  made.get();
-  another.join();
+  EXPECT_EQ(made.get(), 0U);
+  another.get();
 }
 
 TEST(Records, RefuseAFileThatIsNoDatabase) {

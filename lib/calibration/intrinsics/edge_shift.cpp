@@ -71,10 +71,10 @@ ShiftEquations equations_of(const std::vector<BoardLattice::Corner>& corners, co
 }  // namespace
 
 std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Corner>> views,
-                                   const Lens& lens, bool even) {
+                                   const Lens& lens, ShiftForm form) {
   // Corners of 0.05 px, shifts that differ by 0.1 px from view to view and within a view.
   constexpr double weight = 0.25, none = 1e-6, all = 1e9;
-  const double uneven = even ? all : weight;
+  const double uneven = form == ShiftForm::even ? all : weight;
   const Eigen::Vector4d alone(none, uneven, uneven, uneven), beside(weight, uneven, uneven, uneven);
   std::vector<ShiftEquations> equations;
   std::vector<double> alone_px;

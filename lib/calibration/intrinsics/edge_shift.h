@@ -25,16 +25,19 @@ struct EdgeShift {
   }
 };
 
+/// Whether the shift of a view changes over it.
+enum class ShiftForm { even, changing };
+
 /// The shift in each view. A tone curve, sharpening or overexposure moves an edge by a share of its
 /// blur, because half of the coded level is not half of the light; so isolated tags shrink by that
 /// on all sides. Solved for with the pose of the board, by least squares of
 ///   seen - projected - shift inward
 /// (BoardLattice::Corner), which the gaps between the tags determine. A view of few corners goes
-/// with the median of the others, and its shift changes little. `even`: it does not change over a
-/// view at all; otherwise it would take for itself what a board that is bent shows, as long as that
-/// is not known. 0 where the edges cannot move: where touching squares make the corners.
+/// with the median of the others, and its shift changes little. One that changes over a view
+/// would take for itself what a board that is bent shows, as long as that is not known. 0 where the
+/// edges cannot move: where touching squares make the corners.
 std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Corner>> views,
-                                   const Lens& lens, bool even = false);
+                                   const Lens& lens, ShiftForm form = ShiftForm::changing);
 
 /// Moves the edges back; the mean of what they were moved by, in px.
 double take_out_shift(std::vector<BoardLattice::Corner>& corners, const EdgeShift& shift);

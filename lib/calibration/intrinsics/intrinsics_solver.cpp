@@ -156,14 +156,14 @@ bool IntrinsicsSolver::weigh_regularization() {
   return true;
 }
 
-bool IntrinsicsSolver::take_out_shifts(bool even) {
+bool IntrinsicsSolver::take_out_shifts(ShiftForm form) {
   constexpr int rounds = 2;
   constexpr double settled_px = 0.002;
   const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   for (int round = 0; round < rounds; ++round) {
     auto views = input_.views;
     for (auto& view : views) view = input_.lattice.bent(std::move(view), problem_.warp_m);
-    const auto shifts = edge_shifts(views, lens(), even);
+    const auto shifts = edge_shifts(views, lens(), form);
     if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeShift& shift) {
           return shift.by.lpNorm<Eigen::Infinity>() < settled_px;
         })) {
@@ -196,7 +196,6 @@ bool IntrinsicsSolver::bend() {
       squares(flat) - squares(bent) <= much * bent.rms_px * bent.rms_px) {
     problem_ = flat.problem;
     solved_for_.warp = false;
-    return true;
   }
   return true;
 }

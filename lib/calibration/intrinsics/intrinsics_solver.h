@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/intrinsics/edge_shift.h"
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/pose_seeds.h"
 
@@ -26,8 +27,9 @@ class IntrinsicsSolver {
   bool refine();
   /// Of a splined lens, the regularization made for the noise of the corners; no stage of others.
   bool weigh_regularization();
-  /// Stages 4, `even`, and 6: what edge_shifts() finds, twice at most, until it is below 0.002 px.
-  bool take_out_shifts(bool even = false);
+  /// Stages 4, even ones, and 6: what edge_shifts() finds, twice at most, until it is below 0.002
+  /// px.
+  bool take_out_shifts(ShiftForm form);
   /// Stage 5: the warp of the board, if it is to be.
   bool bend();
   /// Stage 7.

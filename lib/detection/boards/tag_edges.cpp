@@ -38,7 +38,7 @@ double light_behind(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
-/// Coefficients of a polynomial of an edge that is much bent; other edges have the first three.
+/// Coefficients of the polynomial of an edge that is much bent; of others the last is 0.
 constexpr int kMostTerms = 4, kTerms = 3;
 using Coefficients = Eigen::Matrix<double, kMostTerms, 1>;
 
@@ -95,26 +95,28 @@ class Edge {
   mutable Jacobian jacobian_;
 };
 
-double value_at(const Coefficients& terms, double w) {
-  return terms[0] + w * (terms[1] + w * (terms[2] + w * terms[3]));
+double value_at(const Coefficients& c, double w) {
+  return c[0] + w * (c[1] + w * (c[2] + w * c[3]));
 }
 
 /// Points x with across.(x - middle) = a + b w + c w^2 + ..., w = along.(x - middle) / half_px.
 struct EdgeCurve {
   Eigen::Vector2d middle, along, across;
   double half_px;
-  Coefficients terms = Coefficients::Zero();
+  Coefficients coefficients = Coefficients::Zero();
+  bool cubic = false;
   double blur_px = 0.8;
 
   /// How far outside a point is.
   double off(const Eigen::Vector2d& x) const {
-    return across.dot(x - middle) - value_at(terms, along.dot(x - middle) / half_px);
+    return across.dot(x - middle) - value_at(coefficients, along.dot(x - middle) / half_px);
   }
 
   /// Of 0 on it, and its gradient.
   double off(const Eigen::Vector2d& x, Eigen::Vector2d& gradient) const {
     const double w = along.dot(x - middle) / half_px;
-    const double slope = terms[1] + w * (2 * terms[2] + w * 3 * terms[3]);
+    const Coefficients& c = coefficients;
+    const double slope = c[1] + w * (2 * c[2] + w * 3 * c[3]);
     gradient = across - slope / half_px * along;
     return off(x);
   }
@@ -132,7 +134,7 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
   constexpr double free_px = 2.5;
   const EdgeCurve &edge = roughly[k], &next = roughly[(k + 1) % 4],
                   &previous = roughly[(k + 3) % 4];
-  const double reach_px = std::max(band.inside_px, band.outside_px) + edge.terms.lpNorm<1>();
+  const double reach_px = std::max(band.inside_px, band.outside_px) + edge.coefficients.lpNorm<1>();
   const Eigen::Vector2d wide =
       edge.along.cwiseAbs() * edge.half_px + edge.across.cwiseAbs() * reach_px;
   const Eigen::Array2i last(image.cols - 1, image.rows - 1);
@@ -143,7 +145,7 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
     for (int column = low.x(); column <= high.x(); ++column) {
       const Eigen::Vector2d at(column, row);
       const double w = edge.along.dot(at - edge.middle) / edge.half_px;
-      const double v = edge.across.dot(at - edge.middle), off = v - value_at(edge.terms, w);
+      const double v = edge.across.dot(at - edge.middle), off = v - value_at(edge.coefficients, w);
       if (off < -band.inside_px || off > band.outside_px) continue;
       if (next.off(at) > -free_px || previous.off(at) > -free_px) continue;
       pixels.push_back({w, v, static_cast<double>(image(row, column))});
@@ -154,11 +156,13 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
 
 /// Middle and contrast of pixels, roughly: those well inside against those well outside.
 template <typename Parameters>
-void start_edge_levels(const std::vector<EdgePixel>& pixels, double gamma, Parameters& p) {
+void start_edge_levels(const std::vector<EdgePixel>& pixels, const EdgeCurve& edge, double gamma,
+                       Parameters& p) {
   double in = 0, out = 0, ins = 0, outs = 0;
   for (const EdgePixel& pixel : pixels) {
-    (pixel.across_px < 0 ? in : out) += light_behind(pixel.grey, gamma);
-    (pixel.across_px < 0 ? ins : outs) += 1;
+    const bool inside = pixel.across_px < value_at(edge.coefficients, pixel.along);
+    (inside ? in : out) += light_behind(pixel.grey, gamma);
+    (inside ? ins : outs) += 1;
   }
   in /= std::max(ins, 1.0);
   out /= std::max(outs, 1.0);
@@ -180,15 +184,15 @@ double fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels, double gamma) 
   using Step = Edge<terms>;
   typename Step::Parameters p = Step::Parameters::Zero();
   p[0] = edge.blur_px;
-  p.template tail<terms>() = edge.terms.head<terms>();
-  start_edge_levels(pixels, gamma, p);
+  p.template tail<terms>() = edge.coefficients.head<terms>();
+  start_edge_levels(pixels, edge, gamma, p);
   const Step step(pixels, gamma);
   ceres::TinySolver<Step> solver;
   solver.options.max_num_iterations = most_steps;
   solver.options.function_tolerance = enough;
   solver.Solve(step, &p);
-  edge.terms.setZero();
-  edge.terms.head<terms>() = p.template tail<terms>();
+  edge.coefficients.setZero();
+  edge.coefficients.head<terms>() = p.template tail<terms>();
   edge.blur_px = p[0];
   const double squares = 2 * solver.summary.final_cost;
   const double rms = std::sqrt(squares / static_cast<double>(pixels.size()));
@@ -239,50 +243,46 @@ struct TagEdges {
     edges = roughly;
   }
 
-  template <int terms>
   void fit_all(const cv::Mat1b& image, const EdgeStripes& stripes, double gamma) {
     // The stripe's other side is kept away from by 2 px: it is blurred, too.
     constexpr double least_px = 1.5, most_px = 4.5, away_px = 2;
+    constexpr double most_bow = 0.25;  // of the tag: beyond, the fit went to something else
     const Band band{std::clamp(stripes.inside * width_px - away_px, least_px, most_px),
                     std::clamp(stripes.outside * width_px - away_px, least_px, most_px)};
     squares = bow_px = 0;
     for (std::size_t k = 0; k < 4 && std::isfinite(squares); ++k) {
-      squares += fit<terms>(edges[k], pixels_beside(image, roughly, k, band), gamma);
-      bow_px = std::max(bow_px, std::abs(edges[k].terms[2]));
+      const auto pixels = pixels_beside(image, roughly, k, band);
+      squares += edges[k].cubic ? fit<kMostTerms>(edges[k], pixels, gamma)
+                                : fit<kTerms>(edges[k], pixels, gamma);
+      bow_px = std::max(bow_px, std::abs(edges[k].coefficients[2]));
     }
+    if (bow_px > most_bow * width_px) squares = std::numeric_limits<double>::infinity();
   }
 };
 
 double difference_px(const TagEdges::Four& a, const TagEdges::Four& b) {
   double most_px = 0;
   for (std::size_t k = 0; k < 4; ++k) {
-    most_px = std::max(most_px, (a[k].terms - b[k].terms).lpNorm<Eigen::Infinity>());
+    most_px = std::max(most_px, (a[k].coefficients - b[k].coefficients).lpNorm<Eigen::Infinity>());
   }
   return most_px;
 }
 
-/// Again, of the same pixels.
-void fit_again(TagEdges& found, const cv::Mat1b& image, const EdgeStripes& stripes, double gamma) {
-  constexpr double no_parabola_px = 1;
-  if (found.bow_px > no_parabola_px) {
-    found.fit_all<kMostTerms>(image, stripes, gamma);
-  } else {
-    found.fit_all<kTerms>(image, stripes, gamma);
-  }
-}
-
 TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& stripes,
                 double gamma) {
-  constexpr double bent_px = 0.5, settled_px = 0.05;
+  constexpr double bent_px = 0.5, no_parabola_px = 1, settled_px = 0.05;
   constexpr int most_rounds = 4;
   TagEdges found(tag);
-  found.fit_all<kTerms>(image, stripes, gamma);
+  found.fit_all(image, stripes, gamma);
   // A wide lens bends an edge out of a band along the quad's side, which ends beside the corners.
   for (int round = 0; round < most_rounds && found.bow_px > bent_px; ++round) {
     if (!std::isfinite(found.squares)) break;
     if (round > 0 && difference_px(found.edges, found.roughly) < settled_px) break;
+    for (EdgeCurve& edge : found.edges) {
+      edge.cubic = edge.cubic || std::abs(edge.coefficients[2]) > no_parabola_px;
+    }
     found.roughly = found.edges;
-    fit_again(found, image, stripes, gamma);
+    found.fit_all(image, stripes, gamma);
   }
   return found;
 }
@@ -291,7 +291,8 @@ TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& s
 std::optional<SeenTag> crossed(const SeenTag& tag, const TagEdges& found) {
   constexpr double moved_px = 1.5, moved_share = 0.03;
   if (!std::isfinite(found.squares)) return {};
-  // A straight line through all of an edge ends beside it by two thirds of what that bends.
+  // A straight line through all of an edge ends beside it by two thirds of what that bends, and at
+  // a corner two do.
   const double most_moved_px = std::max(moved_px, moved_share * found.width_px) + found.bow_px;
   SeenTag exact = tag;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -328,7 +329,7 @@ std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> ta
   for (const std::size_t i : widest) {
     as_it_is += found[i].squares;
     TagEdges other = found[i];
-    fit_again(other, image, stripes, usual_gamma);
+    other.fit_all(image, stripes, usual_gamma);  // to the same pixels
     behind_curve += other.squares;
     const auto [less, more] = std::minmax(as_it_is, behind_curve);
     if (++told >= fewest && more > clearly * less) break;

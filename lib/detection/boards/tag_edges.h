@@ -24,8 +24,8 @@ struct EdgeStripes {
 /// than 0.5 px is fitted again to the pixels beside what was found, and beyond 1 px with a cubic
 /// term: libapriltag's straight lines, where the pixels are looked for at first, end up to 4 px
 /// beside the corners of a tag at the rim of a wide lens. On rendered boards corners are good to
-/// 0.02 px, also at 100 degrees off the axis; of tags narrower than 25 px they are drawn outwards
-/// by 0.02 to 0.05 px.
+/// 0.02 px, at the rim of a lens of 190 degrees, too; of tags narrower than 25 px they are drawn
+/// outwards by some 0.02 px.
 ///
 /// Behind a tone curve, level = 255 (grey / 255)^(1 / gamma), an edge is steeper on its dark side,
 /// which draws the fit there, by more the narrower the stripes are. So gamma is 2.2, about that of

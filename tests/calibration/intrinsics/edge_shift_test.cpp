@@ -86,6 +86,23 @@ TEST_P(ShrunkTags, IsTakenOutOfTheLens) {
   EXPECT_LT(difference->mean_px, 0.03);
 }
 
+TEST_P(ShrunkTags, MoreOnOneSideIsNoBentBoard) {
+  auto seen = shrunk_views(16, 0.03, 0);
+  for (BoardView& view : seen) {
+    for (SeenTag& tag : view.seen.tags) {
+      tag = shrunk(tag, 0.3 + 0.1 * (tag.corners_px[0].x() - 400) / 400);
+    }
+  }
+  const IntrinsicsSolution solution = solve_intrinsics(input_of(seen));
+  ASSERT_TRUE(solution.ok());
+  EXPECT_FALSE(solution.solved_for.warp);
+  EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
+  const auto difference =
+      projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
+  ASSERT_TRUE(difference);
+  EXPECT_LT(difference->mean_px, 0.03);
+}
+
 TEST_P(ShrunkTags, IsNoOtherSpacing) {
   const auto seen = shrunk_views(10, 0.03, 0.4);
   EXPECT_EQ(check_board(board(), seen, {}).problem, "");

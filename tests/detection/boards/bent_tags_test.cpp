@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <map>
+#include <string>
 
 #include "detection/boards/board_detector.h"
 #include "simulation/exposure.h"
