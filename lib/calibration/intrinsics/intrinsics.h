@@ -73,8 +73,7 @@ struct IntrinsicsSolution {
 ///     which OPENCV_FISHEYE leaves a corner elsewhere than its neighbours, to which it would bend
 ///     near the rim); views that fit no pose are dropped;
 ///  4. the shift of the tags' edges, even over a view, taken out (edge_shifts()), and the model
-///  again,
-///     at most twice;
+///     again, at most twice;
 ///  5. the board's warp (WarpChoice);
 ///  6. what the shifts change over a view, as 4.;
 ///  7. all of it without outliers;
