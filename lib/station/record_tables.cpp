@@ -115,10 +115,13 @@ bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3";
 
 /// 0 without tables. Throws for a later version than this program's.
 int version_of(soci::session& sql) {
+  // Not to_regclass(): a connection that looked before remembers that there was no table, and may
+  // go on to say so to who waited for the lock while another made it.
   const char* const look =
       is_sqlite(sql)
           ? "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'vlp_schema'"
-          : "SELECT COUNT(to_regclass('vlp_schema'))";
+          : "SELECT COUNT(*) FROM pg_tables WHERE tablename = 'vlp_schema' AND "
+            "schemaname = ANY (current_schemas(false))";
   int tables_there = 0, version = 0;
   sql << look, soci::into(tables_there);
   if (tables_there == 0) return 0;
