@@ -32,11 +32,14 @@ BoardBend::BoardBend(const SceneBoard& board)
 
 BoardBend::Depth BoardBend::depth(const Eigen::Vector2d& at_m) const {
   constexpr double most = 1.5;  // beyond it there is no paper, and a parabola would turn back
-  const Eigen::Array2d share = 2 * at_m.array() / field_m_.array() - 1;
-  const Eigen::Array2d inside = share.max(-most).min(most);
-  const Eigen::Array2d slope =
-      (share == inside).select(-4 * warp_m_.array() * inside / field_m_.array(), 0);
-  return {warp_m_.dot((1 - inside.square()).matrix()), slope.matrix()};
+  Depth bend{0, {0, 0}};
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    const double share = 2 * at_m[axis] / field_m_[axis] - 1;
+    const double inside = std::clamp(share, -most, most);
+    bend.depth_m += warp_m_[axis] * (1 - inside * inside);
+    if (share == inside) bend.slope[axis] = -4 * warp_m_[axis] * inside / field_m_[axis];
+  }
+  return bend;
 }
 
 BoardPrint::BoardPrint(const SceneBoard& board) : bend_(board), mosaic_(rectangles_of(board)) {}

@@ -35,6 +35,9 @@ class BoardPrint {
   double edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
     return mosaic_.edge_integral(p, q);
   }
+  std::optional<double> even_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+    return mosaic_.even_value(corners);
+  }
 
  private:
   BoardBend bend_;

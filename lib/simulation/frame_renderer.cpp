@@ -254,14 +254,18 @@ cv::Mat1f FrameRenderer::board_electrons(const BoardShot& shot) const {
     part.count =
         parts_of_exposure(moved_px(points_on(scene_.board->print), pose, shot.exposure_s, rays_));
   }
-  cv::Mat1f image = rays_.image(static_cast<float>(scene_.board->surround_e_per_s));
+  const auto surround = static_cast<float>(scene_.board->surround_e_per_s);
+  const cv::Size pixels = rays_.image(0).size();
+  cv::Mat1f halves(2 * pixels.height, 2 * pixels.width, surround), image;
   for (; part.index < part.count; ++part.index) {
     const auto board_from_camera = [&](int line) {
       return shot.camera_from_board(part.middle_s(line)).inverse();
     };
-    add_shape(rays_, whole_window(rays_), board_from_camera, *print_, 1.0 / part.count, image);
+    add_shape_in_halves(rays_, whole_window(rays_), board_from_camera, *print_, 1.0 / part.count,
+                        halves);
   }
-  blur(image, scene_.optics.blur_px);
+  blur(halves, 2 * scene_.optics.blur_px);
+  cv::resize(halves, image, pixels, 0, 0, cv::INTER_AREA);
   return collected(image, shot.exposure_s);
 }
 

@@ -110,4 +110,19 @@ double Mosaic::edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q)
   return sum * way.y();
 }
 
+std::optional<double> Mosaic::even_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+  Eigen::Vector2d least = corners[0], most = corners[0];
+  for (const Eigen::Vector2d& corner : corners) {
+    if (!corner.allFinite()) return std::nullopt;
+    least = least.cwiseMin(corner);
+    most = most.cwiseMax(corner);
+  }
+  const int column = cell_of(x_m_, least.x()), row = cell_of(y_m_, least.y());
+  const auto ends_before = [](const std::vector<double>& lines, int cell, double at) {
+    return cell < static_cast<int>(lines.size()) && lines[static_cast<std::size_t>(cell)] <= at;
+  };
+  if (ends_before(x_m_, column, most.x()) || ends_before(y_m_, row, most.y())) return std::nullopt;
+  return values_[index(column, row)];
+}
+
 }  // namespace vlp

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "simulation/coverage.h"
@@ -27,6 +29,9 @@ class Mosaic {
   /// The integral along the edge of G dy, with G the integral of the pattern from the far left to
   /// x.
   double edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+
+  /// Its value there, when no line of the pattern lies between the corners of a quadrilateral.
+  std::optional<double> even_value(const std::array<Eigen::Vector2d, 4>& corners) const;
 
  private:
   void fill(const Rectangle& rectangle);

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <map>
+#include <numbers>
 
 #include "geometry/angles.h"
 #include "rig/board_layout.h"
@@ -148,6 +150,43 @@ INSTANTIATE_TEST_SUITE_P(
                     View{wide_camera(), {0.001, 0.001}, true, "WideAndBorderOfTwoBits"},
                     View{stereographic_camera(), {0, 0}, false, "Stereographic"}),
     [](const auto& instance) { return std::string(instance.param.name); });
+
+/// What pixels gather of a straight edge that a Gaussian blurs: the integral of its distribution
+/// over a pixel.
+double white_share(double from_edge_px, double sigma_px) {
+  const auto integral = [&](double x) {
+    const double t = x / sigma_px;
+    return x * std::erfc(-t * M_SQRT1_2) / 2 +
+           sigma_px * std::exp(-t * t / 2) / std::sqrt(2 * std::numbers::pi);
+  };
+  return integral(from_edge_px + 0.5) - integral(from_edge_px - 0.5);
+}
+
+TEST(BoardEdge, IsBlurredBeforePixelsGatherIt) {
+  constexpr double sigma_px = 0.6;
+  Scene scene = plain_scene();
+  scene.camera = pinhole_camera();
+  scene.optics.blur_px = sigma_px;
+  scene.board = plain_board();
+  const FrameRenderer renderer(scene);
+  const BoardShot shot = board_shot(scene, board_views(1, 0.171, 0, 0, 0), 0);
+  const cv::Mat1f image(renderer.board_electrons(shot) / 1e3);
+  double worst = 0;
+  int edges = 0;
+  // Left of a tag there is white, and its black border is seven pixels wide.
+  for (const auto& [tag, corner, pixel] : true_corners(scene, renderer, shot)) {
+    constexpr int reach_px = 4, down_px = 20;
+    if (corner != 3 || pixel.x() < reach_px || pixel.y() + down_px > 599) continue;
+    const int row = static_cast<int>(pixel.y()) + down_px;
+    const int column = static_cast<int>(std::lround(pixel.x()));
+    for (int u = column - reach_px; u < column + reach_px; ++u) {
+      worst = std::max(worst, std::abs(image(row, u) - white_share(pixel.x() - u, sigma_px)));
+    }
+    ++edges;
+  }
+  EXPECT_GT(edges, 15);
+  EXPECT_LT(worst, 0.012);  // of pixels that are blurred it would be 0.06
+}
 
 /// The level of a white wall at a pixel, through a fisheye that sees to 104 degrees off its axis.
 double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
