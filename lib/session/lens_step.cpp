@@ -107,7 +107,7 @@ Sorted sorted(const LensInput& input, LensResult& result) {
 
 IntrinsicsReport report_of(const LensResult& result, const IntrinsicsInput& input) {
   const IntrinsicsSolution& solution = result.solution;
-  const ProjectionUncertainty uncertainty(solution);
+  const ProjectionUncertainty uncertainty(solution, input.lattice);
   const Eigen::VectorXd& pull = uncertainty.intrinsics_pull();
   const MatrixX covariance = uncertainty.intrinsics_covariance() + pull * pull.transpose();
   std::optional<std::array<double, 2>> board_warp_m;
@@ -281,7 +281,9 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
                                    report_of(result, views.solved), std::move(entry));
   result.metrics = lens_metrics(solution, result.report, result.coverage);
   const std::string title = fmt::format("{}, {}", camera.id, name_of(camera.lens_model));
-  result.drawing = [title, solution] { return drawing_of(plot_of(title, solution)); };
+  result.drawing = [title, solution, lattice = views.solved.lattice] {
+    return drawing_of(plot_of(title, solution, lattice));
+  };
   return result;
 }
 

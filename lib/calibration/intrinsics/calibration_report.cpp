@@ -20,7 +20,7 @@
 namespace vlp {
 
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
-  const ProjectionUncertainty uncertainty(solution);
+  const ProjectionUncertainty uncertainty(solution, input.lattice);
   const Lens lens = solution.lens();
   const Eigen::MatrixXd by_views = covariance_by_views(solution);
   ImageRegion region = known_region(seen_px(solution.problem), input.imager_px, lens.model());
@@ -62,7 +62,7 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   if (!even.ok() || !odd.ok()) return report;
   // Of a splined lens, half of the views leave holes, which tell nothing of it.
   std::vector<ProjectionUncertainty> halves;
-  if (is_splined(lens.model())) halves = {ProjectionUncertainty(even), ProjectionUncertainty(odd)};
+  if (is_splined(lens.model())) halves = {{even, input.lattice}, {odd, input.lattice}};
   constexpr double hole = 3;  // sqrt(2) is usual
   report.halves = projection_difference(
       even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {

@@ -19,18 +19,18 @@ struct CalibrationReport {
   /// Where the lens is known, and its share of the image.
   ImageRegion region;
   double region_share;
-  /// ProjectionUncertainty::worst_px() over the pixel_grid() of the region, and the worst beyond
-  /// it.
+  /// ProjectionUncertainty::worst_px(), by tags, over the pixel_grid() of the region, and the worst
+  /// beyond it.
   double uncertainty_mean_px, uncertainty_worst_px;
   Eigen::Vector2d uncertainty_worst_at;
   double uncertainty_beyond_px;
-  /// Standard deviation of fx: by the noise of the corners, and by covariance_by_views().
+  /// Standard deviation of fx: by the noise of the tags, and by covariance_by_views().
   double focal_sd_px, focal_sd_by_views_px;
   /// What the lens should be apart from the true one, as projection_difference() says it, rms per
   /// axis: by the noise, and by covariance_by_views(). Of a splined lens over the region.
   double expected_rms_px, expected_by_views_rms_px;
   /// Between the lens of every other view and that of the rest (solve_every_other()): twice
-  /// expected_rms_px when the lens model fits and the corners' errors are independent; more when
+  /// expected_rms_px when the lens model fits and the tags' errors are independent; more when
   /// they are not. Of a splined lens where both halves have corners. Nothing when a half does not
   /// determine a lens.
   std::optional<ProjectionDifference> halves;

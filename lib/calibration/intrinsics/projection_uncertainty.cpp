@@ -26,6 +26,30 @@ double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& re
   return std::sqrt(squares / count - (sum / count) * (sum / count));
 }
 
+/// What the residuals of each tag do together: a row for each tag of each view, from a row for each
+/// residual.
+Eigen::MatrixXd by_tags(const Eigen::MatrixXd& by_residual, const Eigen::VectorXd& residuals_px,
+                        const BoardLattice& lattice) {
+  const std::size_t points = lattice.points(), of_view = lattice.parts() * points;
+  const Eigen::Index corners = residuals_px.size() / 2;
+  const auto views = static_cast<std::size_t>(corners) / of_view;
+  Eigen::MatrixXd sums =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(views * points), by_residual.cols());
+  for (Eigen::Index i = 0; i < corners; ++i) {
+    const auto corner = static_cast<std::size_t>(i);
+    const std::size_t tag = corner / of_view * points + lattice.tag_of(corner % points);
+    sums.row(static_cast<Eigen::Index>(tag)) +=
+        residuals_px.segment<2>(2 * i).transpose() * by_residual.middleRows<2>(2 * i);
+  }
+  return sums;
+}
+
+/// n / (n - k) of ProjectionUncertainty.
+double for_what_was_fitted(const BoardProblem& problem, Eigen::Index states) {
+  const double count = 2 * static_cast<double>(seen_px(problem).size());
+  return count / std::max(count - static_cast<double>(states), 1.0);
+}
+
 /// Of the whole state, packed.
 Eigen::VectorXd pull_of(const Linearization& at, double sigma_px, double regularized_for_px) {
   constexpr double least_px = 0.01;  // coefficients that the corners leave open have no end
@@ -47,6 +71,14 @@ Eigen::VectorXd pull_of(const Linearization& at, double sigma_px, double regular
 }  // namespace
 
 ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
+    : ProjectionUncertainty(solution, nullptr) {}
+
+ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
+                                             const BoardLattice& lattice)
+    : ProjectionUncertainty(solution, &lattice) {}
+
+ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
+                                             const BoardLattice* lattice)
     : lens_(solution.lens()),
       determined_(false),
       intrinsics_pull_(Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
@@ -69,7 +101,12 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
   const Eigen::MatrixXd by_residual =
       (jt.leftCols(at.residuals_px.size()).transpose() * factor.solve(wanted)).eval();
   const double sigma_px = standard_deviation(problem, at.residuals_px);
-  covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
+  if (lattice == nullptr) {
+    covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
+  } else {
+    const Eigen::MatrixXd sums = by_tags(by_residual, at.residuals_px, *lattice);
+    covariance_ = for_what_was_fitted(problem, jt.rows()) * sums.transpose() * sums;
+  }
   intrinsics_pull_ =
       wanted.leftCols(intrinsics).transpose() * pull_of(at, sigma_px, problem.noise_px);
   determined_ = covariance_.allFinite();

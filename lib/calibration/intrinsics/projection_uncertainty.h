@@ -15,10 +15,21 @@ namespace vlp {
 /// regularization, Jr) and s the standard deviation of the residuals. A pixel depends on the
 /// intrinsics and, because the camera's own orientation is what the boards make it, on the mean
 /// over all boards of the changes of their rotations.
+///
+/// That takes the errors of all corners for independent. The corners of a tag share its edges, and
+/// so their errors: each edge's fit moves both of its ends. With the lattice of the board it is,
+/// instead,
+///   c N^-1 (sum over tags (Jt' rt) (Jt' rt)') N^-1,  c = n / (n - k),
+/// with Jt and rt the rows and residuals of a tag in a view, n their number and k that of the
+/// states (Liang and Zeger, "Longitudinal data analysis using generalized linear models", 1986:
+/// errors may be anything within a tag, and of any size). Of a board of squares each corner is by
+/// itself.
 class ProjectionUncertainty {
  public:
-  /// Precondition: solution.ok().
+  /// As mrcal. Precondition: solution.ok().
   explicit ProjectionUncertainty(const IntrinsicsSolution& solution);
+  /// By the board's tags. Preconditions: solution.ok(), and it is of boards of that lattice.
+  ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice& lattice);
 
   /// False when the views leave something open.
   bool determined() const { return determined_; }
@@ -46,6 +57,8 @@ class ProjectionUncertainty {
   double focal_sd_px() const;
 
  private:
+  ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice* lattice);
+
   Lens lens_;
   bool determined_;
   /// Of the intrinsics and of the mean rotation, in rad, in the camera.

@@ -9,7 +9,8 @@
 
 namespace vlp {
 
-IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution) {
+IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution,
+                       const BoardLattice& lattice) {
   const BoardProblem& problem = solution.problem;
   IntrinsicsPlot plot{title, problem.imager_px, {}, 0, {}};
   const auto residuals_px = residuals_of(problem);
@@ -18,7 +19,7 @@ IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solut
     const Eigen::Vector3d& point = problem.points[i];
     plot.corners.push_back({point.head<2>(), residuals_px[i], point.z() <= 0});
   }
-  const ProjectionUncertainty uncertainty(solution);
+  const ProjectionUncertainty uncertainty(solution, lattice);
   for (const Eigen::Vector2d& pixel : pixel_grid(problem.imager_px)) {
     if (pixel.y() == 0) ++plot.cols;
     plot.sd_px.push_back(uncertainty.worst_px(pixel));

@@ -13,8 +13,10 @@
 
 namespace vlp {
 
-/// Corners and residuals of a solution, and the uncertainty of its projection. Precondition: ok().
-IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution);
+/// Corners and residuals of a solution for boards of that lattice, and the uncertainty of its
+/// projection. Precondition: ok().
+IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution,
+                       const BoardLattice& lattice);
 
 /// The lamps of a turn on the spot with their circles, and the rotation centre.
 RotationPlot plot_of(const std::string& title, const SpotCaptures& spot,

@@ -3,6 +3,8 @@
 /// Lenses of 190 degrees from the corners of boards.
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/wide_views.h"
@@ -65,6 +67,35 @@ TEST(WideLensScatter, IsThatOfTheCovariance) {
   EXPECT_LT(focal, 2.0);
   EXPECT_GT(center, 0.37);
   EXPECT_LT(center, 2.0);
+}
+
+// The same when a tag's corners err together.
+TEST(WideLensScatter, IsThatOfTheCovarianceByTags) {
+  constexpr int seeds = 20;
+  double by_tags = 0, by_corners = 0;
+  for (int seed = 0; seed < seeds; ++seed) {
+    Random random(100 + static_cast<std::uint64_t>(seed));
+    IntrinsicsInput input = wide_input(false, 15, random, 0.01);
+    for (auto& view : input.views) {
+      std::map<std::size_t, Eigen::Vector2d> errors_px;
+      for (auto& corner : view) {
+        const double u = random.normal(), v = random.normal();
+        corner.pixel += errors_px.try_emplace(input.lattice.tag_of(corner.point), 0.1 * u, 0.1 * v)
+                            .first->second;
+      }
+    }
+    const IntrinsicsSolution solution = solve_intrinsics(input);
+    ASSERT_TRUE(solution.ok());
+    const auto normalized = [&](const ProjectionUncertainty& uncertainty) {
+      const double error = solution.problem.intrinsics[0] - 290;
+      return error * error / uncertainty.intrinsics_covariance()(0, 0) / seeds;
+    };
+    by_tags += normalized({solution, input.lattice});
+    by_corners += normalized(ProjectionUncertainty(solution));
+  }
+  EXPECT_GT(by_tags, 0.37);
+  EXPECT_LT(by_tags, 2.0);
+  EXPECT_GT(by_corners, 2.0);
 }
 
 }  // namespace

@@ -51,6 +51,20 @@ TEST(ProjectionUncertainty, IsWithoutAPullWhereNothingDraws) {
   EXPECT_EQ(ProjectionUncertainty(solution).intrinsics_pull(), Eigen::VectorXd::Zero(8));
 }
 
+TEST(ProjectionUncertainty, IsTheSameByTagsWhereCornersErrByThemselves) {
+  for (const bool kalibr : {false, true}) {
+    const SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
+    Random random(4);
+    const IntrinsicsInput input = views.input(30, random, 0.1);
+    const auto solution = solve_intrinsics(input);
+    ASSERT_TRUE(solution.ok());
+    const ProjectionUncertainty by_corners(solution), by_tags(solution, input.lattice);
+    for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(400, 300), Eigen::Vector2d(40, 80)}) {
+      EXPECT_NEAR(by_tags.worst_px(pixel) / by_corners.worst_px(pixel), 1, 0.2);
+    }
+  }
+}
+
 TEST(CalibrationReport, HalvesAgreeAsTheUncertaintySays) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(5);
