@@ -58,9 +58,8 @@ class EachProcess:
     def __init__(self, program, lock):
         self.program, self.lock, self.process = program, lock, None
 
-    def __call__(self, arguments):
-        """Its exit code, or the negative number of the signal that ended it, its processor time in seconds, and
-        what it said at the end."""
+    def ask(self, arguments):
+        """One session at a time: answer() before another."""
         if self.process is None:
             self.process = subprocess.Popen([self.program, "--each"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                             pass_fds=[self.lock.fileno()], env=ENVIRONMENT)
@@ -68,9 +67,13 @@ class EachProcess:
         try:
             self.process.stdin.write(request.encode() + b"\n")
             self.process.stdin.flush()
-            answer = self.process.stdout.readline()
         except BrokenPipeError:
-            answer = b""
+            pass  # there will be no answer
+
+    def answer(self):
+        """Its exit code, or the negative number of the signal that ended it, its processor time in seconds, and
+        what it said at the end."""
+        answer = self.process.stdout.readline()
         if answer.endswith(b"\n"):
             answer = json.loads(answer)
             return answer["exit_code"], answer["cpu_s"], answer["said"]
@@ -83,8 +86,8 @@ class EachProcess:
             return process.returncode
 
 
-def calibrate(run, each, name, work):
-    """Runs vlp-calibrate on a session: what came of it, and its processor time."""
+def begin(run, each, name, work):
+    """Has vlp-calibrate begin with a session."""
     folder = work / name
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "session.json").unlink(missing_ok=True)  # of a run that was interrupted
@@ -92,8 +95,7 @@ def calibrate(run, each, name, work):
     arguments += [f"--camera-id={name.split('/')[0]}", *shlex.split(run["camera"])]
     if run["session_gates"]:
         arguments += ["--gates", run["session_gates"]]
-    ended, seconds, said = each(arguments)
-    return outcome_of(folder, name, ended, said.replace(run["archive"] + "/", "")), f"{seconds:.3f}"
+    each.ask(arguments)
 
 
 def same_file(source, target):
@@ -173,10 +175,22 @@ def rows_before(shard):
 
 
 def reprocess(run, shard, glances, lock, keep):
-    """glances: {CAMERA/SESSION: glance at its files}; while that is the same the digest of the inputs is."""
+    """glances: {CAMERA/SESSION: glance at its files}; while that is the same the digest of the inputs is.
+    What a session gave comes to its place, and the next one's inputs are looked at, while vlp-calibrate is at work: they
+    wait for the disk, mostly."""
     work = (STATE / "work" / shard).absolute()
     each = EachProcess(Path(run["bin"]) / "vlp-calibrate", lock)
-    before, rows, made = rows_before(shard), [], 0
+    before, rows, made, at_work = rows_before(shard), {}, 0, None
+
+    def finish(name, known, answer):
+        ended, seconds, said = answer
+        row = outcome_of(work / name, name, ended, said.replace(run["archive"] + "/", "")) | known
+        cost = f"{seconds:.3f}"
+        tell("costs", shard, name, cost, f"{time.time():.3f}")  # a session may come to another shard
+        tell_run(shard, row, cost, publish(row, work, keep))
+        shutil.rmtree(work / name)
+        rows[name] |= row
+
     for name, glance in glances.items():
         row, known = None, before.get(name)
         if known and known.get("glance") == glance:
@@ -185,18 +199,20 @@ def reprocess(run, shard, glances, lock, keep):
             inputs, parts = input_digests(Path(run["archive"]) / name)
             key = key_of(inputs, run)
             row = current(name, key)
+        rows[name] = (row or {}) | {"glance": glance}
         if row is None:
-            outcome, cost = calibrate(run, each, name, work)
-            row = outcome | {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
-            tell("costs", shard, name, cost, f"{time.time():.3f}")  # a session may come to another shard
-            tell_run(shard, row, cost, publish(row, work, keep))
-            shutil.rmtree(work / name)
+            answer = each.answer() if at_work else None
+            begin(run, each, name, work)
+            if at_work:
+                finish(*at_work, answer)
+            at_work = name, {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
             made += 1
-        rows.append(row | {"glance": glance})
+    if at_work:
+        finish(*at_work, each.answer())
     each.end()
     shutil.rmtree(work, ignore_errors=True)
     print(f"{len(rows)} sessions, {made} reprocessed")
-    return rows
+    return list(rows.values())
 
 
 def main():

@@ -52,16 +52,21 @@ class Shard(unittest.TestCase):
                 (Path(name) / "boards/0.png").write_text(text)
             made = []
 
-            def calibrate(run, each, name, work):
+            def begin(run, each, name, work):
                 (work / name).mkdir(parents=True)
                 made.append(name)
-                return {"camera": "c", "session": name[-1], "verdict": "pass"}, "0.5"
+
+            def outcome_of(folder, name, ended, said):
+                return {"camera": "c", "session": name[-1], "verdict": "pass"}
 
             def reprocess(**glances):
                 digested, made[:] = [], []
                 digests = lambda session: digested.append(session.name) or files.input_digests(session)
                 glances = {f"c/{name[1:]}": glance for name, glance in glances.items()}
-                with unittest.mock.patch.multiple(shard, calibrate=calibrate, input_digests=digests):
+                with unittest.mock.patch.multiple(
+                    shard, begin=begin, outcome_of=outcome_of, input_digests=digests, EachProcess=unittest.mock.DEFAULT
+                ) as mocks:
+                    mocks["EachProcess"]().answer.return_value = 0, 0.5, ""
                     rows = shard.reprocess(run, "7", glances, None, 0)
                 files.write_whole(".state/rows/7.csv", files.table(outcome.ALL, rows))
                 self.assertEqual([row["glance"] for row in rows], list(glances.values()))
@@ -90,11 +95,40 @@ exit 5
             program.chmod(0o755)
             with open(Path(folder) / "lock", "w") as lock:
                 each = shard.EachProcess(program, lock)
-                self.assertEqual(each(["dies"]), (-9, 0, ""))
-                one, two = each(["lives"]), each([Path("lives")])
+
+                def answer(arguments):
+                    each.ask(arguments)
+                    return each.answer()
+
+                self.assertEqual(answer(["dies"]), (-9, 0, ""))
+                one, two = answer(["lives"]), answer([Path("lives")])
                 self.assertEqual(one[:2], (3, 0.25))
                 self.assertEqual(one, two)  # the same process
                 self.assertEqual(each.end(), 5)  # which had nothing more to read
+
+    def test_a_result_comes_to_its_place_while_the_next_session_is_at_work(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            for name in ("c/1", "c/2"):
+                (Path("archive") / name / "boards").mkdir(parents=True)
+            program = Path("vlp-calibrate")
+            program.write_text("""#!/bin/bash
+while read -r line; do
+  if [[ $line == *c/2* ]]; then  # not before the first one's is there
+    for i in {1..200}; do [ -e failed/c/1/row.json ] && touch seen && break; sleep 0.05; done
+  fi
+  echo '{"exit_code": 1, "cpu_s": 0.5, "said": "words"}'
+done
+""")
+            program.chmod(0o755)
+            run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "session_gates": "", "version": "1"}
+            run |= {"archive": str(Path("archive").absolute()), "bin": folder}
+            with open("lock", "w") as lock:
+                rows = shard.reprocess(run, "7", {"c/1": "a", "c/2": "b"}, lock, 0)
+            self.assertEqual([row["verdict"] for row in rows], ["crashed", "crashed"])
+            self.assertEqual([row["session"] for row in rows], ["1", "2"])
+            self.assertTrue(Path("seen").exists())
 
     def test_former_results_stay_by_their_keys_so_many(self):
         with tempfile.TemporaryDirectory() as folder:
