@@ -60,7 +60,7 @@ TEST_F(SquareBoards, AChessboardGivesTheLens) {
   ASSERT_EQ(found.exit_code, 0) << found.errors;
   EXPECT_THAT(found.errors, HasSubstr("is not seen as a whole"));
   EXPECT_THAT(found.errors, HasSubstr("does not tell which of its ends is up"));
-  EXPECT_LT(mean_error_px(), 0.03);
+  EXPECT_LT(mean_error_px(), 0.04);  // of twelve views
   const std::string camera = content("camera.cameramodel");
   EXPECT_EQ(calibrate(boards, board, cache).exit_code, 0);
   EXPECT_EQ(content("camera.cameramodel"), camera);
@@ -69,7 +69,7 @@ TEST_F(SquareBoards, AChessboardGivesTheLens) {
   std::string turned = TemporaryFolder::content_of(board);
   turned.replace(turned.find("cols: 10\nrows: 7"), 16, "cols: 7\nrows: 10");
   EXPECT_EQ(calibrate(boards, folder.file("turned.yaml", turned).string()).exit_code, 0);
-  EXPECT_LT(mean_error_px(), 0.03);
+  EXPECT_LT(mean_error_px(), 0.04);
 
   std::string counted = TemporaryFolder::content_of(board);
   counted.replace(counted.find("cols: 10\nrows: 7"), 16, "cols: 9\nrows: 6");
@@ -88,7 +88,7 @@ TEST_F(SquareBoards, ACharucoBoardGivesTheLens) {
   const std::string table = (folder / "corners.csv").string();
   const auto found = calibrate(boards, board, "--corners " + table);
   ASSERT_EQ(found.exit_code, 0) << found.errors;
-  EXPECT_LT(mean_error_px(), 0.03);
+  EXPECT_LT(mean_error_px(), 0.04);  // of twelve views
   const std::string camera = content("camera.cameramodel");
   ASSERT_EQ(calibrate(table, board, "--imager-px 800 600").exit_code, 0);
   EXPECT_EQ(content("camera.cameramodel"), camera);

@@ -20,6 +20,9 @@ struct EdgePixel {
 };
 
 constexpr double kWhite = 255;
+/// Above it pixels tell only that: white that runs over has some levels below 255 left by a
+/// camera's processing, and none of the step's upper end.
+constexpr double kMostTold = 250;
 
 /// A level of light as the image has it, behind a tone curve, and the derivative by the light.
 struct Coded {
@@ -78,8 +81,9 @@ class Edge {
       const BlurredStep step(v - off, blur);
       const double lit = 1 + p[3] * w + p[4] * v, unlit = p[1] + p[2] * step.value;
       const Coded coded(unlit * lit, gamma_);
-      residuals_[i] = coded.level - grey;
-      const double bright = lit * coded.slope, plain = unlit * coded.slope;
+      residuals_[i] = std::min(coded.level, kMostTold) - std::min(grey, kMostTold);
+      const double told = coded.level < kMostTold ? coded.slope : 0;
+      const double bright = lit * told, plain = unlit * told;
       auto row = jacobian_.row(i);
       row.template head<5>() << bright * p[2] * step.by_blur, bright, bright * step.value,
           plain * w, plain * v;
@@ -223,6 +227,8 @@ struct TagEdges {
   double bow_px = 0;           // of the most bent
   /// Infinite where an edge is none.
   double squares = 0;
+  /// Pixels outside, and those of them that run over.
+  std::size_t outside = 0, over = 0;
 
   /// The sides of the quad, which libapriltag has.
   explicit TagEdges(const SeenTag& tag) {
@@ -250,8 +256,14 @@ struct TagEdges {
     const Band band{std::clamp(stripes.inside * width_px - away_px, least_px, most_px),
                     std::clamp(stripes.outside * width_px - away_px, least_px, most_px)};
     squares = bow_px = 0;
+    outside = over = 0;
     for (std::size_t k = 0; k < 4 && std::isfinite(squares); ++k) {
       const auto pixels = pixels_beside(image, roughly, k, band);
+      for (const auto& [along, across_px, grey] : pixels) {
+        if (across_px <= value_at(roughly[k].coefficients, along)) continue;
+        ++outside;
+        if (grey > kMostTold) ++over;
+      }
       squares += edges[k].cubic ? fit<kMostTerms>(edges[k], pixels, gamma)
                                 : fit<kTerms>(edges[k], pixels, gamma);
       bow_px = std::max(bow_px, std::abs(edges[k].coefficients[2]));
@@ -326,7 +338,10 @@ std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> ta
   widest.resize(std::min(widest.size(), asked));
   double as_it_is = 0, behind_curve = 0;
   int told = 0;
+  std::size_t outside = 0, over = 0;
   for (const std::size_t i : widest) {
+    outside += found[i].outside;
+    over += found[i].over;
     as_it_is += found[i].squares;
     TagEdges other = found[i];
     other.fit_all(image, stripes, usual_gamma);  // to the same pixels
@@ -334,7 +349,8 @@ std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> ta
     const auto [less, more] = std::minmax(as_it_is, behind_curve);
     if (++told >= fewest && more > clearly * less) break;
   }
-  const bool curved = behind_curve < better * as_it_is;
+  // Of a step whose upper end is not seen the curve cannot be told.
+  const bool curved = behind_curve < better * as_it_is && 4 * over < outside;
   std::vector<std::optional<SeenTag>> exact;
   for (std::size_t i = 0; i < tags.size(); ++i) {
     if (curved) found[i] = fitted(tags[i], image, stripes, usual_gamma);

@@ -5,8 +5,11 @@
 #include <gtest/gtest.h>
 
 #include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/mrcal_files.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "support/program.h"
+#include "support/temporary_folder.h"
 
 namespace vlp {
 namespace {
@@ -49,6 +52,29 @@ TEST(ProjectionUncertainty, IsWithoutAPullWhereNothingDraws) {
   const auto solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok());
   EXPECT_EQ(ProjectionUncertainty(solution).intrinsics_pull(), Eigen::VectorXd::Zero(8));
+}
+
+TEST(ProjectionUncertainty, OfCornersByThemselvesIsMrcals) {
+  if (run_program("/usr/bin/python3 -c 'import mrcal'").exit_code != 0) {
+    GTEST_SKIP() << "mrcal for Python is not installed";
+  }
+  const TemporaryFolder folder;
+  for (const bool kalibr : {false, true}) {
+    const SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
+    Random random(8);
+    const auto solution = solve_intrinsics(views.input(20, random, 0.05));
+    ASSERT_TRUE(solution.ok());
+    write_cameramodel(folder / "camera.cameramodel", solution);
+    const auto mrcals =
+        run_program("/usr/bin/python3 -c \"import mrcal, numpy as np; m = mrcal.cameramodel('" +
+                    (folder / "camera.cameramodel").string() +
+                    "'); print(mrcal.projection_uncertainty(mrcal.unproject(np.array((790, 10), "
+                    "float), *m.intrinsics()), m, atinfinity = True, "
+                    "what = 'worstdirection-stdev'))\"");
+    ASSERT_EQ(mrcals.exit_code, 0) << mrcals.errors;
+    const double ours = ProjectionUncertainty(solution).worst_px({790, 10});
+    EXPECT_NEAR(std::stod(mrcals.output), ours, 1e-6 * ours);
+  }
 }
 
 TEST(ProjectionUncertainty, IsTheSameByTagsWhereCornersErrByThemselves) {
