@@ -12,15 +12,15 @@
 #include <string>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "geometry/angles.h"
-#include "history.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/step_outcome.h"
 #include "rig/input_error.h"
 #include "session/adjust_step.h"
 #include "session/session_folder.h"
 #include "session/step_history.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {

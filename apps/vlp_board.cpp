@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "app.h"
+#include "program/app.h"
 #include "rig/board.h"
 #include "rig/file.h"
 #include "simulation/board_pdf.h"

@@ -13,14 +13,14 @@
 #include <string_view>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "detection/boards/board_detector.h"
 #include "evaluation/gate.h"
-#include "progress.h"
-#include "run_each.h"
+#include "program/app.h"
+#include "program/progress.h"
+#include "program/run_each.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/step_outcome.h"
 #include "session/session.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {

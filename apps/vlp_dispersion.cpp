@@ -13,14 +13,14 @@
 #include <stdexcept>
 #include <string>
 
-#include "app.h"
-#include "capture_options.h"
-#include "history.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/step_outcome.h"
 #include "report/plots/gnuplot.h"
 #include "rig/input_error.h"
 #include "session/dispersion_step.h"
 #include "session/session_folder.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {

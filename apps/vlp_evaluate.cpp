@@ -14,16 +14,16 @@
 #include <utility>
 #include <vector>
 
-#include "app.h"
 #include "captures/csv_reader.h"
 #include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
 #include "evaluation/gate.h"
-#include "history.h"
-#include "print_evaluation.h"
+#include "program/app.h"
+#include "program/steps/history.h"
+#include "program/steps/print_evaluation.h"
+#include "program/steps/step_outcome.h"
 #include "rig/file.h"
 #include "session/evaluate_step.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {

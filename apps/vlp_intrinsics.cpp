@@ -15,20 +15,20 @@
 #include <utility>
 #include <vector>
 
-#include "app.h"
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/mrcal_files.h"
-#include "capture_options.h"
 #include "detection/boards/corner_table.h"
 #include "evaluation/gate.h"
-#include "history.h"
-#include "print_intrinsics.h"
-#include "progress.h"
+#include "program/app.h"
+#include "program/progress.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/print_intrinsics.h"
+#include "program/steps/step_outcome.h"
 #include "rig/file.h"
 #include "session/board_images.h"
 #include "session/lens_step.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {

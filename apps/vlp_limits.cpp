@@ -13,13 +13,13 @@
 #include <tuple>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "captures/csv_writer.h"
 #include "captures/number_text.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"
 #include "positioning/floor_summary.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
 #include "report/plots/floor_plot.h"
 #include "rig/input_error.h"
 #include "session/capture_motion.h"

@@ -15,14 +15,14 @@
 #include <utility>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "geometry/angles.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/step_outcome.h"
 #include "rig/detection.h"
 #include "session/leaning_captures.h"
 #include "session/locate_step.h"
 #include "session/session_folder.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {

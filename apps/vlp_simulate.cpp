@@ -12,8 +12,8 @@
 #include <regex>
 #include <thread>
 
-#include "app.h"
-#include "progress.h"
+#include "program/app.h"
+#include "program/progress.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "simulation/archive.h"

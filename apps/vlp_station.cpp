@@ -8,11 +8,11 @@
 #include <cstddef>
 #include <string>
 
-#include "app.h"
+#include "program/app.h"
+#include "program/station/station_records.h"
+#include "program/station/station_run.h"
+#include "program/station/station_shift.h"
 #include "station/watched_run.h"
-#include "station_records.h"
-#include "station_run.h"
-#include "station_shift.h"
 
 namespace vlp {
 namespace {

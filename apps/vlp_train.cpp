@@ -8,16 +8,16 @@
 #include <string>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "captures/detections_table.h"
 #include "detection/image_file.h"
-#include "history.h"
-#include "progress.h"
+#include "program/app.h"
+#include "program/progress.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/step_outcome.h"
+#include "program/steps/train_report.h"
 #include "rig/input_error.h"
 #include "session/row_time_step.h"
-#include "step_outcome.h"
-#include "train_report.h"
 
 namespace vlp {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/reference.h"
+#include "program/reference.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "app.h"
+#include "program/app.h"
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -20,8 +20,8 @@
 
 #include "captures/printable.h"
 
-#include "help_formatter.h"
-#include "reference.h"
+#include "program/help_formatter.h"
+#include "program/reference.h"
 
 namespace vlp {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "train_report.h"
+#include "program/steps/train_report.h"
 
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "app.h"
+#include "program/app.h"
 
 namespace vlp {
 

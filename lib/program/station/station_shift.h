@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "station_run.h"
+#include "program/station/station_run.h"
 
 namespace vlp {
 

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "capture_options.h"
+#include "program/steps/capture_options.h"
 
 namespace vlp {
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "help_formatter.h"
+#include "program/help_formatter.h"
 
 #include <sstream>
 #include <utility>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/history.h"
+#include "program/steps/history.h"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "progress.h"
+#include "program/progress.h"
 
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>

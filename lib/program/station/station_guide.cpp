@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "station_guide.h"
+#include "program/station/station_guide.h"
 
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>

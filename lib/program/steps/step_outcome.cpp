@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "step_outcome.h"
+#include "program/steps/step_outcome.h"
 
 #include <spdlog/spdlog.h>
 
 #include <stdexcept>
 
-#include "app.h"
+#include "program/app.h"
 
 namespace vlp {
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "run_each.h"
+#include "program/run_each.h"
 
 #include <fcntl.h>
 #include <fmt/core.h>
@@ -21,7 +21,7 @@
 #include <string>
 #include <vector>
 
-#include "app.h"
+#include "program/app.h"
 
 namespace vlp {
 namespace {

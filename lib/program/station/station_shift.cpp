@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "station_shift.h"
+#include "program/station/station_shift.h"
 
 #include <fmt/core.h>
 #include <spawn.h>
@@ -18,11 +18,11 @@
 #include <thread>
 #include <vector>
 
-#include "app.h"
 #include "captures/printable.h"
+#include "program/app.h"
+#include "program/station/terminal.h"
 #include "rig/input_error.h"
 #include "station/golden_due.h"
-#include "terminal.h"
 
 namespace vlp {
 namespace {

@@ -1,20 +1,20 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "rotation_by_lamps.h"
+#include "program/steps/rotation_by_lamps.h"
 
 #include <fmt/core.h>
 
 #include <filesystem>
 
-#include "app.h"
-#include "capture_options.h"
 #include "captures/captures_table.h"
 #include "geometry/angles.h"
-#include "history.h"
-#include "print_rotation.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/print_rotation.h"
+#include "program/steps/step_outcome.h"
 #include "session/capture_motion.h"
 #include "session/rotation_step.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {

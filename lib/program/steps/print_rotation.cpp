@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "print_rotation.h"
+#include "program/steps/print_rotation.h"
 
 #include <fmt/core.h>
 

@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "rotation_on_spot.h"
+#include "program/steps/rotation_on_spot.h"
 
 #include <map>
 
-#include "app.h"
-#include "history.h"
-#include "print_rotation.h"
+#include "program/app.h"
+#include "program/steps/history.h"
+#include "program/steps/print_rotation.h"
+#include "program/steps/step_outcome.h"
 #include "report/plots/gnuplot.h"
 #include "session/rotation_step.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {

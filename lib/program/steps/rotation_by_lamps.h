@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "capture_options.h"
+#include "program/steps/capture_options.h"
 
 namespace vlp {
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "terminal.h"
+#include "program/station/terminal.h"
 
 #include <fmt/core.h>
 #include <poll.h>

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "program/station/station_run.h"
+#include "program/station/terminal.h"
 #include "station/step_sources.h"
-#include "station_run.h"
-#include "terminal.h"
 
 namespace vlp {
 

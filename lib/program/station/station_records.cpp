@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "station_records.h"
+#include "program/station/station_records.h"
 
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
@@ -14,9 +14,9 @@
 #include <sstream>
 #include <utility>
 
-#include "app.h"
 #include "captures/printable.h"
-#include "progress.h"
+#include "program/app.h"
+#include "program/progress.h"
 #include "rig/input_error.h"
 #include "station/archive_runs.h"
 #include "station/certificate.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "app.h"
 #include "positioning/positioner.h"
+#include "program/app.h"
 #include "session/lamp_images.h"
 #include "session/rotation_step.h"
 

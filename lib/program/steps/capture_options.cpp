@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "capture_options.h"
+#include "program/steps/capture_options.h"
 
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
@@ -17,8 +17,8 @@
 #include "detection/lights/lights_table.h"
 #include "detection/video.h"
 #include "geometry/angles.h"
-#include "progress.h"
-#include "step_outcome.h"
+#include "program/progress.h"
+#include "program/steps/step_outcome.h"
 
 namespace vlp {
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "station_run.h"
+#include "program/station/station_run.h"
 
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
@@ -10,9 +10,10 @@
 #include <optional>
 #include <stdexcept>
 
-#include "app.h"
 #include "captures/printable.h"
 #include "detection/image_file.h"
+#include "program/app.h"
+#include "program/station/station_guide.h"
 #include "rig/input_error.h"
 #include "station/golden_due.h"
 #include "station/hook.h"
@@ -20,7 +21,6 @@
 #include "station/run_hooks.h"
 #include "station/spool.h"
 #include "station/verify_station.h"
-#include "station_guide.h"
 
 namespace vlp {
 namespace {
