@@ -5,7 +5,7 @@
 
 From the project's folder, or with another folder of a lamp map, a calibration, detections and truth:
 
-    PYTHONPATH=build/python python3 apps/python/example.py [datasets/example]
+    PYTHONPATH=build/python python3 lib/python/example.py [datasets/example]
 """
 
 import pathlib
