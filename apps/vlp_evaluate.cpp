@@ -241,8 +241,7 @@ void add_options(CLI::App& app, Options& options) {
                     ->check(finite_positive());
   noise->needs(lamps)->needs(calibration);
   add_report_options(app, options.report);
-  app.add_option("--threads", options.threads, "For the intervals (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  add_threads_option(app, options.threads, "For the intervals");
 }
 
 }  // namespace

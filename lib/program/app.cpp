@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "program/app.h"
 
+#include <fmt/core.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -86,6 +87,27 @@ CLI::Validator finite_not_negative() {
   return number_check("finite and not negative", [](double value) { return value >= 0; });
 }
 
+CLI::Validator ends_in(const std::string& ending) {
+  return CLI::Validator(
+      [ending](const std::string& name) {
+        return name.ends_with(ending) ? std::string() : "the file's name should end in " + ending;
+      },
+      "");
+}
+
+CLI::Validator is_picture() {
+  return CLI::Validator(
+      [](const std::string& name) {
+        const bool known = name.ends_with(".png") || name.ends_with(".svg");
+        return known ? std::string() : "a picture's name should end in .png or .svg";
+      },
+      "");
+}
+
+void add_threads_option(CLI::App& app, int& threads, const std::string& what) {
+  app.add_option("--threads", threads, what + " (default: one a core)")->check(CLI::Range(1, 1024));
+}
+
 void check_output(const std::string& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {
     std::error_code missing;
@@ -108,6 +130,18 @@ void check_further_output(const std::string& option, const std::string& file,
   check_output(file, inputs);
   if (same_file(file, output)) {
     throw std::invalid_argument("--output and " + option + " name one file");
+  }
+}
+
+void check_outputs(const std::vector<std::pair<std::string, std::string>>& outputs,
+                   const std::vector<std::string>& inputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const auto& [option, file] = outputs[i];
+    check_output(file, inputs);
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!same_file(file, outputs[k].second)) continue;
+      throw std::invalid_argument(fmt::format("{} and {} name one file", outputs[k].first, option));
+    }
   }
 }
 

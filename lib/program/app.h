@@ -5,6 +5,7 @@
 #include <functional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 // Its header costs a file that includes it ten seconds of compilation.
@@ -36,6 +37,13 @@ CLI::Validator finite();
 CLI::Validator finite_positive();
 CLI::Validator finite_not_negative();
 
+/// A file's name that ends so; the name of a picture, .png or .svg.
+CLI::Validator ends_in(const std::string& ending);
+CLI::Validator is_picture();
+
+/// Adds --threads: `what` are done so many at a time.
+void add_threads_option(CLI::App& app, int& threads, const std::string& what = "Images at a time");
+
 /// Throws std::invalid_argument when `output` is one of the files that are read.
 void check_output(const std::string& output, const std::vector<std::string>& inputs);
 
@@ -46,6 +54,11 @@ bool same_file(const std::string& one, const std::string& other);
 /// file of --output either.
 void check_further_output(const std::string& option, const std::string& file,
                           const std::string& output, const std::vector<std::string>& inputs);
+
+/// check_output() of all outputs, each with the option that names it, and that no two are one file;
+/// an empty name is none.
+void check_outputs(const std::vector<std::pair<std::string, std::string>>& outputs,
+                   const std::vector<std::string>& inputs);
 
 /// The common shell of a program: adds --quiet, --verbose and --version to `app`, makes its --help
 /// fit 80 columns, parses, and calls `run`. Messages go through spdlog to stderr. Bad usage and bad

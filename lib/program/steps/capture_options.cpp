@@ -79,8 +79,7 @@ void add_detect_options(CLI::App& app, CaptureOptions& options) {
                  "Exposure of the images, for the check of the lamp map (default: short)")
       ->check(finite_positive());
   add_max_mpx_option(app, options.max_mpx);
-  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  add_threads_option(app, options.threads);
 }
 
 std::optional<KnownMotion> MotionOptions::motion() const {
