@@ -13,9 +13,7 @@ namespace vlp {
 namespace {
 
 bool changes_the_result(const CLI::Option& option) {
-  constexpr std::array<std::string_view, 13> others = {
-      "--output", "--plot",   "--annotate", "--threads", "--quiet", "--verbose", "--cache",
-      "--ros",    "--kalibr", "--opencv",   "--report",  "--json",  "--junit"};
+  const auto others = options_without_history();
   return std::find(others.begin(), others.end(), option.get_name()) == others.end();
 }
 
@@ -38,6 +36,13 @@ std::string options_of(const CLI::App& app, const std::vector<std::string>& inpu
 }
 
 }  // namespace
+
+std::span<const std::string_view> options_without_history() {
+  static constexpr std::array<std::string_view, 13> others = {
+      "--output", "--plot",   "--annotate", "--threads", "--quiet", "--verbose", "--cache",
+      "--ros",    "--kalibr", "--opencv",   "--report",  "--json",  "--junit"};
+  return others;
+}
 
 HistoryEntry history_entry(const CLI::App& app, const std::vector<std::string>& inputs) {
   InputDigests digests;
