@@ -207,6 +207,13 @@ std::string zsh_arguments(const CLI::App& app, const std::string& indent) {
   return text;
 }
 
+std::vector<std::string> names_of(const std::vector<const CLI::App*>& commands) {
+  std::vector<std::string> names(commands.size());
+  std::transform(commands.begin(), commands.end(), names.begin(),
+                 [](const CLI::App* command) { return command->get_name(); });
+  return names;
+}
+
 }  // namespace
 
 std::string manual_page(const CLI::App& app) {
@@ -244,8 +251,7 @@ std::string manual_page(const CLI::App& app) {
 std::string bash_completion(const CLI::App& app) {
   const std::string function = function_of(app.get_name());
   const auto commands = commands_in(app);
-  std::vector<std::string> names;
-  for (const CLI::App* command : commands) names.push_back(command->get_name());
+  const auto names = names_of(commands);
   std::string text =
       "# Completion of " + app.get_name() + " for bash; made from its options.\n" + function +
       "() {\n"
@@ -287,8 +293,7 @@ std::string zsh_completion(const CLI::App& app) {
   const auto commands = commands_in(app);
   std::string text = "#compdef " + app.get_name() + "\n# Made from its options.\n";
   if (commands.empty()) return text + zsh_arguments(app, "") + "\n";
-  std::vector<std::string> names;
-  for (const CLI::App* command : commands) names.push_back(command->get_name());
+  const auto names = names_of(commands);
   text.append("local curcontext=$curcontext state line\n").append(zsh_arguments(app, ""));
   text.append(" \\\n  '1:command:(" + in_words(names) + ")' \\\n  '*::argument:->command'\n");
   text.append("[[ $state == command ]] || return\ncase $words[1] in\n");

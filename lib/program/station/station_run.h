@@ -8,6 +8,7 @@
 
 namespace vlp {
 
+/// Where a unit, a shift or the golden unit is measured, by whom, and from which images.
 struct StationRunOptions {
   /// Without a camera it is a shift: unit after unit.
   std::string station, camera_id;

@@ -89,6 +89,7 @@ std::vector<std::string> command_of(const StationRunOptions& options, bool golde
 /// How this program ends with these arguments; an error is told.
 int exit_code_of(const std::vector<std::string>& command) {
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   pid_t process = 0;
