@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "app.h"
+#include "program/app.h"
 #include "rig/board.h"
 #include "rig/file.h"
 #include "simulation/board_pdf.h"
@@ -57,15 +57,6 @@ Board board_of(const Options& options) {
           order};
 }
 
-const Paper& paper_of(const std::string& name) {
-  for (const Paper& paper : papers()) {
-    if (paper.name == name) return paper;
-  }
-  std::string names;
-  for (const Paper& paper : papers()) names.append(names.empty() ? "" : ", ").append(paper.name);
-  throw std::invalid_argument("there is no paper '" + name + "', only " + names);
-}
-
 void run(const Options& options) {
   constexpr int least = 4;
   const bool squares = options.chessboard || options.charuco;
@@ -75,7 +66,7 @@ void run(const Options& options) {
   if (!squares && options.square_mm) {
     throw std::invalid_argument("--square-mm is for --chessboard and --charuco");
   }
-  const Paper& paper = paper_of(options.paper);
+  const Paper& paper = paper_named(options.paper);
   Board board = board_of(options);
   if (board.has_squares() ? !options.square_mm : !options.tag_mm) {
     const auto largest_m = largest_size_m(board, paper);
@@ -123,9 +114,7 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", options.output,
                  "Where to write the PDF; board.yaml goes beside it, under the same name")
       ->required()
-      ->check([](const std::string& name) {
-        return name.ends_with(".pdf") ? std::string() : "the file's name should end in .pdf";
-      });
+      ->check(vlp::ends_in(".pdf"));
   app.add_option("--paper", options.paper, "A0 to A4 or Letter (default: A4)");
   app.add_option("--cols", options.cols, "Tags or squares along the width (default: 6 tags, 10)")
       ->check(CLI::Range(1, 100));

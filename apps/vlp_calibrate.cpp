@@ -1,26 +1,20 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-calibrate: a session's folder -> calibration, fixes, report: the whole procedure.
-#include <fmt/core.h>
-#include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <array>
-#include <chrono>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "detection/boards/board_detector.h"
 #include "evaluation/gate.h"
-#include "progress.h"
-#include "run_each.h"
+#include "program/app.h"
+#include "program/run_each.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/print_session.h"
 #include "session/session.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {
@@ -32,78 +26,18 @@ struct Options {
   SessionOptions how;
 };
 
-/// Tells of each step as it ends.
-class Log {
- public:
-  SessionObserver observer() {
-    return {[this](const std::string&) { begin_ = Clock::now(); },
-            [this](std::size_t done, std::size_t total) {
-              if (!progress_) progress_ = std::make_unique<Progress>("images");
-              progress_->update(done, total);
-            },
-            [this](const SessionStep& step) { ended(step); }};
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-
-  void ended(const SessionStep& step) {
-    progress_.reset();
-    const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
-    const bool missed = !words_of_missed(step.result.gates).empty();
-    fmt::print("{:13} {}{}\n", step.name,
-               step.as_before ? "as before" : fmt::format("{:5.1f} s", seconds),
-               step.result.ok() ? missed ? ", a gate is not met" : "" : ", failed");
-    std::fflush(stdout);
-    tell(step.result);
-  }
-
-  Clock::time_point begin_;
-  std::unique_ptr<Progress> progress_;
-};
-
-std::optional<double> find(const SessionResult& result, const std::string& name) {
-  for (const SessionStep& step : result.steps) {
-    if (const auto value = value_of(step.result.metrics, name)) return value;
-  }
-  return std::nullopt;
-}
-
-void print_summary(const SessionResult& result, const std::string& results) {
-  struct Shown {
-    const char *label, *metric, *unit;
-  };
-  constexpr std::array shown{Shown{"residuals", "rms_px", "px rms, of the board's corners"},
-                             Shown{"tilt", "tilt_deg", "degrees"},
-                             Shown{"lever arm", "lever_arm_mm", "mm"},
-                             Shown{"dispersion", "dispersion_mm", "mm, before it is taken off"},
-                             Shown{"mean error", "mean_mm", "mm, horizontal"},
-                             Shown{"p90", "p90_mm", "mm"},
-                             Shown{"max", "max_mm", "mm"},
-                             Shown{"height", "height_rms_mm", "mm rms"},
-                             Shown{"missing", "missing", "of the captures, as a share"}};
-  fmt::print("\n");
-  for (const auto& [label, name, unit] : shown) {
-    if (const auto value = find(result, name)) fmt::print("{:11} {:.4g} {}\n", label, *value, unit);
-  }
-  for (const CheckedMetric& gate : result.gates) {
-    if (!gate.met()) fmt::print("NOT MET     {}\n", words_of(gate));
-  }
-  fmt::print("verdict     {}; results are in {}\n", name_of(result.verdict), results);
-}
-
 void run(Options options) {
   options.how.choose_lens_model = options.lens == kChosenLens;
   if (const auto model = lens_model_from_name(options.lens)) options.how.lens_model = *model;
   options.how.program = {kName, VLP_VERSION};
-  Log log;
+  SessionLog log;
   const SessionResult result =
       run_session(options.session, options.results, options.how, log.observer());
   if (result.verdict == SessionVerdict::no_result) {
     if (result.failure == StepFailure::undetermined) throw Undetermined(result.reason);
     throw std::invalid_argument(result.reason);
   }
-  print_summary(result, options.results);
+  print_session(result, options.results);
   if (result.verdict == SessionVerdict::gate) throw GateNotMet(result.reason);
 }
 
@@ -151,8 +85,7 @@ int calibrate(int argc, char** argv) {
                "Draw pictures and write report.html (default), or not");
   app.add_option("--redo", how.redo, "Run a step again though nothing has changed")
       ->option_text("STEP ...");
-  app.add_option("--threads", how.threads, "Images at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  add_threads_option(app, how.threads);
   app.add_flag(
       "--each", [](std::int64_t) { throw CLI::ValidationError("--each", "stands alone"); },
       "Alone: do what stdin says, a line of JSON for each session; see apps/README.md");

@@ -6,10 +6,10 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "app.h"
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/camera_imports.h"
-#include "history.h"
+#include "program/app.h"
+#include "program/steps/history.h"
 #include "rig/file.h"
 #include "rig/stage.h"
 

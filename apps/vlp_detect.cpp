@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "detection/lights/lights_table.h"
 #include "detection/video.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
 
 namespace vlp {
 namespace {

@@ -1,26 +1,25 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-dispersion: captures at a known station -> what their fixes still lack.
-#include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
-#include <cmath>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
-#include "app.h"
-#include "capture_options.h"
-#include "history.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/print_dispersion.h"
+#include "program/steps/step_outcome.h"
 #include "report/plots/gnuplot.h"
 #include "rig/input_error.h"
 #include "session/dispersion_step.h"
 #include "session/session_folder.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {
@@ -75,35 +74,6 @@ KnownPlaces places_of(const Options& options, const std::vector<Frame>& frames,
   return places;
 }
 
-void print_circle(const char* name, const Circle& circle) {
-  fmt::print("{:12}radius {:.3f} mm, centre {:.3f} {:.3f} mm from the station\n", name,
-             1e3 * circle.radius, 1e3 * circle.center.x(), 1e3 * circle.center.y());
-}
-
-void print_summary(const DispersionFit& fit, std::size_t captures) {
-  const Dispersion& found = fit.dispersion;
-  fmt::print("captures    {}, {} used, {} left out as outliers, {} without a fix\n", captures,
-             found.captures, static_cast<int>(fit.fixes.size()) - found.captures,
-             fit.captures_without_fix);
-  print_circle("before", fit.before);
-  print_circle("after", fit.after);
-  fmt::print("offset      {:.4f} {:.4f} px", found.offset_px.x(), found.offset_px.y());
-  if (found.covariance) {
-    fmt::print(", sd {:.4f} {:.4f} px", std::sqrt((*found.covariance)(0, 0)),
-               std::sqrt((*found.covariance)(1, 1)));
-  }
-  fmt::print(", fixed in the camera\n");
-  if (const auto& world_m = fit.world_offset_m) {
-    fmt::print(
-        "world       {:.3f} {:.3f} mm, sd {:.3f} {:.3f} mm, fixed in the world: lamp map or "
-        "station; not corrected\n",
-        1e3 * world_m->x(), 1e3 * world_m->y(), 1e3 * std::sqrt(fit.world_covariance(0, 0)),
-        1e3 * std::sqrt(fit.world_covariance(1, 1)));
-  } else {
-    fmt::print("world       supposed right: an error of lamp map or station is in the offset\n");
-  }
-}
-
 void run(const CLI::App& app, Options options) {
   std::vector<std::string> inputs = inputs_of(options.images);
   if (!options.captures.empty()) inputs.push_back(options.captures);
@@ -125,7 +95,7 @@ void run(const CLI::App& app, Options options) {
   require(found);
   if (!options.plot.empty()) draw(options.plot, found.drawing());
   write_calibration(options.images.output, found.calibration);
-  print_summary(found.fit, places.captures.size());
+  print_dispersion(found.fit, places.captures.size());
 }
 
 }  // namespace

@@ -14,16 +14,16 @@
 #include <utility>
 #include <vector>
 
-#include "app.h"
 #include "captures/csv_reader.h"
 #include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
 #include "evaluation/gate.h"
-#include "history.h"
-#include "print_evaluation.h"
+#include "program/app.h"
+#include "program/steps/history.h"
+#include "program/steps/print_evaluation.h"
+#include "program/steps/step_outcome.h"
 #include "rig/file.h"
 #include "session/evaluate_step.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {
@@ -241,8 +241,7 @@ void add_options(CLI::App& app, Options& options) {
                     ->check(finite_positive());
   noise->needs(lamps)->needs(calibration);
   add_report_options(app, options.report);
-  app.add_option("--threads", options.threads, "For the intervals (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  add_threads_option(app, options.threads, "For the intervals");
 }
 
 }  // namespace

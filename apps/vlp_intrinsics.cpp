@@ -15,20 +15,20 @@
 #include <utility>
 #include <vector>
 
-#include "app.h"
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/mrcal_files.h"
-#include "capture_options.h"
 #include "detection/boards/corner_table.h"
 #include "evaluation/gate.h"
-#include "history.h"
-#include "print_intrinsics.h"
-#include "progress.h"
+#include "program/app.h"
+#include "program/progress.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/print_intrinsics.h"
+#include "program/steps/step_outcome.h"
 #include "rig/file.h"
 #include "session/board_images.h"
 #include "session/lens_step.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {
@@ -109,27 +109,6 @@ void write_exports(const Options& options, const Camera& camera) {
 
 bool chooses_lens(const Options& options) { return options.lens == kChosenLens; }
 
-/// Every file that is written, and the option that names it: none may be an input, nor two one.
-void check_outputs(const Options& options, const std::vector<std::string>& inputs) {
-  const std::vector<std::pair<std::string, std::string>> outputs{
-      {"--output", options.output},
-      {"--output's .cameramodel", beside(options.output, ".cameramodel")},
-      {"--output's .corners.vnl", beside(options.output, ".corners.vnl")},
-      {"--ros", options.ros},
-      {"--kalibr", options.kalibr},
-      {"--opencv", options.opencv},
-      {"--corners", options.corners},
-      {"--plot", options.plot}};
-  for (std::size_t i = 0; i < outputs.size(); ++i) {
-    const auto& [option, file] = outputs[i];
-    check_output(file, inputs);
-    for (std::size_t k = 0; k < i; ++k) {
-      if (!same_file(file, outputs[k].second)) continue;
-      throw std::invalid_argument(fmt::format("{} and {} name one file", outputs[k].first, option));
-    }
-  }
-}
-
 /// A table of corners tells images by their names.
 void check_names(const std::vector<std::filesystem::path>& images) {
   std::set<std::string> names;
@@ -164,7 +143,15 @@ void run(const CLI::App& app, const Options& options) {
                                       : std::vector<std::filesystem::path>{options.images.front()};
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
-  check_outputs(options, inputs);
+  check_outputs({{"--output", options.output},
+                 {"--output's .cameramodel", beside(options.output, ".cameramodel")},
+                 {"--output's .corners.vnl", beside(options.output, ".corners.vnl")},
+                 {"--ros", options.ros},
+                 {"--kalibr", options.kalibr},
+                 {"--opencv", options.opencv},
+                 {"--corners", options.corners},
+                 {"--plot", options.plot}},
+                inputs);
   if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
   possible_warp(board, options.warp);  // refused before the images are looked at
@@ -227,9 +214,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--corners", options.corners,
                  "Write the corners as they were seen, too, a .csv to calibrate from again without "
                  "the images")
-      ->check([](const std::string& name) {
-        return name.ends_with(".csv") ? std::string() : "the file's name should end in .csv";
-      });
+      ->check(ends_in(".csv"));
   app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Width of a pixel")
       ->check(CLI::Range(1e-7, 1e-4));
   app.add_option("--held-out", options.held_out,
@@ -259,16 +244,12 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--plot", options.plot,
                  "Draw the corners, their residuals and the uncertainty over the image, .png or "
                  ".svg")
-      ->check([](const std::string& name) {
-        const bool known = name.ends_with(".png") || name.ends_with(".svg");
-        return known ? std::string() : "a picture's name should end in .png or .svg";
-      });
+      ->check(is_picture());
   app.add_option("--cache", options.cache,
                  "Folder to keep the corners of each image in, for the next time");
   add_every_option(app, options.every);
   add_max_mpx_option(app, options.max_mpx);
-  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  add_threads_option(app, options.threads);
 }
 
 }  // namespace

@@ -2,24 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-limits: what accuracy a room, a camera and their errors allow.
 #include <fmt/core.h>
-
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <string>
-#include <string_view>
-#include <tuple>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
-#include "captures/csv_writer.h"
-#include "captures/number_text.h"
+#include "evaluation/limits_table.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"
 #include "positioning/floor_summary.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/print_limits.h"
 #include "report/plots/floor_plot.h"
 #include "rig/input_error.h"
 #include "session/capture_motion.h"
@@ -40,30 +37,6 @@ struct Options {
   std::vector<double> floor_m;  // x_min x_max y_min y_max
 };
 
-void write_map(const std::string& file, const FloorLimits& limits) {
-  constexpr int digits = 6;
-  std::vector<std::string> header{"x_m",    "y_m",    "z_m",    "yaw_rad",   "lamps",
-                                  "sd_x_m", "sd_y_m", "sd_z_m", "sd_yaw_rad"};
-  for (const auto& [name, key] : limits.sources) header.push_back(fmt::format("{}_m", key));
-  header.emplace_back("horizontal_m");
-  CsvWriter csv(file, header);
-  const auto at = [](double value) { return significant(value, digits); };
-  for (const FloorLimits::Place& place : limits.places) {
-    const auto& [position_m, yaw_rad] = place.camera;
-    std::vector<std::string> row{at(position_m.x()), at(position_m.y()), at(position_m.z()),
-                                 at(yaw_rad), std::to_string(place.lamps)};
-    if (!place.parts.empty()) {
-      const Eigen::Vector4d sd = place.total().diagonal().cwiseMax(0).cwiseSqrt();
-      for (const double one : sd) row.push_back(at(one));
-      for (const Matrix4& part : place.parts) row.push_back(at(spread_of(part).horizontal_m));
-      row.push_back(at(spread_of(place.total()).horizontal_m));
-    }
-    row.resize(header.size());
-    csv.row(row);
-  }
-  csv.save();
-}
-
 std::string title_of(const Options& options) {
   std::string title = fmt::format("Camera at {} m, yaw {} deg", options.height_m, options.yaw_deg);
   if (const auto& speed = options.motion.max_speed_m_per_s) {
@@ -71,54 +44,6 @@ std::string title_of(const Options& options) {
   }
   if (options.lean_sd_deg > 0) title += fmt::format(", lean to {} deg", options.lean_sd_deg);
   return title;
-}
-
-void draw_map(const Options& options, const FloorLimits& limits, const LampMap& lamps) {
-  FloorPlot plot{title_of(options), "horizontal standard deviation (mm)", options.step_m, {}};
-  for (const FloorLimits::Place& place : limits.places) {
-    plot.places.push_back({place.camera.position_m.head<2>(), {}});
-    if (place.parts.empty()) continue;
-    plot.places.back().value = 1e3 * spread_of(place.total()).horizontal_m;
-  }
-  draw_floor_plot(options.picture, plot, lamps);
-}
-
-/// What makes a source smaller.
-std::string_view remedy_of(std::string_view key) {
-  if (key == "motion") return "odometry, or a faster read-out";
-  if (key == "lean") return "an inclination sensor, or a camera that is held level";
-  if (key == "lens") return "more views of the board, or vlp-adjust, which corrects the lens";
-  if (key == "zenith") return "more captures of the turn, or vlp-adjust with known places";
-  if (key == "offset") return "more captures at the known place, or vlp-adjust instead";
-  if (key == "lamp_map") return "a better survey, or vlp-adjust --refine-map with known places";
-  return "more lamps in view, larger in the image, or the mean of several captures";
-}
-
-void print_summary(const FloorSummary& summary, const FloorLimits& limits, bool is_free) {
-  const auto in_view =
-      std::count_if(limits.places.begin(), limits.places.end(),
-                    [](const FloorLimits::Place& place) { return place.lamps > 1; });
-  fmt::print("places      {}, two lamps or more in view at {}{}\n\n", limits.places.size(), in_view,
-             is_free ? fmt::format(", a fix at {}", summary.places_with_fix) : "");
-  fmt::print("{:11} {:>21} {:>21} {:>21}\n", "one sigma", "horizontal (mm)", "height (mm)",
-             "yaw (deg)");
-  fmt::print("{:11}", "source");
-  for (int i = 0; i < 3; ++i) fmt::print(" {:>10} {:>10}", "median", "worst");
-  fmt::print("\n");
-  const auto print = [](const FloorSummary::Row& row) {
-    const auto& [median, worst] = std::tie(row.median, row.worst);
-    fmt::print("{:11} {:10.3f} {:10.3f} {:10.3f} {:10.3f} {:10.4f} {:10.4f}\n", row.source.name,
-               1e3 * median.horizontal_m, 1e3 * worst.horizontal_m, 1e3 * median.height_m,
-               1e3 * worst.height_m, deg_from_rad(median.yaw_rad), deg_from_rad(worst.yaw_rad));
-  };
-  for (const FloorSummary::Row& row : summary.sources) print(row);
-  print(summary.together);
-}
-
-void print_advice(const FloorSummary& summary) {
-  const auto& [name, key] = summary.largest().source;
-  fmt::print("\nimprove     {} first, {:.0f} % of the horizontal variance: {}\n", name,
-             100 * summary.largest().share, remedy_of(key));
 }
 
 /// What calibration and map state of themselves.
@@ -200,9 +125,11 @@ void run(const Options& options) {
         "two lamps are in view nowhere on this floor: is it under the lamps, and the camera below "
         "them? Otherwise lower the camera, widen the lens, or add lamps");
   }
-  if (!options.map.empty()) write_map(options.map, limits);
-  if (!options.picture.empty()) draw_map(options, limits, lamps);
-  print_summary(*summary, limits, is_free);
+  if (!options.map.empty()) write_limits(options.map, limits);
+  if (!options.picture.empty()) {
+    draw_floor_plot(options.picture, plot_of(limits, title_of(options), options.step_m), lamps);
+  }
+  print_limits(*summary, limits, is_free);
   if (options.stated) print_advice(*summary);
 }
 
@@ -268,9 +195,6 @@ int main(int argc, char** argv) {
   app.add_option("--map", options.map, "Write the figures of every place to this CSV file");
   app.add_option("--picture", options.picture,
                  "Draw the horizontal standard deviation over the floor, .png or .svg")
-      ->check([](const std::string& name) {
-        const bool known = name.ends_with(".png") || name.ends_with(".svg");
-        return known ? std::string() : "a picture's name should end in .png or .svg";
-      });
+      ->check(vlp::is_picture());
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

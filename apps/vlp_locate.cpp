@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-locate: identified lamps in images -> positions.
-#include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
@@ -15,14 +14,15 @@
 #include <utility>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "geometry/angles.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/print_fixes.h"
+#include "program/steps/step_outcome.h"
 #include "rig/detection.h"
 #include "session/leaning_captures.h"
 #include "session/locate_step.h"
 #include "session/session_folder.h"
-#include "step_outcome.h"
 
 namespace vlp {
 namespace {
@@ -83,24 +83,6 @@ CapturesTable captures_of(const Options& options) {
     throw std::invalid_argument("--height-sd-m needs z_m in captures.csv");
   }
   return captures;
-}
-
-void print_summary(const FixSummary& summary) {
-  fmt::print("frames      {}\nfixes       {}\n", summary.frames, summary.fixes);
-  for (const auto& [status, count] : summary.refused) {
-    fmt::print("  no fix    {} {}\n", count, status);
-  }
-  if (const auto& typical = summary.typical) {
-    fmt::print("lamps       {:.1f} a fix ({} to {})\n", typical->mean_lamps, typical->fewest_lamps,
-               typical->most_lamps);
-    if (const auto& residual_px = typical->median_residual_px) {
-      fmt::print("residual    {:.3f} px (median)\n", *residual_px);
-    }
-  }
-  if (const auto& sd = summary.median_sd) {
-    fmt::print("sd          {:.2f} mm horizontal, {:.2f} mm height, {:.3f} deg yaw (median)\n",
-               1e3 * sd->horizontal_m, 1e3 * sd->height_m, deg_from_rad(sd->yaw_rad));
-  }
 }
 
 LocateInput input_of(const Options& options, const CapturesTable& captures, LampCaptures seen) {
@@ -168,7 +150,7 @@ void run(const Options& options) {
   const LocateResult found = locate_frames(input);
   write_fixes(options.images.output, found.rows);
   tell(found);
-  print_summary(found.summary);
+  print_fixes(found.summary);
   require(found);
 }
 

@@ -6,10 +6,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "app.h"
-#include "capture_options.h"
-#include "rotation_by_lamps.h"
-#include "rotation_on_spot.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/rotation_by_lamps.h"
+#include "program/steps/rotation_on_spot.h"
 
 namespace vlp {
 namespace {

@@ -5,17 +5,16 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <opencv2/core/utility.hpp>
 #include <optional>
-#include <regex>
-#include <thread>
+#include <string>
+#include <vector>
 
-#include "app.h"
-#include "progress.h"
-#include "rig/file.h"
-#include "rig/input_error.h"
+#include "program/app.h"
+#include "program/progress.h"
 #include "simulation/archive.h"
 #include "simulation/simulate.h"
 
@@ -26,33 +25,18 @@ struct Options {
   std::string scene, output;
   std::vector<std::string> folders;
   std::optional<int> seed, archive;
-  int threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  int threads = all_cores();
 };
-
-/// The scene file as it goes into the output: with the seed that is used, and what rendered it.
-std::string origin_of(const Options& options, std::uint64_t seed) {
-  constexpr std::size_t most_bytes = 1 << 20;
-  std::string text = read_text_file(options.scene, most_bytes);
-  constexpr std::string_view mark = "# vlp-simulate ";
-  if (text.starts_with(mark)) text.erase(0, text.find('\n') + 1);
-  if (options.seed) {
-    const std::regex seed_line("(^|\n)seed:[^\n]*");
-    if (!std::regex_search(text, seed_line)) {
-      throw InputError(options.scene, "--seed needs the scene's seed on a line of its own");
-    }
-    text = std::regex_replace(text, seed_line, fmt::format("$1seed: {}", seed),
-                              std::regex_constants::format_first_only);
-  }
-  return std::string(mark) + VLP_VERSION + '\n' + text;
-}
 
 void run(const Options& options) {
   check_output((std::filesystem::path(options.output) / "scene.yaml").string(), {options.scene});
   Scene scene = read_scene(options.scene);
-  if (options.seed) scene.seed = static_cast<std::uint64_t>(*options.seed);
+  std::optional<std::uint64_t> seed;
+  if (options.seed) seed = scene.seed = static_cast<std::uint64_t>(*options.seed);
   cv::setNumThreads(1);  // the captures themselves go in parallel
   const std::string what = options.archive ? "sessions" : "captures";
-  const SimulationOptions how{options.folders, options.threads, origin_of(options, scene.seed)};
+  const SimulationOptions how{options.folders, options.threads,
+                              origin_of(options.scene, seed, "vlp-simulate", VLP_VERSION)};
   SimulationSummary summary;
   {
     Progress progress(what);
@@ -96,7 +80,6 @@ int main(int argc, char** argv) {
       ->excludes(only);
   app.add_option("--seed", options.seed, "Another seed than the scene's")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
-  app.add_option("--threads", options.threads, "Captures at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  vlp::add_threads_option(app, options.threads, "Captures at a time");
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

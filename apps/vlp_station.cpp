@@ -2,17 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-station: a factory's calibration station: units to a verdict, and their records.
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <array>
-#include <chrono>
-#include <cstddef>
 #include <string>
 
-#include "app.h"
+#include "program/app.h"
+#include "program/station/station_records.h"
+#include "program/station/station_run.h"
+#include "program/station/station_shift.h"
+#include "station/records.h"
 #include "station/watched_run.h"
-#include "station_records.h"
-#include "station_run.h"
-#include "station_shift.h"
 
 namespace vlp {
 namespace {
@@ -47,8 +44,7 @@ void add_run(CLI::App& app, StationRunOptions& options) {
                   "used")
       ->check(finite_positive());
   add_operator(*run, options);
-  run->add_option("--threads", options.threads, "Images at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  add_threads_option(*run, options.threads);
 }
 
 void add_verify(CLI::App& app, StationRunOptions& options) {
@@ -59,8 +55,7 @@ void add_verify(CLI::App& app, StationRunOptions& options) {
                      "Its images: a folder with check and, maybe, dispersion and boards (default: "
                      "those that are in the station's folder, which are put away)");
   add_operator(*verify, options);
-  verify->add_option("--threads", options.threads, "Images at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  add_threads_option(*verify, options.threads);
 }
 
 void add_hook(CLI::App& app, StationRunOptions& options) {
@@ -68,31 +63,6 @@ void add_hook(CLI::App& app, StationRunOptions& options) {
       "hook", "Run the hook again for runs whose hook failed or was not run to its end");
   hook->add_option("--station", options.station, "The station, station.yaml")->required();
 }
-
-/// A UTC as records have it, 2026-11-21T13:45:01Z, or its beginning from the day on.
-const CLI::Validator kUtc(
-    [](const std::string& text) -> std::string {
-      const std::string form = "0000-00-00T00:00:00Z";
-      constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};
-      bool good = std::find(lengths.begin(), lengths.end(), text.size()) != lengths.end();
-      for (std::size_t i = 0; good && i < text.size(); ++i) {
-        good = form[i] == '0' ? text[i] >= '0' && text[i] <= '9' : text[i] == form[i];
-      }
-      if (good) {
-        const auto at = [&](std::size_t begin) {
-          return static_cast<unsigned>(std::stoul(text.substr(begin, 2)));
-        };
-        constexpr std::size_t month = 5, day = 8, hour = 11, minute = 14, second = 17;
-        const std::chrono::year year(std::stoi(text.substr(0, 4)));
-        const auto below = [&](std::size_t begin, unsigned end) {
-          return text.size() < begin + 2 || at(begin) < end;
-        };
-        good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok() &&
-               below(hour, 24) && below(minute, 60) && below(second, 60);
-      }
-      return good ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
-    },
-    "");
 
 /// Where records are.
 CLI::App* add_where(CLI::App& app, const char* name, const char* what,
@@ -118,9 +88,9 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
   command
       ->add_option("--since", options.filter.since,
                    "Only those that ended at this UTC or later, 2026-11-21 or 2026-11-21T13:45")
-      ->check(kUtc);
+      ->check(utc_problem);
   command->add_option("--until", options.filter.until, "Only those that ended before this UTC")
-      ->check(kUtc);
+      ->check(utc_problem);
   command->add_option("--last", options.filter.last, "Only the last so many")
       ->check(CLI::Range(1, 1'000'000));
   return command;

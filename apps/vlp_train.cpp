@@ -8,16 +8,17 @@
 #include <string>
 #include <vector>
 
-#include "app.h"
-#include "capture_options.h"
 #include "captures/detections_table.h"
 #include "detection/image_file.h"
-#include "history.h"
-#include "progress.h"
+#include "program/app.h"
+#include "program/progress.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/print_training.h"
+#include "program/steps/step_outcome.h"
 #include "rig/input_error.h"
 #include "session/row_time_step.h"
-#include "step_outcome.h"
-#include "train_report.h"
+#include "session/train_step.h"
 
 namespace vlp {
 namespace {
@@ -75,23 +76,12 @@ Inputs read_inputs(const Options& options) {
 
 void train(const Options& options) {
   const Inputs inputs = read_inputs(options);
-  Labelled labelled;
-  for (std::size_t i = 0; i < inputs.labels.size(); ++i) {
-    add_labelled(inputs.seen.folders[i], inputs.labels[i], labelled);
-  }
-  if (labelled.labels == 0) {
-    throw InputError(options.folders.front(),
-                     "the table names none of the images that can be used: image names have to be "
-                     "equal, with their endings");
-  }
-  check_examples(labelled.lights, inputs.lamps);
-  LampClassifier classifier = train_classifier(labelled.lights);
-  classifier.row_time_s = inputs.seen.camera.row_time_s;
-  check_kept(classifier);
-  write_lamp_classifier(options.output, classifier);
-  print_labelled(labelled, classifier);
-  print_confusion(cross_validated(labelled.lights, train_classifier));
-  warn_of_inseparable(classifier);
+  const TrainStepResult result =
+      train_lamps(inputs.seen, inputs.labels, inputs.lamps, options.folders.front());
+  require(result);
+  write_lamp_classifier(options.output, result.classifier);
+  print_training(result);
+  tell(result);
 }
 
 void train_row_time(const CLI::App& app, const Options& options) {
@@ -145,8 +135,7 @@ int main(int argc, char** argv) {
                  "true_detections.csv; with --row-time none)")
       ->option_text("NAME");
   vlp::add_readout_option(app, options.readout);
-  app.add_option("--threads", options.threads, "Images at a time (default: one a core)")
-      ->check(CLI::Range(1, 1024));
+  vlp::add_threads_option(app, options.threads);
   return vlp::run_app(app, argc, argv, [&] {
     if (row_time->count() == 0 && output->count() == 0) throw CLI::RequiredError("--output");
     if (options.row_time) {

@@ -107,7 +107,7 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$release" '
     echo "$fixes"
     [ "$(grep -c "^0 " <<<"$fixes")" = 2 ]
   fi
-  if has python3-vlp; then python3 ../../apps/python/example.py .; fi
+  if has python3-vlp; then python3 ../../lib/python/example.py .; fi
   installed=$(dpkg-query -W -f "\${Package}\n" | grep vlp)
   apt-get purge -qq $installed >>/packages/install.log 2>&1
   left=$(ls -d /usr/bin/vlp-* /usr/include/vlp /usr/lib/*/libvlp* /usr/lib/python3/dist-packages/vlp* \

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <stdexcept>
 #include <utility>
 
 #include "calibration/rotation/rotation_fit.h"
@@ -151,6 +152,18 @@ bool states_noise(const AdjustmentInput& input) {
 }
 
 }  // namespace
+
+void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths) {
+  std::vector<std::string> names;
+  names.reserve(sets.size());
+  for (const AdjustSet& set : sets) names.push_back(set.name);
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    if (std::count(paths.begin(), paths.end(), paths[i]) > 1) {
+      throw std::invalid_argument(paths[i] + " is named twice: its captures would count twice");
+    }
+    if (std::count(names.begin(), names.end(), names[i]) > 1) sets[i].name = paths[i];
+  }
+}
 
 AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry) {
   AdjustStepResult result;

@@ -23,6 +23,10 @@ struct AdjustSet {
   bool turn = false;
 };
 
+/// Gives sets of one name the paths that they were given by: a spot is one of its set. Throws
+/// std::invalid_argument for a path that stands twice.
+void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths);
+
 struct AdjustStepInput {
   std::vector<AdjustSet> sets;
   LampMap lamps;

@@ -115,6 +115,15 @@ const std::vector<Paper>& papers() {
   return all;
 }
 
+const Paper& paper_named(const std::string& name) {
+  for (const Paper& paper : papers()) {
+    if (paper.name == name) return paper;
+  }
+  std::string names;
+  for (const Paper& paper : papers()) names.append(names.empty() ? "" : ", ").append(paper.name);
+  throw std::invalid_argument("there is no paper '" + name + "', only " + names);
+}
+
 std::optional<double> largest_size_m(const Board& board, const Paper& paper) {
   constexpr int least_mm = 5, most_mm = 1000;
   Board tried = board;

@@ -20,6 +20,9 @@ struct Paper {
 /// A0 to A4 and Letter.
 const std::vector<Paper>& papers();
 
+/// The one of this name; throws std::invalid_argument, with the names, when there is none.
+const Paper& paper_named(const std::string& name);
+
 /// How large a tag, or square, a sheet has room for, upright or lying, in whole millimetres;
 /// nothing when less than 5 mm. board: its tag_size_m, or square_size_m, is not looked at.
 std::optional<double> largest_size_m(const Board& board, const Paper& paper);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <regex>
 #include <stdexcept>
 
 #include "captures/in_parallel.h"
@@ -80,6 +81,23 @@ bool render(const Scene& scene, const FrameRenderer& renderer, const CaptureSet&
 }
 
 }  // namespace
+
+std::string origin_of(const fs::path& scene, std::optional<std::uint64_t> seed,
+                      const std::string& program, const std::string& version) {
+  constexpr std::size_t most_bytes = 1 << 20;
+  std::string text = read_text_file(scene, most_bytes);
+  const std::string mark = "# " + program + " ";
+  if (text.starts_with(mark)) text.erase(0, text.find('\n') + 1);
+  if (seed) {
+    const std::regex seed_line("(^|\n)seed:[^\n]*");
+    if (!std::regex_search(text, seed_line)) {
+      throw InputError(scene, "--seed needs the scene's seed on a line of its own");
+    }
+    text = std::regex_replace(text, seed_line, "$1seed: " + std::to_string(*seed),
+                              std::regex_constants::format_first_only);
+  }
+  return mark + version + '\n' + text;
+}
 
 void claim_for_simulation(const fs::path& output, const std::string& origin) {
   const fs::path mark = output / "scene.yaml";

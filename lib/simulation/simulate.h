@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,12 @@ struct SimulationOptions {
   /// a run is taken up again.
   std::string origin;
 };
+
+/// What the output of a scene file is made from: the file, with `seed` where there is one, below a
+/// line of the program that renders it, "# vlp-simulate 0.1.0", which takes the place of such a
+/// line. Throws InputError when the file cannot be read, or its seed has no line of its own.
+std::string origin_of(const std::filesystem::path& scene, std::optional<std::uint64_t> seed,
+                      const std::string& program, const std::string& version);
 
 struct SimulationSummary {
   /// What may make captures useless: warnings_about() each folder, and captures without a lamp in

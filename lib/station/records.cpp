@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <initializer_list>
@@ -313,6 +314,28 @@ std::vector<Row> rows_of(soci::session& sql, const std::string& query, const Run
 }
 
 }  // namespace
+
+std::string utc_problem(const std::string& text) {
+  const std::string form = "0000-00-00T00:00:00Z";
+  constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};
+  bool good = std::find(lengths.begin(), lengths.end(), text.size()) != lengths.end();
+  for (std::size_t i = 0; good && i < text.size(); ++i) {
+    good = form[i] == '0' ? text[i] >= '0' && text[i] <= '9' : text[i] == form[i];
+  }
+  if (good) {
+    const auto at = [&](std::size_t begin) {
+      return static_cast<unsigned>(std::stoul(text.substr(begin, 2)));
+    };
+    constexpr std::size_t month = 5, day = 8, hour = 11, minute = 14, second = 17;
+    const std::chrono::year year(std::stoi(text.substr(0, 4)));
+    const auto below = [&](std::size_t begin, unsigned end) {
+      return text.size() < begin + 2 || at(begin) < end;
+    };
+    good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok() &&
+           below(hour, 24) && below(minute, 60) && below(second, 60);
+  }
+  return good ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
+}
 
 std::vector<double> values_of(std::span<const TrendPoint> points) {
   std::vector<double> values;

@@ -24,6 +24,10 @@ struct RunFilter {
   int last = 0;
 };
 
+/// What is wrong with such a UTC, 2026-11-21T13:45:01Z or its beginning from the day on; empty when
+/// nothing is.
+std::string utc_problem(const std::string& text);
+
 /// A run as it is listed.
 struct RunSummary {
   std::string run, kind, station, camera, ended_utc, verdict, causes;

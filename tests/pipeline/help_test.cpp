@@ -12,7 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/reference.h"
+#include "program/reference.h"
+#include "program/steps/history.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -204,6 +205,19 @@ TEST(Completion, LeavesZshAllValuesOfAnOption) {
   const std::string floor = zsh.substr(begin, zsh.find('\n', begin) - begin);
   EXPECT_THAT(floor, HasSubstr(":value::value::value::value:'"));
   EXPECT_THAT(floor, testing::Not(HasSubstr(":value::value::value::value::value:")));
+}
+
+/// An option that was renamed would be recorded.
+TEST(HistoryOptions, AreThoseOfPrograms) {
+  std::vector<std::string> options;
+  for (const char* program : {"vlp-adjust", "vlp-convert", "vlp-dispersion", "vlp-evaluate",
+                              "vlp-intrinsics", "vlp-rotation", "vlp-train"}) {
+    const auto more = options_in(run_program(std::string(program) + " --help").output);
+    options.insert(options.end(), more.begin(), more.end());
+  }
+  for (const std::string_view option : options_without_history()) {
+    EXPECT_THAT(options, testing::Contains(option));
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(

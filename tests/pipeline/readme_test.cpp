@@ -480,13 +480,15 @@ std::size_t words_in(const std::string& text) {
 }
 
 /// What the sources say of errors and doubts: in a statement that throws, fails or warns, and, in
-/// the library, whatever asks or advises. What stands between the literals of a message is "...".
+/// the library below programs, whatever asks or advises. What stands between the literals of a
+/// message is "...".
 std::vector<std::string> messages_in(const fs::path& file) {
   static const std::regex tells(
       "\\bthrow\\b|\\bfail\\(|\\berror\\(|\\bwarn\\(|\\bwarnings\\b|Error\\(");
   static const std::regex asks("\\?( [A-Z]| ?$)|\\badd\\b|[:;] take ");
   static const std::regex goes_on("^[ ,;:'?)]");
-  const bool of_library = name_of_page(file).starts_with("lib/");
+  const std::string name = name_of_page(file);
+  const bool of_library = name.starts_with("lib/") && !name.starts_with("lib/program/");
   std::string code;
   std::vector<std::string> messages;
   std::size_t last = std::string::npos;

@@ -160,7 +160,7 @@ class Module(unittest.TestCase):
         self.assertLess(took, 5)  # 1 s on a machine of its own
 
     def test_stubs_are_of_the_module(self):
-        stubs = ast.parse((SOURCE / "apps/python/vlp-stubs/__init__.pyi").read_text()).body
+        stubs = ast.parse((SOURCE / "lib/python/vlp-stubs/__init__.pyi").read_text()).body
         functions = [node for node in stubs if isinstance(node, ast.FunctionDef)]
         classes = [node for node in stubs if isinstance(node, ast.ClassDef)]
         tables = {
@@ -202,7 +202,7 @@ class Module(unittest.TestCase):
         self.assertEqual(tables["TruthTable"], list(self.truth))
 
     def test_example_runs(self):
-        example = [sys.executable, SOURCE / "apps/python/example.py", EXAMPLE]
+        example = [sys.executable, SOURCE / "lib/python/example.py", EXAMPLE]
         told = subprocess.run(example, capture_output=True, text=True, check=True).stdout
         self.assertRegex(told, "5 lamps")
         self.assertRegex(told, r"\d+ fixes, mean error 0\.\d+ mm")

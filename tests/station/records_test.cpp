@@ -285,6 +285,17 @@ void check_later_version(const std::string& where) {
   EXPECT_EQ(state_of(where), before);
 }
 
+TEST(Utc, OfAFilterIsADayOrAnInstantThatThereIs) {
+  for (const char* good : {"2026-11-21", "2024-02-29", "2026-11-21T13:45", "2026-11-21T13:45:01",
+                           "2026-11-21T13:45:01Z"}) {
+    EXPECT_EQ(utc_problem(good), "");
+  }
+  for (const char* bad : {"", "2026", "2026-02-29", "2026-13-01", "2026-11-21T24:00",
+                          "2026-11-21T13:60", "2026-11-21T13:45:60", "2026-11-21 13:45"}) {
+    EXPECT_THAT(utc_problem(bad), StartsWith("should be a UTC as ")) << bad;
+  }
+}
+
 TEST(Records, OfVersion1InAFileAreBroughtUpToDate) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();

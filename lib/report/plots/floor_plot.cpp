@@ -3,10 +3,21 @@
 #include "report/plots/floor_plot.h"
 
 #include "captures/number_text.h"
+#include "positioning/floor_summary.h"
 #include "report/plots/gnuplot.h"
 #include "report/plots/plot_parts.h"
 
 namespace vlp {
+
+FloorPlot plot_of(const FloorLimits& limits, const std::string& title, double step_m) {
+  FloorPlot plot{title, "horizontal standard deviation (mm)", step_m, {}};
+  for (const FloorLimits::Place& place : limits.places) {
+    plot.places.push_back({place.camera.position_m.head<2>(), {}});
+    if (place.parts.empty()) continue;
+    plot.places.back().value = 1e3 * spread_of(place.total()).horizontal_m;
+  }
+  return plot;
+}
 
 void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
                      const LampMap& lamps) {

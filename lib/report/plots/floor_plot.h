@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "positioning/floor_limits.h"
 #include "rig/lamp_map.h"
 
 namespace vlp {
@@ -26,6 +27,9 @@ struct FloorPlot {
   double step_m;
   std::vector<Place> places;
 };
+
+/// The horizontal standard deviation of all sources together, in mm; blank where there is no fix.
+FloorPlot plot_of(const FloorLimits& limits, const std::string& title, double step_m);
 
 /// Draws it, .png or .svg by the ending. Throws InputError, see draw().
 void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,

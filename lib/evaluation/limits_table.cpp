@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/limits_table.h"
+
+#include <string>
+#include <vector>
+
+#include "captures/csv_writer.h"
+#include "captures/number_text.h"
+#include "positioning/floor_summary.h"
+
+namespace vlp {
+
+void write_limits(const std::filesystem::path& file, const FloorLimits& limits) {
+  constexpr int digits = 6;
+  std::vector<std::string> header{"x_m",    "y_m",    "z_m",    "yaw_rad",   "lamps",
+                                  "sd_x_m", "sd_y_m", "sd_z_m", "sd_yaw_rad"};
+  for (const auto& [name, key] : limits.sources) header.push_back(std::string(key) + "_m");
+  header.emplace_back("horizontal_m");
+  CsvWriter csv(file, header);
+  const auto at = [](double value) { return significant(value, digits); };
+  for (const FloorLimits::Place& place : limits.places) {
+    const auto& [position_m, yaw_rad] = place.camera;
+    std::vector<std::string> row{at(position_m.x()), at(position_m.y()), at(position_m.z()),
+                                 at(yaw_rad), std::to_string(place.lamps)};
+    if (!place.parts.empty()) {
+      const Eigen::Vector4d sd = place.total().diagonal().cwiseMax(0).cwiseSqrt();
+      for (const double one : sd) row.push_back(at(one));
+      for (const Matrix4& part : place.parts) row.push_back(at(spread_of(part).horizontal_m));
+      row.push_back(at(spread_of(place.total()).horizontal_m));
+    }
+    row.resize(header.size());
+    csv.row(row);
+  }
+  csv.save();
+}
+
+}  // namespace vlp

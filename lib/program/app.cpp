@@ -1,0 +1,198 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/app.h"
+
+#include <fmt/core.h>
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include "captures/printable.h"
+
+#include "program/help_formatter.h"
+#include "program/reference.h"
+
+namespace vlp {
+namespace {
+
+/// The message, without what a name of a file could do to the terminal.
+class PrintableMessage : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&,
+              spdlog::memory_buf_t& line) override {
+    const std::string text = printable({message.payload.data(), message.payload.size()});
+    line.append(text.data(), text.data() + text.size());
+  }
+  std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PrintableMessage>();
+  }
+};
+
+void log_to_stderr(const std::string& program, bool quiet, bool verbose) {
+  auto logger = std::make_shared<spdlog::logger>(
+      program, std::make_shared<spdlog::sinks::stderr_color_sink_mt>());
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  formatter->add_flag<PrintableMessage>('*').set_pattern("%n: %^%l%$: %*");
+  logger->set_formatter(std::move(formatter));
+  logger->set_level(quiet     ? spdlog::level::err
+                    : verbose ? spdlog::level::debug
+                              : spdlog::level::info);
+  spdlog::set_default_logger(logger);
+}
+
+CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
+  return CLI::Validator(
+      [name, accepts](const std::string& text) {
+        double value = 0;
+        const bool good =
+            CLI::detail::lexical_cast(text, value) && std::isfinite(value) && accepts(value);
+        return good ? std::string() : "'" + text + "' should be a " + name + " number";
+      },
+      "");
+}
+
+/// Of what was typed, separated by commas.
+std::string unknown_options(const CLI::App& app) {
+  std::string names;
+  for (const std::string& word : app.remaining()) {
+    if (!word.starts_with("--")) continue;
+    names.append(names.empty() ? "" : ", ").append(word);
+  }
+  return names;
+}
+
+}  // namespace
+
+int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
+
+CLI::Validator finite() {
+  return number_check("finite", [](double) { return true; });
+}
+CLI::Validator finite_positive() {
+  return number_check("finite positive", [](double value) { return value > 0; });
+}
+CLI::Validator finite_not_negative() {
+  return number_check("finite and not negative", [](double value) { return value >= 0; });
+}
+
+CLI::Validator ends_in(const std::string& ending) {
+  return CLI::Validator(
+      [ending](const std::string& name) {
+        return name.ends_with(ending) ? std::string() : "the file's name should end in " + ending;
+      },
+      "");
+}
+
+CLI::Validator is_picture() {
+  return CLI::Validator(
+      [](const std::string& name) {
+        const bool known = name.ends_with(".png") || name.ends_with(".svg");
+        return known ? std::string() : "a picture's name should end in .png or .svg";
+      },
+      "");
+}
+
+void add_threads_option(CLI::App& app, int& threads, const std::string& what) {
+  app.add_option("--threads", threads, what + " (default: one a core)")->check(CLI::Range(1, 1024));
+}
+
+void check_output(const std::string& output, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code missing;
+    if (std::filesystem::equivalent(output, input, missing)) {
+      throw std::invalid_argument(output + ": is an input, too, and would be overwritten");
+    }
+  }
+}
+
+bool same_file(const std::string& one, const std::string& other) {
+  const auto of = [](const std::string& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
+  };
+  return !one.empty() && !other.empty() && of(one) == of(other);
+}
+
+void check_further_output(const std::string& option, const std::string& file,
+                          const std::string& output, const std::vector<std::string>& inputs) {
+  if (file.empty()) return;
+  check_output(file, inputs);
+  if (same_file(file, output)) {
+    throw std::invalid_argument("--output and " + option + " name one file");
+  }
+}
+
+void check_outputs(const std::vector<std::pair<std::string, std::string>>& outputs,
+                   const std::vector<std::string>& inputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const auto& [option, file] = outputs[i];
+    check_output(file, inputs);
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!same_file(file, outputs[k].second)) continue;
+      throw std::invalid_argument(fmt::format("{} and {} name one file", outputs[k].first, option));
+    }
+  }
+}
+
+int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run) {
+  bool quiet = false, verbose = false;
+  const auto formatter = std::make_shared<HelpFormatter>();
+  app.formatter(formatter);
+  const std::function<bool(CLI::App*)> every = [](CLI::App*) { return true; };
+  for (CLI::App* command : app.get_subcommands(every)) command->formatter(formatter);
+  auto* quiet_flag = app.add_flag("-q,--quiet", quiet, "Only errors on stderr, nothing on stdout");
+  app.add_flag("-v,--verbose", verbose, "Details on stderr")->excludes(quiet_flag);
+  app.set_version_flag("--version", app.get_name() + " " + VLP_VERSION);
+  log_to_stderr(app.get_name(), false, false);
+  if (argc == 3 && std::string_view(argv[1]) == "--reference") {
+    const std::string text = reference_of(app, argv[2]);
+    if (!text.empty()) {  // of another name the parser complains
+      std::fputs(text.c_str(), stdout);
+      return std::fflush(stdout) != 0 ? kBadInput : kDone;
+    }
+  }
+  try {
+    app.parse(argc, argv);
+    log_to_stderr(app.get_name(), quiet, verbose);
+    if (quiet && std::freopen("/dev/null", "w", stdout) == nullptr) return kBadInput;
+    run();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+      throw std::runtime_error("stdout cannot be written");
+    }
+    return kDone;
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    const auto unknown = unknown_options(app);  // a misspelt option says more than what it lacks
+    if (!unknown.empty()) {
+      spdlog::error("unknown: {}; see {} --help", unknown, app.get_name());
+    } else {
+      spdlog::error("{}; see {} --help", error.what(), app.get_name());
+    }
+    return kBadInput;
+  } catch (const GateNotMet& error) {
+    spdlog::error("{}", error.what());
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return kGateNotMet;
+    spdlog::error("stdout cannot be written");
+    return kBadInput;
+  } catch (const Undetermined& error) {
+    spdlog::error("{}", error.what());
+    return kUndetermined;
+  } catch (const std::exception& error) {  // vlp::InputError and std::invalid_argument among them
+    spdlog::error("{}", error.what());
+    return kBadInput;
+  }
+}
+
+}  // namespace vlp

@@ -1,0 +1,314 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/reference.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "program/help_formatter.h"
+
+namespace vlp {
+namespace {
+
+using Options = std::vector<const CLI::Option*>;
+
+/// Those of --help, in its order.
+Options options_in(const CLI::App& app) {
+  return app.get_options([](const CLI::Option* option) {
+    return option->nonpositional() && !option->get_group().empty();
+  });
+}
+Options positionals_in(const CLI::App& app) {
+  return app.get_options([](const CLI::Option* option) { return option->get_positional(); });
+}
+std::vector<const CLI::App*> commands_in(const CLI::App& app) {
+  return app.get_subcommands(std::function<bool(const CLI::App*)>(
+      [](const CLI::App* command) { return !command->get_name().empty(); }));
+}
+
+/// "-o", "--output"; of a flag that has it "--no-report", too.
+std::vector<std::string> names_of(const CLI::Option& option) {
+  std::vector<std::string> names;
+  for (const std::string& name : option.get_snames()) names.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) names.push_back("--" + name);
+  return names;
+}
+
+/// "a|b" or "TEXT:{a,b}"; empty for others.
+std::vector<std::string> choices_of(const CLI::Option& option) {
+  std::string list = option.get_type_name();
+  char separator = '|';
+  if (const auto brace = list.find(":{"); brace != std::string::npos) {
+    list = list.substr(brace + 2, list.rfind('}') - brace - 2);
+    separator = ',';
+  } else if (list.find('|') == std::string::npos) {
+    return {};
+  }
+  std::vector<std::string> choices;
+  std::istringstream stream(list);
+  for (std::string choice; std::getline(stream, choice, separator);) choices.push_back(choice);
+  return choices;
+}
+
+enum class Value { none, choice, file, other };
+
+Value value_of(const CLI::Option& option) {
+  if (option.get_items_expected_max() == 0) return Value::none;  // a flag
+  if (!choices_of(option).empty()) return Value::choice;
+  const std::string type = option.get_type_name();
+  const std::string word = type.substr(0, type.find_first_of(": ["));
+  const bool file = word == "TEXT" || word == "FILE" || word == "SET" || word == "FIXES";
+  return file ? Value::file : Value::other;
+}
+
+/// `text` with each of `letters` after a backslash.
+std::string escaped(const std::string& text, std::string_view letters) {
+  std::string result;
+  for (const char letter : text) {
+    if (letters.find(letter) != std::string_view::npos) result += '\\';
+    result += letter;
+  }
+  return result;
+}
+
+std::string in_words(const std::vector<std::string>& words) {
+  std::string line;
+  for (const std::string& word : words) line.append(line.empty() ? "" : " ").append(word);
+  return line;
+}
+
+/// A line of roff that shows `text`.
+std::string roff(const std::string& text) {
+  std::string line;
+  for (const char letter : text) {
+    if (letter == '\\') {
+      line.append("\\e");
+    } else {
+      line.append(letter == '-' ? "\\" : "").append(1, letter);
+    }
+  }
+  if (line.starts_with('.') || line.starts_with('\'')) line.insert(0, "\\&");
+  return line;
+}
+
+/// Lines that begin with a blank, and those that are `verbatim`, as they are; others as paragraphs.
+std::string roff_paragraphs(const std::string& text, bool verbatim) {
+  std::istringstream lines(text);
+  std::string page;
+  bool as_is = false;
+  for (std::string line; std::getline(lines, line);) {
+    const bool now = verbatim || line.starts_with(' ');
+    if (now != as_is) page.append(now ? ".PP\n.nf\n" : ".fi\n");
+    as_is = now;
+    // The examples are of a tree that is built; installed programs are in the path.
+    for (auto at = line.find("build/bin/"); at != std::string::npos; at = line.find("build/bin/")) {
+      line.erase(at, 10);
+    }
+    page.append(line.empty() ? (now ? "" : ".PP") : roff(line)).append("\n");
+  }
+  return page.append(as_is ? ".fi\n" : "");
+}
+
+/// "vlp-locate - positions from ...": the description up to its first stop.
+std::string name_line(const CLI::App& app) {
+  std::string summary = app.get_description();
+  std::replace(summary.begin(), summary.end(), '\n', ' ');
+  for (std::size_t i = 0; i + 1 < summary.size(); ++i) {
+    const bool stop = summary[i] == '.' || summary[i] == ':' || summary[i] == ';';
+    if (stop && summary[i + 1] == ' ') summary.resize(i);
+  }
+  if (summary.ends_with('.')) summary.pop_back();
+  if (!summary.empty()) {
+    summary[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(summary[0])));
+  }
+  return roff(app.get_name()) + " \\- " + roff(summary) + "\n";
+}
+
+std::string roff_options(const Options& options, bool positional) {
+  const HelpFormatter formatter;
+  std::string page;
+  for (const CLI::Option* option : options) {
+    page.append(".TP\n.B ")
+        .append(roff(formatter.make_option_name(option, positional) +
+                     formatter.make_option_opts(option)))
+        .append("\n")
+        .append(roff(option->get_description()))
+        .append("\n");
+  }
+  return page;
+}
+
+/// A shell function's name.
+std::string function_of(const std::string& program) {
+  std::string name = "_" + program;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+}
+
+std::string bash_options(const CLI::App& app, const std::string& indent) {
+  std::vector<std::string> names, quiet, files;
+  std::string cases;
+  for (const CLI::Option* option : options_in(app)) {
+    const auto of_option = names_of(*option);
+    names.insert(names.end(), of_option.begin(), of_option.end());
+    const Value value = value_of(*option);
+    if (value == Value::none) continue;
+    std::string pattern;
+    for (const std::string& name : of_option)
+      pattern.append(pattern.empty() ? "" : "|").append(name);
+    cases.append(indent).append("  ").append(pattern).append(") ");
+    if (value == Value::choice) cases.append("words='" + in_words(choices_of(*option)) + "'; ");
+    if (value == Value::file) cases.append("files=yes; ");
+    cases.append("value=yes ;;\n");
+  }
+  return indent + "options='" + in_words(names) + "'\n" + indent + "case $previous in\n" + cases +
+         indent + "esac\n";
+}
+
+/// One of zsh's _arguments: '(-o --output)'{-o,--output}'[text]:TEXT:_files'.
+std::string zsh_option(const CLI::Option& option) {
+  const auto names = names_of(option);
+  const bool again = option.get_expected_max() > 1;
+  std::string text = escaped(option.get_description(), "[]:\\");
+  for (auto at = text.find('\''); at != std::string::npos; at = text.find('\'', at + 4)) {
+    text.replace(at, 1, "'\\''");
+  }
+  std::string spec;
+  if (again) {
+    spec = "'*'";
+  } else if (names.size() > 1) {
+    spec = "'(" + in_words(names) + ")'";
+  }
+  std::string list;
+  for (const std::string& name : names) list.append(list.empty() ? "" : ",").append(name);
+  spec.append(names.size() > 1 ? "{" + list + "}" : list).append("'[" + text + "]");
+  const Value value = value_of(option);
+  const int values = value == Value::none ? 0 : std::max(1, option.get_items_expected_min());
+  for (int i = 0; i < values; ++i) {
+    spec.append(":value:");
+    if (value == Value::choice) spec.append("(" + in_words(choices_of(option)) + ")");
+    if (value == Value::file) spec.append("_files");
+  }
+  return spec + "'";
+}
+
+std::string zsh_arguments(const CLI::App& app, const std::string& indent) {
+  std::string text = indent + "_arguments -s" + (commands_in(app).empty() ? "" : " -C");
+  for (const CLI::Option* option : options_in(app)) {
+    text.append(" \\\n").append(indent).append("  ").append(zsh_option(*option));
+  }
+  if (!positionals_in(app).empty()) text.append(" \\\n" + indent + "  '*:file:_files'");
+  return text;
+}
+
+std::vector<std::string> names_of(const std::vector<const CLI::App*>& commands) {
+  std::vector<std::string> names(commands.size());
+  std::transform(commands.begin(), commands.end(), names.begin(),
+                 [](const CLI::App* command) { return command->get_name(); });
+  return names;
+}
+
+}  // namespace
+
+std::string manual_page(const CLI::App& app) {
+  const HelpFormatter formatter;
+  std::string page = ".TH " + roff(app.get_name()) + " 1 \"\" \"vlp " VLP_VERSION "\" \"VLP\"\n";
+  page.append(".SH NAME\n").append(name_line(app));
+  page.append(".SH SYNOPSIS\n.B ").append(roff(app.get_name())).append("\n[OPTIONS]");
+  for (const CLI::Option* option : positionals_in(app)) {
+    page.append(" ").append(roff(formatter.make_option_usage(option)));
+  }
+  page.append(commands_in(app).empty() ? "\n" : " COMMAND ...\n");
+  page.append(".SH DESCRIPTION\n").append(roff_paragraphs(app.get_description(), false));
+  if (!positionals_in(app).empty()) {
+    page.append(".SH ARGUMENTS\n").append(roff_options(positionals_in(app), true));
+  }
+  page.append(".SH OPTIONS\n").append(roff_options(options_in(app), false));
+  for (const CLI::App* command : commands_in(app)) {
+    page.append(".SH COMMAND ").append(roff(command->get_name())).append("\n");
+    page.append(roff_paragraphs(command->get_description(), false));
+    page.append(roff_options(positionals_in(*command), true));
+    page.append(roff_options(options_in(*command), false));
+  }
+  if (!app.get_footer().empty()) {
+    page.append(".SH FURTHER\n").append(roff_paragraphs(app.get_footer(), true));
+  }
+  page.append(
+      ".SH EXIT STATUS\n"
+      ".TP\n0\nDone.\n"
+      ".TP\n1\nDone, and a gate is not met.\n"
+      ".TP\n2\nBad input or usage; a line on stderr tells file, line and key.\n"
+      ".TP\n3\nThe data do not determine the answer; a line on stderr tells what to add.\n");
+  return page;
+}
+
+std::string bash_completion(const CLI::App& app) {
+  const std::string function = function_of(app.get_name());
+  const auto commands = commands_in(app);
+  const auto names = names_of(commands);
+  std::string text =
+      "# Completion of " + app.get_name() + " for bash; made from its options.\n" + function +
+      "() {\n"
+      "  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}\n"
+      "  local options words='' files='' value='' command='' word\n"
+      "  COMPREPLY=()\n";
+  if (!commands.empty()) {
+    text.append("  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n    case $word in\n      ");
+    std::string pattern = in_words(names);
+    std::replace(pattern.begin(), pattern.end(), ' ', '|');
+    text.append(pattern).append(") command=$word; break ;;\n    esac\n  done\n");
+    text.append("  case $command in\n");
+    for (const CLI::App* command : commands) {
+      text.append("    " + command->get_name() + ")\n").append(bash_options(*command, "      "));
+      text.append("      ;;\n");
+    }
+    text.append("    *)\n").append(bash_options(app, "      "));
+    text.append("      [ \"$value\" ] || words='" + in_words(names) + "'\n      ;;\n  esac\n");
+  } else {
+    text.append(bash_options(app, "  "));
+  }
+  if (commands.empty() && !positionals_in(app).empty())
+    text.append("  [ \"$value\" ] || files=yes\n");
+  text.append(
+      "  if [[ $current == -* && ! $value ]]; then\n"
+      "    words=$options files=''\n"
+      "  fi\n"
+      "  if [ \"$files\" ]; then\n"
+      "    compopt -o filenames 2>/dev/null\n"
+      "    mapfile -t COMPREPLY < <(compgen -f -- \"$current\")\n"
+      "  else\n"
+      "    mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$current\")\n"
+      "  fi\n"
+      "}\n");
+  return text + "complete -F " + function + " " + app.get_name() + "\n";
+}
+
+std::string zsh_completion(const CLI::App& app) {
+  const auto commands = commands_in(app);
+  std::string text = "#compdef " + app.get_name() + "\n# Made from its options.\n";
+  if (commands.empty()) return text + zsh_arguments(app, "") + "\n";
+  const auto names = names_of(commands);
+  text.append("local curcontext=$curcontext state line\n").append(zsh_arguments(app, ""));
+  text.append(" \\\n  '1:command:(" + in_words(names) + ")' \\\n  '*::argument:->command'\n");
+  text.append("[[ $state == command ]] || return\ncase $words[1] in\n");
+  for (const CLI::App* command : commands) {
+    text.append("  " + command->get_name() + ")\n").append(zsh_arguments(*command, "    "));
+    text.append("\n    ;;\n");
+  }
+  return text + "esac\n";
+}
+
+std::string reference_of(const CLI::App& app, std::string_view which) {
+  if (which == "man") return manual_page(app);
+  if (which == "bash") return bash_completion(app);
+  if (which == "zsh") return zsh_completion(app);
+  return {};
+}
+
+}  // namespace vlp

@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/run_each.h"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "program/app.h"
+
+namespace vlp {
+namespace {
+
+using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+
+constexpr unsigned kLongest_s = 86400;
+
+struct Request {
+  std::vector<std::string> arguments;
+  unsigned limit_s;
+};
+
+Request request_in(const std::string& line) {
+  try {
+    const auto json = nlohmann::json::parse(line);
+    const auto& limit_s = json.at("limit_s");
+    if (limit_s.is_number_unsigned() && limit_s >= 1U && limit_s <= kLongest_s) {
+      return {json.at("arguments").get<std::vector<std::string>>(), limit_s.get<unsigned>()};
+    }
+  } catch (const nlohmann::json::exception&) {  // said below
+  }
+  throw std::invalid_argument(
+      "stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": 1 to 86400}: " + line);
+}
+
+/// What the process does that was split off. It says all to `said`.
+[[noreturn]] void become(const char* name, Request request, std::FILE* said, pid_t parent,
+                         const std::function<int(int, char**)>& program) {
+  // A process that nobody waits for any more would write where another begins.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) std::_Exit(kBadInput);
+  // Not by freopen(), which would set back for us, too, how far the lines are read.
+  const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const bool ready = ::dup2(nothing, STDIN_FILENO) >= 0 &&
+                     ::dup2(::fileno(said), STDOUT_FILENO) >= 0 &&
+                     ::dup2(::fileno(said), STDERR_FILENO) >= 0;
+  if (!ready) std::_Exit(kBadInput);
+  ::alarm(request.limit_s);
+  request.arguments.insert(request.arguments.begin(), name);
+  std::vector<char*> argv;
+  for (std::string& argument : request.arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const int code = program(static_cast<int>(request.arguments.size()), argv.data());
+  std::fflush(nullptr);
+  std::_Exit(code);
+}
+
+std::string end_of(std::FILE* said) {
+  constexpr long most = 4096;
+  std::fseek(said, 0, SEEK_END);
+  std::fseek(said, std::max(0L, std::ftell(said) - most), SEEK_SET);
+  std::string text(most, '\0');
+  text.resize(std::fread(text.data(), 1, text.size(), said));
+  return text;
+}
+
+double seconds(const timeval& time) {
+  constexpr double microsecond = 1e-6;
+  return static_cast<double>(time.tv_sec) + microsecond * static_cast<double>(time.tv_usec);
+}
+
+std::string answer_to(const char* name, const Request& request,
+                      const std::function<int(int, char**)>& program) {
+  const int memory = ::memfd_create("said", MFD_CLOEXEC);
+  const File said(memory < 0 ? nullptr : ::fdopen(memory, "w+"), &std::fclose);
+  if (!said) throw std::runtime_error("there is no memory left for what a process says");
+  const pid_t parent = ::getpid(), process = ::fork();
+  if (process < 0) throw std::runtime_error("no process can be split off");
+  if (process == 0) become(name, request, said.get(), parent, program);
+  int status = 0;
+  rusage used{};
+  while (::wait4(process, &status, 0, &used) < 0) {
+    if (errno != EINTR) throw std::runtime_error("a process that was split off is lost");
+  }
+  const nlohmann::json answer{
+      {"exit_code", WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status)},
+      {"cpu_s", seconds(used.ru_utime) + seconds(used.ru_stime)},
+      {"said", end_of(said.get())}};
+  return answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+void run_each(const char* name, const std::function<int(int argc, char** argv)>& program) {
+  std::string line;
+  while (std::getline(std::cin, line)) {
+    fmt::print("{}\n", answer_to(name, request_in(line), program));
+    if (std::fflush(stdout) != 0) break;  // which run_app() tells
+  }
+}
+
+}  // namespace vlp

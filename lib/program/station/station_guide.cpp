@@ -1,0 +1,103 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/station/station_guide.h"
+
+#include <fmt/core.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+#include <utility>
+
+#include "station/golden_due.h"
+#include "station/station_screen.h"
+
+namespace vlp {
+namespace {
+
+/// Tells of what came, line by line, where there is no terminal.
+class Log {
+ public:
+  explicit Log(bool quiet) : quiet_(quiet) {}
+
+  void tell(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals) {
+    if (quiet_) return;
+    for (const auto& [step, image, gone] : arrivals) {
+      if (!gone) spdlog::info("{}", last_image_line(unit, step, image));
+    }
+    for (; done_ < kStationSteps.size() && unit.step(kStationSteps[done_]).done(); ++done_) {
+      spdlog::info("{} is done", name_of(kStationSteps[done_]));
+    }
+  }
+
+ private:
+  bool quiet_;
+  std::size_t done_ = 0;  // steps that were said to be done
+};
+
+/// Whether an image came; of a source's frames only one that is used counts.
+bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bool of_source) {
+  return std::any_of(arrivals.begin(), arrivals.end(), [&](const WatchedRun::Arrival& arrival) {
+    const auto& images = unit.step(arrival.step).images;
+    const auto image = images.find(arrival.image);
+    return !of_source || image == images.end() || image->second.refused.empty();
+  });
+}
+
+/// A unit begins with its first image, which may come long after its serial was scanned.
+void ask_for_golden(Unit& unit, const Terminal& terminal) {
+  std::string why = golden_problem(unit.config());
+  if (!why.empty() && why != unit.distrusted() && !terminal.interactive()) {
+    spdlog::warn("{}; no unit passes", why);
+  }
+  unit.distrust(std::move(why));
+}
+
+}  // namespace
+
+void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
+                StepSources& sources, Spool& spool, Terminal& terminal) {
+  using Clock = std::chrono::steady_clock;
+  constexpr int look_every_ms = 50;
+  Clock::time_point last = Clock::now();
+  Log log(terminal.interactive());
+  bool changed = true, begun = false;
+  while (unit.current() && !unit.hopeless()) {
+    const auto arrivals = watched.look(static_cast<std::size_t>(options.threads));
+    if (!begun && !arrivals.empty()) {
+      begun = true;
+      ask_for_golden(unit, terminal);
+    }
+    log.tell(unit, arrivals);
+    changed = changed || !arrivals.empty();
+    if (changed && terminal.interactive()) {
+      auto lines = station_screen(unit);
+      for (ScreenLine& line : spool_lines(spool.state())) lines.push_back(std::move(line));
+      lines.push_back({"q: verdict now   Ctrl-C: leave, to go on later"});
+      terminal.draw(lines);
+    }
+    changed = false;
+    if (came(unit, arrivals, sources.any())) last = Clock::now();
+    sources.feed(unit, watched);
+    if (sources.ended(unit)) {
+      unit.end_early("the frames ended");
+      break;
+    }
+    const std::chrono::duration<double> idle = Clock::now() - last;
+    if (options.idle_s && idle.count() > *options.idle_s) {
+      unit.end_early(fmt::format("no image came for {:g} s", *options.idle_s));
+      break;
+    }
+    if (terminal.key(arrivals.empty() ? look_every_ms : 0) == 'q') {
+      unit.end_early("the operator ended the run");
+      break;
+    }
+    if (interrupted()) {
+      throw std::runtime_error("left before the verdict; the same command goes on where it was");
+    }
+    changed = terminal.resized();
+  }
+}
+
+}  // namespace vlp

@@ -1,0 +1,439 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/station/station_records.h"
+
+#include <fmt/core.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include "captures/printable.h"
+#include "program/app.h"
+#include "program/progress.h"
+#include "rig/input_error.h"
+#include "station/archive_runs.h"
+#include "station/certificate.h"
+#include "station/control_chart.h"
+#include "station/export_runs.h"
+#include "station/known_runs.h"
+#include "station/publish_run.h"
+#include "station/retention.h"
+#include "station/run_figures.h"
+#include "station/station_screen.h"
+
+namespace vlp {
+namespace {
+
+constexpr const char* kAny = "any";
+
+/// To stdout; what records hold of names is not for the terminal to obey.
+void say(const std::string& text) { fmt::print("{}", printable(text)); }
+
+/// Of a station, or of records alone; what the spool has to tell is told.
+std::unique_ptr<KnownRuns> known_runs(const StationRecordsOptions& options) {
+  if (options.station.empty() == options.records.empty()) {
+    throw std::invalid_argument("which records? Give --station or --records");
+  }
+  if (options.station.empty()) return std::make_unique<KnownRuns>(options.records);
+  auto known = std::make_unique<KnownRuns>(read_station(options.station));
+  const std::string state = known->spool()->state();
+  if (!state.empty()) spdlog::warn("{}", printable(state));
+  return known;
+}
+
+/// A filter in which "any" is not asked for.
+RunFilter asked(RunFilter filter) {
+  for (std::string* text : {&filter.station, &filter.verdict, &filter.kind}) {
+    if (*text == kAny) text->clear();
+  }
+  return filter;
+}
+
+/// The run that is named, or the last that the filter lets through.
+RunRecord run_of(KnownRuns& known, const StationRecordsOptions& options) {
+  return options.run.empty() ? known.last(asked(options.filter)) : known.find(options.run);
+}
+
+/// What is compared unless it is asked for otherwise: units of the station.
+RunFilter comparable(const StationRecordsOptions& options, const KnownRuns& known) {
+  RunFilter filter = options.filter;
+  if (filter.kind.empty()) filter.kind = "unit";
+  if (filter.station.empty() && known.station()) filter.station = known.station()->station;
+  return asked(filter);
+}
+
+const StationConfig* station_of(const KnownRuns& known) {
+  return known.station() ? &*known.station() : nullptr;
+}
+
+/// Records that several stations share, when nothing says of which.
+void check_one_station(const std::vector<TrendPoint>& points,
+                       const StationRecordsOptions& options) {
+  if (options.station.empty() && options.filter.station.empty()) check_one_station(points);
+}
+
+/// The folder into which files of a run go.
+std::filesystem::path results_of(const StationRecordsOptions& options) {
+  if (!options.output.empty()) return options.output;
+  if (!options.station.empty()) return read_station(options.station).results;
+  throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
+}
+
+/// What a study gives, or why these values are none, as Undetermined.
+template <typename Study>
+auto determined(const Study& study) {
+  try {
+    return study();
+  } catch (const std::invalid_argument& error) {
+    throw Undetermined(error.what());
+  }
+}
+
+/// UNIT=VALUE, by unit.
+std::map<std::string, double> references_of(const std::vector<std::string>& texts) {
+  std::map<std::string, double> references;
+  for (const std::string& text : texts) {
+    const auto at = text.rfind('=');
+    std::istringstream number(at == std::string::npos ? "" : text.substr(at + 1));
+    double value = 0;
+    if (at == 0 || !(number >> value) || !number.eof() || !std::isfinite(value)) {
+      throw std::invalid_argument("--reference: should be UNIT=VALUE, not " + text);
+    }
+    if (!references.emplace(text.substr(0, at), value).second) {
+      throw std::invalid_argument("--reference: " + text.substr(0, at) + " stands twice");
+    }
+  }
+  return references;
+}
+
+std::string words_of(const TestedEstimate& estimate) {
+  return fmt::format("{:>12.4g}{:>12.3g}{:>9.2f}{:>9.4f}   {:.4g} to {:.4g}", estimate.value,
+                     estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high);
+}
+
+/// Bias and linearity of a station against reference units.
+void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
+  const auto references = references_of(options.references);
+  const auto known = known_runs(options);
+  const auto points = judged_values(known->records(), options.figure, comparable(options, *known));
+  check_one_station(points, options);
+  const auto values = reference_values(points, references);
+  const BiasStudy study = determined([&] { return bias_study(values); });
+  constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}\n";
+  say(fmt::format("{}: bias against {} reference units, {}\n\n", options.figure, study.units.size(),
+                  std::string_view(kind.unit).empty() ? "a share" : kind.unit));
+  say(fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
+  for (const UnitBias& unit : study.units) {
+    say(fmt::format("{:<20}{:>10.4g}{:>6}{}{}\n", unit.unit, unit.reference, unit.count,
+                    words_of(unit.bias), unit.bias.shows() ? "   shows" : ""));
+  }
+  const auto line = [](const char* name, const TestedEstimate& estimate) {
+    fmt::print("{:<36}{}{}\n", name, words_of(estimate), estimate.shows() ? "   shows" : "");
+  };
+  line("all", study.all);
+  if (study.linearity) {
+    const Linearity& linearity = *study.linearity;
+    fmt::print("\nbias = intercept + slope x reference\n");
+    line("slope", linearity.slope);
+    line("intercept", linearity.intercept);
+    fmt::print("residual sd {:.4g}, R^2 {:.1f} %\n\n{:<20}{:>10}{:>18}   95 % band\n",
+               linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
+    for (const UnitBias& unit : study.units) {
+      const double at = linearity.bias_at(unit.reference), half = linearity.band_at(unit.reference);
+      say(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}\n", unit.unit, unit.reference,
+                      at, at - half, at + half, std::abs(at) > half ? "   without 0" : ""));
+    }
+  }
+  if (!options.output.empty()) draw_bias(options.output, options.figure, values, study);
+}
+
+}  // namespace
+
+void list_runs(const StationRecordsOptions& options) {
+  const auto known = known_runs(options);
+  const auto runs = known->list(asked(options.filter));
+  constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}\n";
+  say(fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
+  for (const RunSummary& run : runs) {
+    const bool counts = run.voided.empty();
+    say(fmt::format(line, run.run, run.ended_utc, counts ? run.verdict : "VOID", run.kind,
+                    run.station, run.camera,
+                    counts ? run.causes.substr(0, run.causes.find('\n'))
+                           : "was " + run.verdict + ": " + run.voided));
+  }
+  const RunCounts counts = count_runs(runs);
+  fmt::print("\n{} runs, {} passed, {} failed, {} invalid", runs.size(), counts.passed,
+             counts.failed, counts.invalid);
+  if (counts.voided > 0) fmt::print(", {} voided", counts.voided);
+  constexpr double percent = 100;
+  if (const auto yield = counts.yield()) {
+    fmt::print(": yield {:.1f} % of {}", percent * *yield, counts.units_judged);
+  }
+  fmt::print("\n");
+  const auto open = known->with_open_hook();
+  const auto without = std::count_if(runs.begin(), runs.end(), [&](const RunSummary& run) {
+    return std::binary_search(open.begin(), open.end(), run.run);
+  });
+  if (without > 0) {
+    fmt::print("{} of them with a hook that has not ended well: 'vlp-station hook' runs it again\n",
+               without);
+  }
+  known->records();  // these are not all there are when the records are away
+}
+
+void show_run(const StationRecordsOptions& options) {
+  const auto known = known_runs(options);
+  const RunRecord record = run_of(*known, options);
+  for (const ScreenLine& line : verdict_screen(record)) say(fmt::format("{}\n", line.text));
+  fmt::print("\nfigures without a gate\n");
+  for (const CheckedMetric& figure : record.figures) {
+    if (figure.limit || !figure.value) continue;
+    say(fmt::format("{:<24}{:>12.4g} {}\n", figure.name, *figure.value, figure.unit));
+  }
+  const auto used = std::count_if(record.images.begin(), record.images.end(),
+                                  [](const auto& image) { return image.refused.empty(); });
+  fmt::print("\n");
+  for (const RunField& field : run_fields()) {
+    if (field.label == nullptr || (record.*field.text).empty()) continue;
+    say(fmt::format("{:<11}{}\n", field.label, record.*field.text));
+  }
+  fmt::print("images     {}, {} used\n", record.images.size(), used);
+  for (const RunEvent& event : record.events) {
+    const std::string who = event.who.empty() ? "" : event.who + ": ";
+    say(fmt::format("{:<11} {} {}{}\n", event.what, event.utc(), who, event.text));
+  }
+}
+
+void restore_run(const StationRecordsOptions& options) {
+  const std::filesystem::path results = results_of(options);
+  const auto known = known_runs(options);
+  const RunRecord record = run_of(*known, options);
+  const std::string no_verdict = why_no_verdict(record);
+  if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
+  say(fmt::format("{}\n", publish_run(record, {}, results).string()));
+}
+
+void write_certificate(const StationRecordsOptions& options) {
+  const std::filesystem::path results = results_of(options);
+  const auto known = known_runs(options);
+  const RunRecord record = run_of(*known, options);
+  say(fmt::format("{}\n", write_certificate(record, results).string()));
+}
+
+void clean_up(const StationRecordsOptions& options) {
+  const auto known = known_runs(options);
+  const StationConfig& config = *known->station();
+  if (!config.keep.images_days && !config.keep.results_days) {
+    throw InputError(options.station, "keeps all for ever: add the key 'keep'");
+  }
+  const Retained found = look_for_expired(config, known->records());
+  constexpr double megabyte = 1e6;
+  double all_mb = 0;
+  std::size_t done = 0;
+  for (const ExpiredFolder& expired : found.expired) {
+    const double mb = double(expired.bytes) / megabyte;
+    try {
+      if (options.remove) delete_expired(expired, *known->spool());
+    } catch (const InputError& error) {
+      spdlog::warn("{}", printable(error.what()));
+      continue;
+    }
+    ++done;
+    all_mb += mb;
+    say(fmt::format("{:>10.1f} MB  {} of {}, {} {}\n", mb, expired.folder.string(),
+                    expired.run.ended_utc, expired.run.verdict, options.remove ? "(deleted)" : ""));
+  }
+  for (const auto& folder : found.without_record) {
+    spdlog::warn("{}: is of no run of the records: left", folder.string());
+  }
+  fmt::print("{} folders, {:.1f} MB{}\n", done, all_mb,
+             options.remove ? " deleted" : ": --delete deletes them");
+  known->spool()->deliver();
+  if (done == found.expired.size()) return;
+  throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
+                                       found.expired.size() - done, found.expired.size()));
+}
+
+void void_run(const StationRecordsOptions& options) {
+  const auto known = known_runs(options);
+  const auto [record, problem] =
+      void_run(*known, options.run, options.operator_name, options.reason);
+  if (!problem.empty()) spdlog::error("{}", printable(problem));
+  say(fmt::format("{} {} {}: voided\n", record.run, record.camera, record.verdict));
+  for (const ScreenLine& line : hook_lines(record)) say(fmt::format("{}\n", line.text));
+}
+
+void verify_records(const StationRecordsOptions& options) {
+  const auto known = known_runs(options);
+  const TrailCheck found = known->records().check(options.noted);
+  for (const std::string& problem : found.problems) say(fmt::format("{}\n", problem));
+  fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
+  if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
+  if (found.problems.empty()) return;
+  throw GateNotMet(fmt::format(
+      "the records are not as they were kept: {}{}", found.problems.front(),
+      found.problems.size() == 1 ? "" : fmt::format(", and {} more", found.problems.size() - 1)));
+}
+
+void export_runs(const StationRecordsOptions& options) {
+  const auto known = known_runs(options);
+  const auto runs = known->whole(asked(options.filter));
+  write_runs(options.output, runs);
+  fmt::print("{} runs\n", runs.size());
+}
+
+void import_archive(const StationRecordsOptions& options) {
+  const auto [sessions, undated, crashed] = sessions_of_archive(options.archive);
+  if (undated > 0) {
+    spdlog::warn(
+        "{} sessions are left out: when they were taken stands neither in archive.csv "
+        "nor in their names",
+        undated);
+  }
+  if (crashed > 0) spdlog::warn("{} sessions are left out: their program crashed", crashed);
+  if (sessions.empty()) throw Undetermined(options.archive + ": no session with a date");
+  Records records(options.records);
+  Progress progress("sessions");
+  std::size_t taken = 0;
+  std::vector<std::string> other;
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const RunRecord& run = sessions[i].run;
+    if (const auto kept = records.find(run.run)) {
+      if (kept->config_sha256 != run.config_sha256) other.push_back(run.run);
+    } else {
+      records.keep(run_of(sessions[i]));
+      ++taken;
+    }
+    progress.update(i + 1, sessions.size());
+  }
+  say(fmt::format("station {}: {} runs taken, {} were there\n", sessions.front().run.station, taken,
+                  sessions.size() - taken - other.size()));
+  if (other.empty()) return;
+  throw std::invalid_argument(fmt::format(
+      "{} sessions, the first {}, have another result than these records have: take new records",
+      other.size(), other.front()));
+}
+
+void show_trend(const StationRecordsOptions& options) {
+  const MetricKind kind = run_figure(options.figure);
+  const auto known = known_runs(options);
+  Records& records = known->records();
+  RunFilter filter = comparable(options, *known);
+  if (options.filter.verdict.empty()) filter.verdict = name_of(Verdict::pass);
+  const auto points = records.trend(options.figure, filter);
+  check_one_station(points, options);
+  constexpr std::size_t least = 2;
+  if (points.size() < least) {
+    throw Undetermined(
+        fmt::format("{} of the runs have {}: a trend needs two", points.size(), options.figure));
+  }
+  const std::vector<double> values = values_of(points);
+  const auto alarms = chart_alarms(values, options.rules);
+  const ControlChart chart = control_chart(values);
+  const auto gate = gate_of(options.figure, station_of(*known), records, points);
+  if (!options.output.empty()) draw_trend(options.output, options.figure, points, alarms, gate);
+  say(fmt::format("{} of {} runs, {} to {}\nmean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n",
+                  options.figure, points.size(), points.front().ended_utc, points.back().ended_utc,
+                  chart.mean, kind.unit, chart.lower, chart.upper));
+  if (gate) fmt::print("gate      {} {:.4g}\n", words_of(kind.asked), *gate);
+  for (const ChartAlarm& alarm : alarms) {
+    const TrendPoint& point = points[alarm.index];
+    say(fmt::format("{} {} {} {:.4g}  {}: {}\n", point.ended_utc, point.run, point.camera,
+                    point.value, alarm.rule, alarm.meaning));
+  }
+  if (alarms.empty()) return;
+  throw GateNotMet(fmt::format("{}: {} alarms, the last {} at {}", options.figure, alarms.size(),
+                               alarms.back().rule, points[alarms.back().index].run));
+}
+
+void show_capability(const StationRecordsOptions& options) {
+  std::vector<MetricKind> kinds = run_figures();
+  if (!options.figure.empty()) kinds = {run_figure(options.figure)};
+  const auto known = known_runs(options);
+  Records& records = known->records();
+  const RunFilter filter = comparable(options, *known);
+  constexpr const char* head = "{:<22}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}\n";
+  std::string rows;
+  for (const MetricKind& kind : kinds) {
+    const auto points = judged_values(records, kind.name, filter);
+    check_one_station(points, options);
+    const auto gate = gate_of(kind.name, station_of(*known), records, points);
+    const auto found = capability(values_of(points), limits_of(kind, gate));
+    if (!found) continue;
+    const auto index = [](const CapabilityIndex& of) {
+      return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
+    };
+    rows += fmt::format(
+        head, kind.name, found->count, fmt::format("{:.4g}", found->mean),
+        fmt::format("{:.3g}", found->within_sd), fmt::format("{:.3g}", found->overall_sd),
+        fmt::format("{} {:.4g}", kind.asked == Direction::at_least ? ">=" : "<=", gate.value_or(0)),
+        index(found->cpk), index(found->ppk));
+  }
+  if (rows.empty()) {
+    throw Undetermined(
+        "no figure with a gate has two values that differ, of runs that were judged");
+  }
+  say(fmt::format(head, "figure", "runs", "mean", "sd within", "overall", "gate", "Cpk (95 %)",
+                  "Ppk (95 %)") +
+      rows);
+}
+
+void show_study(const StationRecordsOptions& options) {
+  const MetricKind kind = run_figure(options.figure);
+  if (!options.references.empty()) return show_bias(kind, options);
+  const auto known = known_runs(options);
+  Records& records = known->records();
+  RunFilter filter = options.filter;
+  if (filter.kind.empty()) filter.kind = "unit";
+  const auto points = judged_values(records, options.figure, asked(filter));
+  const auto values = study_values(points, options.units);
+  const MeasurementStudy study = determined([&] { return measurement_study(values); });
+  const auto gate = gate_of(options.figure, station_of(*known), records, points);
+  say(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}\n\n", options.figure,
+                  study.units, study.stations, study.repeats, study.mean, kind.unit));
+  fmt::print("{:<18}{:>5}{:>14}{:>14}\n", "", "dof", "squares", "mean square");
+  for (const auto& [name, line] :
+       {std::pair("units", study.unit), std::pair("stations", study.station),
+        std::pair("units x stations", study.both), std::pair("error", study.error)}) {
+    fmt::print("{:<18}{:>5}{:>14.5g}{:>14.5g}\n", name, line.dof, line.sum_of_squares,
+               line.mean_square());
+  }
+  if (study.interaction_p) {
+    fmt::print("units x stations by chance with p = {:.3f}: {}\n", *study.interaction_p,
+               study.pooled ? "taken as error" : "of its own");
+  }
+  fmt::print("\n{:<34}{:>12}{:>14}\n", "", "sd", "% of total");
+  const auto part = [&](const char* name, double sd) {
+    constexpr double percent = 100;
+    fmt::print("{:<34}{:>12.5g}{:>14.1f}\n", name, sd,
+               study.total > 0 ? percent * sd / study.total : 0);
+  };
+  part("repeatability (EV)", study.repeatability);
+  if (study.stations > 1) {
+    part("stations (AV)", study.of_station);
+    part("units x stations (INT)", study.of_both);
+  }
+  part("measuring, all of it (GRR)", study.measuring);
+  part("units (PV)", study.of_unit);
+  part("total (TV)", study.total);
+  if (const auto categories = study.distinct_categories()) {
+    fmt::print("distinct categories (ndc){:>21}\n", *categories);
+  }
+  if (const auto share = study.percent_of_tolerance(limits_of(kind, gate))) {
+    fmt::print("measuring / tolerance (P/T){:>19.1f} %\n", *share);
+  } else if (gate) {
+    fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n", words_of(kind.asked), *gate);
+  }
+  if (study.stations == 1) {
+    fmt::print("\nOne station: nothing is known of what stations differ by.\n");
+  }
+}
+
+}  // namespace vlp

@@ -1,0 +1,154 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/station/station_shift.h"
+
+#include <fmt/core.h>
+#include <spawn.h>
+#include <spdlog/spdlog.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "captures/printable.h"
+#include "program/app.h"
+#include "program/station/terminal.h"
+#include "rig/input_error.h"
+#include "station/golden_due.h"
+
+namespace vlp {
+namespace {
+
+constexpr const char* kQuit = "q";
+
+/// A word as records keep it.
+std::optional<std::string> asked(const std::string& label, Terminal& terminal) {
+  constexpr std::size_t longest = 64;
+  const auto line = terminal.line({{label}});
+  return line ? std::optional(printable(first_characters(*line, longest))) : std::nullopt;
+}
+
+/// Asks who measures, and in which shift, where it is empty. Whether somebody said who.
+bool begin_shift(std::string& operator_name, std::string& shift, Terminal& terminal) {
+  while (operator_name.empty()) {
+    const auto name = asked("Operator ", terminal);
+    if (!name || *name == kQuit) return false;
+    operator_name = *name;
+  }
+  if (!shift.empty()) return true;
+  const auto name = asked("Shift    ", terminal);
+  if (name) shift = *name;
+  return name.has_value() && shift != kQuit;
+}
+
+/// The next unit's id, or the golden unit's, as a scanner types it, one that the station takes;
+/// nothing for `q` and at the end of the input.
+std::optional<std::string> next_serial(const StationConfig& config, Terminal& terminal) {
+  const std::string golden = golden_problem(config);
+  std::string problem;
+  for (;;) {
+    std::vector<ScreenLine> prompt;
+    if (!golden.empty()) prompt.push_back({"Station  " + golden, Tone::bad});
+    if (!problem.empty()) prompt.push_back({"Wrong    " + problem, Tone::bad});
+    prompt.push_back({"Next     scan a unit's serial; q: end"});
+    prompt.push_back({"Serial   "});
+    auto line = terminal.line(prompt);
+    if (!line || *line == kQuit) return std::nullopt;
+    if (line->empty()) continue;
+    const bool is_golden = config.golden && *line == config.golden->camera_id;
+    problem = is_golden ? "" : serial_problem(config, *line);
+    if (problem.empty()) return line;
+    // Where there is no screen.
+    if (!terminal.interactive()) spdlog::error("{}", problem);
+  }
+}
+
+/// The options of a unit's own process.
+std::vector<std::string> command_of(const StationRunOptions& options, bool golden) {
+  std::vector<std::string> command{
+      "vlp-station", golden ? "verify" : "run", "--station=" + options.station,
+      "--threads=" + std::to_string(options.threads), "--operator=" + options.operator_name};
+  if (!options.shift.empty()) command.push_back("--shift=" + options.shift);
+  if (spdlog::get_level() == spdlog::level::err) command.emplace_back("--quiet");
+  if (spdlog::get_level() == spdlog::level::debug) command.emplace_back("--verbose");
+  if (golden) return command;
+  command.push_back("--camera-id=" + options.camera_id);
+  if (options.idle_s) command.push_back(fmt::format("--idle-s={}", *options.idle_s));
+  for (const std::string& source : options.sources) command.push_back("--source=" + source);
+  return command;
+}
+
+/// How this program ends with these arguments; an error is told.
+int exit_code_of(const std::vector<std::string>& command) {
+  std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
+  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  pid_t process = 0;
+  std::signal(SIGCHLD, SIG_DFL);  // who inherited that it is ignored never hears how it ended
+  if (const int error =
+          ::posix_spawn(&process, "/proc/self/exe", nullptr, nullptr, arguments.data(), environ)) {
+    throw std::runtime_error("the unit's process cannot be started: " +
+                             std::generic_category().message(error));
+  }
+  int status = 0;
+  bool told = false;
+  for (;;) {
+    const pid_t ended = ::waitpid(process, &status, WNOHANG);
+    if (ended == process) break;
+    if (ended < 0 && errno != EINTR) {
+      spdlog::error("how the unit's process ended is not known: {}",
+                    std::generic_category().message(errno));
+      return kBadInput;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    if (interrupted() && !told) told = ::kill(process, SIGTERM) == 0;
+  }
+  if (WIFEXITED(status)) return WEXITSTATUS(status);
+  spdlog::error("the unit's process was ended by signal {}", WTERMSIG(status));
+  return kBadInput;
+}
+
+}  // namespace
+
+void run_shift(StationRunOptions options) {
+  StationConfig config = read_station(options.station);
+  Terminal terminal;
+  std::map<int, int> ends;  // by exit code
+  int units = 0;
+  const bool begun = begin_shift(options.operator_name, options.shift, terminal);
+  while (begun) {
+    try {
+      config = read_station(options.station);  // as each unit does
+    } catch (const InputError&) {              // the unit tells why
+    }
+    const auto serial = next_serial(config, terminal);
+    if (!serial) break;
+    options.camera_id = *serial;
+    const bool golden = config.golden && *serial == config.golden->camera_id;
+    const int code = exit_code_of(command_of(options, golden));
+    terminal.forget_keys();
+    if (!golden) {
+      ++units;
+      ++ends[code];
+    }
+    const bool judged = code == kDone || code == kGateNotMet || code == kUndetermined;
+    if (interrupted() && !judged) {
+      throw std::runtime_error("the shift was left in the middle of a unit");
+    }
+  }
+  const int judged = ends[kDone] + ends[kGateNotMet] + ends[kUndetermined];
+  fmt::print("{} units: {} passed, {} failed, {} invalid{}\n", units, ends[kDone],
+             ends[kGateNotMet], ends[kUndetermined],
+             judged == units ? "" : fmt::format(", {} with an error", units - judged));
+}
+
+}  // namespace vlp

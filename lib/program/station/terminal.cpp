@@ -1,0 +1,183 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/station/terminal.h"
+
+#include <fmt/core.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <memory>
+#include <thread>
+
+#include "captures/printable.h"
+
+namespace vlp {
+namespace {
+
+std::atomic<bool> stop_asked = false;
+
+const char* colour_of(Tone tone) {
+  switch (tone) {
+    case Tone::heading:
+      return "\x1b[1m";
+    case Tone::good:
+      return "\x1b[32m";
+    case Tone::bad:
+      return "\x1b[31m";
+    case Tone::plain:
+      break;
+  }
+  return "";
+}
+
+bool read_key(char& key, int wait_ms) {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  return ::poll(&input, 1, wait_ms) > 0 && ::read(STDIN_FILENO, &key, 1) == 1;
+}
+
+constexpr int kSlowerThanAScanner_ms = 30;
+
+}  // namespace
+
+struct Terminal::Saved {
+  bool keys = false;
+  termios settings{};
+};
+
+Terminal::Terminal() : interactive_(::isatty(STDOUT_FILENO) == 1), saved_(new Saved) {
+  const char* no_colour = std::getenv("NO_COLOR");
+  colour_ = interactive_ && (no_colour == nullptr || *no_colour == '\0');
+  std::signal(SIGINT, [](int) { stop_asked = true; });
+  std::signal(SIGTERM, [](int) { stop_asked = true; });
+  if (!interactive_ || ::tcgetattr(STDIN_FILENO, &saved_->settings) != 0) return;
+  termios settings = saved_->settings;
+  settings.c_lflag &= static_cast<tcflag_t>(~(ICANON | ECHO));
+  saved_->keys = ::tcsetattr(STDIN_FILENO, TCSANOW, &settings) == 0;
+}
+
+Terminal::~Terminal() {
+  if (saved_->keys) ::tcsetattr(STDIN_FILENO, TCSANOW, &saved_->settings);
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+}
+
+Terminal::Size Terminal::size() {
+  winsize known{};
+  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &known) != 0 || known.ws_col == 0 || known.ws_row == 0) {
+    return {80, 24};
+  }
+  return {known.ws_col, known.ws_row};
+}
+
+bool Terminal::resized() const { return interactive_ && drawn_ > 0 && size() != size_; }
+
+/// Puts the text in the place of what was drawn. After a change of size nobody knows where that is:
+/// all is cleared.
+void Terminal::show(const std::string& text, std::size_t lines) {
+  const Size now = size();
+  const bool moved = drawn_ > 0 && now != size_;
+  if (text == last_ && !moved) return;
+  const std::string home = moved        ? "\x1b[2J\x1b[H"
+                           : drawn_ > 0 ? fmt::format("\x1b[{}A\r", drawn_)
+                                        : "";
+  fmt::print("{}{}\x1b[J", home, text);
+  std::fflush(stdout);
+  last_ = text;
+  drawn_ = lines;
+  size_ = now;
+}
+
+void Terminal::draw(const std::vector<ScreenLine>& lines) {
+  if (!interactive_) return;
+  const auto [columns, rows] = size();
+  const std::size_t shown = std::min(lines.size(), rows - 1);
+  std::string text;
+  for (std::size_t i = 0; i < shown; ++i) {
+    // The last line, with the keys, stays.
+    const auto& [line, tone] = i + 1 == shown ? lines.back() : lines[i];
+    text += toned(first_characters(printable(line), columns), tone) + "\x1b[K\n";
+  }
+  show(text, shown);
+}
+
+void Terminal::print(const std::vector<ScreenLine>& lines) {
+  std::string text;
+  for (const auto& [line, tone] : lines) {
+    text += toned(printable(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
+  }
+  if (!interactive_) {
+    fmt::print("{}", text);
+    std::fflush(stdout);  // what comes next may take its time
+    return;
+  }
+  show(text, lines.size());
+  drawn_ = 0;
+  last_.clear();
+}
+
+std::string Terminal::toned(const std::string& text, Tone tone) const {
+  return colour_ ? fmt::format("{}{}\x1b[0m", colour_of(tone), text) : text;
+}
+
+std::optional<char> Terminal::key(int wait_ms) const {
+  if (!saved_->keys) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
+    return std::nullopt;
+  }
+  char first = 0, key = 0;
+  if (!read_key(first, wait_ms)) return std::nullopt;
+  bool alone = true;
+  while (!interrupted() && read_key(key, kSlowerThanAScanner_ms)) alone = alone && key == first;
+  return alone ? std::optional(first) : std::nullopt;
+}
+
+void Terminal::forget_keys() const {
+  char key = 0;
+  while (saved_->keys && !interrupted() && read_key(key, kSlowerThanAScanner_ms)) continue;
+}
+
+std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
+  constexpr char escape = 0x1b, backspace = 0x08, del = 0x7f, end = 0x04;
+  constexpr int look_every_ms = 100;
+  constexpr std::size_t longest = 200, most_of_a_character = 4;
+  const std::string asked = prompt.back().text;
+  std::string typed;
+  if (!interactive_ && ::isatty(STDIN_FILENO) == 1) {
+    fmt::print(stderr, "{}\n", printable(asked));
+  }
+  for (;;) {
+    prompt.back().text = asked + typed;
+    draw(prompt);
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    char key = 0;
+    if (interrupted()) return std::nullopt;
+    if (::poll(&input, 1, look_every_ms) < 1) continue;
+    const bool ended = ::read(STDIN_FILENO, &key, 1) != 1 || key == end;
+    if (ended && typed.empty()) return std::nullopt;
+    if (ended || key == '\n' || key == '\r') break;
+    if (key == escape) {  // an arrow, or another key of several characters
+      while (saved_->keys && read_key(key, 0)) continue;
+    } else if (key == backspace || key == del) {
+      if (!typed.empty()) typed = first_characters(typed, typed.size() - 1);
+    } else if (static_cast<unsigned char>(key) >= ' ' &&
+               typed.size() < longest + most_of_a_character) {
+      typed += key;
+    }
+  }
+  if (interactive_) print(prompt);  // to stay
+  typed = first_characters(typed, longest);
+  const auto first = typed.find_first_not_of(' ');
+  return first == std::string::npos ? ""
+                                    : typed.substr(first, typed.find_last_not_of(' ') + 1 - first);
+}
+
+bool interrupted() { return stop_asked; }
+
+}  // namespace vlp

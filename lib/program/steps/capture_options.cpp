@@ -1,0 +1,182 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/steps/capture_options.h"
+
+#include <fmt/core.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "camera/lens_model.h"
+#include "detection/image_file.h"
+#include "detection/lights/lights_table.h"
+#include "detection/video.h"
+#include "geometry/angles.h"
+#include "program/progress.h"
+#include "program/steps/step_outcome.h"
+
+namespace vlp {
+
+void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTexts& texts) {
+  app.add_option("images", options.images, texts.images)->required();
+  app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
+  app.add_option("--calibration", options.calibration, texts.calibration)->required();
+  app.add_option("-o,--output", options.output, texts.output)->required();
+  add_detect_options(app, options);
+}
+
+void add_lens_option(CLI::App& app, std::string& lens) {
+  app.add_option("--lens", lens,
+                 "Lens model (default: LENSMODEL_OPENCV8); auto: the one that the views call for, "
+                 "by what each leaves of views that took no part")
+      ->check([](const std::string& name) {
+        const bool known = name == kChosenLens || lens_model_from_name(name);
+        return known ? std::string() : "the models are: auto, " + lens_model_names();
+      });
+}
+
+void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {
+  static const std::map<std::string, Readout> names{{"rows", Readout::rows},
+                                                    {"columns", Readout::columns}};
+  app.add_option_function<std::string>(
+         "--readout", [&readout](const std::string& name) { readout = names.at(name); },
+         "Along what the shutter reads and stripes lie (default: as the calibration says, or else "
+         "as the images show)")
+      ->check(CLI::IsMember({"rows", "columns"}))
+      ->option_text("rows|columns");
+}
+
+void add_every_option(CLI::App& app, int& every) {
+  app.add_option("--every", every, "Of a video take every Nth frame (default: 1)")
+      ->check(CLI::Range(1, 1000000))
+      ->option_text("N");
+}
+
+void check_every(int every, const std::vector<std::string>& files) {
+  if (every == 1 || std::any_of(files.begin(), files.end(), is_video_name)) return;
+  throw std::invalid_argument("--every is for videos, and there is none");
+}
+
+void add_max_mpx_option(CLI::App& app, double& max_mpx) {
+  app.add_option("--max-mpx", max_mpx,
+                 "Skip images of more than so many million pixels, unread (default: 200)")
+      ->check(finite_positive())
+      ->check(CLI::Range(0.001, 1e6));
+}
+
+void add_detect_options(CLI::App& app, CaptureOptions& options) {
+  app.add_option("--classifier", options.classifier,
+                 "Lamp classifier by vlp-train, instead of the map's frequencies");
+  app.add_option("--annotate", options.annotate,
+                 "Folder for pictures of the lights found, with outlines, centres and lamps");
+  add_readout_option(app, options.readout);
+  app.add_option("--exposure-s", options.exposure_s,
+                 "Exposure of the images, for the check of the lamp map (default: short)")
+      ->check(finite_positive());
+  add_max_mpx_option(app, options.max_mpx);
+  add_threads_option(app, options.threads);
+}
+
+std::optional<KnownMotion> MotionOptions::motion() const {
+  constexpr double fastest_deg_per_s = 180;  // that robots turn
+  if (!max_speed_m_per_s) return std::nullopt;
+  return KnownMotion::up_to(*max_speed_m_per_s,
+                            rad_from_deg(max_yaw_rate_deg_per_s.value_or(fastest_deg_per_s)));
+}
+
+void add_motion_options(CLI::App& app, MotionOptions& options, const char* help) {
+  app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s, help)->check(finite_positive());
+  app.add_option("--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
+                 "With --max-speed-m-per-s: it turns so fast at most (default: 180); 0: not at all")
+      ->check(finite_not_negative())
+      ->needs("--max-speed-m-per-s");
+}
+
+void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_deg_per_s) {
+  app.add_option("--yaw-rate-sd-deg-per-s", yaw_rate_sd_deg_per_s,
+                 "Standard deviation of yaw_rate_rad_per_s in captures.csv (default: as it says)")
+      ->check(finite_not_negative());
+}
+
+std::vector<std::string> inputs_of(const CaptureOptions& options) {
+  return {options.images, options.lamps, options.calibration, options.classifier};
+}
+
+LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
+                       const std::optional<Calibration>& calibration) {
+  return {options.images,          lamps,
+          options.lamps,           calibration,
+          options.calibration,     options.row_time_s,
+          options.classifier,      options.readout,
+          options.exposure_s,      options.annotate,
+          options.threads,         options.max_mpx,
+          options.every,           options.captures,
+          options.yaw_in_robot_rad};
+}
+
+void tell_of_lights(const std::vector<LightsOfImage>& lights) {
+  if (!spdlog::should_log(spdlog::level::debug)) return;
+  for (const auto& [image, of_image] : lights) {
+    for (const Light& light : of_image) spdlog::debug("{}: {}", image, line_of(light));
+  }
+}
+
+SeenLamps look_for_lamps(const CaptureOptions& options, const LampMap& lamps,
+                         const std::optional<Calibration>& calibration) {
+  if (!is_video_name(options.images)) {
+    for (const auto& image : images_in(options.images)) {
+      check_output(options.output, {image.string()});
+      if (!options.lights.empty()) check_output(options.lights, {image.string()});
+    }
+  }
+  SeenLamps seen;
+  {
+    Progress progress("images");
+    seen = see_lamps(lamp_images(options, lamps, calibration),
+                     [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+  }
+  tell(seen);
+  tell_of_lights(seen.lights);
+  if (!options.lights.empty()) write_lights(options.lights, seen.lights);
+  return seen;
+}
+
+SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
+                    const std::optional<Calibration>& calibration) {
+  SeenLamps seen = look_for_lamps(options, lamps, calibration);
+  require(seen);
+  return seen;
+}
+
+LampCaptures read_captures_of(const CaptureOptions& options) {
+  LampCaptures captures{
+      {}, read_lamp_map(options.lamps), options.lamps, read_calibration(options.calibration)};
+  if (std::filesystem::is_directory(options.images)) {
+    captures.frames = std::move(see_lamps(options, captures.lamps, captures.calibration).frames);
+    return captures;
+  }
+  if (is_video_name(options.images)) {
+    throw std::invalid_argument(
+        options.images +
+        " is a video: vlp-detect finds the lamps in it, and with --captures "
+        "the times of its frames");
+  }
+  const std::array<std::pair<const char*, bool>, 4> of_images{
+      {{"--classifier", !options.classifier.empty()},
+       {"--annotate", !options.annotate.empty()},
+       {"--readout", options.readout.has_value()},
+       {"--exposure-s", options.exposure_s.has_value()}}};
+  for (const auto& [name, given] : of_images) {
+    if (!given) continue;
+    throw std::invalid_argument(fmt::format("{}: {} is no folder of images", name, options.images));
+  }
+  captures.frames = read_detections(options.images);
+  return captures;
+}
+
+}  // namespace vlp

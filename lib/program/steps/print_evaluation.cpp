@@ -1,0 +1,145 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/steps/print_evaluation.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+double mm(double value_m) { return 1e3 * value_m; }
+
+void print_figure(const char* name, double value_m, const Interval* interval_m) {
+  fmt::print("{:10} {:>10.3f} mm", name, mm(value_m));
+  if (interval_m != nullptr) {
+    fmt::print("   {:.3f} to {:.3f}", mm(interval_m->low), mm(interval_m->high));
+  }
+  fmt::print("\n");
+}
+
+void print_horizontal(const Evaluation& evaluation) {
+  const ErrorFigures& figures = evaluation.horizontal_m;
+  const auto& intervals = evaluation.intervals_m;
+  fmt::print("\nhorizontal {:>13}", "");
+  if (intervals) {
+    fmt::print("   95 % interval, of {} {}\n", intervals->units, evaluation.drawn);
+  } else {
+    fmt::print("   too few {} for an interval\n", evaluation.drawn);
+  }
+  print_figure("mean", figures.mean, intervals ? &intervals->mean : nullptr);
+  print_figure("median", figures.median, intervals ? &intervals->median : nullptr);
+  print_figure("p90", figures.p90, intervals && intervals->p90 ? &*intervals->p90 : nullptr);
+  print_figure("rms", figures.rms, intervals ? &intervals->rms : nullptr);
+  print_figure("max", figures.max, nullptr);
+  fmt::print("\nshare of the fixes, and the error in mm that it does not exceed\n");
+  const auto& distribution_m = evaluation.distribution_m;
+  const std::initializer_list<std::size_t> percents{10, 25, 50, 68, 75, 90, 95, 99, 100};
+  for (const std::size_t percent : percents) fmt::print("{:>8} %", percent);
+  fmt::print("\n");
+  for (const std::size_t percent : percents) {
+    fmt::print("{:>10.3f}", mm(distribution_m[percent - 1].second));
+  }
+  fmt::print("\n\n");
+}
+
+void print_height_and_yaw(const Evaluation& evaluation) {
+  if (const auto& height_m = evaluation.height_m) {
+    fmt::print("height      rms {:.3f} mm, max {:.3f} mm, bias {:+.3f} mm\n",
+               mm(height_m->sizes.rms), mm(height_m->sizes.max), mm(height_m->bias));
+  }
+  if (const auto& yaw_rad = evaluation.yaw_rad) {
+    fmt::print("yaw         rms {:.4f} deg, max {:.4f} deg, bias {:+.4f} deg\n",
+               deg_from_rad(yaw_rad->sizes.rms), deg_from_rad(yaw_rad->sizes.max),
+               deg_from_rad(yaw_rad->bias));
+  }
+}
+
+void print_stations(const BiasAndScatter& figures) {
+  const auto& stations = figures.stations;
+  const auto worst_bias = std::max_element(
+      stations.begin(), stations.end(),
+      [](const auto& a, const auto& b) { return a.bias_m.norm() < b.bias_m.norm(); });
+  const auto worst_sd =
+      std::max_element(stations.begin(), stations.end(),
+                       [](const auto& a, const auto& b) { return a.sd_m < b.sd_m; });
+  fmt::print("stations    {} with {} fixes: bias {:.3f} mm rms, scatter {:.3f} mm\n",
+             stations.size(), figures.fixes, mm(figures.bias_m), mm(figures.scatter_m));
+  fmt::print(
+      "  worst     bias {:.3f} mm at ({:.3f}, {:.3f}) m; sd {:.3f} mm at ({:.3f}, {:.3f}) m\n",
+      mm(worst_bias->bias_m.norm()), worst_bias->xy_m.x(), worst_bias->xy_m.y(), mm(worst_sd->sd_m),
+      worst_sd->xy_m.x(), worst_sd->xy_m.y());
+}
+
+void print_fit(const LineFit& fit) {
+  const ErrorFigures& figures = fit.distances_m;
+  fmt::print(
+      "line fit    mean {:.3f} mm, median {:.3f}, p90 {:.3f}, rms {:.3f}, max {:.3f}\n"
+      "  hides     jitter of {:.3f} mm rms across the fitted line, which is turned by {:+.4f} "
+      "deg\n",
+      mm(figures.mean), mm(figures.median), mm(figures.p90), mm(figures.rms), mm(figures.max),
+      mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
+}
+
+void print_ratios(const Evaluation& evaluation) {
+  if (const auto& stated = evaluation.stated) {
+    fmt::print("error / sd  horizontal {:.3f}", stated->horizontal);
+    if (stated->height) fmt::print(", height {:.3f}", *stated->height);
+    if (stated->yaw) fmt::print(", yaw {:.3f}", *stated->yaw);
+    fmt::print(" (rms; 1: the stated sd are right)\n");
+    constexpr double percent = 100;
+    fmt::print("within 95 % horizontal {:.1f} %", percent * stated->within_95);
+    if (const auto& share = stated->height_within_95) {
+      fmt::print(", height {:.1f} %", percent * *share);
+    }
+    if (const auto& share = stated->yaw_within_95) fmt::print(", yaw {:.1f} %", percent * *share);
+    fmt::print(" (errors within 1.96 sd; those of one calibration go together)\n");
+  }
+  if (const auto& limit = evaluation.limit) {
+    fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
+               limit->horizontal,
+               limit->beaten() ? "beaten: see the warning" : "1: the best of one level image");
+  }
+}
+
+void print_comparison(const Comparison& comparison) {
+  fmt::print("compared    {}", comparison.words());
+  if (comparison.pairs > 0) {
+    fmt::print(": mean error differs by {:+.3f} mm", mm(comparison.mean_difference_m));
+  }
+  if (const auto& interval_m = comparison.interval_m) {
+    fmt::print(" (95 %: {:+.3f} to {:+.3f})", mm(interval_m->low), mm(interval_m->high));
+  }
+  fmt::print(
+      "\n  captures  {} in both: {} with a smaller error, {} with a larger; {} only here, {} "
+      "only there\n",
+      comparison.pairs, comparison.smaller, comparison.larger, comparison.only_these,
+      comparison.only_others);
+}
+
+}  // namespace
+
+void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
+  fmt::print("captures    {}\nfixes       {}\nmissing     {:.3g} %\n", evaluation.captures,
+             evaluation.fixes, 100 * evaluation.missing_share());
+  for (const auto& [status, count] : evaluation.missing) {
+    fmt::print("  no fix    {} {}\n", count, status);
+  }
+  print_horizontal(evaluation);
+  print_height_and_yaw(evaluation);
+  if (evaluation.stations) print_stations(*evaluation.stations);
+  if (evaluation.fit) print_fit(*evaluation.fit);
+  print_ratios(evaluation);
+  if (evaluation.comparison) print_comparison(*evaluation.comparison);
+  if (!gates.empty()) fmt::print("\n");
+  for (const CheckedMetric& gate : gates) {
+    fmt::print("{:6} gate {:16} {:>10.4g} {:3} {} {:.4g}\n", gate.met() ? "met" : "NOT MET",
+               gate.name, gate.value.value(), gate.unit, words_of(gate.asked), gate.limit.value());
+  }
+}
+
+}  // namespace vlp

@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/steps/print_training.h"
+
+#include <fmt/core.h>
+
+namespace vlp {
+namespace {
+
+void print_labelled(const Labelled& labelled, const LampClassifier& classifier) {
+  int used = 0;
+  for (const auto& lamp : classifier.lamps) used += lamp.examples;
+  const auto lights = static_cast<int>(labelled.lights.size());
+  fmt::print("labels      {}\n  no light  {}\n  left out  {} unlike their lamp's others\n",
+             labelled.labels, labelled.without_light, lights - used);
+  fmt::print("trained on  {} lights of {} lamps\n", used, classifier.lamps.size());
+}
+
+void print_confusion(const Confusion& confusion) {
+  fmt::print("answers to lights that were held out, one fifth of the images at a time\n  {:>8}",
+             "lamp");
+  for (const int lamp : confusion.lamps) fmt::print(" {:>6}", lamp);
+  fmt::print(" unknown\n");
+  for (std::size_t row = 0; row < confusion.lamps.size(); ++row) {
+    fmt::print("  {:>8}", confusion.lamps[row]);
+    for (Eigen::Index column = 0; column < confusion.counts.cols(); ++column) {
+      fmt::print(" {:>6}", confusion.counts(static_cast<Eigen::Index>(row), column));
+    }
+    fmt::print("\n");
+  }
+  const int all = confusion.counts.sum();
+  fmt::print("right       {:.2f} %\n  wrong     {}\n  unknown   {}\n",
+             100.0 * confusion.right() / all, confusion.wrong(), confusion.unknown());
+}
+
+}  // namespace
+
+void print_training(const TrainStepResult& result) {
+  print_labelled(result.labelled, result.classifier);
+  print_confusion(result.confusion);
+}
+
+void print_row_time(const RowTime& row_time, Readout readout) {
+  fmt::print("row time    {:.5g} us\n  sd        {:.2g} us{}\n", 1e6 * row_time.row_time_s,
+             1e6 * row_time.sd_s,
+             row_time.lamps == 1 ? ", and the error of the one lamp's frequency" : "");
+  fmt::print("rests on    {} lights of {} lamps\nread-out    along {}\n", row_time.lights,
+             row_time.lamps, readout == Readout::rows ? "rows" : "columns");
+}
+
+}  // namespace vlp

@@ -1,0 +1,76 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/steps/rotation_by_lamps.h"
+
+#include <fmt/core.h>
+
+#include <filesystem>
+
+#include "captures/captures_table.h"
+#include "geometry/angles.h"
+#include "program/app.h"
+#include "program/steps/capture_options.h"
+#include "program/steps/history.h"
+#include "program/steps/print_rotation.h"
+#include "program/steps/step_outcome.h"
+#include "session/capture_motion.h"
+#include "session/rotation_step.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Empty where there is none.
+fs::path captures_file(const CaptureOptions& images, const LevelOptions& options) {
+  if (!options.captures.empty()) return options.captures;
+  const fs::path beside = fs::path(images.images) / "captures.csv";
+  return fs::is_directory(images.images) && fs::exists(beside) ? beside : fs::path();
+}
+
+void print_corrections(const Levelling& result) {
+  fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "moved by x y z (mm)", "sd (mm)");
+  for (const auto& [id, correction_m, sd_m] : result.corrections) {
+    fmt::print("{:10} {:10.3f}{:9.3f}{:9.3f} {:10.3f}{:9.3f}{:9.3f}\n", id, 1e3 * correction_m.x(),
+               1e3 * correction_m.y(), 1e3 * correction_m.z(), 1e3 * sd_m.x(), 1e3 * sd_m.y(),
+               1e3 * sd_m.z());
+  }
+}
+
+void report(const Levelling& result, const Camera& camera) {
+  fmt::print("captures    {} used, {} of fewer than three lamps, {} left out\n", result.captures,
+             result.captures_of_few_lamps, result.captures_rejected);
+  fmt::print("detections  {} used, {} left out\n", result.detections, result.detections_rejected);
+  print_center(result.center, camera);
+  fmt::print("residual    {:.4f} px per axis, {:.4f} px for a level camera{}\n", result.residual_px,
+             result.residual_before_px, result.corrections.empty() ? "" : " and the map as it was");
+  if (!result.corrections.empty()) print_corrections(result);
+}
+
+}  // namespace
+
+void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOptions& options) {
+  const std::string& refined_map = options.refined_map;
+  const fs::path captures = captures_file(images, options);
+  std::vector<std::string> inputs = inputs_of(images);
+  inputs.push_back(captures.string());
+  check_output(images.output, inputs);
+  check_further_output("--refine-map", refined_map, images.output, inputs);
+  images.captures.emplace();  // level is what is found
+  LampCaptures input = read_captures_of(images);
+  check_lamps(input.frames, input.lamps, input.lamps_file);
+  input.motions =
+      motions_of(input.frames, captures.empty() ? CapturesTable() : read_captures(captures),
+                 options.motion.motion(), rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0)));
+  // A table that tells of no motion is no part of the result.
+  if (input.motions.empty()) inputs.pop_back();
+  const LevellingResult result =
+      solve_levelling(input, !refined_map.empty(), history_entry(app, inputs));
+  tell(result);
+  require(result);
+  if (!refined_map.empty()) write_lamp_map(refined_map, result.levelling.map);
+  write_calibration(images.output, result.calibration);
+  report(result.levelling, input.calibration.camera);
+}
+
+}  // namespace vlp

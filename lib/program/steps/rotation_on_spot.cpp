@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/steps/rotation_on_spot.h"
+
+#include <map>
+
+#include "program/app.h"
+#include "program/steps/history.h"
+#include "program/steps/print_rotation.h"
+#include "program/steps/step_outcome.h"
+#include "report/plots/gnuplot.h"
+#include "session/rotation_step.h"
+
+namespace vlp {
+namespace {
+
+const std::map<std::string, RotationMethod> kMethods{{"axis", RotationMethod::axis},
+                                                     {"joint", RotationMethod::joint},
+                                                     {"circle", RotationMethod::circle}};
+
+}  // namespace
+
+void rotate_on_spot(const CLI::App& app, CaptureOptions images, const std::string& method,
+                    const std::string& plot) {
+  const std::vector<std::string> inputs = inputs_of(images);
+  check_output(images.output, inputs);
+  check_further_output("--plot", plot, images.output, inputs);
+  images.captures.emplace();  // the axis that is found is level
+  const LampCaptures input = read_captures_of(images);
+  const RotationResult found =
+      solve_rotation(input, kMethods.at(method), history_entry(app, inputs));
+  tell(found);
+  require(found);
+  if (!plot.empty()) draw(plot, found.drawing());
+  write_calibration(images.output, found.calibration);
+  print_summary(found.fit, found.spot, found.circles, input.calibration.camera);
+}
+
+}  // namespace vlp

@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/train_step.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <map>
+#include <span>
+#include <stdexcept>
+#include <string>
+
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+/// Whether there are enough lights of each lamp; otherwise the step fails.
+bool has_examples(std::span<const LabelledLight> lights, const LampMap& lamps,
+                  TrainStepResult& result) {
+  std::map<int, int> counts;
+  for (const Lamp& lamp : lamps.lamps) counts[lamp.id] = 0;
+  for (const LabelledLight& light : lights) {
+    const auto lamp = counts.find(light.lamp);
+    if (lamp == counts.end()) {
+      throw std::invalid_argument(fmt::format(
+          "the labels name lamp {}, which is not in the lamp map: correct one of the two",
+          light.lamp));
+    }
+    ++lamp->second;
+  }
+  std::string few;
+  for (const auto& [lamp, count] : counts) {
+    if (count >= kLeastExamples) continue;
+    few += fmt::format("{}{} (has {})", few.empty() ? "" : ", ", lamp, count);
+  }
+  if (!few.empty()) {
+    result.fail(StepFailure::undetermined,
+                fmt::format("too few labelled lights of lamps {}: add captures in which they are "
+                            "wholly in view, {} or more of each",
+                            few, kLeastExamples));
+  } else if (counts.size() < 2) {
+    result.fail(StepFailure::undetermined, "one lamp: there is nothing to tell apart; add lamps");
+  }
+  return result.ok();
+}
+
+/// Whether enough of them were kept; otherwise the step fails.
+bool kept_enough(const LampClassifier& classifier, TrainStepResult& result) {
+  std::string few;
+  for (const auto& lamp : classifier.lamps) {
+    if (lamp.examples >= kLeastExamples) continue;
+    few += fmt::format("{}{}", few.empty() ? "" : ", ", lamp.lamp);
+  }
+  if (few.empty()) return true;
+  result.fail(StepFailure::undetermined,
+              fmt::format("the lights of lamps {} have too little in common: are their labels "
+                          "right? Add captures that show them clearly",
+                          few));
+  return false;
+}
+
+void warn_of_inseparable(const LampClassifier& classifier, TrainStepResult& result) {
+  constexpr std::size_t most_lines = 10;
+  const auto pairs = inseparable(classifier);
+  for (std::size_t i = 0; i < std::min(pairs.size(), most_lines); ++i) {
+    result.warnings.push_back(fmt::format(
+        "lamps {} and {} look alike ({:.1f} standard deviations apart) and may be left unknown: "
+        "change a frequency or a duty",
+        pairs[i].first, pairs[i].second, pairs[i].distance));
+  }
+  if (pairs.size() > most_lines) {
+    result.warnings.push_back(
+        fmt::format("and {} more pairs that look alike", pairs.size() - most_lines));
+  }
+}
+
+}  // namespace
+
+TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels,
+                            const LampMap& lamps, const std::filesystem::path& first_folder) {
+  TrainStepResult result;
+  Labelled& labelled = result.labelled;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    add_labelled(seen.folders[i], labels[i], labelled);
+  }
+  if (labelled.labels == 0) {
+    throw InputError(first_folder,
+                     "the table names none of the images that can be used: image names have to be "
+                     "equal, with their endings");
+  }
+  if (!has_examples(labelled.lights, lamps, result)) return result;
+  result.classifier = train_classifier(labelled.lights);
+  result.classifier.row_time_s = seen.camera.row_time_s;
+  if (!kept_enough(result.classifier, result)) return result;
+  result.confusion = cross_validated(labelled.lights, train_classifier);
+  warn_of_inseparable(result.classifier, result);
+  return result;
+}
+
+}  // namespace vlp

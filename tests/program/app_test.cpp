@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/app.h"
+
+#include <gmock/gmock.h>
+
+#include <CLI/CLI.hpp>
+
+#include "rig/input_error.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+/// How a program ends that does this, and what it says on stderr.
+std::pair<int, std::string> end_of(const std::function<void()>& run) {
+  std::string name = "vlp-something";
+  char* argv[] = {name.data(), nullptr};
+  CLI::App app("Something", name);
+  testing::internal::CaptureStderr();
+  const int code = run_app(app, 1, argv, run);
+  return {code, testing::internal::GetCapturedStderr()};
+}
+
+TEST(RunApp, TellsByTheExitCodeHowItWent) {
+  EXPECT_EQ(end_of([] {}).first, kDone);
+  EXPECT_EQ(end_of([] { throw GateNotMet("mean_mm"); }).first, kGateNotMet);
+  EXPECT_EQ(end_of([] { throw InputError("lamps.yaml", "is empty"); }).first, kBadInput);
+  EXPECT_EQ(end_of([] { throw std::invalid_argument("no such lens"); }).first, kBadInput);
+  EXPECT_EQ(end_of([] { throw Undetermined("add lamps"); }).first, kUndetermined);
+}
+
+TEST(RunApp, SaysWhyInOneLineThatATerminalCanShow) {
+  const std::string said = end_of([] { throw Undetermined("lamp \x1b[2J is dark"); }).second;
+  EXPECT_THAT(said, HasSubstr("vlp-something: error: lamp "));
+  EXPECT_EQ(said.find('\x1b'), std::string::npos);
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
+}
+
+TEST(Outputs, AreNoInputs) {
+  const TemporaryFolder folder;
+  const std::string lamps = folder.file("lamps.yaml", "x").string();
+  const std::string again = (folder / ".").string() + "/lamps.yaml";
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] {
+                check_output(again, {"", lamps});
+              }),
+              HasSubstr("is an input, too"));
+  check_output((folder / "other.yaml").string(), {lamps});
+}
+
+TEST(Outputs, AreNotTwiceOneFile) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "a").string(), same = (folder / "b/../a").string();
+  EXPECT_TRUE(same_file(file, same));
+  EXPECT_FALSE(same_file("", ""));
+  check_outputs({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
+  EXPECT_EQ(refusal_of<std::invalid_argument>([&] {
+              check_outputs({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
+            }),
+            "--output and --plot name one file");
+  EXPECT_EQ(
+      refusal_of<std::invalid_argument>([&] { check_further_output("--plot", same, file, {}); }),
+      "--output and --plot name one file");
+}
+
+TEST(Checks, OfNumbersAndNames) {
+  EXPECT_EQ(finite()("-1e3"), "");
+  EXPECT_NE(finite()("inf"), "");
+  EXPECT_NE(finite()("1 m"), "");
+  EXPECT_EQ(finite_not_negative()("0"), "");
+  EXPECT_NE(finite_positive()("0"), "");
+  EXPECT_EQ(is_picture()("a.svg"), "");
+  EXPECT_NE(is_picture()("a.pdf"), "");
+  EXPECT_EQ(ends_in(".csv")("corners.csv"), "");
+  EXPECT_EQ(ends_in(".csv")("corners.vnl"), "the file's name should end in .csv");
+}
+
+}  // namespace
+}  // namespace vlp

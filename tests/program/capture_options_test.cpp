@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/steps/capture_options.h"
+
+#include <gmock/gmock.h>
+
+#include "geometry/angles.h"
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+TEST(MotionOptions, AreOfACameraThatStandsUnlessItHasASpeed) {
+  EXPECT_FALSE(MotionOptions{}.motion());
+  const MotionOptions drives{2.0, {}}, straight{2.0, 0.0};
+  ASSERT_TRUE(drives.motion());
+  EXPECT_GT(drives.motion()->yaw_rate_sd_rad_per_s, rad_from_deg(45));
+  EXPECT_EQ(straight.motion()->yaw_rate_sd_rad_per_s, 0);
+  EXPECT_EQ(straight.motion()->velocity_sd_m_per_s, drives.motion()->velocity_sd_m_per_s);
+}
+
+TEST(EveryFrame, IsOfVideos) {
+  check_every(1, {"boards"});
+  check_every(5, {"boards", "boards.mp4"});
+  EXPECT_EQ(refusal_of<std::invalid_argument>([] { check_every(5, {"boards"}); }),
+            "--every is for videos, and there is none");
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "program/steps/history.h"
+
+#include <gmock/gmock.h>
+
+#include <CLI/CLI.hpp>
+
+#include "captures/digest.h"
+#include "session/step_history.h"
+#include "support/program.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+/// A program with options of each kind, as called with `arguments`.
+HistoryEntry entry_of(const std::string& arguments, const std::vector<std::string>& inputs) {
+  CLI::App app("Something", "vlp-something");
+  std::string images, lamps, output, method;
+  std::vector<double> numbers;
+  int threads = 0;
+  bool flag = false, quiet = false;
+  app.add_option("images", images)->required();
+  app.add_option("--lamps", lamps);
+  app.add_option("-o,--output", output);
+  app.add_option("--method", method);
+  app.add_option("--numbers", numbers)->expected(2);
+  app.add_option("--threads", threads);
+  app.add_flag("--refine-map", flag);
+  app.add_flag("-q,--quiet", quiet);
+  app.parse(arguments);
+  return history_entry(app, inputs);
+}
+
+TEST(History, DigestsAreThoseOfTheStandard) {  // FIPS 180-2, appendix B
+  const TemporaryFolder folder;
+  EXPECT_EQ(sha256_of_file(folder.file("abc", "abc")),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(sha256_of_file(folder.file("million", std::string(1000000, 'a'))),
+            "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+TEST(History, AFolderIsWhatSha256sumSaysOfItsImages) {
+  const TemporaryFolder folder;
+  folder.file("b.png", "second");
+  folder.file("a.png", "first");
+  folder.file("notes.txt", "no image");
+  const auto oracle =
+      run_program("cd '" + (folder / "").string() + "' && sha256sum *.png | sha256sum");
+  EXPECT_EQ(InputDigests().of_images(folder / ""), oracle.output.substr(0, 64));
+}
+
+TEST(History, KeepsOptionsAndInputsButNothingOfTheMachine) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "spot");
+  folder.file("spot/0.png", "an image");
+  const std::string images = (folder / "spot").string() + "/";
+  const std::string lamps = folder.file("lamps.yaml", "abc").string();
+  const HistoryEntry entry =
+      entry_of("--refine-map --threads 3 -q --numbers 1.5 -2 --method axis -o /else/where.yaml '" +
+                   images + "' --lamps '" + lamps + "'",
+               {images, lamps, ""});
+  EXPECT_EQ(entry.program, "vlp-something");
+  EXPECT_EQ(entry.version, VLP_VERSION);
+  EXPECT_EQ(entry.options, "--lamps lamps.yaml --method axis --numbers 1.5 -2 --refine-map");
+  ASSERT_EQ(entry.inputs.size(), 2U);
+  EXPECT_EQ(entry.inputs[0].file, "spot");
+  EXPECT_EQ(entry.inputs[0].sha256, InputDigests().of_images(images));
+  EXPECT_EQ(entry.inputs[1].file, "lamps.yaml");
+  EXPECT_EQ(entry.inputs[1].sha256, sha256_of_file(lamps));
+}
+
+TEST(History, IsEmptyWithoutOptionsAndRefusesWhatCannotBeRead) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(entry_of("images", {}).options, "");
+  const std::string missing = (folder / "missing").string();
+  EXPECT_EQ(refusal_of([&] { entry_of("images", {missing}); }), missing + ": cannot be read");
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+
+#include "session/adjust_step.h"
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+TEST(AdjustSets, OfOneNameGoByTheirPaths) {
+  std::vector<AdjustSet> sets{{"check", {}, {}}, {"rotation", {}, {}}, {"check", {}, {}}};
+  name_apart(sets, {"a/check", "a/rotation", "b/check"});
+  EXPECT_EQ(sets[0].name, "a/check");
+  EXPECT_EQ(sets[1].name, "rotation");
+  EXPECT_EQ(sets[2].name, "b/check");
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] {
+                name_apart(sets, {"a/check", "a/rotation", "a/check"});
+              }),
+              testing::StartsWith("a/check is named twice"));
+}
+
+}  // namespace
+}  // namespace vlp

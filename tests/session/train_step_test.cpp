@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/train_step.h"
+
+#include <gmock/gmock.h>
+
+#include "detection/image_file.h"
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample";
+
+/// Two images, labelled, as if they were of so many folders.
+struct Training {
+  LampMap lamps = read_lamp_map(VLP_SOURCE_DIR "/datasets/paper-rig/rendered/lamps.yaml");
+  SeenLights seen;
+  std::vector<std::vector<Frame>> labels;
+
+  explicit Training(std::size_t folders) {
+    const SeenLights one = see_lights({kSample}, lamps, {}, Readout::rows, false, 1);
+    seen.folders.assign(folders, one.folders[0]);
+    labels.assign(folders, read_detections(kSample + "/true_detections.csv"));
+  }
+  TrainStepResult trained() const { return train_lamps(seen, labels, lamps, "sample"); }
+};
+
+TEST(TrainStep, NeedsSeveralLightsOfEachLamp) {
+  const TrainStepResult result = Training(1).trained();
+  EXPECT_EQ(result.failure, StepFailure::undetermined);
+  EXPECT_THAT(result.why, HasSubstr("too few labelled lights of lamps 1 (has 2), 2 (has 2)"));
+}
+
+TEST(TrainStep, TellsHowLightsThatWereHeldOutAreAnswered) {
+  const TrainStepResult result = Training(kLeastExamples).trained();
+  ASSERT_TRUE(result.ok()) << result.why;
+  EXPECT_EQ(result.classifier.lamps.size(), 6U);
+  EXPECT_EQ(result.labelled.labels, 12 * kLeastExamples);
+  EXPECT_EQ(result.confusion.counts.sum(), 12 * kLeastExamples);
+  EXPECT_EQ(result.confusion.wrong(), 0);
+}
+
+TEST(TrainStep, RefusesLabelsOfNoImageAndOfNoLamp) {
+  Training training(1);
+  training.lamps.lamps.pop_back();
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { training.trained(); }),
+              HasSubstr("the labels name lamp 6, which is not in the lamp map"));
+  for (Frame& frame : training.labels[0]) frame.image += ".png";
+  EXPECT_THAT(refusal_of([&] { training.trained(); }),
+              HasSubstr("sample: the table names none of the images"));
+}
+
+}  // namespace
+}  // namespace vlp
