@@ -25,7 +25,8 @@
 # What is current is not run again; an interrupted run goes on. A session
 # without a result does not stop the others.
 #
-# --cores N        at a time on this machine (default: all)
+# --cores N        shards at a time on this machine (default: one more than it
+#                  has cores, so that none is idle while one waits)
 # --profile NAME   a profile of scripts/reprocess/profiles or a folder: slurm
 #                  submits shards to a cluster
 # --previous       results of an earlier run to compare with
@@ -69,7 +70,7 @@ if [ "${1:-}" = --diff ]; then
   PYTHONDONTWRITEBYTECODE=1 exec "$python" "$scripts/diff.py" "$@"
 fi
 folders=() plan=() profile=''
-cores=$(nproc)
+cores=$(($(nproc) + 1))
 while [ $# -gt 0 ]; do
   case $1 in
     --gates | --session-gates | --previous | --shard-size | --keep | --look | --cores | --profile | --row-time-s | --readout)

@@ -33,8 +33,8 @@ struct EdgeStripes {
 /// eight as long as they leave it open. What is left of another curve is alike all over a view, and
 /// found when the lens is (edge_shifts()).
 ///
-/// Levels beyond 250 tell only that: of white that runs over, the step's upper end is not looked at,
-/// and gamma is 1 then.
+/// Levels beyond 250 tell only that: of white that runs over, the step's upper end is not looked
+/// at, and gamma is 1 then.
 ///
 /// Nothing for a tag of which an edge looks otherwise, or a corner is more than 1.5 px, and than 3
 /// % of the tag, and what its edges bend, from where it was.
