@@ -132,7 +132,7 @@ def run(options, folder):
     took = {}
     bin_folder = Path(os.environ.get("VLP_PROGRAMS_DIR", SOURCE / "build/bin"))
     python = ["/usr/bin/python3", "-B"]
-    plan = [*python, SCRIPTS / "plan.py", archive, results, "--bin", bin_folder, "--at-a-time", os.cpu_count()]
+    plan = [*python, SCRIPTS / "plan.py", archive, results, "--bin", bin_folder, "--at-a-time", os.cpu_count() + 1]
     print(f"{options.sessions} sessions of {len(FILES)} files and {len(FOLDERS) + 1} folders")
     time.sleep(SETTLED_S)
     measured("plan, the first", *plan)
