@@ -8,7 +8,6 @@
 
 #include "detection/boards/square_corners.h"
 #include "detection/boards/tag_edges.h"
-#include "detection/boards/tag_families.h"
 #include "detection/boards/tag_finder.h"
 #include "detection/boards/touching_tags.h"
 #include "rig/board_layout.h"
@@ -26,15 +25,6 @@ cv::Mat1f smooth(const cv::Mat1b& levels) {
   cv::Mat1f smoothed;
   cv::GaussianBlur(exact, smoothed, {}, sigma_px);
   return smoothed;
-}
-
-/// A tag's border is as wide as a bit; outside is the gap, but for families with bits around the
-/// border.
-EdgeStripes stripes_of(const Board& board) {
-  const TagFamily family = tag_family(board.family);
-  const double width = family->width_at_border + 2 * (board.border_bits - 1);
-  const double bit = 1 / width;
-  return {board.border_bits * bit, family->reversed_border ? bit : board.tag_spacing};
 }
 
 bool inside(const SeenTag& tag, const cv::Mat& image) {
@@ -79,7 +69,7 @@ BoardDetector::BoardDetector(const Board& board) {
   } else if (board.corner_squares) {
     touching_ = std::make_unique<TouchingTags>(board);
   } else {
-    stripes_ = std::make_unique<EdgeStripes>(stripes_of(board));
+    print_ = std::make_unique<TagPrint>(board);
   }
 }
 
@@ -144,11 +134,9 @@ SeenBoard BoardDetector::detect(const cv::Mat& image) const {
   for (const auto& [id, same] : found) {
     if (same.size() == 1) once.push_back(same.front());
   }
-  if (stripes_) {
-    const auto found_exact = with_exact_edges(once, levels, *stripes_);
-    for (std::size_t i = 0; i < once.size(); ++i) {
-      seen.tags.push_back(found_exact[i].value_or(once[i]));
-    }
+  if (print_) {
+    seen.curve_costs = find_exact_edges(once, levels, *print_);
+    seen.tags = once;
   } else {
     for (const SeenTag& tag : once) {
       if (const auto found_exact = exact(tag, grey)) seen.tags.push_back(*found_exact);

@@ -16,16 +16,20 @@
 namespace vlp {
 
 class TagFinder;
-struct EdgeStripes;
+class TagPrint;
 class TouchingTags;
 class SquareCorners;
 struct GreyLevels;
 
 /// A tag as an image shows it.
 struct SeenTag {
-  int id;
   /// As BoardTag::corners_m: bottom left, bottom right, top right, top left of the black border.
-  std::array<Eigen::Vector2d, 4> corners_px;
+  using Corners = std::array<Eigen::Vector2d, 4>;
+
+  int id;
+  Corners corners_px;
+  /// The same behind tone curves of kGammas beyond 1; empty of an image without one.
+  std::vector<Corners> behind_curves_px = {};
 };
 
 /// A point of a board's lattice as an image shows it: a corner in which squares touch.
@@ -51,6 +55,10 @@ struct SeenBoard {
   int overexposed = 0;
   /// Of boards of squares, and from files that hold corners without their tags: by index.
   std::vector<SeenPoint> points = {};
+  /// Minus the logarithm of the likelihood of what edges of tags show behind curves of kGammas, up
+  /// to a constant; of the first of them only where it is that for sure, empty where none is
+  /// fitted.
+  std::vector<double> curve_costs = {};
 
   /// Whether there is something to calibrate from.
   bool any() const { return !tags.empty() || !points.empty(); }
@@ -96,7 +104,7 @@ class BoardDetector {
   /// Of boards of squares.
   std::unique_ptr<SquareCorners> squares_;
   /// Of boards without corner squares.
-  std::unique_ptr<EdgeStripes> stripes_;
+  std::unique_ptr<TagPrint> print_;
   /// Of boards with corner squares.
   std::unique_ptr<TouchingTags> touching_;
 };

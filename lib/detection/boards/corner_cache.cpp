@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 std::string settings_of(const Board& board) {
   std::string settings =
-      fmt::format("5 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+      fmt::format("6 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                   board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
                   board.border_bits, board.corner_squares, board.first_id, name_of(board.id_order));
   if (board.has_squares()) {
@@ -31,26 +31,36 @@ std::string settings_of(const Board& board) {
   return settings;
 }
 
-/// A row per tag, then one per foreign tag, then one per point, with its place; the first row, with
-/// id -1, holds the image's size and the counts, by which a file that a power cut left in part is
-/// known.
+std::vector<std::string> row_of(int id, const std::array<Eigen::Vector2d, 4>& pixels) {
+  std::vector<std::string> row{std::to_string(id)};
+  for (const Eigen::Vector2d& pixel : pixels) {
+    row.push_back(shortest(pixel.x()));
+    row.push_back(shortest(pixel.y()));
+  }
+  return row;
+}
+
+/// The first row, with id -1, holds the image's size and the counts, by which a file that a power
+/// cut left in part is known. Then come a row per tag, one per foreign tag, one per point, with its
+/// place, and for each curve one with its cost, and all tags behind it.
 void write_view(const fs::path& file, const BoardView& view) {
   CsvWriter csv(file, {"id", "u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"});
   csv.row({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
            std::to_string(view.seen.foreign.size()), std::to_string(view.seen.unusable),
            std::to_string(view.seen.overexposed), std::to_string(view.seen.points.size()),
-           std::to_string(view.seen.tags.size()), "0"});
+           std::to_string(view.seen.tags.size()), std::to_string(view.seen.curve_costs.size())});
   for (const auto* tags : {&view.seen.tags, &view.seen.foreign}) {
-    for (const SeenTag& tag : *tags) {
-      const auto& [a, b, c, d] = tag.corners_px;
-      csv.row({std::to_string(tag.id), shortest(a.x()), shortest(a.y()), shortest(b.x()),
-               shortest(b.y()), shortest(c.x()), shortest(c.y()), shortest(d.x()),
-               shortest(d.y())});
-    }
+    for (const SeenTag& tag : *tags) csv.row(row_of(tag.id, tag.corners_px));
   }
   for (const SeenPoint& point : view.seen.points) {
     csv.row({std::to_string(point.index), shortest(point.pixel.x()), shortest(point.pixel.y()), "0",
              "0", "0", "0", "0", "0"});
+  }
+  for (const double cost : view.seen.curve_costs) {
+    csv.row({"-1", shortest(cost), "0", "0", "0", "0", "0", "0", "0"});
+  }
+  for (const SeenTag& tag : view.seen.tags) {
+    for (const auto& corners : tag.behind_curves_px) csv.row(row_of(tag.id, corners));
   }
   csv.save_unsynced();
 }
@@ -68,19 +78,28 @@ BoardView read_view(const fs::path& file, const std::string& image) {
   const auto foreign = static_cast<std::size_t>(at(0, "u1"));
   const auto points = static_cast<std::size_t>(at(0, "v2"));
   const auto tags_seen = static_cast<std::size_t>(at(0, "u3"));
-  if (1 + tags_seen + foreign + points != rows) throw InputError(file, "is not of the cache");
-  const std::size_t tag_rows = rows - points;
-  for (std::size_t row = tag_rows; row < rows; ++row) {
+  const auto curves = static_cast<std::size_t>(at(0, "v3"));
+  const std::size_t behind = curves > 2 ? curves - 1 : 0;
+  if (1 + tags_seen + foreign + points + curves + behind * tags_seen != rows)
+    throw InputError(file, "is not of the cache");
+  const auto pixels_of = [&](std::size_t row) -> std::array<Eigen::Vector2d, 4> {
+    return {{{at(row, "u0"), at(row, "v0")},
+             {at(row, "u1"), at(row, "v1")},
+             {at(row, "u2"), at(row, "v2")},
+             {at(row, "u3"), at(row, "v3")}}};
+  };
+  std::size_t row = 1;
+  for (const std::size_t end = row + tags_seen + foreign; row < end; ++row) {
+    auto& tags = row <= tags_seen ? view.seen.tags : view.seen.foreign;
+    tags.push_back({static_cast<int>(at(row, "id")), pixels_of(row)});
+  }
+  for (const std::size_t end = row + points; row < end; ++row) {
     view.seen.points.push_back(
         {static_cast<std::size_t>(at(row, "id")), {at(row, "u0"), at(row, "v0")}});
   }
-  for (std::size_t row = 1; row < tag_rows; ++row) {
-    auto& tags = row <= tags_seen ? view.seen.tags : view.seen.foreign;
-    tags.push_back({static_cast<int>(at(row, "id")),
-                    {{{at(row, "u0"), at(row, "v0")},
-                      {at(row, "u1"), at(row, "v1")},
-                      {at(row, "u2"), at(row, "v2")},
-                      {at(row, "u3"), at(row, "v3")}}}});
+  for (std::size_t i = 0; i < curves; ++i) view.seen.curve_costs.push_back(at(row++, "u0"));
+  for (SeenTag& tag : view.seen.tags) {
+    for (std::size_t i = 0; i < behind; ++i) tag.behind_curves_px.push_back(pixels_of(row++));
   }
   return view;
 }

@@ -166,20 +166,20 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
   if (squares) header.erase(header.begin() + 1);
   CsvWriter csv(file, header);
   for (const BoardView& view : views) {
-    const auto& [tags, foreign, unusable, overexposed, points] = view.seen;
-    if (squares ? points.empty() : tags.empty() && foreign.empty()) {
+    const SeenBoard& seen = view.seen;
+    if (squares ? seen.points.empty() : seen.tags.empty() && seen.foreign.empty()) {
       std::vector<std::string> empty(header.size());
       empty.front() = view.image;
       csv.row(empty);
     }
     if (squares) {
-      for (const SeenPoint& point : points) {
+      for (const SeenPoint& point : seen.points) {
         csv.row({view.image, std::to_string(point.index), shortest(point.pixel.x()),
                  shortest(point.pixel.y())});
       }
       continue;
     }
-    for (const auto* each : {&tags, &foreign}) {
+    for (const auto* each : {&seen.tags, &seen.foreign}) {
       for (const SeenTag& tag : *each) {
         for (std::size_t k = 0; k < 4; ++k) {
           csv.row({view.image, std::to_string(tag.id), std::to_string(k),

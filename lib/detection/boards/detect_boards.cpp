@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "detection/boards/tone_curve.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -67,6 +68,9 @@ FoundBoards detect_boards(const BoardDetector& detector, ImageSource& images, in
       result.refused.push_back(std::move(outcome.refused));
     }
   }
+  std::vector<SeenBoard*> boards;
+  for (BoardView& view : result.views) boards.push_back(&view.seen);
+  take_common_curve(boards);
   return result;
 }
 

@@ -2,138 +2,48 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/boards/tag_edges.h"
 
-#include <ceres/tiny_solver.h>
-
-#include <Eigen/LU>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 #include <vector>
 
 #include "detection/boards/blurred_step.h"
+#include "detection/boards/edge_fit.h"
+#include "detection/boards/tone_curve.h"
+#include "geometry/homography.h"
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
-
-struct EdgePixel {
-  double along, across_px, grey;
-};
-
-constexpr double kWhite = 255;
-/// Above it pixels tell only that: white that runs over has some levels below 255 left by a
-/// camera's processing, and none of the step's upper end.
-constexpr double kMostTold = 250;
-
-/// A level of light as the image has it, behind a tone curve, and the derivative by the light.
-struct Coded {
-  Coded(double light, double gamma) : level(light), slope(1) {
-    if (gamma == 1) return;
-    constexpr double least = 1e-3;  // the curve is vertical at 0
-    const double some = std::max(light, least);
-    level = kWhite * std::pow(some / kWhite, 1 / gamma);
-    slope = level / (gamma * some);
-  }
-
-  double level, slope;
-};
-
-double light_behind(double level, double gamma) {
-  return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
-}
-
-/// Coefficients of the polynomial of an edge that is much bent; of others the last is 0.
-constexpr int kMostTerms = 4, kTerms = 3;
-using Coefficients = Eigen::Matrix<double, kMostTerms, 1>;
-
-/// Parameters: blur, middle, contrast, light along and across, the polynomial's. A step that is
-/// taken is asked for twice, with its derivatives the second time: they are kept from the first.
-template <int terms>
-class Edge {
- public:
-  using Scalar = double;
-  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 5 + terms };
-  using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
-  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>;
-
-  Edge(const std::vector<EdgePixel>& pixels, double gamma)
-      : pixels_(pixels), gamma_(gamma), residuals_(rows()), jacobian_(rows(), +NUM_PARAMETERS) {}
-
-  int NumResiduals() const { return static_cast<int>(pixels_.size()); }
-
-  bool operator()(const double* p, double* residuals, double* jacobian) const {
-    const Eigen::Map<const Parameters> parameters(p);
-    if (parameters != at_) evaluate(parameters);
-    Eigen::Map<Eigen::VectorXd>(residuals, rows()) = residuals_;
-    if (jacobian) Eigen::Map<Jacobian>(jacobian, rows(), +NUM_PARAMETERS) = jacobian_;
-    return true;
-  }
-
- private:
-  Eigen::Index rows() const { return static_cast<Eigen::Index>(pixels_.size()); }
-
-  void evaluate(const Parameters& p) const {
-    at_ = p;
-    const Blur blur(p[0]);
-    for (Eigen::Index i = 0; i < rows(); ++i) {
-      const auto& [w, v, grey] = pixels_[static_cast<std::size_t>(i)];
-      double off = p[4 + terms];
-      for (int k = terms - 2; k >= 0; --k) off = p[5 + k] + w * off;
-      const BlurredStep step(v - off, blur);
-      const double lit = 1 + p[3] * w + p[4] * v, unlit = p[1] + p[2] * step.value;
-      const Coded coded(unlit * lit, gamma_);
-      residuals_[i] = std::min(coded.level, kMostTold) - std::min(grey, kMostTold);
-      const double told = coded.level < kMostTold ? coded.slope : 0;
-      const double bright = lit * told, plain = unlit * told;
-      auto row = jacobian_.row(i);
-      row.template head<5>() << bright * p[2] * step.by_blur, bright, bright * step.value,
-          plain * w, plain * v;
-      double by_term = -bright * p[2] * step.slope;
-      for (int k = 0; k < terms; ++k, by_term *= w) row[5 + k] = by_term;
-    }
-  }
-
-  const std::vector<EdgePixel>& pixels_;
-  double gamma_;
-  mutable Parameters at_ = Parameters::Constant(std::numeric_limits<double>::quiet_NaN());
-  mutable Eigen::VectorXd residuals_;
-  mutable Jacobian jacobian_;
-};
-
-double value_at(const Coefficients& c, double w) {
-  return c[0] + w * (c[1] + w * (c[2] + w * c[3]));
-}
-
-/// Points x with across.(x - middle) = a + b w + c w^2 + ..., w = along.(x - middle) / half_px.
-struct EdgeCurve {
-  Eigen::Vector2d middle, along, across;
-  double half_px;
-  Coefficients coefficients = Coefficients::Zero();
-  bool cubic = false;
-  double blur_px = 0.8;
-
-  /// How far outside a point is.
-  double off(const Eigen::Vector2d& x) const {
-    return across.dot(x - middle) - value_at(coefficients, along.dot(x - middle) / half_px);
-  }
-
-  /// Of 0 on it, and its gradient.
-  double off(const Eigen::Vector2d& x, Eigen::Vector2d& gradient) const {
-    const double w = along.dot(x - middle) / half_px;
-    const Coefficients& c = coefficients;
-    const double slope = c[1] + w * (2 * c[2] + w * 3 * c[3]);
-    gradient = across - slope / half_px * along;
-    return off(x);
-  }
-};
 
 struct Band {
   double inside_px, outside_px;
 };
 
+/// What follows upon the black stripe inside an edge: how wide that is, start + by_along w, and
+/// where along the edge white bits begin and end.
+struct Behind {
+  double start_px = 0, by_along_px = 0;
+  std::vector<std::array<double, 2>> white;
+
+  double stripe_px(double w) const { return start_px + by_along_px * w; }
+
+  double white_at(double w, double half_px) const {
+    const Blur along_edge(0.8);  // about; it is not solved for
+    double sum = 0;
+    for (const auto& [from, to] : white) {
+      sum += BlurredStep((w - from) * half_px, along_edge).value -
+             BlurredStep((w - to) * half_px, along_edge).value;
+    }
+    return sum / 2;
+  }
+};
+
 /// The pixels along an edge of a tag, by where its edges are roughly.
 std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
                                      const std::array<EdgeCurve, 4>& roughly, std::size_t k,
-                                     const Band& band) {
+                                     const Behind& behind, const Band& band) {
   // Of the edges beside it, which are as blurred; so the corners, which are round, are away.
   constexpr double free_px = 2.5;
   const EdgeCurve &edge = roughly[k], &next = roughly[(k + 1) % 4],
@@ -149,130 +59,50 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
     for (int column = low.x(); column <= high.x(); ++column) {
       const Eigen::Vector2d at(column, row);
       const double w = edge.along.dot(at - edge.middle) / edge.half_px;
-      const double v = edge.across.dot(at - edge.middle), off = v - value_at(edge.coefficients, w);
+      const double v = edge.across.dot(at - edge.middle), off = v - edge.value_at(w);
       if (off < -band.inside_px || off > band.outside_px) continue;
       if (next.off(at) > -free_px || previous.off(at) > -free_px) continue;
-      pixels.push_back({w, v, static_cast<double>(image(row, column))});
+      pixels.push_back({w, v, static_cast<double>(image(row, column)), behind.stripe_px(w),
+                        behind.white_at(w, edge.half_px)});
     }
   }
   return pixels;
 }
 
-/// Middle and contrast of pixels, roughly: those well inside against those well outside.
-template <typename Parameters>
-void start_edge_levels(const std::vector<EdgePixel>& pixels, const EdgeCurve& edge, double gamma,
-                       Parameters& p) {
-  double in = 0, out = 0, ins = 0, outs = 0;
-  for (const EdgePixel& pixel : pixels) {
-    const bool inside = pixel.across_px < value_at(edge.coefficients, pixel.along);
-    (inside ? in : out) += light_behind(pixel.grey, gamma);
-    (inside ? ins : outs) += 1;
-  }
-  in /= std::max(ins, 1.0);
-  out /= std::max(outs, 1.0);
-  p[1] = (in + out) / 2;
-  p[2] = (out - in) / 2;
-}
-
-/// From where the edge is. The sum of the squares that are left over; infinite when the pixels look
-/// otherwise.
-template <int terms>
-double fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels, double gamma) {
-  constexpr std::size_t least_pixels = 24;
-  constexpr int most_steps = 15;
-  constexpr double least_blur_px = 0.05, most_blur_px = 6;
-  constexpr double enough = 1e-3;  // grey levels squared
-  constexpr double least_contrast = 3, unlike = 0.35;
-  constexpr double no_edge = std::numeric_limits<double>::infinity();
-  if (pixels.size() < least_pixels) return no_edge;
-  using Step = Edge<terms>;
-  typename Step::Parameters p = Step::Parameters::Zero();
-  p[0] = edge.blur_px;
-  p.template tail<terms>() = edge.coefficients.head<terms>();
-  start_edge_levels(pixels, edge, gamma, p);
-  const Step step(pixels, gamma);
-  ceres::TinySolver<Step> solver;
-  solver.options.max_num_iterations = most_steps;
-  solver.options.function_tolerance = enough;
-  solver.Solve(step, &p);
-  edge.coefficients.setZero();
-  edge.coefficients.head<terms>() = p.template tail<terms>();
-  edge.blur_px = p[0];
-  const double squares = 2 * solver.summary.final_cost;
-  const double rms = std::sqrt(squares / static_cast<double>(pixels.size()));
-  const bool good = p.allFinite() && p[0] > least_blur_px && p[0] < most_blur_px &&
-                    std::abs(p[2]) > least_contrast && rms < unlike * std::abs(p[2]);
-  return good ? squares : no_edge;
-}
-
-/// Newton's method, from a point near it.
-Eigen::Vector2d crossing(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point) {
-  constexpr int steps = 4;
-  for (int i = 0; i < steps; ++i) {
-    Eigen::Vector2d by_a, by_b, off;
-    off << a.off(point, by_a), b.off(point, by_b);
-    Eigen::Matrix2d gradients;
-    gradients << by_a.transpose(), by_b.transpose();
-    point -= gradients.inverse() * off;
-  }
-  return point;
-}
-
 /// The edges of a tag, each fitted from corner to corner.
-struct TagEdges {
-  using Four = std::array<EdgeCurve, 4>;
+class TagEdges {
+ public:
+  TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& print);
 
-  Four roughly, edges;
-  double width_px = INFINITY;  // where it is narrowest
-  double bow_px = 0;           // of the most bent
-  /// Infinite where an edge is none.
-  double squares = 0;
-  /// Pixels outside, and those of them that run over.
-  std::size_t outside = 0, over = 0;
+  /// Whether all edges are there.
+  bool found() const { return found_; }
+  double width_px() const { return width_px_; }
+  const std::array<EdgeCurve, 4>& edges() const { return edges_; }
+  const std::array<EdgeFit, 4>& fits() const { return fits_; }
+  double squares() const;
+  double pixels() const;
 
-  /// The sides of the quad, which libapriltag has.
-  explicit TagEdges(const SeenTag& tag) {
-    const auto& corners = tag.corners_px;
-    const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const Eigen::Vector2d from = corners[k], to = corners[(k + 1) % 4];
-      EdgeCurve& edge = roughly[k];
-      edge.middle = (from + to) / 2;
-      edge.half_px = (to - from).norm() / 2;
-      edge.along = (to - from) / (2 * edge.half_px);
-      edge.across = {-edge.along.y(), edge.along.x()};
-      if (edge.across.dot(edge.middle - middle) < 0) edge.across = -edge.across;
-      for (const std::size_t other : {k + 2, k + 3}) {
-        width_px = std::min(width_px, edge.across.dot(from - corners[other % 4]));
-      }
-    }
-    edges = roughly;
-  }
+  /// To the same pixels again, from where the edges are roughly.
+  void fit(const EdgePrior& prior);
 
-  void fit_all(const cv::Mat1b& image, const EdgeStripes& stripes, double gamma) {
-    // The stripe's other side is kept away from by 2 px: it is blurred, too.
-    constexpr double least_px = 1.5, most_px = 4.5, away_px = 2;
-    constexpr double most_bow = 0.25;  // of the tag: beyond, the fit went to something else
-    const Band band{std::clamp(stripes.inside * width_px - away_px, least_px, most_px),
-                    std::clamp(stripes.outside * width_px - away_px, least_px, most_px)};
-    squares = bow_px = 0;
-    outside = over = 0;
-    for (std::size_t k = 0; k < 4 && std::isfinite(squares); ++k) {
-      const auto pixels = pixels_beside(image, roughly, k, band);
-      for (const auto& [along, across_px, grey] : pixels) {
-        if (across_px <= value_at(roughly[k].coefficients, along)) continue;
-        ++outside;
-        if (grey > kMostTold) ++over;
-      }
-      squares += edges[k].cubic ? fit<kMostTerms>(edges[k], pixels, gamma)
-                                : fit<kTerms>(edges[k], pixels, gamma);
-      bow_px = std::max(bow_px, std::abs(edges[k].coefficients[2]));
-    }
-    if (bow_px > most_bow * width_px) squares = std::numeric_limits<double>::infinity();
-  }
+  /// Where the edges cross. Nothing when an edge is none, or a corner has gone too far.
+  std::optional<SeenTag::Corners> crossed() const;
+
+ private:
+  void look_behind(const TagPrint& print);
+  void look_beside(const cv::Mat1b& image, const Band& band);
+
+  const SeenTag& tag_;
+  std::array<EdgeCurve, 4> roughly_, edges_;
+  std::array<Behind, 4> behind_;
+  std::array<std::vector<EdgePixel>, 4> pixels_;
+  double width_px_ = INFINITY;  // where it is narrowest
+  double bow_px_ = 0;           // of the most bent
+  std::array<EdgeFit, 4> fits_{};
+  bool found_ = false;
 };
 
-double difference_px(const TagEdges::Four& a, const TagEdges::Four& b) {
+double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCurve, 4>& b) {
   double most_px = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     most_px = std::max(most_px, (a[k].coefficients - b[k].coefficients).lpNorm<Eigen::Infinity>());
@@ -280,83 +110,206 @@ double difference_px(const TagEdges::Four& a, const TagEdges::Four& b) {
   return most_px;
 }
 
-TagEdges fitted(const SeenTag& tag, const cv::Mat1b& image, const EdgeStripes& stripes,
-                double gamma) {
+/// From the sides of the quad, which libapriltag has.
+TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& print) : tag_(tag) {
+  // The stripe's other side outside is kept away from by 2 px: it is blurred, too.
+  constexpr double least_px = 1.5, most_px = 4.5, away_px = 2;
   constexpr double bent_px = 0.5, no_parabola_px = 1, settled_px = 0.05;
   constexpr int most_rounds = 4;
-  TagEdges found(tag);
-  found.fit_all(image, stripes, gamma);
+  const auto& corners = tag.corners_px;
+  const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Eigen::Vector2d from = corners[k], to = corners[(k + 1) % 4];
+    EdgeCurve& edge = roughly_[k];
+    edge.middle = (from + to) / 2;
+    edge.half_px = (to - from).norm() / 2;
+    edge.along = (to - from) / (2 * edge.half_px);
+    edge.across = {-edge.along.y(), edge.along.x()};
+    if (edge.across.dot(edge.middle - middle) < 0) edge.across = -edge.across;
+    for (const std::size_t other : {k + 2, k + 3}) {
+      width_px_ = std::min(width_px_, edge.across.dot(from - corners[other % 4]));
+    }
+  }
+  edges_ = roughly_;
+  look_behind(print);
+  const double bit_px = width_px_ / print.width();
+  const Band band{std::clamp(print.inside() * bit_px - away_px, least_px, most_px),
+                  std::clamp(print.outside() * bit_px - away_px, least_px, most_px)};
+  look_beside(image, band);
+  fit({});
   // A wide lens bends an edge out of a band along the quad's side, which ends beside the corners.
-  for (int round = 0; round < most_rounds && found.bow_px > bent_px; ++round) {
-    if (!std::isfinite(found.squares)) break;
-    if (round > 0 && difference_px(found.edges, found.roughly) < settled_px) break;
-    for (EdgeCurve& edge : found.edges) {
+  for (int round = 0; round < most_rounds && found_ && bow_px_ > bent_px; ++round) {
+    if (round > 0 && difference_px(edges_, roughly_) < settled_px) break;
+    for (EdgeCurve& edge : edges_) {
       edge.cubic = edge.cubic || std::abs(edge.coefficients[2]) > no_parabola_px;
     }
-    found.roughly = found.edges;
-    found.fit_all(image, stripes, gamma);
+    roughly_ = edges_;
+    look_beside(image, band);
+    fit({});
   }
-  return found;
 }
 
-/// Nothing when an edge is none, or a corner has gone too far.
-std::optional<SeenTag> crossed(const SeenTag& tag, const TagEdges& found) {
+void TagEdges::look_behind(const TagPrint& print) {
+  const double width = print.width(), deep = print.inside();
+  const std::array<Eigen::Vector2d, 4> square{{{0, 0}, {width, 0}, {width, width}, {0, width}}};
+  const TagPrint::Sides white = print.white_behind(tag_.id);
+  for (std::size_t k = 0; k < 4; ++k) {
+    std::array<PlanePair, 4> pairs;
+    for (std::size_t i = 0; i < 4; ++i) pairs[i] = {square[i], tag_.corners_px[(k + i) % 4]};
+    const Eigen::Matrix3d px_from_bits = homography(pairs);
+    const EdgeCurve& edge = roughly_[k];
+    const auto at = [&](double along) {
+      const Eigen::Vector2d x =
+          (px_from_bits * Eigen::Vector3d(along, deep, 1)).hnormalized() - edge.middle;
+      return Eigen::Vector2d(edge.along.dot(x) / edge.half_px, edge.across.dot(x));
+    };
+    const Eigen::Vector2d from = at(0), to = at(width);
+    behind_[k].by_along_px = (from.y() - to.y()) / (to.x() - from.x());
+    behind_[k].start_px = -from.y() - behind_[k].by_along_px * from.x();
+    for (const auto& run : white[k]) {
+      behind_[k].white.push_back({at(run.from).x(), at(run.to).x()});
+    }
+  }
+}
+
+void TagEdges::look_beside(const cv::Mat1b& image, const Band& band) {
+  for (std::size_t k = 0; k < 4; ++k) {
+    pixels_[k] = pixels_beside(image, roughly_, k, behind_[k], band);
+  }
+}
+
+void TagEdges::fit(const EdgePrior& prior) {
+  constexpr double most_bow = 0.25;  // of the tag: beyond, the fit went to something else
+  bow_px_ = 0;
+  found_ = false;
+  for (std::size_t k = 0; k < 4; ++k) {
+    edges_[k].coefficients = roughly_[k].coefficients;
+    edges_[k].blur_px = roughly_[k].blur_px;
+    const auto fitted = fit_edge(edges_[k], pixels_[k], prior);
+    if (!fitted) return;
+    fits_[k] = *fitted;
+    bow_px_ = std::max(bow_px_, std::abs(edges_[k].coefficients[2]));
+  }
+  found_ = bow_px_ <= most_bow * width_px_;
+}
+
+std::optional<SeenTag::Corners> TagEdges::crossed() const {
   constexpr double moved_px = 1.5, moved_share = 0.03;
-  if (!std::isfinite(found.squares)) return {};
+  if (!found_) return {};
   // A straight line through all of an edge ends beside it by two thirds of what that bends, and at
   // a corner two do.
-  const double most_moved_px = std::max(moved_px, moved_share * found.width_px) + found.bow_px;
-  SeenTag exact = tag;
+  const double most_moved_px = std::max(moved_px, moved_share * width_px_) + bow_px_;
+  SeenTag::Corners corners;
   for (std::size_t k = 0; k < 4; ++k) {
-    const Eigen::Vector2d& from = tag.corners_px[k];
-    exact.corners_px[k] = crossing(found.edges[(k + 3) % 4], found.edges[k], from);
-    if (!((exact.corners_px[k] - from).norm() < most_moved_px)) return {};
+    const Eigen::Vector2d& from = tag_.corners_px[k];
+    corners[k] = crossing(edges_[(k + 3) % 4], edges_[k], from);
+    if (!((corners[k] - from).norm() < most_moved_px)) return {};
   }
-  return exact;
+  return corners;
+}
+
+double TagEdges::squares() const {
+  return fits_[0].squares + fits_[1].squares + fits_[2].squares + fits_[3].squares;
+}
+
+double TagEdges::pixels() const {
+  return static_cast<double>(fits_[0].pixels + fits_[1].pixels + fits_[2].pixels + fits_[3].pixels);
+}
+
+/// Minus the logarithm of the likelihood of what some tags show, up to a constant, whatever the
+/// noise; enormous when one looks otherwise.
+double cost_of(std::span<const TagEdges> tags, std::span<const std::size_t> asked) {
+  constexpr double least_rms = 0.1, otherwise = 1e9;
+  double squares = 0, pixels = 0;
+  for (const std::size_t i : asked) {
+    if (!tags[i].found()) return otherwise;
+    squares += tags[i].squares();
+    pixels += tags[i].pixels();
+  }
+  return pixels * std::log(std::max(std::sqrt(squares / pixels), least_rms));
+}
+
+/// Of values around a middle, whatever a few of them are.
+double variance_of(std::vector<double> values, double middle) {
+  constexpr double median_of_normal = 0.6745;
+  for (double& value : values) value = std::abs(value - middle);
+  const double sd = upper_median(std::move(values)) / median_of_normal;
+  return sd * sd;
+}
+
+/// With the blur of an image's edges where white runs over: their median and, for its weight, by
+/// how much more they differ than by noise.
+EdgePrior with_blur_of(std::span<const TagEdges> tags, EdgePrior prior) {
+  constexpr double least_apart = 0.01;  // share of the blur
+  std::vector<double> blurs_px, variances;
+  double squares = 0, pixels = 0;
+  for (const TagEdges& tag : tags) {
+    for (std::size_t k = 0; tag.found() && k < 4; ++k) {
+      const EdgeFit& fit = tag.fits()[k];
+      if (!fit.runs_over) continue;
+      blurs_px.push_back(tag.edges()[k].blur_px);
+      variances.push_back(fit.blur_variance);
+      squares += fit.squares;
+      pixels += static_cast<double>(fit.pixels);
+    }
+  }
+  if (blurs_px.empty()) return prior;
+  prior.blur_px = upper_median(blurs_px);
+  const double noise = squares / pixels, least_px = least_apart * prior.blur_px;
+  const double apart = variance_of(blurs_px, prior.blur_px) - noise * upper_median(variances);
+  prior.blur_weight = std::sqrt(noise / std::max(apart, least_px * least_px));
+  return prior;
+}
+
+/// The cost of some tags behind the first curve.
+double cost_behind_curve(std::vector<TagEdges> tags, std::span<const std::size_t> asked) {
+  for (const std::size_t i : asked) tags[i].fit({kGammas[1]});
+  return cost_of(tags, asked);
 }
 
 }  // namespace
 
-std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> tags,
-                                                     const cv::Mat1b& image,
-                                                     const EdgeStripes& stripes) {
+std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& image,
+                                     const TagPrint& print) {
   constexpr std::size_t asked = 8;  // tags, the widest
-  constexpr double usual_gamma = 2.2;
-  constexpr double better = 0.99;  // of the squares, or it is chance
-  // One or the other, so that no further tag is asked; a glare can be on one.
-  constexpr double clearly = 1.5;
-  constexpr int fewest = 3;
+  constexpr double surely = 10;     // e^10 times more likely
   std::vector<TagEdges> found;
   std::vector<std::size_t> widest;
   for (std::size_t i = 0; i < tags.size(); ++i) {
-    found.push_back(fitted(tags[i], image, stripes, 1));
-    if (std::isfinite(found[i].squares)) widest.push_back(i);
+    found.emplace_back(tags[i], image, print);
+    if (found[i].found()) widest.push_back(i);
   }
   std::stable_sort(widest.begin(), widest.end(), [&](std::size_t a, std::size_t b) {
-    return found[a].width_px > found[b].width_px;
+    return found[a].width_px() > found[b].width_px();
   });
   widest.resize(std::min(widest.size(), asked));
-  double as_it_is = 0, behind_curve = 0;
-  int told = 0;
-  std::size_t outside = 0, over = 0;
-  for (const std::size_t i : widest) {
-    outside += found[i].outside;
-    over += found[i].over;
-    as_it_is += found[i].squares;
-    TagEdges other = found[i];
-    other.fit_all(image, stripes, usual_gamma);  // to the same pixels
-    behind_curve += other.squares;
-    const auto [less, more] = std::minmax(as_it_is, behind_curve);
-    if (++told >= fewest && more > clearly * less) break;
+  if (widest.empty()) return {};
+  std::vector<std::vector<SeenTag::Corners>> corners(tags.size());
+  std::vector<double> costs;
+  for (const double gamma : kGammas) {
+    const auto fit_all = [&](const EdgePrior& prior) {
+      for (TagEdges& edges : found) edges.fit(prior);
+    };
+    if (gamma == kGammas[1]) {
+      const double cost = cost_behind_curve(found, widest);
+      if (cost > costs[0] + surely) {
+        costs.push_back(cost);
+        break;
+      }
+    }
+    if (gamma != 1) fit_all({gamma});
+    costs.push_back(cost_of(found, widest));
+    const EdgePrior prior = with_blur_of(found, {gamma});
+    if (prior.blur_weight > 0) fit_all(prior);
+    for (std::size_t i = 0; i < tags.size(); ++i) {
+      corners[i].push_back(found[i].crossed().value_or(tags[i].corners_px));
+    }
   }
-  // Of a step whose upper end is not seen the curve cannot be told.
-  const bool curved = behind_curve < better * as_it_is && 4 * over < outside;
-  std::vector<std::optional<SeenTag>> exact;
   for (std::size_t i = 0; i < tags.size(); ++i) {
-    if (curved) found[i] = fitted(tags[i], image, stripes, usual_gamma);
-    exact.push_back(crossed(tags[i], found[i]));
+    tags[i].corners_px = corners[i].front();
+    tags[i].behind_curves_px.assign(corners[i].begin() + 1, corners[i].end());
   }
-  return exact;
+  return costs;
 }
 
 }  // namespace vlp

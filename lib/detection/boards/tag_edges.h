@@ -3,43 +3,34 @@
 #pragma once
 
 #include <opencv2/core.hpp>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "detection/boards/board_detector.h"
+#include "detection/boards/tag_print.h"
 
 namespace vlp {
 
-/// How wide the stripes of one colour along a tag's edges are, as shares of the tag's width.
-struct EdgeStripes {
-  double inside, outside;
-};
-
-/// The tags of an image with their corners where their four edges cross. Each edge is fitted to the
-/// pixels beside it, from corner to corner, as a parabola, since the lens bends it, by least
-/// squares:
-///   grey = (middle + contrast step(v - a - b w - c w^2)) (1 + light . (w, v)),
-/// with w from -1 to 1 along the edge, v across it and a blurred step. An edge that bends by more
-/// than 0.5 px is fitted again to the pixels beside what was found, and beyond 1 px with a cubic
-/// term: libapriltag's straight lines, where the pixels are looked for at first, end up to 4 px
-/// beside the corners of a tag at the rim of a wide lens. On rendered boards corners are good to
-/// 0.02 px, at the rim of a lens of 190 degrees, too; of tags narrower than 25 px they are drawn
-/// outwards by some 0.02 px.
+/// Puts the corners of an image's tags where their four edges cross, each fitted to the pixels
+/// beside it, from corner to corner, as a parabola, since the lens bends it (fit_edge()). An edge
+/// that bends by more than 0.5 px is fitted again to the pixels beside what was found, and beyond
+/// 1 px with a cubic term: libapriltag's straight lines, where the pixels are looked for at first,
+/// end up to 4 px beside the corners of a tag at the rim of a wide lens. On rendered boards corners
+/// are good to 0.02 px, of tags of 16 px and at the rim of a lens of 190 degrees, too. The corners
+/// of a tag stay of which an edge looks otherwise, or one would move by more than 1.5 px, and than
+/// 3 % of the tag, and what its edges bend.
 ///
-/// Behind a tone curve, level = 255 (grey / 255)^(1 / gamma), an edge is steeper on its dark side,
-/// which draws the fit there, by more the narrower the stripes are. So gamma is 2.2, about that of
-/// cameras for people, when that fits the widest tags of the image better than 1: three, or up to
-/// eight as long as they leave it open. What is left of another curve is alike all over a view, and
-/// found when the lens is (edge_shifts()).
+/// Behind a tone curve an edge is steeper on its dark side, which draws the fit there, by more the
+/// narrower the stripes are. So they are fitted behind each of kGammas (SeenTag::behind_curves_px),
+/// unless the image tells that there is none.
 ///
-/// Levels beyond 250 tell only that: of white that runs over, the step's upper end is not looked
-/// at, and gamma is 1 then.
+/// Where white runs over, blur, contrast and place of an edge are hard to tell apart. So such edges
+/// are fitted again with their median blur, which they may differ from by as much as they do beyond
+/// their noise, and corners are good to 0.03 px at 1.5 times the white that the sensor holds; at
+/// three times they are 0.1 px off.
 ///
-/// Nothing for a tag of which an edge looks otherwise, or a corner is more than 1.5 px, and than 3
-/// % of the tag, and what its edges bend, from where it was.
-std::vector<std::optional<SeenTag>> with_exact_edges(std::span<const SeenTag> tags,
-                                                     const cv::Mat1b& image,
-                                                     const EdgeStripes& stripes);
+/// Returns what the eight widest tags tell of the curve (SeenBoard::curve_costs).
+std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& image,
+                                     const TagPrint& print);
 
 }  // namespace vlp

@@ -4,6 +4,11 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "detection/image_file.h"
 #include "rig/board.h"
 #include "support/datasets.h"
 #include "support/temporary_folder.h"
@@ -37,6 +42,36 @@ TEST(CornerCache, TakesNoFileThatLacksLines) {
     ASSERT_EQ(again.seen.tags.size(), whole.seen.tags.size()) << ends << " lines";
     EXPECT_EQ(again.seen.tags.back().corners_px, whole.seen.tags.back().corners_px);
     EXPECT_EQ(TemporaryFolder::content_of(kept), text);
+  }
+}
+
+/// Behind curves, too: what an image calls for is told by others of the camera.
+TEST(CornerCache, KeepsCornersBehindCurves) {
+  const fs::path rig = kRig;
+  const TemporaryFolder folder;
+  const Board board = read_board(rig / "board.yaml");
+  cv::Mat image = read_image(rig / "sample-boards/0000.png");
+  cv::Mat table(1, 256, CV_8U);
+  for (int i = 0; i < 256; ++i) {
+    table.at<uchar>(i) = cv::saturate_cast<uchar>(255 * std::pow(i / 255.0, 1 / 1.8));
+  }
+  cv::LUT(image, table, image);
+  cv::imwrite(folder / "coded.png", image);
+  const auto view = [&](const fs::path& cache) {
+    ImageSource source({folder / "coded.png"});
+    return detect_boards(BoardDetector(board), source, 1, corner_cache(cache, board), [](auto) {})
+        .views.at(0)
+        .seen;
+  };
+  const SeenBoard seen = view("");
+  ASSERT_GT(seen.curve_costs.size(), 2U);
+  view(folder / "cache");
+  const SeenBoard again = view(folder / "cache");
+  EXPECT_EQ(again.curve_costs, seen.curve_costs);
+  ASSERT_EQ(again.tags.size(), seen.tags.size());
+  for (std::size_t i = 0; i < seen.tags.size(); ++i) {
+    EXPECT_EQ(again.tags[i].corners_px, seen.tags[i].corners_px);
+    EXPECT_EQ(again.tags[i].behind_curves_px, seen.tags[i].behind_curves_px);
   }
 }
 

@@ -1,0 +1,194 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/edge_fit.h"
+
+#include <ceres/tiny_solver.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "detection/boards/blurred_step.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kWhite = 255;
+
+/// A level of light as the image has it, behind a tone curve, and the derivative by the light.
+struct Coded {
+  Coded(double light, double gamma) : level(light), slope(1) {
+    if (gamma == 1) return;
+    constexpr double least = 1e-3;  // the curve is vertical at 0
+    const double some = std::max(light, least);
+    level = kWhite * std::pow(some / kWhite, 1 / gamma);
+    slope = level / (gamma * some);
+  }
+
+  double level, slope;
+};
+
+double light_behind(double level, double gamma) {
+  return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
+}
+
+/// Parameters: blur, middle, contrast, light along and across, the polynomial's. A step that is
+/// taken is asked for twice, with its derivatives the second time: they are kept from the first.
+template <int terms>
+class Edge {
+ public:
+  using Scalar = double;
+  enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 5 + terms };
+  using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
+  using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>;
+
+  /// Levels beyond most_told tell only that.
+  Edge(const std::vector<EdgePixel>& pixels, const EdgePrior& prior, double most_told)
+      : pixels_(pixels),
+        prior_(prior),
+        most_told_(most_told),
+        residuals_(rows()),
+        jacobian_(rows(), +NUM_PARAMETERS) {}
+
+  int NumResiduals() const { return static_cast<int>(rows()); }
+
+  bool operator()(const double* p, double* residuals, double* jacobian) const {
+    const Eigen::Map<const Parameters> parameters(p);
+    if (parameters != at_) evaluate(parameters);
+    Eigen::Map<Eigen::VectorXd>(residuals, rows()) = residuals_;
+    if (jacobian) Eigen::Map<Jacobian>(jacobian, rows(), +NUM_PARAMETERS) = jacobian_;
+    return true;
+  }
+
+  double blur_variance(const Parameters& p) const {
+    if (p != at_) evaluate(p);
+    const Eigen::Matrix<double, NUM_PARAMETERS, NUM_PARAMETERS> normal =
+        jacobian_.transpose() * jacobian_;
+    return normal.ldlt().solve(Parameters::Unit(0))[0];
+  }
+
+ private:
+  /// The last is the prior's.
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(pixels_.size()) + 1; }
+
+  void evaluate(const Parameters& p) const {
+    at_ = p;
+    const Blur blur(p[0]);
+    for (Eigen::Index i = 0; i + 1 < rows(); ++i) {
+      const auto& [w, v, level, stripe_px, white] = pixels_[static_cast<std::size_t>(i)];
+      double off = p[4 + terms];
+      for (int k = terms - 2; k >= 0; --k) off = p[5 + k] + w * off;
+      const double from_edge_px = v - off;
+      BlurredStep step(from_edge_px, blur);
+      if (white > 0) {
+        const BlurredStep behind(-from_edge_px - stripe_px, blur);
+        step.value += white * (1 + behind.value);
+        step.slope -= white * behind.slope;
+        step.by_blur += white * behind.by_blur;
+      }
+      const double lit = 1 + p[3] * w + p[4] * v, unlit = p[1] + p[2] * step.value;
+      const Coded coded(unlit * lit, prior_.gamma);
+      residuals_[i] = std::min(coded.level, most_told_) - std::min(level, most_told_);
+      const double told = coded.level < most_told_ ? coded.slope : 0;
+      const double bright = lit * told, plain = unlit * told;
+      auto row = jacobian_.row(i);
+      row.template head<5>() << bright * p[2] * step.by_blur, bright, bright * step.value,
+          plain * w, plain * v;
+      double by_term = -bright * p[2] * step.slope;
+      for (int k = 0; k < terms; ++k, by_term *= w) row[5 + k] = by_term;
+    }
+    const Eigen::Index last = rows() - 1;
+    residuals_[last] = prior_.blur_weight * (p[0] - prior_.blur_px);
+    jacobian_.row(last).setZero();
+    jacobian_(last, 0) = prior_.blur_weight;
+  }
+
+  const std::vector<EdgePixel>& pixels_;
+  EdgePrior prior_;
+  double most_told_;
+  mutable Parameters at_ = Parameters::Constant(std::numeric_limits<double>::quiet_NaN());
+  mutable Eigen::VectorXd residuals_;
+  mutable Jacobian jacobian_;
+};
+
+/// The mean light of pixels on both sides, and how white those outside are.
+struct Sides {
+  Sides(const std::vector<EdgePixel>& pixels, const EdgeCurve& edge, double gamma) {
+    constexpr double white = 254;
+    double ins = 0, outs = 0, whites = 0;
+    for (const EdgePixel& pixel : pixels) {
+      const bool inside = pixel.across_px < edge.value_at(pixel.along);
+      (inside ? in : out) += light_behind(pixel.level, gamma);
+      (inside ? ins : outs) += 1;
+      if (!inside && pixel.level >= white) whites += 1;
+    }
+    in /= std::max(ins, 1.0);
+    out /= std::max(outs, 1.0);
+    white_share = whites / std::max(outs, 1.0);
+  }
+
+  double in = 0, out = 0;
+  double white_share;
+};
+
+template <int terms>
+std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
+                           const EdgePrior& prior) {
+  constexpr double least_blur_px = 0.05, most_blur_px = 6;
+  constexpr double least_contrast = 3, unlike = 0.35;
+  constexpr double enough_white = 0.25, told_then = 250;
+  using Step = Edge<terms>;
+  const Sides sides(pixels, edge, prior.gamma);
+  typename Step::Parameters p = Step::Parameters::Zero();
+  p.template head<3>() << edge.blur_px, (sides.in + sides.out) / 2, (sides.out - sides.in) / 2;
+  p.template tail<terms>() = edge.coefficients.head<terms>();
+  const bool runs_over = sides.white_share >= enough_white;
+  const double most_told = runs_over ? told_then : std::numeric_limits<double>::infinity();
+  const Step step(pixels, runs_over ? prior : EdgePrior{prior.gamma}, most_told);
+  ceres::TinySolver<Step> solver;
+  // Blur, contrast and place of a step that is seen in part nearly make up for each other.
+  solver.options.max_num_iterations = runs_over ? 60 : 15;
+  solver.options.function_tolerance = runs_over ? 1e-6 : 1e-3;  // levels squared
+  solver.Solve(step, &p);
+  edge.coefficients.setZero();
+  edge.coefficients.head<terms>() = p.template tail<terms>();
+  edge.blur_px = p[0];
+  EdgeFit result{2 * solver.summary.final_cost, pixels.size(), runs_over};
+  const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
+  const bool good = p.allFinite() && p[0] > least_blur_px && p[0] < most_blur_px &&
+                    std::abs(p[2]) > least_contrast && rms < unlike * std::abs(p[2]);
+  if (!good) return {};
+  if (runs_over && prior.blur_weight == 0) result.blur_variance = step.blur_variance(p);
+  return result;
+}
+
+}  // namespace
+
+Eigen::Vector2d EdgeCurve::gradient(const Eigen::Vector2d& x) const {
+  const double w = along.dot(x - middle) / half_px;
+  const Coefficients& c = coefficients;
+  const double slope = c[1] + w * (2 * c[2] + w * 3 * c[3]);
+  return across - slope / half_px * along;
+}
+
+Eigen::Vector2d crossing(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point) {
+  constexpr int steps = 4;
+  for (int i = 0; i < steps; ++i) {
+    Eigen::Matrix2d gradients;
+    gradients << a.gradient(point).transpose(), b.gradient(point).transpose();
+    point -= gradients.inverse() * Eigen::Vector2d(a.off(point), b.off(point));
+  }
+  return point;
+}
+
+std::optional<EdgeFit> fit_edge(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
+                                const EdgePrior& prior) {
+  constexpr std::size_t least_pixels = 24;
+  if (pixels.size() < least_pixels) return {};
+  return edge.cubic ? fit<EdgeCurve::kMostTerms>(edge, pixels, prior)
+                    : fit<EdgeCurve::kTerms>(edge, pixels, prior);
+}
+
+}  // namespace vlp

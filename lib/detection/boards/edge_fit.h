@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+namespace vlp {
+
+/// A pixel beside an edge of a tag.
+struct EdgePixel {
+  /// w, -1 to 1 along the edge, and v, in px outwards.
+  double along, across_px;
+  double level;
+  /// How wide the stripe inside the edge is there, and how white what follows upon it, 0 to 1.
+  double stripe_px, white_behind;
+};
+
+/// A curve v = a + b w + c w^2 + d w^3 beside a straight line; at a pixel x
+///   w = along.(x - middle) / half_px,  v = across.(x - middle).
+struct EdgeCurve {
+  static constexpr int kTerms = 3, kMostTerms = 4;
+  using Coefficients = Eigen::Matrix<double, kMostTerms, 1>;
+
+  Eigen::Vector2d middle, along, across;
+  double half_px;
+  Coefficients coefficients = Coefficients::Zero();
+  /// d is asked for; else it is 0.
+  bool cubic = false;
+  double blur_px = 0.8;
+
+  double value_at(double w) const {
+    const Coefficients& c = coefficients;
+    return c[0] + w * (c[1] + w * (c[2] + w * c[3]));
+  }
+  /// How far outside a point is.
+  double off(const Eigen::Vector2d& x) const {
+    return across.dot(x - middle) - value_at(along.dot(x - middle) / half_px);
+  }
+  /// Of off().
+  Eigen::Vector2d gradient(const Eigen::Vector2d& x) const;
+};
+
+/// Where two curves cross, by Newton's method from a point near it.
+Eigen::Vector2d crossing(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point);
+
+/// What is known of the edges of an image before one is fitted.
+struct EdgePrior {
+  /// Of the tone curve, level = 255 (light / 255)^(1 / gamma).
+  double gamma = 1;
+  /// The blur, where white runs over, is about so much, which counts as a pixel with the residual
+  /// blur_weight (blur - blur_px), in levels.
+  double blur_px = 0, blur_weight = 0;
+};
+
+struct EdgeFit {
+  /// Of the levels that are left over.
+  double squares;
+  std::size_t pixels;
+  /// White runs over; then, without blur_weight, the variance of the blur by noise of one level.
+  bool runs_over;
+  double blur_variance = 0;
+};
+
+/// Fits an edge, from where it is, by least squares of
+///   light = (middle + contrast step) (1 + light . (w, v)),
+///   step = s(e) + white_behind (1 + s(-e - stripe_px)),     e = v - a - b w - c w^2 - d w^3,
+/// with s(e) = erf(e / (sqrt(2) blur)), in levels, behind the prior's tone curve. Where a quarter
+/// of the pixels outside are white, white runs over: levels beyond 250 tell only that, since a
+/// camera's processing leaves some of them below 255. Nothing when the pixels look otherwise.
+std::optional<EdgeFit> fit_edge(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
+                                const EdgePrior& prior);
+
+}  // namespace vlp

@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/tag_print.h"
+
+#include <algorithm>
+
+namespace vlp {
+
+TagPrint::TagPrint(const Board& board)
+    : family_(tag_family(board.family)),
+      width_(family_->width_at_border + 2 * (board.border_bits - 1)),
+      inside_(board.border_bits),
+      outside_(family_->reversed_border ? 1 : board.tag_spacing * width_) {}
+
+TagPrint::Sides TagPrint::white_behind(int id) const {
+  Sides sides;
+  if (family_->reversed_border) return sides;
+  const int last = static_cast<int>(width_) - 1, border = static_cast<int>(inside_);
+  for (uint32_t bit = 0; bit < family_->nbits; ++bit) {
+    if (((family_->codes[id] >> (family_->nbits - 1 - bit)) & 1) == 0) continue;
+    const int x = static_cast<int>(family_->bit_x[bit]) + border - 1;  // from the top left
+    const int y = static_cast<int>(family_->bit_y[bit]) + border - 1;
+    const std::array<int, 4> along{x, last - y, last - x, y}, deep{last - y, last - x, y, x};
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (deep[k] == border) sides[k].push_back({double(along[k]), double(along[k] + 1)});
+    }
+  }
+  return sides;
+}
+
+}  // namespace vlp

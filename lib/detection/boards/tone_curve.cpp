@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/tone_curve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace vlp {
+namespace {
+
+/// Three of kGammas, from `first` on, and x, y of the parabola through values there.
+struct Parabola {
+  std::size_t first;
+
+  double x(std::size_t i) const { return std::log(kGammas[first + i]); }
+
+  /// The weights of the three values at x.
+  std::array<double, 3> weights(double at) const {
+    std::array<double, 3> weights{1, 1, 1};
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (k != i) weights[i] *= (at - x(k)) / (x(i) - x(k));
+      }
+    }
+    return weights;
+  }
+
+  /// Where it is least between its ends.
+  double least(const std::array<double, 3>& values) const {
+    const double low = (values[1] - values[0]) / (x(1) - x(0));
+    const double high = (values[2] - values[1]) / (x(2) - x(1));
+    if (high <= low) return values[0] <= values[2] ? x(0) : x(2);
+    const double middle = (x(0) + x(1)) / 2 - low * (x(2) - x(0)) / (2 * (high - low));
+    return std::clamp(middle, x(0), x(2));
+  }
+};
+
+/// Sums over images, each with the best of its own as 0.
+std::array<double, kGammas.size()> sums_of(std::span<SeenBoard*> images) {
+  constexpr double most = 1000;  // of one image, whatever is in it
+  std::array<double, kGammas.size()> sums{};
+  for (const SeenBoard* image : images) {
+    const auto& costs = image->curve_costs;
+    if (costs.empty()) continue;
+    const double best = *std::min_element(costs.begin(), costs.end());
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      sums[i] += std::min(costs[std::min(i, costs.size() - 1)] - best, most);
+    }
+  }
+  return sums;
+}
+
+}  // namespace
+
+double take_common_curve(std::span<SeenBoard*> images) {
+  constexpr double none = 0.05;  // of the logarithm: noise makes so much of none
+  const auto sums = sums_of(images);
+  const auto best =
+      static_cast<std::size_t>(std::min_element(sums.begin(), sums.end()) - sums.begin());
+  const Parabola near{std::clamp<std::size_t>(best, 1, kGammas.size() - 2) - 1};
+  const double log_gamma =
+      near.least({sums[near.first], sums[near.first + 1], sums[near.first + 2]});
+  if (log_gamma < none) return 1;
+  const auto weights = near.weights(log_gamma);
+  for (SeenBoard* image : images) {
+    for (SeenTag& tag : image->tags) {
+      if (tag.behind_curves_px.empty()) continue;
+      SeenTag::Corners corners = tag.corners_px;
+      for (std::size_t k = 0; k < 4; ++k) {
+        corners[k].setZero();
+        for (std::size_t i = 0; i < 3; ++i) {
+          const std::size_t of = near.first + i;
+          corners[k] += weights[i] * (of == 0 ? tag.corners_px : tag.behind_curves_px[of - 1])[k];
+        }
+      }
+      tag.corners_px = corners;
+    }
+  }
+  return std::exp(log_gamma);
+}
+
+}  // namespace vlp

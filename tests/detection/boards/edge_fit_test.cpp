@@ -1,0 +1,157 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/edge_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace vlp {
+namespace {
+
+/// An edge of 40 px, behind a tone curve, with a black stripe of 3 px upon which white follows along
+/// half of it.
+struct Step {
+  double off_px = 0.31, slope_px = 0.2, bow_px = -0.15, blur_px = 0.8;
+  double black = 16, white = 200, gamma = 1;
+  double stripe_px = 3, clipped_at = 255, noise = 0;
+
+  double level(double w, double v, double white_behind) const {
+    const double e = v - off_px - slope_px * w - bow_px * w * w;
+    const auto share = [&](double x) {
+      return std::erfc(-x / (std::numbers::sqrt2 * blur_px)) / 2;
+    };
+    const double light =
+        black + (white - black) * (share(e) + white_behind * share(-e - stripe_px));
+    return 255 * std::pow(light / 255, 1 / gamma);
+  }
+
+  std::vector<EdgePixel> pixels(unsigned seed = 1) const {
+    std::mt19937 generator(seed);
+    std::normal_distribution<double> normal;
+    std::vector<EdgePixel> all;
+    for (double x = -19.5; x < 20; ++x) {
+      for (double v = -1.3; v < 4; ++v) {
+        const double behind = x > 0 ? 1 : 0;
+        const double seen = level(x / 20, v, behind) + noise * normal(generator);
+        all.push_back({x / 20, v, std::min(seen, clipped_at), stripe_px, behind});
+      }
+    }
+    return all;
+  }
+
+  EdgeCurve start() const {
+    EdgeCurve edge;
+    edge.middle = {100, 100};
+    edge.along = {1, 0};
+    edge.across = {0, 1};
+    edge.half_px = 20;
+    return edge;
+  }
+
+  void expect_found(const EdgeCurve& edge, double tolerance_px) const {
+    EXPECT_NEAR(edge.coefficients[0], off_px, tolerance_px);
+    EXPECT_NEAR(edge.coefficients[1], slope_px, tolerance_px);
+    EXPECT_NEAR(edge.coefficients[2], bow_px, tolerance_px);
+    EXPECT_NEAR(edge.blur_px, blur_px, tolerance_px);
+  }
+};
+
+TEST(EdgeFit, IsExactWithoutNoise) {
+  const Step step;
+  EdgeCurve edge = step.start();
+  const auto fit = fit_edge(edge, step.pixels(), {});
+  ASSERT_TRUE(fit);
+  step.expect_found(edge, 1e-3);
+  EXPECT_LT(fit->squares, 1e-3);
+  EXPECT_FALSE(fit->runs_over);
+}
+
+TEST(EdgeFit, IsExactBehindToneCurves) {
+  for (const double gamma : {1.3, 2.4}) {
+    const Step step{.gamma = gamma};
+    EdgeCurve edge = step.start();
+    ASSERT_TRUE(fit_edge(edge, step.pixels(), {gamma}));
+    step.expect_found(edge, 1e-3);
+    EdgeCurve without = step.start();
+    const auto wrong = fit_edge(without, step.pixels(), {});
+    ASSERT_TRUE(wrong);
+    EXPECT_GT(wrong->squares, 100);
+  }
+}
+
+TEST(EdgeFit, IsDrawnOutwardsByWhiteThatItDoesNotKnowOf) {
+  const Step step;
+  auto pixels = step.pixels();
+  for (EdgePixel& pixel : pixels) pixel.white_behind = 0;
+  EdgeCurve edge = step.start();
+  ASSERT_TRUE(fit_edge(edge, pixels, {}));
+  EXPECT_GT(edge.coefficients[0], step.off_px + 0.02);
+}
+
+TEST(EdgeFit, IsExactWhereWhiteRunsOver) {
+  for (const double gamma : {1.0, 2.2}) {
+    const Step step{.white = 380, .gamma = gamma, .clipped_at = 255};
+    EdgeCurve edge = step.start();
+    const auto fit = fit_edge(edge, step.pixels(), {gamma});
+    ASSERT_TRUE(fit);
+    EXPECT_TRUE(fit->runs_over);
+    EXPECT_GT(fit->blur_variance, 0);
+    step.expect_found(edge, 2e-3);
+  }
+}
+
+/// Root of the mean square of the error of an edge's place, over sets of noise.
+double scatter_px(const Step& step, const EdgePrior& prior) {
+  constexpr unsigned sets = 60;
+  double squares = 0;
+  for (unsigned seed = 1; seed <= sets; ++seed) {
+    EdgeCurve edge = step.start();
+    const auto fit = fit_edge(edge, step.pixels(seed), prior);
+    EXPECT_TRUE(fit);
+    squares += std::pow(edge.coefficients[0] - step.off_px, 2) / sets;
+  }
+  return std::sqrt(squares);
+}
+
+TEST(EdgeFit, OfBrightPaperIsAsGoodAsOfOther) {
+  const double other_px = scatter_px({.white = 240, .noise = 1.5}, {});
+  const double bright_px = scatter_px({.white = 252, .noise = 1.5}, {});
+  EXPECT_LT(bright_px, 1.2 * other_px);
+}
+
+TEST(EdgeFit, WithItsBlurKnownIsBetterWhereWhiteRunsOver) {
+  const Step step{.white = 380, .gamma = 2.2, .noise = 1};
+  const double alone_px = scatter_px(step, {step.gamma});
+  const double held_px = scatter_px(step, {step.gamma, step.blur_px, 60});
+  EXPECT_LT(held_px, 0.5 * alone_px);
+  // Elsewhere the pixels tell it.
+  const Step seen{.noise = 4};
+  EXPECT_EQ(scatter_px(seen, {}), scatter_px(seen, {1, 2 * seen.blur_px, 1000}));
+}
+
+TEST(EdgeFit, IsNoneOfNoiseOrOfFewPixels) {
+  Step step{.black = 99, .white = 101, .noise = 30};
+  EdgeCurve edge = step.start();
+  EXPECT_FALSE(fit_edge(edge, step.pixels(), {}));
+  auto few = Step().pixels();
+  few.resize(20);
+  EXPECT_FALSE(fit_edge(edge, few, {}));
+}
+
+TEST(EdgeCurve, CrossesAnother) {
+  EdgeCurve flat = Step().start(), upright = flat;
+  flat.coefficients << 0.5, 0.1, -0.3, 0.05;
+  upright.along = {0, 1};
+  upright.across = {-1, 0};
+  upright.coefficients << -0.2, 0.3, 0.2, 0;
+  const Eigen::Vector2d at = crossing(flat, upright, {101, 99});
+  EXPECT_LT(std::abs(flat.off(at)), 1e-12);
+  EXPECT_LT(std::abs(upright.off(at)), 1e-12);
+}
+
+}  // namespace
+}  // namespace vlp

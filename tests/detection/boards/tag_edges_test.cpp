@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Corners of tags as rendered, against where they project.
+#include "detection/boards/tag_edges.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "simulation/exposure.h"
+#include "simulation/scene.h"
+#include "simulation/truth.h"
+
+namespace vlp {
+namespace {
+
+struct CornerErrors {
+  int corners = 0;
+  double outwards = 0, squares = 0;
+
+  void add(const SeenTag::Corners& seen, const SeenTag::Corners& truth) {
+    const Eigen::Vector2d middle = (truth[0] + truth[1] + truth[2] + truth[3]) / 4;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Eigen::Vector2d error = seen[k] - truth[k];
+      outwards += error.dot((truth[k] - middle).normalized());
+      squares += error.squaredNorm();
+      ++corners;
+    }
+  }
+  double outwards_px() const { return outwards / corners; }
+  double rms_px() const { return std::sqrt(squares / (2 * corners)); }
+};
+
+double narrowest_px(const SeenTag::Corners& corners) {
+  double least = INFINITY;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Eigen::Vector2d side = corners[(k + 1) % 4] - corners[k];
+    const Eigen::Vector2d across = Eigen::Vector2d(-side.y(), side.x()).normalized();
+    for (const std::size_t other : {k + 2, k + 3}) {
+      least = std::min(least, std::abs(across.dot(corners[other % 4] - corners[k])));
+    }
+  }
+  return least;
+}
+
+/// Of boards in front of the camera of datasets/paper-rig.
+template <typename Wanted>
+CornerErrors errors_of(const Scene& scene, const CaptureSet& views, std::size_t images,
+                       Wanted wanted) {
+  const FrameRenderer renderer(scene);
+  const BoardDetector detector(scene.board->print);
+  CornerErrors errors;
+  for (std::size_t index = 0; index < images; ++index) {
+    const BoardShot shot = board_shot(scene, views, index);
+    std::map<int, SeenTag::Corners> truth;
+    for (const auto& [tag, corner, pixel] : true_corners(scene, renderer, shot)) {
+      truth[*tag][static_cast<std::size_t>(corner)] = pixel;
+    }
+    const cv::Mat image =
+        expose(scene.sensor, renderer.board_electrons(shot), index, scene.picture);
+    for (const SeenTag& tag : detector.detect(image).tags) {
+      if (wanted(truth[tag.id])) errors.add(tag.corners_px, truth[tag.id]);
+    }
+  }
+  return errors;
+}
+
+Scene paper_rig() { return read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml"); }
+
+CaptureSet boards_of(const Scene& scene) {
+  return *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
+}
+
+TEST(TagEdges, OfNarrowTagsAreNotDrawnOutwardsByTheirBits) {
+  Scene scene = paper_rig();
+  scene.sensor.shot_noise = false;
+  scene.sensor.read_noise_e = 0;
+  const CornerErrors errors = errors_of(
+      scene, boards_of(scene), 16, [](const auto& corners) { return narrowest_px(corners) < 24; });
+  ASSERT_GT(errors.corners, 40);
+  EXPECT_LT(std::abs(errors.outwards_px()), 0.006);  // without the bits 0.02
+  EXPECT_LT(errors.rms_px(), 0.012);
+  RecordProperty("outwards_px", std::to_string(errors.outwards_px()));
+  RecordProperty("rms_px", std::to_string(errors.rms_px()));
+}
+
+TEST(TagEdges, OfWhiteThatRunsOverAreWhereTheyWere) {
+  Scene scene = paper_rig();
+  CaptureSet views = boards_of(scene);
+  views.exposure_s = 0.0079;  // one and a half times white
+  const CornerErrors errors = errors_of(scene, views, 6, [](const auto&) { return true; });
+  ASSERT_GT(errors.corners, 400);
+  EXPECT_LT(std::abs(errors.outwards_px()), 0.02);
+  EXPECT_LT(errors.rms_px(), 0.045);  // with the blur of each edge by itself 0.057
+  RecordProperty("outwards_px", std::to_string(errors.outwards_px()));
+  RecordProperty("rms_px", std::to_string(errors.rms_px()));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,78 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Against libapriltag's own pictures of tags.
+#include "detection/boards/tag_print.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+namespace vlp {
+namespace {
+
+TEST(TagPrint, HasTheBitsOfTheFamilysPictures) {
+  Board board;
+  board.border_bits = 1;
+  board.tag_spacing = 0.5;
+  for (const std::string family : {"tag36h11", "tag25h9", "tag16h5"}) {
+    board.family = family;
+    const TagPrint print(board);
+    const TagFamily drawn = tag_family(family);
+    const int width = drawn->width_at_border, margin = (drawn->total_width - width) / 2;
+    EXPECT_EQ(print.width(), width);
+    EXPECT_EQ(print.inside(), 1);
+    EXPECT_EQ(print.outside(), 0.5 * width);
+    for (const int id : {0, 5, 17}) {
+      const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> picture(
+          apriltag_to_image(drawn.get(), id), image_u8_destroy);
+      const auto white = [&](int x, int y) {
+        return picture->buf[(margin + y) * picture->stride + margin + x] > 0;
+      };
+      const TagPrint::Sides sides = print.white_behind(id);
+      const int last = width - 1;
+      for (int i = 0; i < width; ++i) {
+        // Bottom, from the left; right, from the bottom; top, from the right; left, from the top.
+        const std::array<bool, 4> expected{white(i, last - 1), white(last - 1, last - i),
+                                           white(last - i, 1), white(1, i)};
+        for (std::size_t k = 0; k < 4; ++k) {
+          bool found = false;
+          for (const TagPrint::Run& run : sides[k]) found |= run.from <= i && i + 1 <= run.to;
+          EXPECT_EQ(found, expected[k] && i > 0 && i < last)
+              << family << id << " " << k << " " << i;
+        }
+      }
+    }
+  }
+}
+
+TEST(TagPrint, HasItsBitsBehindAWiderBorder) {
+  Board board;
+  board.family = "tag36h11";
+  board.border_bits = 1;
+  board.tag_spacing = 1;
+  const TagPrint::Sides narrow = TagPrint(board).white_behind(3);
+  board.border_bits = 2;
+  const TagPrint wide(board);
+  EXPECT_EQ(wide.width(), 10);
+  EXPECT_EQ(wide.inside(), 2);
+  const TagPrint::Sides sides = wide.white_behind(3);
+  for (std::size_t k = 0; k < 4; ++k) {
+    ASSERT_EQ(sides[k].size(), narrow[k].size());
+    for (std::size_t i = 0; i < sides[k].size(); ++i) {
+      EXPECT_EQ(sides[k][i].from, narrow[k][i].from + 1);
+    }
+  }
+}
+
+TEST(TagPrint, KnowsNothingBehindAWhiteBorder) {
+  Board board;
+  board.family = "tagStandard41h12";
+  board.border_bits = 1;
+  board.tag_spacing = 0.3;
+  const TagPrint print(board);
+  EXPECT_EQ(print.outside(), 1);
+  for (const auto& side : print.white_behind(0)) EXPECT_TRUE(side.empty());
+}
+
+}  // namespace
+}  // namespace vlp
