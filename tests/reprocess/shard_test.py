@@ -2,6 +2,7 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 """A shard's job: keys, results that appear whole, former ones."""
+import errno
 import json
 import os
 import tempfile
@@ -151,6 +152,23 @@ done
         self.assertTrue(Path("seen").exists())  # it did not wait for the answer of c/2
         self.assertEqual([row["verdict"] for row in rows], ["crashed", "crashed"])
         self.assertEqual([row["session"] for row in rows], ["1", "2"])
+
+    def test_what_is_at_work_ends_when_a_result_cannot_come_to_its_place(self):
+        run = self.run_of_two_sessions("""#!/bin/bash
+read -r line
+echo '{"exit_code": 1, "cpu_s": 0.5, "said": "words"}'
+read -r line
+echo $$ >.process && mv .process process
+exec sleep 60
+""")
+
+        def publish(*of_it):
+            self.assertTrue(there_soon(Path("process")))
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        with unittest.mock.patch.object(shard, "publish", publish):
+            self.assertRaisesRegex(OSError, "No space left", shard.reprocess, *run)
+        self.assertRaises(ProcessLookupError, os.kill, int(Path("process").read_text()), 0)
 
     def test_former_results_stay_by_their_keys_so_many(self):
         with tempfile.TemporaryDirectory() as folder:
