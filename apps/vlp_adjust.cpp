@@ -67,8 +67,7 @@ void run(const CLI::App& app, const Options& options) {
       }
     }
   }
-  check_output(images.output, inputs);
-  check_further_output("--refine-map", options.refined_map, images.output, inputs);
+  check_outputs({{"--output", images.output}, {"--refine-map", options.refined_map}}, inputs);
   AdjustStepInput input;
   input.lamps = read_lamp_map(images.lamps);
   input.lamps_file = images.lamps;

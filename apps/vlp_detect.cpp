@@ -23,13 +23,10 @@ namespace {
 void run(const CaptureOptions& options, const std::string& captures) {
   const std::vector<std::string> inputs{options.images, options.lamps, options.calibration,
                                         options.classifier};
-  check_output(options.output, inputs);
-  check_further_output("--lights", options.lights, options.output, inputs);
-  check_further_output("--captures", captures, options.output, inputs);
+  check_outputs(
+      {{"--output", options.output}, {"--lights", options.lights}, {"--captures", captures}},
+      inputs);
   check_every(options.every, {options.images});
-  if (same_file(options.lights, captures)) {
-    throw std::invalid_argument("--lights and --captures name one file");
-  }
   if (!captures.empty() && !is_video_name(options.images)) {
     throw std::invalid_argument("--captures is for a video, whose frames have times");
   }

@@ -81,8 +81,7 @@ void run(const CLI::App& app, Options options) {
     const auto beside = std::filesystem::path(options.images.images) / table;
     if (options.captures.empty() && std::filesystem::exists(beside)) inputs.push_back(beside);
   }
-  check_output(options.images.output, inputs);
-  check_further_output("--plot", options.plot, options.images.output, inputs);
+  check_outputs({{"--output", options.images.output}, {"--plot", options.plot}}, inputs);
   const CapturesTable captures = captures_of(options);
   options.images.captures = captures;
   const LampCaptures input = read_captures_of(options.images);

@@ -103,15 +103,8 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
     inputs.push_back(fixes);
     check_line("--track " + fixes, {x0_m, y0_m, x1_m, y1_m});
   }
-  check_output(options.json, inputs);
-  check_output(options.junit, inputs);
-  check_output(report.file, inputs);
-  if (same_file(options.json, options.junit)) {
-    throw std::invalid_argument("--json and --junit name one file");
-  }
-  if (same_file(report.file, options.json) || same_file(report.file, options.junit)) {
-    throw std::invalid_argument("--report and another output name one file");
-  }
+  check_outputs({{"--json", options.json}, {"--junit", options.junit}, {"--report", report.file}},
+                inputs);
 }
 
 double station_m(const Options& options) {

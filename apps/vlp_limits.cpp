@@ -99,11 +99,8 @@ FloorLimits limits_of(const Options& options, const LampMap& lamps, const FloorG
 }
 
 void run(const Options& options) {
-  check_output(options.map, {options.lamps, options.calibration});
-  check_output(options.picture, {options.lamps, options.calibration});
-  if (same_file(options.map, options.picture)) {
-    throw std::invalid_argument("--map and --picture name one file");
-  }
+  check_outputs({{"--map", options.map}, {"--picture", options.picture}},
+                {options.lamps, options.calibration});
   const LampMap lamps = read_lamp_map(options.lamps);
   FloorGrid grid = floor_under(lamps, options.step_m);
   if (const auto& floor = options.floor_m; !floor.empty()) {

@@ -73,6 +73,14 @@ std::string unknown_options(const CLI::App& app) {
   return names;
 }
 
+/// Whether two outputs, which need not exist, are one file; an empty name is none.
+bool same_file(const std::string& one, const std::string& other) {
+  const auto of = [](const std::string& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
+  };
+  return !one.empty() && !other.empty() && of(one) == of(other);
+}
+
 }  // namespace
 
 int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
@@ -114,22 +122,6 @@ void check_output(const std::string& output, const std::vector<std::string>& inp
     if (std::filesystem::equivalent(output, input, missing)) {
       throw std::invalid_argument(output + ": is an input, too, and would be overwritten");
     }
-  }
-}
-
-bool same_file(const std::string& one, const std::string& other) {
-  const auto of = [](const std::string& file) {
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
-  };
-  return !one.empty() && !other.empty() && of(one) == of(other);
-}
-
-void check_further_output(const std::string& option, const std::string& file,
-                          const std::string& output, const std::vector<std::string>& inputs) {
-  if (file.empty()) return;
-  check_output(file, inputs);
-  if (same_file(file, output)) {
-    throw std::invalid_argument("--output and " + option + " name one file");
   }
 }
 

@@ -47,14 +47,6 @@ void add_threads_option(CLI::App& app, int& threads, const std::string& what = "
 /// Throws std::invalid_argument when `output` is one of the files that are read.
 void check_output(const std::string& output, const std::vector<std::string>& inputs);
 
-/// Whether two outputs, which need not exist, are one file; an empty name is none.
-bool same_file(const std::string& one, const std::string& other);
-
-/// check_output() of a further output, that of `option`, which may be none: it must not be the
-/// file of --output either.
-void check_further_output(const std::string& option, const std::string& file,
-                          const std::string& output, const std::vector<std::string>& inputs);
-
 /// check_output() of all outputs, each with the option that names it, and that no two are one file;
 /// an empty name is none.
 void check_outputs(const std::vector<std::pair<std::string, std::string>>& outputs,

@@ -13,11 +13,6 @@
 namespace vlp {
 namespace {
 
-/// Version 2: a figure has its unit. Version 3: images are found by their digest; a verdict can be
-/// INVALID. Version 4: guard bands. Version 5: events, operator and shift.
-/// Version 6: who of events; the trail.
-constexpr int kSchema = 6;
-
 constexpr const char* kFigures =  // gate: no limit is no gate; guard_k: none is no guard band
     "CREATE TABLE IF NOT EXISTS figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
     "place INTEGER NOT NULL, name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, "
@@ -109,7 +104,7 @@ constexpr int kFirstWithTrail = 6;
 
 /// From each version to the next; the first is of version 1.
 constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4, from_4_to_5, from_5_to_6};
-static_assert(kMigrations.size() + 1 == kSchema);
+static_assert(kMigrations.size() + 1 == kSchemaVersion);
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
 
@@ -126,9 +121,9 @@ int version_of(soci::session& sql) {
   sql << look, soci::into(tables_there);
   if (tables_there == 0) return 0;
   sql << "SELECT COALESCE(MAX(version), 0) FROM vlp_schema", soci::into(version);
-  if (version <= kSchema) return version;
+  if (version <= kSchemaVersion) return version;
   throw std::runtime_error("holds records of version " + std::to_string(version) +
-                           ", this program knows those up to " + std::to_string(kSchema) +
+                           ", this program knows those up to " + std::to_string(kSchemaVersion) +
                            ": use the newer vlp-station that wrote them");
 }
 
@@ -136,7 +131,7 @@ int version_of(soci::session& sql) {
 
 bool has_record_tables(soci::session& sql) {
   // Versions only grow. Without a lock, so that who may only read can.
-  return version_of(sql) == kSchema;
+  return version_of(sql) == kSchemaVersion;
 }
 
 void make_record_tables(soci::session& sql) {
@@ -154,17 +149,19 @@ void make_record_tables(soci::session& sql) {
     for (const std::string& table : tables()) sql << table;
     sql << "INSERT INTO vlp_schema (version) SELECT CAST(:version AS INTEGER) WHERE NOT EXISTS "
            "(SELECT 1 FROM vlp_schema)",
-        soci::use(kSchema);
+        soci::use(kSchemaVersion);
   }
   // Waits for those who write already.
   lock_trail(sql);
   const int found = version_of(sql);
-  for (int version = found; version < kSchema; ++version) {
+  for (int version = found; version < kSchemaVersion; ++version) {
     kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
   }
   // When all columns are there.
   if (found < kFirstWithTrail) append_all(sql);
-  if (found < kSchema) sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchema);
+  if (found < kSchemaVersion) {
+    sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchemaVersion);
+  }
   transaction.commit();
 }
 

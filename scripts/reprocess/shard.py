@@ -85,6 +85,12 @@ class EachProcess:
             process.communicate()
             return process.returncode
 
+    def kill(self):
+        """With what it is at."""
+        if self.process is not None:
+            self.process.kill()
+            self.end()
+
 
 def begin(run, each, name, work):
     """Has vlp-calibrate begin with a session."""
@@ -191,25 +197,28 @@ def reprocess(run, shard, glances, lock, keep):
         shutil.rmtree(work / name)
         rows[name] |= row
 
-    for name, glance in glances.items():
-        row, known = None, before.get(name)
-        if known and known.get("glance") == glance:
-            row = current(name, key_of(known["inputs"], run))
-        if row is None:
-            inputs, parts = input_digests(Path(run["archive"]) / name)
-            key = key_of(inputs, run)
-            row = current(name, key)
-        rows[name] = (row or {}) | {"glance": glance}
-        if row is None:
-            answer = each.answer() if at_work else None
-            begin(run, each, name, work)
-            if at_work:
-                finish(*at_work, answer)
-            at_work = name, {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
-            made += 1
-    if at_work:
-        finish(*at_work, each.answer())
-    each.end()
+    try:
+        for name, glance in glances.items():
+            row, known = None, before.get(name)
+            if known and known.get("glance") == glance:
+                row = current(name, key_of(known["inputs"], run))
+            if row is None:
+                inputs, parts = input_digests(Path(run["archive"]) / name)
+                key = key_of(inputs, run)
+                row = current(name, key)
+            rows[name] = (row or {}) | {"glance": glance}
+            if row is None:
+                answer = each.answer() if at_work else None
+                begin(run, each, name, work)
+                if at_work:
+                    finish(*at_work, answer)
+                at_work = name, {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
+                made += 1
+        if at_work:
+            finish(*at_work, each.answer())
+        each.end()
+    finally:
+        each.kill()  # when this failed it is at a session that nobody waits for
     shutil.rmtree(work, ignore_errors=True)
     print(f"{len(rows)} sessions, {made} reprocessed")
     return list(rows.values())

@@ -4,18 +4,19 @@
 #
 # Kills scripts/reprocess.sh, the whole of it, at random moments while it runs over an archive of datasets/archive, and
 # goes on: what stands there at any moment is whole, and in the end it has the bytes of an undisturbed run. What is done
-# is thrown away and begun again, until so many kills hit a run at work.
+# is thrown away and begun again, until so many kills hit a run at work. Shards are of three sessions, so that one's
+# result is on its way to its place while another is at work.
 #
-#   reprocess_kills.sh FOLDER    of 50 kills, or KILLS=N, and 4 sessions, or SESSIONS=N; SEED=N: other moments
+#   reprocess_kills.sh FOLDER    of 50 kills, or KILLS=N, and 6 sessions, or SESSIONS=N; SEED=N: other moments
 source_dir=$(cd "$(dirname "$0")/../.." && pwd)
 bin=${VLP_PROGRAMS_DIR:-$source_dir/build/bin}
 kills=${KILLS:-50} RANDOM=${SEED:-1}
 set -- "$source_dir" "$bin" "$(realpath -m "${1:?which FOLDER?}")"
 mkdir -p "$3"
 source "$source_dir/tests/reprocess/common.sh"
-run=(--shard-size 1 --cores 2)
+run=(--shard-size 3 --cores 2)
 [ -e "$archive" ] ||
-  "$bin/vlp-simulate" --quiet "$source_dir/datasets/archive/scene.yaml" --archive "${SESSIONS:-4}" -o "$archive"
+  "$bin/vlp-simulate" --quiet "$source_dir/datasets/archive/scene.yaml" --archive "${SESSIONS:-6}" -o "$archive"
 rm -rf "$baseline"
 began=$(date +%s%3N)
 reprocess "$baseline" "${run[@]}" >"$said"

@@ -100,7 +100,8 @@ TEST_F(ReportTest, RefusesWhatItCannotShow) {
   EXPECT_THAT(refusal(" --picture" + in("none.svg")), HasSubstr("none.svg: cannot be read"));
   EXPECT_THAT(refusal(" --track" + in("track.csv") + " 1 0 1 0"),
               HasSubstr("begins where it ends"));
-  EXPECT_THAT(refusal(" --json" + in("report.html")), HasSubstr("name one file"));
+  EXPECT_THAT(refusal(" --json" + in("report.html")),
+              HasSubstr("--json and --report name one file"));
 }
 
 /// A page that passes, small enough to be broken in many ways.

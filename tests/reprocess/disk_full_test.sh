@@ -17,7 +17,7 @@ full=0
 for kilobytes in 40 120 250 400 600; do
   mount -t tmpfs -o "size=${kilobytes}k" tmpfs "$results"
   code=0
-  reprocess "$results" --shard-size 1 --cores 1 >"$said" 2>&1 || code=$?
+  reprocess "$results" --shard-size 3 --cores 1 >"$said" 2>&1 || code=$?
   if [ $code != 0 ] || grep -q 'and [1-9][0-9]* that crashed' "$said"; then
     full=$((full + 1))
     [ $code = 0 ] || [ $code = 2 ] || [ $code = 3 ] || fail "exit code $code of $kilobytes kB: $(cat "$said")"
@@ -28,7 +28,7 @@ for kilobytes in 40 120 250 400 600; do
     [ ! -e "$session" ] || [ -s "$session/row.json" ] || fail "$session is not whole, of $kilobytes kB"
   done
   mount -o remount,size=50m "$results"
-  reprocess "$results" --shard-size 1 --cores 1 >"$said" || fail "it does not go on, of $kilobytes kB: $(cat "$said")"
+  reprocess "$results" --shard-size 3 --cores 1 >"$said" || fail "it does not go on, of $kilobytes kB: $(cat "$said")"
   expect_baseline "$results" "${sessions[@]}"
   umount "$results"
 done

@@ -10,12 +10,13 @@ good=camera-00001/session-01 broken=$(cd "$baseline/failed" && echo */* | cut -d
 sessions=("$good" camera-00002/session-01 "$broken")
 take "$results-archive" "${sessions[@]}"
 
-# Killed in a step, between steps, and when the first session is done, the whole of it; then to its end.
+# Killed in a step, between steps, and when the first session is done and the next at work, the whole of it; then to its
+# end.
 count() { { find "$results" -path "$1" 2>/dev/null || true; } | wc -l; }
 another() { [ "$(count "$1")" -gt "$before" ]; }
 for moment in '*/work/*/steps/corners/*.csv' '*/work/*/rotated.yaml' '*/sessions/*/row.json'; do
   before=$(count "$moment")
-  start_reprocess "$results" --shard-size 1 --cores 1
+  start_reprocess "$results" --shard-size 3 --cores 1
   patiently 60 another "$moment"
   kill -9 -- -$!
   wait $! 2>/dev/null || true
@@ -25,7 +26,9 @@ for moment in '*/work/*/steps/corners/*.csv' '*/work/*/rotated.yaml' '*/sessions
     [ ! -e "$session" ] || [ -s "$session/row.json" ] || fail "$session is not whole"
   done
 done
-run() { reprocess "$results" --shard-size 1 --cores 2 >"$said"; }
+names_in() { (cd "$1" && ls -d */*); }
+[ -n "$(comm -23 <(names_in "$results"/.state/work/*) <(names_in "$results/sessions"))" ] || fail "no other was at work"
+run() { reprocess "$results" --shard-size 3 --cores 2 >"$said"; }
 run
 expect_baseline "$results" "${sessions[@]:0:2}"
 cmp "$baseline/failed/$broken/session.json" "$results/failed/$broken/session.json"
@@ -36,11 +39,11 @@ redone() {  # since the last time
 }
 redone >/dev/null 2>&1 || true
 
-# A worker that is lost, as for want of memory, is replaced by the run itself.
-start_reprocess "$results-lost" --shard-size 1 --cores 1
+# A worker that is lost, as for want of memory, is replaced by the run itself; here with a session at work.
+start_reprocess "$results-lost" --shard-size 3 --cores 1
 worker() { pgrep --session "$run" --full 'shard\.py'; }
 run=$!
-patiently 60 worker
+patiently 60 test -e "$results-lost/sessions/$good/row.json"
 kill -9 $(worker)
 wait "$run" || fail "the run ended with its worker: $(cat "$said")"
 expect_baseline "$results-lost" "${sessions[@]:0:2}"

@@ -2,9 +2,11 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 """A shard's job: keys, results that appear whole, former ones."""
+import errno
 import json
 import os
 import tempfile
+import time
 import unittest
 import unittest.mock
 from pathlib import Path
@@ -13,6 +15,13 @@ import parts  # noqa: F401
 import files
 import outcome
 import shard
+
+
+def there_soon(file):
+    until = time.monotonic() + 10
+    while not file.exists() and time.monotonic() < until:
+        time.sleep(0.01)
+    return file.exists()
 
 
 class Shard(unittest.TestCase):
@@ -106,29 +115,60 @@ exit 5
                 self.assertEqual(one, two)  # the same process
                 self.assertEqual(each.end(), 5)  # which had nothing more to read
 
+    def run_of_two_sessions(self, program):
+        """What reprocess() is told for c/1 and c/2, in a folder of their own."""
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.addCleanup(os.chdir, os.getcwd())
+        os.chdir(folder.name)
+        for name in ("c/1", "c/2"):
+            (Path("archive") / name / "boards").mkdir(parents=True)
+        Path("vlp-calibrate").write_text(program)
+        Path("vlp-calibrate").chmod(0o755)
+        lock = self.enterContext(open("lock", "w"))
+        run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "session_gates": "", "version": "1"}
+        run |= {"archive": str(Path("archive").absolute()), "bin": folder.name}
+        return run, "7", {"c/1": "a", "c/2": "b"}, lock, 0
+
     def test_a_result_comes_to_its_place_while_the_next_session_is_at_work(self):
-        with tempfile.TemporaryDirectory() as folder:
-            self.addCleanup(os.chdir, os.getcwd())
-            os.chdir(folder)
-            for name in ("c/1", "c/2"):
-                (Path("archive") / name / "boards").mkdir(parents=True)
-            program = Path("vlp-calibrate")
-            program.write_text("""#!/bin/bash
+        run = self.run_of_two_sessions("""#!/bin/bash
 while read -r line; do
-  if [[ $line == *c/2* ]]; then  # not before the first one's is there
+  if [[ $line == *c/2* ]]; then
+    touch begun
     for i in {1..200}; do [ -e failed/c/1/row.json ] && touch seen && break; sleep 0.05; done
   fi
   echo '{"exit_code": 1, "cpu_s": 0.5, "said": "words"}'
 done
 """)
-            program.chmod(0o755)
-            run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "session_gates": "", "version": "1"}
-            run |= {"archive": str(Path("archive").absolute()), "bin": folder}
-            with open("lock", "w") as lock:
-                rows = shard.reprocess(run, "7", {"c/1": "a", "c/2": "b"}, lock, 0)
-            self.assertEqual([row["verdict"] for row in rows], ["crashed", "crashed"])
-            self.assertEqual([row["session"] for row in rows], ["1", "2"])
-            self.assertTrue(Path("seen").exists())
+        publish, next_at_work = shard.publish, {}
+
+        def publish_when_the_next_has_begun(row, *of_it):
+            next_at_work[row["session"]] = there_soon(Path("begun")) and not Path("seen").exists()
+            return publish(row, *of_it)
+
+        with unittest.mock.patch.object(shard, "publish", publish_when_the_next_has_begun):
+            rows = shard.reprocess(*run)
+        self.assertEqual(next_at_work, {"1": True, "2": False})
+        self.assertTrue(Path("seen").exists())  # it did not wait for the answer of c/2
+        self.assertEqual([row["verdict"] for row in rows], ["crashed", "crashed"])
+        self.assertEqual([row["session"] for row in rows], ["1", "2"])
+
+    def test_what_is_at_work_ends_when_a_result_cannot_come_to_its_place(self):
+        run = self.run_of_two_sessions("""#!/bin/bash
+read -r line
+echo '{"exit_code": 1, "cpu_s": 0.5, "said": "words"}'
+read -r line
+echo $$ >.process && mv .process process
+exec sleep 60
+""")
+
+        def publish(*of_it):
+            self.assertTrue(there_soon(Path("process")))
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        with unittest.mock.patch.object(shard, "publish", publish):
+            self.assertRaisesRegex(OSError, "No space left", shard.reprocess, *run)
+        self.assertRaises(ProcessLookupError, os.kill, int(Path("process").read_text()), 0)
 
     def test_former_results_stay_by_their_keys_so_many(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -17,8 +17,10 @@ namespace vlp {
 /// Writes mrcal's .cameramodel: the lens with 17 digits, where it is known
 /// (valid_intrinsics_region, known_region()), and all of the solved problem
 /// (optimization_inputs), on which mrcal's own tools work, such as
-/// mrcal-show-projection-uncertainty and mrcal-show-residuals. Throws InputError. Precondition,
-/// here and below: mrcal has the lens model, has_mrcal().
+/// mrcal-show-projection-uncertainty and mrcal-show-residuals. The former is of corners that err by
+/// themselves, and of a board of tags shows less than IntrinsicsReport::uncertainty_px, which is by
+/// tags (ProjectionUncertainty). Throws InputError. Precondition, here and below: mrcal has the
+/// lens model, has_mrcal().
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
 
 /// Writes the corners that were solved for as mrcal-calibrate-cameras reads them (--corners-cache):

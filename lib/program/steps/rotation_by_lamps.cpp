@@ -54,8 +54,7 @@ void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOpti
   const fs::path captures = captures_file(images, options);
   std::vector<std::string> inputs = inputs_of(images);
   inputs.push_back(captures.string());
-  check_output(images.output, inputs);
-  check_further_output("--refine-map", refined_map, images.output, inputs);
+  check_outputs({{"--output", images.output}, {"--refine-map", refined_map}}, inputs);
   images.captures.emplace();  // level is what is found
   LampCaptures input = read_captures_of(images);
   check_lamps(input.frames, input.lamps, input.lamps_file);

@@ -23,8 +23,7 @@ const std::map<std::string, RotationMethod> kMethods{{"axis", RotationMethod::ax
 void rotate_on_spot(const CLI::App& app, CaptureOptions images, const std::string& method,
                     const std::string& plot) {
   const std::vector<std::string> inputs = inputs_of(images);
-  check_output(images.output, inputs);
-  check_further_output("--plot", plot, images.output, inputs);
+  check_outputs({{"--output", images.output}, {"--plot", plot}}, inputs);
   images.captures.emplace();  // the axis that is found is level
   const LampCaptures input = read_captures_of(images);
   const RotationResult found =
