@@ -12,8 +12,8 @@
 namespace vlp {
 namespace {
 
-/// An edge of 40 px, behind a tone curve, with a black stripe of 3 px upon which white follows along
-/// half of it.
+/// An edge of 40 px, behind a tone curve, with a black stripe of 3 px upon which white follows
+/// along half of it.
 struct Step {
   double off_px = 0.31, slope_px = 0.2, bow_px = -0.15, blur_px = 0.8;
   double black = 16, white = 200, gamma = 1;
