@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "detection/boards/tone_curve.h"
 #include "geometry/median.h"
 
 namespace vlp {
@@ -28,6 +29,7 @@ std::vector<BoardView> views_of(const UnitStep& boards) {
   for (const auto& [name, image] : boards.images) {
     if (image.refused.empty()) views.push_back(*image.view);
   }
+  take_common_curve(views);
   return views;
 }
 

@@ -42,7 +42,7 @@ struct UnitStep {
   int used() const;
 };
 
-/// The views that are used, by name.
+/// The views that are used, by name, behind the tone curve that they call for together.
 std::vector<BoardView> views_of(const UnitStep& boards);
 /// The frames of the images that are used, by name.
 std::vector<Frame> frames_of(const UnitStep& step);

@@ -125,7 +125,9 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Coded{"paper-rig", kPhone, "0.004", "Plain", 0.02, 0.15},
                     Coded{"paper-rig-faulty", kPhone, "0.004", "Kalibr", 0.05, 0.25},
                     Coded{"paper-rig", kSharp, "0.004", "PlainSharpened", 0.02, 0.1},
-                    Coded{"paper-rig", "", "0.0079", "PlainOfOneAndAHalfTimesWhite", 0.022, 0.15}),
+                    Coded{"paper-rig", "", "0.0079", "PlainOfOneAndAHalfTimesWhite", 0.022, 0.15},
+                    Coded{"paper-rig-faulty", "", "0.0079", "KalibrOfOneAndAHalfTimesWhite", 0.05,
+                          0.25}),
     [](const auto& instance) { return std::string(instance.param.name); });
 
 TEST_F(IntrinsicsProgram, SaysThatViewsFromTheFrontDoNotFixTheFocalLength) {

@@ -28,7 +28,8 @@ struct SeenTag {
 
   int id;
   Corners corners_px;
-  /// The same behind tone curves of kGammas beyond 1; empty of an image without one.
+  /// The same behind tone curves of kGammas beyond 1, until one is taken (take_common_curve());
+  /// empty where there is none for sure.
   std::vector<Corners> behind_curves_px = {};
 };
 
@@ -56,8 +57,8 @@ struct SeenBoard {
   /// Of boards of squares, and from files that hold corners without their tags: by index.
   std::vector<SeenPoint> points = {};
   /// Minus the logarithm of the likelihood of what edges of tags show behind curves of kGammas, up
-  /// to a constant; of the first of them only where it is that for sure, empty where none is
-  /// fitted.
+  /// to a constant: of the first two where there is no curve for sure. Empty where no edges are
+  /// fitted, and when a curve is taken.
   std::vector<double> curve_costs = {};
 
   /// Whether there is something to calibrate from.

@@ -68,9 +68,7 @@ FoundBoards detect_boards(const BoardDetector& detector, ImageSource& images, in
       result.refused.push_back(std::move(outcome.refused));
     }
   }
-  std::vector<SeenBoard*> boards;
-  for (BoardView& view : result.views) boards.push_back(&view.seen);
-  take_common_curve(boards);
+  take_common_curve(result.views);
   return result;
 }
 

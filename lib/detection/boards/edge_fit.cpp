@@ -34,8 +34,9 @@ double light_behind(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
-/// Parameters: blur, middle, contrast, light along and across, the polynomial's. A step that is
-/// taken is asked for twice, with its derivatives the second time: they are kept from the first.
+/// Parameters: blur, middle, contrast, slope of the light along and across, the polynomial's. A
+/// step that is taken is asked for twice, with its derivatives the second time: they are kept from
+/// the first.
 template <int terms>
 class Edge {
  public:
@@ -113,20 +114,20 @@ class Edge {
   mutable Jacobian jacobian_;
 };
 
-/// The mean light of pixels on both sides, and how white those outside are.
+/// The mean light of pixels on both sides, and how much of the brighter one is white.
 struct Sides {
   Sides(const std::vector<EdgePixel>& pixels, const EdgeCurve& edge, double gamma) {
     constexpr double white = 254;
-    double ins = 0, outs = 0, whites = 0;
+    double ins = 0, outs = 0, whites_in = 0, whites_out = 0;
     for (const EdgePixel& pixel : pixels) {
       const bool inside = pixel.across_px < edge.value_at(pixel.along);
       (inside ? in : out) += light_behind(pixel.level, gamma);
       (inside ? ins : outs) += 1;
-      if (!inside && pixel.level >= white) whites += 1;
+      if (pixel.level >= white) (inside ? whites_in : whites_out) += 1;
     }
     in /= std::max(ins, 1.0);
     out /= std::max(outs, 1.0);
-    white_share = whites / std::max(outs, 1.0);
+    white_share = out > in ? whites_out / std::max(outs, 1.0) : whites_in / std::max(ins, 1.0);
   }
 
   double in = 0, out = 0;
@@ -137,7 +138,7 @@ template <int terms>
 std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
                            const EdgePrior& prior) {
   constexpr double least_blur_px = 0.05, most_blur_px = 6;
-  constexpr double least_contrast = 3, unlike = 0.35;
+  constexpr double least_contrast = 3, unlike = 0.35;  // in levels
   constexpr double enough_white = 0.25, told_then = 250;
   using Step = Edge<terms>;
   const Sides sides(pixels, edge, prior.gamma);
@@ -157,8 +158,10 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   edge.blur_px = p[0];
   EdgeFit result{2 * solver.summary.final_cost, pixels.size(), runs_over};
   const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
+  const double bright = Coded(p[1] + p[2], prior.gamma).level;
+  const double contrast = std::abs(bright - Coded(p[1] - p[2], prior.gamma).level) / 2;
   const bool good = p.allFinite() && p[0] > least_blur_px && p[0] < most_blur_px &&
-                    std::abs(p[2]) > least_contrast && rms < unlike * std::abs(p[2]);
+                    contrast > least_contrast && rms < unlike * contrast;
   if (!good) return {};
   if (runs_over && prior.blur_weight == 0) result.blur_variance = step.blur_variance(p);
   return result;

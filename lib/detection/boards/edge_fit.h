@@ -64,11 +64,12 @@ struct EdgeFit {
 };
 
 /// Fits an edge, from where it is, by least squares of
-///   light = (middle + contrast step) (1 + light . (w, v)),
+///   light = (middle + contrast step) (1 + slope . (w, v)),
 ///   step = s(e) + white_behind (1 + s(-e - stripe_px)),     e = v - a - b w - c w^2 - d w^3,
 /// with s(e) = erf(e / (sqrt(2) blur)), in levels, behind the prior's tone curve. Where a quarter
-/// of the pixels outside are white, white runs over: levels beyond 250 tell only that, since a
-/// camera's processing leaves some of them below 255. Nothing when the pixels look otherwise.
+/// of the brighter side's pixels are white, white runs over: levels beyond 250 tell only that,
+/// since a camera's processing leaves some of them below 255. Nothing when the pixels look
+/// otherwise.
 std::optional<EdgeFit> fit_edge(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
                                 const EdgePrior& prior);
 

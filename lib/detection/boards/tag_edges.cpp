@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -261,53 +262,48 @@ EdgePrior with_blur_of(std::span<const TagEdges> tags, EdgePrior prior) {
   return prior;
 }
 
-/// The cost of some tags behind the first curve.
-double cost_behind_curve(std::vector<TagEdges> tags, std::span<const std::size_t> asked) {
-  for (const std::size_t i : asked) tags[i].fit({kGammas[1]});
-  return cost_of(tags, asked);
-}
-
 }  // namespace
 
 std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& image,
                                      const TagPrint& print) {
-  constexpr std::size_t asked = 8;  // tags, the widest
-  constexpr double surely = 10;     // e^10 times more likely
+  constexpr std::size_t most_asked = 8;
+  constexpr double surely = 10;  // e^10 times more likely
   std::vector<TagEdges> found;
-  std::vector<std::size_t> widest;
-  for (std::size_t i = 0; i < tags.size(); ++i) {
-    found.emplace_back(tags[i], image, print);
-    if (found[i].found()) widest.push_back(i);
+  std::vector<SeenTag*> exact;
+  for (SeenTag& tag : tags) {
+    TagEdges edges(tag, image, print);
+    if (!edges.crossed()) continue;
+    found.push_back(std::move(edges));
+    exact.push_back(&tag);
   }
+  if (found.empty()) return {};
+  std::vector<std::size_t> widest(found.size());
+  std::iota(widest.begin(), widest.end(), std::size_t{0});
   std::stable_sort(widest.begin(), widest.end(), [&](std::size_t a, std::size_t b) {
     return found[a].width_px() > found[b].width_px();
   });
-  widest.resize(std::min(widest.size(), asked));
-  if (widest.empty()) return {};
-  std::vector<std::vector<SeenTag::Corners>> corners(tags.size());
+  const auto asked = std::span(widest).first(std::min(widest.size(), most_asked));
+  const auto others = std::span(widest).subspan(asked.size());
+  const auto fit = [&](std::span<const std::size_t> some, const EdgePrior& prior) {
+    for (const std::size_t i : some) found[i].fit(prior);
+  };
+  std::vector<std::vector<SeenTag::Corners>> corners(found.size());
   std::vector<double> costs;
   for (const double gamma : kGammas) {
-    const auto fit_all = [&](const EdgePrior& prior) {
-      for (TagEdges& edges : found) edges.fit(prior);
-    };
-    if (gamma == kGammas[1]) {
-      const double cost = cost_behind_curve(found, widest);
-      if (cost > costs[0] + surely) {
-        costs.push_back(cost);
-        break;
-      }
-    }
-    if (gamma != 1) fit_all({gamma});
-    costs.push_back(cost_of(found, widest));
+    if (gamma != 1) fit(asked, {gamma});
+    costs.push_back(cost_of(found, asked));
+    if (costs.size() == 2 && costs[1] > costs[0] + surely) break;
+    if (gamma != 1) fit(others, {gamma});
     const EdgePrior prior = with_blur_of(found, {gamma});
-    if (prior.blur_weight > 0) fit_all(prior);
-    for (std::size_t i = 0; i < tags.size(); ++i) {
-      corners[i].push_back(found[i].crossed().value_or(tags[i].corners_px));
+    if (prior.blur_weight > 0) fit(widest, prior);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const auto& before = corners[i].empty() ? exact[i]->corners_px : corners[i].back();
+      corners[i].push_back(found[i].crossed().value_or(before));
     }
   }
-  for (std::size_t i = 0; i < tags.size(); ++i) {
-    tags[i].corners_px = corners[i].front();
-    tags[i].behind_curves_px.assign(corners[i].begin() + 1, corners[i].end());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    exact[i]->corners_px = corners[i].front();
+    exact[i]->behind_curves_px.assign(corners[i].begin() + 1, corners[i].end());
   }
   return costs;
 }

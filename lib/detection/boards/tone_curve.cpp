@@ -37,11 +37,11 @@ struct Parabola {
 };
 
 /// Sums over images, each with the best of its own as 0.
-std::array<double, kGammas.size()> sums_of(std::span<SeenBoard*> images) {
+std::array<double, kGammas.size()> sums_of(const std::vector<BoardView>& views) {
   constexpr double most = 1000;  // of one image, whatever is in it
   std::array<double, kGammas.size()> sums{};
-  for (const SeenBoard* image : images) {
-    const auto& costs = image->curve_costs;
+  for (const BoardView& view : views) {
+    const auto& costs = view.seen.curve_costs;
     if (costs.empty()) continue;
     const double best = *std::min_element(costs.begin(), costs.end());
     for (std::size_t i = 0; i < sums.size(); ++i) {
@@ -53,31 +53,32 @@ std::array<double, kGammas.size()> sums_of(std::span<SeenBoard*> images) {
 
 }  // namespace
 
-double take_common_curve(std::span<SeenBoard*> images) {
-  constexpr double none = 0.05;  // of the logarithm: noise makes so much of none
-  const auto sums = sums_of(images);
+double take_common_curve(std::vector<BoardView>& views) {
+  constexpr double least_gamma = 1.2;
+  const auto sums = sums_of(views);
   const auto best =
       static_cast<std::size_t>(std::min_element(sums.begin(), sums.end()) - sums.begin());
   const Parabola near{std::clamp<std::size_t>(best, 1, kGammas.size() - 2) - 1};
   const double log_gamma =
       near.least({sums[near.first], sums[near.first + 1], sums[near.first + 2]});
-  if (log_gamma < none) return 1;
+  const bool none = log_gamma < std::log(least_gamma);
   const auto weights = near.weights(log_gamma);
-  for (SeenBoard* image : images) {
-    for (SeenTag& tag : image->tags) {
-      if (tag.behind_curves_px.empty()) continue;
-      SeenTag::Corners corners = tag.corners_px;
+  for (BoardView& view : views) {
+    view.seen.curve_costs.clear();
+    for (SeenTag& tag : view.seen.tags) {
+      std::vector<SeenTag::Corners> behind{tag.corners_px};
+      behind.insert(behind.end(), tag.behind_curves_px.begin(), tag.behind_curves_px.end());
+      tag.behind_curves_px.clear();
+      if (none || behind.size() < kGammas.size()) continue;
       for (std::size_t k = 0; k < 4; ++k) {
-        corners[k].setZero();
+        tag.corners_px[k].setZero();
         for (std::size_t i = 0; i < 3; ++i) {
-          const std::size_t of = near.first + i;
-          corners[k] += weights[i] * (of == 0 ? tag.corners_px : tag.behind_curves_px[of - 1])[k];
+          tag.corners_px[k] += weights[i] * behind[near.first + i][k];
         }
       }
-      tag.corners_px = corners;
     }
   }
-  return std::exp(log_gamma);
+  return none ? 1 : std::exp(log_gamma);
 }
 
 }  // namespace vlp

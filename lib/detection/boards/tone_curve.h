@@ -3,9 +3,9 @@
 #pragma once
 
 #include <array>
-#include <span>
+#include <vector>
 
-#include "detection/boards/board_detector.h"
+#include "detection/boards/detect_boards.h"
 
 namespace vlp {
 
@@ -15,10 +15,11 @@ inline constexpr std::array kGammas{1.0, 1.3, 1.6, 2.0, 2.4};
 
 /// Puts corners where they are behind the curve that all images of a camera call for together
 /// (SeenBoard::curve_costs): the least of a parabola through the least of the costs' sums and its
-/// neighbours, by the logarithm of gamma, and corners between those of kGammas likewise. An image
-/// says it to 20 % from JPEG of quality 80, forty to 3 %. One curve for all, as what it leaves over
-/// is alike all over a view then, and taken out with the lens (edge_shifts()). Returns gamma, 1 of
-/// none.
-double take_common_curve(std::span<SeenBoard*> images);
+/// neighbours, by the logarithm of gamma, and corners between those of kGammas likewise. Of less
+/// than 1.2 it is taken for none, as sharpening makes so much. JPEG and sharpening make curves look
+/// flatter (tests/ACCURACY.md); what one leaves over is alike all over a view, as it is one for all
+/// images, and taken out with the lens (edge_shifts()). An image that has none for sure keeps its
+/// corners. Returns gamma, 1 of none; what it went by is gone from the views then.
+double take_common_curve(std::vector<BoardView>& views);
 
 }  // namespace vlp

@@ -104,6 +104,18 @@ TEST(EdgeFit, IsExactWhereWhiteRunsOver) {
   }
 }
 
+/// Tags of some families are white inside.
+TEST(EdgeFit, IsExactWhereWhiteInsideRunsOver) {
+  const Step step{.black = 380, .white = 16, .stripe_px = 100};
+  auto pixels = step.pixels();
+  for (EdgePixel& pixel : pixels) pixel.white_behind = 0;
+  EdgeCurve edge = step.start();
+  const auto fit = fit_edge(edge, pixels, {});
+  ASSERT_TRUE(fit);
+  EXPECT_TRUE(fit->runs_over);
+  step.expect_found(edge, 2e-3);
+}
+
 /// Root of the mean square of the error of an edge's place, over sets of noise.
 double scatter_px(const Step& step, const EdgePrior& prior) {
   constexpr unsigned sets = 60;
@@ -131,6 +143,13 @@ TEST(EdgeFit, WithItsBlurKnownIsBetterWhereWhiteRunsOver) {
   // Elsewhere the pixels tell it.
   const Step seen{.noise = 4};
   EXPECT_EQ(scatter_px(seen, {}), scatter_px(seen, {1, 2 * seen.blur_px, 1000}));
+}
+
+TEST(EdgeFit, OfDimPaperIsFoundBehindTheSteepestCurve) {
+  const Step step{.black = 0.3, .white = 5, .gamma = 2.4};  // levels of 15 and 49
+  EdgeCurve edge = step.start();
+  ASSERT_TRUE(fit_edge(edge, step.pixels(), {step.gamma}));
+  step.expect_found(edge, 5e-3);
 }
 
 TEST(EdgeFit, IsNoneOfNoiseOrOfFewPixels) {
