@@ -28,8 +28,8 @@ struct SeenTag {
 
   int id;
   Corners corners_px;
-  /// The same behind tone curves of kGammas beyond 1, until one is taken (take_common_curve());
-  /// empty where there is none for sure.
+  /// The same behind tone curves of kGammas beyond 1, until one is taken (take_common_curve()); of
+  /// an image that has none for sure there are none.
   std::vector<Corners> behind_curves_px = {};
 };
 
@@ -77,7 +77,7 @@ void prepare_tag_family(const std::string& name);
 
 /// Finds a board's tags, or the corners of its squares (SquareCorners). Boards of AprilTags without
 /// corner squares by libapriltag, with corners where the
-/// tag's edges cross (with_exact_edges()), or its own where that fails; the gap between tags has to
+/// tag's edges cross (find_exact_edges()), or its own where that fails; the gap between tags has to
 /// be white. Boards with corner squares, where tags touch, by OpenCV's ArUco module and from one to
 /// the next, with corners where the squares' edges cross (edge_crossing()). Safe to share between
 /// threads.

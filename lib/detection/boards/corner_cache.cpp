@@ -31,7 +31,7 @@ std::string settings_of(const Board& board) {
   return settings;
 }
 
-std::vector<std::string> row_of(int id, const std::array<Eigen::Vector2d, 4>& pixels) {
+std::vector<std::string> row_of(int id, const SeenTag::Corners& pixels) {
   std::vector<std::string> row{std::to_string(id)};
   for (const Eigen::Vector2d& pixel : pixels) {
     row.push_back(shortest(pixel.x()));
@@ -42,7 +42,7 @@ std::vector<std::string> row_of(int id, const std::array<Eigen::Vector2d, 4>& pi
 
 /// The first row, with id -1, holds the image's size and the counts, by which a file that a power
 /// cut left in part is known. Then come a row per tag, one per foreign tag, one per point, with its
-/// place, and for each curve one with its cost, and all tags behind it.
+/// place, one per curve with its cost, and of more than two each tag behind those beyond the first.
 void write_view(const fs::path& file, const BoardView& view) {
   CsvWriter csv(file, {"id", "u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"});
   csv.row({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
@@ -80,9 +80,10 @@ BoardView read_view(const fs::path& file, const std::string& image) {
   const auto tags_seen = static_cast<std::size_t>(at(0, "u3"));
   const auto curves = static_cast<std::size_t>(at(0, "v3"));
   const std::size_t behind = curves > 2 ? curves - 1 : 0;
-  if (1 + tags_seen + foreign + points + curves + behind * tags_seen != rows)
+  if (1 + tags_seen + foreign + points + curves + behind * tags_seen != rows) {
     throw InputError(file, "is not of the cache");
-  const auto pixels_of = [&](std::size_t row) -> std::array<Eigen::Vector2d, 4> {
+  }
+  const auto pixels_of = [&](std::size_t row) -> SeenTag::Corners {
     return {{{at(row, "u0"), at(row, "v0")},
              {at(row, "u1"), at(row, "v1")},
              {at(row, "u2"), at(row, "v2")},

@@ -63,6 +63,7 @@ class Edge {
     return true;
   }
 
+  /// By noise of one level.
   double blur_variance(const Parameters& p) const {
     if (p != at_) evaluate(p);
     const Eigen::Matrix<double, NUM_PARAMETERS, NUM_PARAMETERS> normal =

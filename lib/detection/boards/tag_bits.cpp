@@ -13,7 +13,7 @@ namespace vlp {
 bool shows_its_bits(const SeenTag& tag, const cv::Mat1f& levels, const apriltag_family_t& family,
                     int border_bits) {
   constexpr int most_wrong = 2;
-  const double width = family.width_at_border + 2 * (border_bits - 1);
+  const double width = width_in_bits(family, border_bits);
   const std::array<Eigen::Vector2d, 4> square{{{0, width}, {width, width}, {width, 0}, {0, 0}}};
   std::array<PlanePair, 4> pairs;
   for (std::size_t k = 0; k < 4; ++k) pairs[k] = {square[k], tag.corners_px[k]};
@@ -33,8 +33,7 @@ bool shows_its_bits(const SeenTag& tag, const cv::Mat1f& levels, const apriltag_
   const float threshold = (*darkest + *brightest) / 2;
   int wrong = 0;
   for (uint32_t bit = 0; bit < family.nbits; ++bit) {
-    const bool white = (family.codes[tag.id] >> (family.nbits - 1 - bit)) & 1;
-    wrong += white != (seen[bit] > threshold);
+    wrong += is_white(family, tag.id, bit) != (seen[bit] > threshold);
   }
   return wrong <= most_wrong;
 }

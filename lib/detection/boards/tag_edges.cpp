@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -268,43 +267,43 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
                                      const TagPrint& print) {
   constexpr std::size_t most_asked = 8;
   constexpr double surely = 10;  // e^10 times more likely
-  std::vector<TagEdges> found;
-  std::vector<SeenTag*> exact;
-  for (SeenTag& tag : tags) {
-    TagEdges edges(tag, image, print);
-    if (!edges.crossed()) continue;
-    found.push_back(std::move(edges));
-    exact.push_back(&tag);
+  std::vector<TagEdges> edges;
+  std::vector<SeenTag::Corners> corners;  // where they were found last
+  std::vector<std::size_t> widest;        // of those that are found, the widest first
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    edges.emplace_back(tags[i], image, print);
+    const auto crossed = edges[i].crossed();
+    corners.push_back(crossed.value_or(tags[i].corners_px));
+    if (crossed) widest.push_back(i);
   }
-  if (found.empty()) return {};
-  std::vector<std::size_t> widest(found.size());
-  std::iota(widest.begin(), widest.end(), std::size_t{0});
+  if (widest.empty()) return {};
   std::stable_sort(widest.begin(), widest.end(), [&](std::size_t a, std::size_t b) {
-    return found[a].width_px() > found[b].width_px();
+    return edges[a].width_px() > edges[b].width_px();
   });
   const auto asked = std::span(widest).first(std::min(widest.size(), most_asked));
   const auto others = std::span(widest).subspan(asked.size());
   const auto fit = [&](std::span<const std::size_t> some, const EdgePrior& prior) {
-    for (const std::size_t i : some) found[i].fit(prior);
+    for (const std::size_t i : some) edges[i].fit(prior);
   };
-  std::vector<std::vector<SeenTag::Corners>> corners(found.size());
   std::vector<double> costs;
+  std::vector<SeenTag::Corners> without_curve;
   for (const double gamma : kGammas) {
     if (gamma != 1) fit(asked, {gamma});
-    costs.push_back(cost_of(found, asked));
+    costs.push_back(cost_of(edges, asked));
     if (costs.size() == 2 && costs[1] > costs[0] + surely) break;
     if (gamma != 1) fit(others, {gamma});
-    const EdgePrior prior = with_blur_of(found, {gamma});
+    const EdgePrior prior = with_blur_of(edges, {gamma});
     if (prior.blur_weight > 0) fit(widest, prior);
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const auto& before = corners[i].empty() ? exact[i]->corners_px : corners[i].back();
-      corners[i].push_back(found[i].crossed().value_or(before));
+    for (const std::size_t i : widest) corners[i] = edges[i].crossed().value_or(corners[i]);
+    if (gamma == 1) {
+      without_curve = corners;
+    } else {
+      for (std::size_t i = 0; i < tags.size(); ++i) {
+        tags[i].behind_curves_px.push_back(corners[i]);
+      }
     }
   }
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    exact[i]->corners_px = corners[i].front();
-    exact[i]->behind_curves_px.assign(corners[i].begin() + 1, corners[i].end());
-  }
+  for (std::size_t i = 0; i < tags.size(); ++i) tags[i].corners_px = without_curve[i];
   return costs;
 }
 

@@ -27,4 +27,12 @@ TagFamily tag_family(const std::string& name) {
   throw std::invalid_argument("there is no tag family " + name);
 }
 
+int width_in_bits(const apriltag_family_t& family, int border_bits) {
+  return family.width_at_border + 2 * (border_bits - 1);
+}
+
+bool is_white(const apriltag_family_t& family, int id, uint32_t bit) {
+  return ((family.codes[id] >> (family.nbits - 1 - bit)) & 1) != 0;
+}
+
 }  // namespace vlp

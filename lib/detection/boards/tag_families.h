@@ -15,4 +15,10 @@ using TagFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*
 /// detectors. Throws std::invalid_argument.
 TagFamily tag_family(const std::string& name);
 
+/// How many bits wide a tag is whose border is printed border_bits wide, for the family's one.
+int width_in_bits(const apriltag_family_t& family, int border_bits);
+
+/// Whether a bit of a tag, one of family.nbits, is white.
+bool is_white(const apriltag_family_t& family, int id, uint32_t bit);
+
 }  // namespace vlp

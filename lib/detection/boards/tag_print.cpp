@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detection/boards/tag_print.h"
 
-#include <algorithm>
-
 namespace vlp {
 
 TagPrint::TagPrint(const Board& board)
     : family_(tag_family(board.family)),
-      width_(family_->width_at_border + 2 * (board.border_bits - 1)),
+      width_(width_in_bits(*family_, board.border_bits)),
       inside_(board.border_bits),
       outside_(family_->reversed_border ? 1 : board.tag_spacing * width_) {}
 
@@ -17,7 +15,7 @@ TagPrint::Sides TagPrint::white_behind(int id) const {
   if (family_->reversed_border) return sides;
   const int last = static_cast<int>(width_) - 1, border = static_cast<int>(inside_);
   for (uint32_t bit = 0; bit < family_->nbits; ++bit) {
-    if (((family_->codes[id] >> (family_->nbits - 1 - bit)) & 1) == 0) continue;
+    if (!is_white(*family_, id, bit)) continue;
     const int x = static_cast<int>(family_->bit_x[bit]) + border - 1;  // from the top left
     const int y = static_cast<int>(family_->bit_y[bit]) + border - 1;
     const std::array<int, 4> along{x, last - y, last - x, y}, deep{last - y, last - x, y, x};

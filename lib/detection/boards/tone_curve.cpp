@@ -9,13 +9,13 @@
 namespace vlp {
 namespace {
 
-/// Three of kGammas, from `first` on, and x, y of the parabola through values there.
+/// Through values at three of kGammas, from `first` on, over x, the logarithm of gamma.
 struct Parabola {
   std::size_t first;
 
   double x(std::size_t i) const { return std::log(kGammas[first + i]); }
 
-  /// The weights of the three values at x.
+  /// What the three values count at an x.
   std::array<double, 3> weights(double at) const {
     std::array<double, 3> weights{1, 1, 1};
     for (std::size_t i = 0; i < 3; ++i) {

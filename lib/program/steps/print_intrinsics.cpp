@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "camera/spline_grid.h"
 #include "geometry/angles.h"
@@ -20,8 +21,9 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("rms           {:.3f} px per axis\n", solution.rms_px);
   if (std::any_of(solution.edge_shifts_px.begin(), solution.edge_shifts_px.end(),
                   [](double shift_px) { return shift_px != 0; })) {
-    fmt::print("edges         {:.3f} px towards the dark, taken out\n",
-               upper_median(solution.edge_shifts_px));
+    const double shift_px = upper_median(solution.edge_shifts_px);
+    fmt::print("edges         {:.3f} px towards the {}, taken out\n", std::abs(shift_px),
+               shift_px < 0 ? "light" : "dark");
   }
   fmt::print("focal length  {:.2f}, {:.2f} px", parameters[0], parameters[1]);
   if (is_splined(solution.problem.lens_model)) {

@@ -4,9 +4,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "detection/image_file.h"
 #include "rig/board.h"
@@ -56,8 +58,19 @@ TEST(CornerCache, KeepsCornersBehindCurves) {
     table.at<uchar>(i) = cv::saturate_cast<uchar>(255 * std::pow(i / 255.0, 1 / 1.8));
   }
   cv::LUT(coded, table, coded);
+  // One tag, of which an edge looks otherwise, keeps libapriltag's corners.
+  const SeenTag whole = BoardDetector(board).detect(coded).tags.at(7);
+  const Eigen::Vector2d from = whole.corners_px[0], to = whole.corners_px[1];
+  const Eigen::Vector2d outwards = 4 * (from - whole.corners_px[3]).normalized();
+  for (const double share : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85}) {
+    const Eigen::Vector2d at = from + share * (to - from) + outwards;
+    cv::circle(coded, cv::Point2d(at.x(), at.y()), 1, cv::Scalar(0), -1);
+  }
   const BoardView view{"coded.png", {coded.cols, coded.rows}, BoardDetector(board).detect(coded)};
   ASSERT_EQ(view.seen.curve_costs.size(), 5U);
+  const auto spoilt = std::ranges::find(view.seen.tags, whole.id, &SeenTag::id);
+  ASSERT_NE(spoilt, view.seen.tags.end());
+  ASSERT_EQ(spoilt->behind_curves_px, std::vector<SeenTag::Corners>(4, spoilt->corners_px));
   cv::imwrite(folder / "coded.png", coded);
   const SourceImage image(folder / "coded.png");
   const BoardCache cache = corner_cache(folder / "cache", board);
