@@ -109,9 +109,15 @@ TEST(WriteFile, KilledAtAnyMomentLeavesTheOldFileOrTheNew) {
   int times_changed = 0;
   std::size_t last = 1;
   for (int round = 0; round < 100; ++round) {
+    int begun[2];
+    ASSERT_EQ(::pipe(begun), 0);
     const pid_t child = start_child([&] {
+      if (::write(begun[1], "", 1) != 1) ::_exit(1);
       for (std::size_t i = last + 1;; ++i) write_file(file, contents[i % 2]);
     });
+    char sign;
+    ASSERT_EQ(::read(begun[0], &sign, 1), 1);  // a busy machine may take long to start it
+    for (const int end : begun) ::close(end);
     std::this_thread::sleep_for(time_of_two_writes * double(random() % 1000) / 1000);
     kill_child(child);
     const std::string found = folder.content_of(file);
