@@ -8,6 +8,7 @@
 #   scripts/setup.sh --build    to build the programs and run them
 #   scripts/setup.sh [--tests]  also what the tests, the benchmarks and the checks of the code need
 #   scripts/setup.sh --batch    also what scripts/reprocess.sh and its tests need
+#   scripts/setup.sh --root     only what tests/bare_root.sh needs
 set -euo pipefail
 
 build=(
@@ -26,18 +27,20 @@ tests=(
   postgresql postgresql-client tmux util-linux  # of the station
   pybind11-dev python3-dev python3-numpy python3-pil  # of the Python module
   chromium-headless-shell python3  # the report is opened in a browser
-  debootstrap lintian  # of tests/bare_root.sh and tests/packages.sh
+  lintian  # of tests/packages.sh
   groff zsh  # manual pages and completions are checked by them
   abigail-tools  # the library's ABI is
   python3-jsonschema  # documents of JSON are held against datasets/schemas
 )
+root=(debootstrap)
 # Snakemake, and a Slurm on one machine for the tests of its profile.
 batch=(snakemake slurmctld slurmd slurm-client munge procps)
 case ${1:---tests} in
   --build) packages=("${build[@]}") ;;
-  --tests) packages=("${build[@]}" "${tests[@]}") ;;
-  --batch) packages=("${build[@]}" "${tests[@]}" "${batch[@]}") ;;
-  *) echo "setup.sh: unknown option $1; there are --build, --tests and --batch" >&2; exit 2 ;;
+  --tests) packages=("${build[@]}" "${tests[@]}" "${root[@]}") ;;
+  --batch) packages=("${build[@]}" "${tests[@]}" "${root[@]}" "${batch[@]}") ;;
+  --root) packages=("${root[@]}") ;;
+  *) echo "setup.sh: unknown option $1; there are --build, --tests, --batch and --root" >&2; exit 2 ;;
 esac
 
 missing=()
