@@ -115,9 +115,10 @@ TEST(WriteFile, KilledAtAnyMomentLeavesTheOldFileOrTheNew) {
       if (::write(begun[1], "", 1) != 1) ::_exit(1);
       for (std::size_t i = last + 1;; ++i) write_file(file, contents[i % 2]);
     });
+    ::close(begun[1]);
     char sign;
     ASSERT_EQ(::read(begun[0], &sign, 1), 1);  // a busy machine may take long to start it
-    for (const int end : begun) ::close(end);
+    ::close(begun[0]);
     std::this_thread::sleep_for(time_of_two_writes * double(random() % 1000) / 1000);
     kill_child(child);
     const std::string found = folder.content_of(file);
