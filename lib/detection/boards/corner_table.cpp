@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <optional>
 #include <set>
@@ -22,9 +23,14 @@ namespace {
 
 /// The corners of an image: of its tags in the order in which the table has them first.
 struct ImageCorners {
+  struct Corner {
+    Eigen::Vector2d pixel;
+    EdgeBow bow;
+  };
+
   std::string image;
   std::vector<int> tags;
-  std::map<int, std::array<std::optional<Eigen::Vector2d>, 4>> of_tag;
+  std::map<int, std::array<std::optional<Corner>, 4>> of_tag;
   std::vector<SeenPoint> points;
 };
 
@@ -36,7 +42,9 @@ SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
     for (std::size_t k = 0; k < 4; ++k) {
       const auto& corner = corners.of_tag[id][k];
       whole = whole && corner;
-      if (corner) tag.corners_px[k] = *corner;
+      if (!corner) continue;
+      tag.corners_px[k] = corner->pixel;
+      tag.bows[k] = corner->bow;
     }
     if (!whole) {
       seen.unusable += ids.contains(id) ? 1 : 0;
@@ -50,6 +58,17 @@ SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
   std::sort(seen.points.begin(), seen.points.end(),
             [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
   return seen;
+}
+
+constexpr std::array kBowColumns{"bow_square_px", "bow_cube_px", "bow_reach"};
+
+EdgeBow bow_of(const CsvTable& csv, std::size_t row) {
+  std::array<double, 3> figures{};
+  for (std::size_t i = 0; i < figures.size(); ++i) {
+    if (const auto column = csv.optional(kBowColumns[i])) figures[i] = csv.number(row, *column);
+  }
+  const auto [square_px, cube_px, reach] = figures;
+  return {square_px, cube_px, reach};
 }
 
 /// Counted as board.yaml says, points of another board do not lie in rows.
@@ -139,7 +158,7 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
     if (first) corners.tags.push_back(id);
     auto& place = tag->second[static_cast<std::size_t>(corner)];
     if (place) throw twice();
-    place = pixel;
+    place = {pixel, bow_of(csv, row)};
   }
   if (images.empty()) throw InputError(file, "holds no corner");
   if (too_many_outside(outside, seen)) throw InputError(*first_outside);
@@ -163,7 +182,11 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
                         const Board& board) {
   const bool squares = board.has_squares();
   std::vector<std::string> header{"image", "tag", "corner", "u_px", "v_px"};
-  if (squares) header.erase(header.begin() + 1);
+  if (squares) {
+    header.erase(header.begin() + 1);
+  } else {
+    header.insert(header.end(), kBowColumns.begin(), kBowColumns.end());
+  }
   CsvWriter csv(file, header);
   for (const BoardView& view : views) {
     const SeenBoard& seen = view.seen;
@@ -183,7 +206,9 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
       for (const SeenTag& tag : *each) {
         for (std::size_t k = 0; k < 4; ++k) {
           csv.row({view.image, std::to_string(tag.id), std::to_string(k),
-                   shortest(tag.corners_px[k].x()), shortest(tag.corners_px[k].y())});
+                   shortest(tag.corners_px[k].x()), shortest(tag.corners_px[k].y()),
+                   shortest(tag.bows[k].square_px), shortest(tag.bows[k].cube_px),
+                   shortest(tag.bows[k].reach)});
         }
       }
     }
