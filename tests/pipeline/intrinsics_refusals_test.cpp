@@ -106,6 +106,29 @@ TEST_F(IntrinsicsRefusals, NamesWhatIsWrongWithTheBoard) {
   EXPECT_THAT(spacing.errors, HasSubstr("tag_spacing is 0.5, but the images show gaps of "));
 }
 
+TEST_F(IntrinsicsRefusals, NamesTheOrderOfASquareKalibrBoard) {
+  std::string scene =
+      TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
+  const std::string rows = "rows: 5,";
+  scene.replace(scene.find(rows), rows.size(), "rows: 6,");
+  const std::string file = folder.file("scene.yaml", scene).string();
+  const std::string rig = (folder / "rig").string();
+  ASSERT_EQ(run_program("vlp-simulate -q " + file + " --only sample-boards -o " + rig).exit_code,
+            0);
+  const std::string board = TemporaryFolder::content_of(rig + "/board.yaml");
+  const std::string right = "row-major-from-bottom-left";
+  for (const char* wrong : {"row-major-from-top-left", "row-major-from-bottom-right",
+                            "column-major-from-top-left", "column-major-from-bottom-right"}) {
+    std::string changed = board;
+    changed.replace(changed.find(right), right.size(), wrong);
+    const auto result =
+        calibrate(rig + "/sample-boards", folder.file("board.yaml", changed).string());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.errors,
+                HasSubstr("board.yaml: the images show cols 6, rows 6, id_order " + right));
+  }
+}
+
 TEST_F(IntrinsicsRefusals, RefusesMixedSizesAndSkipsWhatIsNoImage) {
   const std::string images = copies({"0.png", "1.png"});
   folder.file("images/2.png", "no image\n");
