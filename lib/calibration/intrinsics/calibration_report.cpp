@@ -23,7 +23,8 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   const ProjectionUncertainty uncertainty(solution, input.lattice);
   const Lens lens = solution.lens();
   const Eigen::MatrixXd by_views = covariance_by_views(solution);
-  ImageRegion region = known_region(seen_px(solution.problem), input.imager_px, lens.model());
+  ImageRegion region =
+      known_region(seen_px(solution.problem), input.imager_px, lens.model(), solution.another_fits);
   // Beyond it splines are anything.
   const ImageRegion compared = is_splined(lens.model()) ? region : ImageRegion();
   const auto expected =
