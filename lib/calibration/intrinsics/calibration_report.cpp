@@ -58,6 +58,17 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
     report.uncertainty_worst_at = pixel;
   }
   report.uncertainty_mean_px /= std::max(inside, 1.0);
+  if (!is_splined(lens.model())) {
+    // Of few views each of them may chance to be small.
+    const ProjectionUncertainty independent(solution);
+    for (const Eigen::MatrixXd& covariance :
+         {uncertainty.intrinsics_covariance(), independent.intrinsics_covariance(), by_views}) {
+      if (!covariance.allFinite()) continue;
+      report.uncertainty_worst_px =
+          std::max(report.uncertainty_worst_px,
+                   expected_worst_px(lens, input.imager_px, covariance, report.region));
+    }
+  }
   const IntrinsicsSolution even = solve_every_other(solution, 0);
   const IntrinsicsSolution odd = solve_every_other(solution, 1);
   if (!even.ok() || !odd.ok()) return report;
