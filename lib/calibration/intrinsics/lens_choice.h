@@ -43,8 +43,8 @@ struct FisheyeFit {
 /// Nothing when none fits the views to 2 px. input.lens_model is not looked at.
 std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input);
 
-/// Whether there may be corners far off the axis, 40 degrees or more by the focal length with which the
-/// views' poses fit best. Takes a small part of the time of a solve.
+/// Whether there may be corners far off the axis, 40 degrees or more by the focal length with which
+/// the views' poses fit best. Takes a small part of the time of a solve.
 bool may_be_wide(const IntrinsicsInput& input);
 
 /// The lens model that the views call for, by cross-validation: the views go into three parts in
