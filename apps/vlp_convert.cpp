@@ -4,10 +4,12 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/camera_imports.h"
+#include "calibration/intrinsics/known_region.h"
 #include "program/app.h"
 #include "program/steps/history.h"
 #include "rig/file.h"
@@ -20,15 +22,32 @@ struct Options {
   std::string input, output, to = "calibration", lens, camera_id;
 };
 
-std::string text_of(const Options& options, const Camera& camera) {
-  if (options.to == "mrcal") return mrcal_cameramodel(camera);
+std::string text_of(const Options& options, const Camera& camera, const ImageRegion& region) {
+  if (options.to == "mrcal") return mrcal_cameramodel(camera, region);
   if (options.to == "opencv") return opencv_camera(camera);
   return options.to == "ros" ? ros_camera_info(camera) : kalibr_camchain(camera);
 }
 
+/// Of the calibration only where the lens is known.
+std::optional<IntrinsicsReport> report_of(const ImageRegion& region) {
+  if (region.empty()) return std::nullopt;
+  IntrinsicsReport report{};
+  report.region_px = region;
+  return report;
+}
+
+void print_region(const Options& options, const Camera& camera, const ImageRegion& region) {
+  if (region.empty()) return;
+  const bool kept = options.to == "calibration" || options.to == "mrcal";
+  fmt::print("known         in {:.1f} % of the image, which {}\n",
+             100 * share_of_image(region, camera.imager_px),
+             kept ? "is kept" : "the format cannot say");
+}
+
 void run(const CLI::App& app, const Options& options) {
   check_output(options.output, {options.input});
-  FittedCamera fitted{read_any_camera(options.input), 0, 1};
+  const auto [read, region] = read_any_camera(options.input);
+  FittedCamera fitted{read, 0, 1};
   const std::string was(name_of(fitted.camera.lens_model));
   if (!options.lens.empty()) {
     fitted = with_lens_model(fitted.camera, *lens_model_from_name(options.lens));
@@ -36,9 +55,10 @@ void run(const CLI::App& app, const Options& options) {
   Camera& camera = fitted.camera;
   if (!options.camera_id.empty()) camera.id = options.camera_id;
   if (options.to == "calibration") {
-    write_calibration(options.output, with_camera(camera, {}, history_entry(app, {options.input})));
+    write_calibration(options.output,
+                      with_camera(camera, report_of(region), history_entry(app, {options.input})));
   } else {
-    write_file(options.output, text_of(options, camera));
+    write_file(options.output, text_of(options, camera, region));
   }
   if (options.to == "calibration") {
     fmt::print("kept          the camera alone; vlp-rotation and vlp-dispersion add the rest\n");
@@ -51,6 +71,7 @@ void run(const CLI::App& app, const Options& options) {
         "lens          {}, fitted to {}: {:.3g} px apart at worst, over {:.1f} % of the image\n",
         name_of(camera.lens_model), was, fitted.worst_px, 100 * fitted.share);
   }
+  print_region(options, camera, region);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace vlp {
@@ -23,10 +24,12 @@ double Fisheye::valid_angle_rad() const {
   return std::numbers::pi;
 }
 
-std::optional<double> Fisheye::angle_rad(double at_distance, double valid_rad) const {
+double Fisheye::angle_rad(double at_distance, double valid_rad, double start_rad) const {
   constexpr double rounding = 1e-14;  // of the distance at the very end, from which it came
-  if (!(at_distance <= distance(valid_rad) * (1 + rounding))) return std::nullopt;
-  double low = 0, high = valid_rad, angle = std::min(at_distance, valid_rad);
+  if (!(at_distance <= distance(valid_rad) * (1 + rounding))) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  double low = 0, high = valid_rad, angle = start_rad;
   constexpr int most_steps = 60;
   for (int i = 0; i < most_steps; ++i) {
     const double error = distance(angle) - at_distance;
@@ -35,12 +38,36 @@ std::optional<double> Fisheye::angle_rad(double at_distance, double valid_rad) c
     if (!(next >= low && next <= high)) next = (low + high) / 2;
     const double moved = std::abs(next - angle);
     angle = next;
-    if (moved <= 1e-9 * angle) {  // Newton squares it
-      if (moved > 0) angle -= (distance(angle) - at_distance) / slope(angle);
-      break;
-    }
+    if (moved <= 1e-7 * angle) break;  // Newton squares it
   }
   return std::clamp(angle, 0.0, valid_rad);
+}
+
+FisheyeAngles::FisheyeAngles(const Fisheye& fisheye)
+    : fisheye_(fisheye), valid_rad_(fisheye.valid_angle_rad()) {
+  const double interval = fisheye.distance(valid_rad_) / kIntervals;
+  intervals_per_distance_ = 1 / interval;
+  double from = 0, from_slope = interval / fisheye.slope(0);
+  for (int i = 0; i < kIntervals; ++i) {
+    const double start = std::min(from + from_slope, valid_rad_);
+    const double to =
+        i + 1 == kIntervals ? valid_rad_ : fisheye.angle_rad((i + 1) * interval, valid_rad_, start);
+    // At a fold the angle goes up at once.
+    const double way = to - from, steepest = 3 * way;
+    const double to_slope = std::min(interval / fisheye.slope(to), steepest);
+    starts_[static_cast<std::size_t>(i)] = {from, from_slope, 3 * way - 2 * from_slope - to_slope,
+                                            from_slope + to_slope - 2 * way};
+    from = to, from_slope = to_slope;
+  }
+}
+
+double FisheyeAngles::start_for(double distance) const {
+  const double at = distance * intervals_per_distance_;
+  const int interval = at < kIntervals ? static_cast<int>(at) : kIntervals - 1;
+  const double x = at - interval;
+  const auto& [a, b, c, d] = starts_[static_cast<std::size_t>(interval)];
+  // In this order 0 where it is not a number.
+  return std::min(valid_rad_, std::max(0.0, a + x * (b + x * (c + x * d))));
 }
 
 }  // namespace vlp

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 
 namespace vlp {
 
@@ -29,9 +28,33 @@ struct Fisheye {
   /// pixel, and the model describes no lens.
   double valid_angle_rad() const;
 
-  /// The angle up to valid_rad that lands there, by Newton's method in a shrinking bracket; nothing
-  /// when none does. Precondition: distance >= 0, valid_rad = valid_angle_rad().
-  std::optional<double> angle_rad(double at_distance, double valid_rad) const;
+  /// The angle up to valid_rad that lands there, by Newton's method in a shrinking bracket from
+  /// start_rad; not a number when none does. Preconditions: distance >= 0, valid_rad =
+  /// valid_angle_rad(), the start is within 0 and that.
+  double angle_rad(double at_distance, double valid_rad, double start_rad) const;
+};
+
+/// The angles of a lens, from a table that leaves Newton's method a step.
+class FisheyeAngles {
+ public:
+  explicit FisheyeAngles(const Fisheye& fisheye);
+
+  double valid_rad() const { return valid_rad_; }
+  /// As Fisheye::angle_rad().
+  double operator()(double distance) const {
+    return fisheye_.angle_rad(distance, valid_rad_, start_for(distance));
+  }
+
+ private:
+  double start_for(double distance) const;
+
+  Fisheye fisheye_;
+  double valid_rad_;
+  /// Of equal intervals of the distance, the angle as a cubic polynomial of the share of it, the
+  /// constant first.
+  static constexpr int kIntervals = 64;
+  double intervals_per_distance_;
+  std::array<std::array<double, 4>, kIntervals> starts_;
 };
 
 }  // namespace vlp

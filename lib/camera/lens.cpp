@@ -189,9 +189,9 @@ class Splined : public LensFamily {
     const auto u = surface_.undistorted(plane, d_plane_d_u);
     if (!u) return std::nullopt;
     const Eigen::Matrix2d d_u_d_plane = d_plane_d_u.inverse();
-    Ray ray;
-    ray.direction << *u, 1 - u->squaredNorm() / 4;
-    ray.d_direction_d_plane << d_u_d_plane, -u->transpose() / 2 * d_u_d_plane;
+    std::optional<Ray> ray(std::in_place);
+    ray->direction << *u, 1 - u->squaredNorm() / 4;
+    ray->d_direction_d_plane << d_u_d_plane, -u->transpose() / 2 * d_u_d_plane;
     return ray;
   }
 
@@ -201,14 +201,12 @@ class Splined : public LensFamily {
 
 class OpencvFisheye : public LensFamily {
  public:
-  explicit OpencvFisheye(std::span<const double> distortions) {
-    std::copy(distortions.begin(), distortions.end(), fisheye_.k.begin());
-    valid_angle_rad_ = fisheye_.valid_angle_rad();
-  }
+  explicit OpencvFisheye(std::span<const double> k)
+      : fisheye_{{k[0], k[1], k[2], k[3]}}, angles_(fisheye_) {}
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x) const override {
     const double beside = x.head<2>().norm();
     const double angle_rad = std::atan2(beside, x.z());
-    if (!x.allFinite() || !(angle_rad <= valid_angle_rad_) || !(beside > 0 || x.z() > 0)) {
+    if (!x.allFinite() || !(angle_rad <= angles_.valid_rad()) || !(beside > 0 || x.z() > 0)) {
       return std::nullopt;
     }
     return x.head<2>() * (fisheye_.distance(angle_rad) / std::max(beside, kOnAxis));
@@ -221,7 +219,7 @@ class OpencvFisheye : public LensFamily {
   static constexpr double kOnAxis = 1e-300;
 
   Fisheye fisheye_;
-  double valid_angle_rad_;
+  FisheyeAngles angles_;
 };
 
 LensFamily::Jacobians OpencvFisheye::jacobians(const Eigen::Vector3d& x) const {
@@ -248,18 +246,18 @@ LensFamily::Jacobians OpencvFisheye::jacobians(const Eigen::Vector3d& x) const {
 
 std::optional<LensFamily::Ray> OpencvFisheye::unproject(const Eigen::Vector2d& plane) const {
   const double distance = plane.norm();
-  const auto angle_rad = fisheye_.angle_rad(distance, valid_angle_rad_);
-  if (!angle_rad) return std::nullopt;
-  const double sine = std::sin(*angle_rad), cosine = std::cos(*angle_rad);
+  const double angle_rad = angles_(distance);
+  if (std::isnan(angle_rad)) return std::nullopt;
+  const double sine = std::sin(angle_rad), cosine = std::cos(angle_rad);
   const bool on_axis = distance <= kOnAxis;
-  const Eigen::Vector2d way = on_axis ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(plane / distance);
-  const double across = on_axis ? 1 : sine / distance;
-  Ray ray;
-  ray.direction << across * plane, cosine;
-  const double slope = fisheye_.slope(*angle_rad);
-  ray.d_direction_d_plane.topRows<2>() =
-      across * Eigen::Matrix2d::Identity() + (cosine / slope - across) * way * way.transpose();
-  ray.d_direction_d_plane.row(2) = -sine / slope * way.transpose();
+  const double inverse = on_axis ? 0 : 1 / distance, across = on_axis ? 1 : sine * inverse;
+  const double x = plane.x() * inverse, y = plane.y() * inverse;
+  const double by_slope = 1 / fisheye_.slope(angle_rad), more = cosine * by_slope - across;
+  std::optional<Ray> ray(std::in_place);
+  ray->direction << across * plane, cosine;
+  ray->d_direction_d_plane << across + more * x * x, more * x * y,  //
+      more * x * y, across + more * y * y,                          //
+      -sine * by_slope * x, -sine * by_slope * y;
   return ray;
 }
 

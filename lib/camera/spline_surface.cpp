@@ -134,20 +134,30 @@ SplineSurface::Weights SplineSurface::weights(const Eigen::Vector2d& u) const {
   return grid_.order == 2 ? weights_of<2>(u) : weights_of<3>(u);
 }
 
+template <int Order>
 std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
                                                      const Eigen::Vector2d& distorted,
                                                      Eigen::Matrix2d& d_distorted_d_u) const {
   constexpr int most_steps = 50, most_halvings = 12;
   constexpr double rounding = 1e-12;  // of the reach, from which the pixel may have come
-  Value at = (*this)(u);
-  Eigen::Vector2d error = at.distorted - distorted;
-  for (int iteration = 0; iteration < most_steps; ++iteration) {
+  Eigen::Vector2d from = u, step(0, 0);
+  double least = std::numeric_limits<double>::infinity();
+  for (int steps = 0, halvings = 0; steps < most_steps;) {
+    // In one place, so that it is compiled into the loop.
+    const Value at = value<Order>(u);
+    const Eigen::Vector2d error = at.distorted - distorted;
+    if (!(error.squaredNorm() < least)) {  // Halved until it helps.
+      if (++halvings == most_halvings) return std::nullopt;
+      step /= 2;
+      u = within_reach(from + step);
+      continue;
+    }
     const Eigen::Matrix2d& j = at.d_distorted_d_u;
     const double determinant = j.determinant();
     if (!(determinant > 0)) return std::nullopt;
-    Eigen::Vector2d step = Eigen::Vector2d(j(0, 1) * error.y() - j(1, 1) * error.x(),
-                                           j(1, 0) * error.x() - j(0, 0) * error.y()) /
-                           determinant;
+    step = Eigen::Vector2d(j(0, 1) * error.y() - j(1, 1) * error.x(),
+                           j(1, 0) * error.x() - j(0, 0) * error.y()) /
+           determinant;
     // Newton squares the error: after a step of 1e-6 1e-12 is left.
     if (step.squaredNorm() <= 1e-12) {
       u += step;
@@ -157,23 +167,17 @@ std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
       d_distorted_d_u = j;
       return within_reach(u);
     }
-    // Halved until it helps.
-    for (int halving = 0;; ++halving, step /= 2) {
-      if (halving == most_halvings) return std::nullopt;
-      const Eigen::Vector2d next = within_reach(u + step);
-      const Value next_at = (*this)(next);
-      const Eigen::Vector2d next_error = next_at.distorted - distorted;
-      if (!(next_error.squaredNorm() < error.squaredNorm())) continue;
-      u = next, at = next_at, error = next_error;
-      break;
-    }
+    from = u, least = error.squaredNorm(), halvings = 0, ++steps;
+    u = within_reach(from + step);
   }
   return std::nullopt;
 }
 
 std::optional<Eigen::Vector2d> SplineSurface::undistorted(const Eigen::Vector2d& distorted,
                                                           Eigen::Matrix2d& d_distorted_d_u) const {
-  return search(start_for(distorted), distorted, d_distorted_d_u);
+  const Eigen::Vector2d start = start_for(distorted);
+  return grid_.order == 2 ? search<2>(start, distorted, d_distorted_d_u)
+                          : search<3>(start, distorted, d_distorted_d_u);
 }
 
 Eigen::Vector2d SplineSurface::start_for(const Eigen::Vector2d& distorted) const {

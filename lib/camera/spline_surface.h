@@ -60,7 +60,8 @@ class SplineSurface {
   template <int Order>
   Weights weights_of(const Eigen::Vector2d& u) const;
   template <int Order>
-  Value value(const Eigen::Vector2d& u) const;
+  inline Value value(const Eigen::Vector2d& u) const;
+  template <int Order>
   std::optional<Eigen::Vector2d> search(Eigen::Vector2d u, const Eigen::Vector2d& distorted,
                                         Eigen::Matrix2d& d_distorted_d_u) const;
   Eigen::Vector2d within_reach(const Eigen::Vector2d& u) const {

@@ -54,12 +54,13 @@ std::string camera_table(const Camera& camera) {
 }
 
 std::string intrinsics_table(const IntrinsicsReport& report) {
-  HtmlTable table{"Lens calibration",
-                  {},
-                  {{"views of the board", std::to_string(report.views)},
-                   {"corners", std::to_string(report.corners)},
-                   {"outliers", std::to_string(report.outliers)},
-                   {"residual, rms per axis", significant(report.rms_px, 3) + " px"}}};
+  HtmlTable table{"Lens calibration", {}, {}};
+  if (report.views > 0) {
+    table.rows = {{"views of the board", std::to_string(report.views)},
+                  {"corners", std::to_string(report.corners)},
+                  {"outliers", std::to_string(report.outliers)},
+                  {"residual, rms per axis", significant(report.rms_px, 3) + " px"}};
+  }
   if (report.uncertainty_px) {
     table.rows.push_back({"worst uncertainty of the projection, one standard deviation",
                           significant(*report.uncertainty_px, 3) + " px"});

@@ -34,7 +34,8 @@ struct Camera {
   Eigen::Vector2d center_px() const { return {intrinsics[2], intrinsics[3]}; }
 };
 
-/// What the intrinsic calibration says of itself.
+/// What the intrinsic calibration says of itself; without views, of a lens that another program
+/// calibrated, the region alone.
 struct IntrinsicsReport {
   int views;
   int corners;
@@ -49,7 +50,7 @@ struct IntrinsicsReport {
   /// Of the intrinsics, in their order; of a splined lens, none or of fx, fy, cx, cy alone, as
   /// wherever errors of the intrinsics are told of below.
   std::optional<MatrixX> covariance = {};
-  /// Where the lens is known, a convex polygon of three corners or more; empty: all over the image.
+  /// Where the lens is known, the corners of a polygon in turn; empty: all over the image.
   std::vector<Eigen::Vector2d> region_px = {};
 };
 

@@ -425,7 +425,7 @@ class SessionRun {
     return step("lens", {camera}, unused, [&] {
       const auto report = read_calibration(camera).intrinsics_report;
       Work work;
-      if (report) work.result.metrics = {{"rms_px", report->rms_px}};
+      if (report && report->views > 0) work.result.metrics = {{"rms_px", report->rms_px}};
       if (!unused.empty()) {
         work.result.warnings.push_back(
             "camera.yaml says what the camera is: not used is what was stated of its " + unused);

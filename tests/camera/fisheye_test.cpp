@@ -77,6 +77,29 @@ TEST(Fisheye, HasItsJacobiansBeyondNinetyDegrees) {
   }
 }
 
+TEST(Fisheye, ComesBackToThePixelUpToWhereItEnds) {
+  for (const std::array<double, 4>& k : {std::array<double, 4>{0, 0, 0, 0},
+                                         {0.03, -0.012, 0.004, -0.0006},
+                                         {-0.1, 0, 0, 0},
+                                         {-0.4, 0.3, 0, 0},
+                                         {5, 40, 300, 1000},
+                                         {-1e4, 0, 0, 0},
+                                         {1e4, 0, 0, 0}}) {
+    const Lens lens(LensModel::fisheye, std::array{300.0, 301.0, 0.0, 0.0, k[0], k[1], k[2], k[3]});
+    const Fisheye fisheye{k};
+    const double edge = fisheye.distance(fisheye.valid_angle_rad());
+    for (int i = 0; i <= 1000; ++i) {
+      const double share = i < 900 ? i / 900.0 : 1 - std::pow(10.0, -2 - (i - 900) / 7.0);
+      const Eigen::Vector2d pixel(300 * edge * share * 0.6, 301 * edge * share * 0.8);
+      const auto ray = lens.unproject(pixel);
+      ASSERT_TRUE(ray) << k[0] << " " << share;
+      const auto back = lens.project(ray->direction);
+      ASSERT_TRUE(back) << k[0] << " " << share;
+      ASSERT_LT((*back - pixel).norm(), 1e-8 * std::max(1.0, edge)) << k[0] << " " << share;
+    }
+  }
+}
+
 TEST(Fisheye, EndsWhereItFolds) {
   const Fisheye fisheye{{-0.1, 0, 0, 0}};  // d' = 1 - 0.3 a^2
   const double fold_rad = std::sqrt(1 / 0.3);

@@ -158,7 +158,7 @@ TEST_F(CornerFiles, GiveTheLensOfTheImagesToTheLastBit) {
     break;
   }
   ASSERT_LT(theirs_px, right_px);
-  const Camera found = read_any_camera(folder / "mrcal/camera-0.cameramodel");
+  const Camera found = read_any_camera(folder / "mrcal/camera-0.cameramodel").camera;
   const Lens theirs(found.lens_model, found.intrinsics);
   EXPECT_LT(projection_difference(theirs, here, imager_px, one)->worst_px, 0.01);
   // mrcal counts the corners that are not seen, too, and its regularization.

@@ -87,6 +87,17 @@ TEST(Report, ShowsEachPartOfTheCalibrationAndItsHistory) {
   }
 }
 
+TEST(Report, OfALensByAnotherProgramSaysWhereItIsKnownAlone) {
+  Calibration calibration;
+  calibration.camera = {"cam-9", {800, 600}, LensModel::pinhole, {500, 501, 400, 300}, {}, {}, {}};
+  calibration.intrinsics_report.emplace();
+  calibration.intrinsics_report->region_px = {{0, 0}, {500, 0}, {500, 599}};
+  const Report report{"cam-9", {}, {}, {}, calibration, {}, {}};
+  const std::string html = report_html(report);
+  EXPECT_THAT(html, HasSubstr("where the board was seen, region_px"));
+  EXPECT_THAT(html, Not(HasSubstr("views of the board")));
+}
+
 TEST(Report, OrdersPicturesByTheirParts) {
   Report report{"a", {}, {}, {}, {}, {}, {}};
   report.pictures = {{ReportPart::distribution, "<svg>", "second", "b"},

@@ -94,7 +94,9 @@ std::vector<BoardLattice::Corner> BoardLattice::corners(const SeenBoard& seen) c
                      tag.corners_px[k],
                      parts_ == 1 ? 0 : k,
                      static_cast<std::size_t>(row * cols_ + col),
-                     touching_ ? Eigen::Vector2d::Zero() : inward_at(tag, k)});
+                     touching_ ? Eigen::Vector2d::Zero() : inward_at(tag, k),
+                     1,
+                     tag.bows[k]});
     }
   }
   return all;

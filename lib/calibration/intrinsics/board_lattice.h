@@ -42,6 +42,8 @@ class BoardLattice {
     Eigen::Vector2d inward{0, 0};
     /// What its residual is multiplied by.
     double weight = 1;
+    /// Of its tag's edge to the tag's next corner.
+    EdgeBow bow = {};
   };
   /// Every corner of what was seen, of a flat board: its points, or four of each tag, in its order.
   std::vector<Corner> corners(const SeenBoard& seen) const;

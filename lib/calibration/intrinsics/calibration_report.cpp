@@ -10,6 +10,7 @@
 
 #include <Eigen/Geometry>
 
+#include "calibration/intrinsics/edge_bow.h"
 #include "calibration/intrinsics/edge_shift.h"
 #include "calibration/intrinsics/expected_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
@@ -93,6 +94,7 @@ std::vector<double> held_out_rms_px(const IntrinsicsSolution& solution,
   const Lens lens = solution.lens();
   auto views = held_out.views;
   for (auto& view : views) {
+    take_bows_of_lens(view, lens);
     view = held_out.lattice.bent(std::move(view), solution.problem.warp_m);
   }
   const auto shifts = edge_shifts(views, lens);

@@ -111,12 +111,22 @@ std::string opencv_camera(const Camera& camera) {
   return text;
 }
 
-std::string mrcal_cameramodel(const Camera& camera) {
+std::string mrcal_region(const ImageRegion& region) {
+  if (region.empty()) return "";
+  std::string text = "    'valid_intrinsics_region': [";
+  for (std::size_t i = 0; i <= region.size(); ++i) {  // closed
+    const Eigen::Vector2d& corner = region[i % region.size()];
+    text.append(i > 0 ? ", " : "").append(list_of({corner.x(), corner.y()}));
+  }
+  return text + "],\n";
+}
+
+std::string mrcal_cameramodel(const Camera& camera, const ImageRegion& region) {
   if (!has_mrcal(camera.lens_model)) refuse(camera, "mrcal", "LENSMODEL_OPENCV8");
   std::string text = "{\n    'lensmodel':  '";
   text.append(name_of(camera.lens_model)).append("',\n    'intrinsics': ");
-  text.append(list_of(camera.intrinsics));
-  text.append(",\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ");
+  text.append(list_of(camera.intrinsics)).append(",\n").append(mrcal_region(region));
+  text.append("    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ");
   text.append(std::to_string(camera.imager_px[0])).append(", ");
   text.append(std::to_string(camera.imager_px[1])).append(" ]\n}\n");
   return text;

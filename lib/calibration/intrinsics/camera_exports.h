@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "calibration/intrinsics/known_region.h"
 #include "rig/calibration.h"
 
 namespace vlp {
@@ -21,7 +22,10 @@ std::string kalibr_camchain(const Camera& camera);
 /// splined lenses.
 /// Those of OPENCV_FISHEYE are for cv::fisheye; distortion_model says so.
 std::string opencv_camera(const Camera& camera);
-/// mrcal's .cameramodel, the camera alone, for all but OPENCV_FISHEYE.
-std::string mrcal_cameramodel(const Camera& camera);
+/// mrcal's .cameramodel, the camera and, unless it is empty, where its lens is known; for all but
+/// OPENCV_FISHEYE.
+std::string mrcal_cameramodel(const Camera& camera, const ImageRegion& region = {});
+/// That region's key and value in a .cameramodel, a line; "" when it is empty.
+std::string mrcal_region(const ImageRegion& region);
 
 }  // namespace vlp

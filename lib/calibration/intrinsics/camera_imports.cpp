@@ -10,10 +10,11 @@
 #include <fstream>
 #include <iterator>
 #include <locale>
-#include <regex>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -34,21 +35,57 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// What follows 'key': in a Python literal.
-std::string python_value(const fs::path& file, const std::string& text, const std::string& key) {
-  const std::regex pattern("['\"]" + key +
-                           "['\"]\\s*:\\s*(\\[[^\\]]*\\]|\\([^)]*\\)|'[^']*'|\"[^\"]*\")");
-  std::smatch match;
-  if (!std::regex_search(text, match, pattern)) throw InputError(file, "lacks '" + key + "'");
-  const std::string value = match[1];
-  return value.substr(1, value.size() - 2);
+/// Without the comments, which are whole lines in mrcal's files.
+std::string without_comments(const std::string& text) {
+  std::string rest;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t first = line.find_first_not_of(" \t");
+    if (first == std::string::npos || line[first] != '#') rest.append(line).append("\n");
+  }
+  return rest;
 }
 
-std::vector<double> python_numbers(const fs::path& file, const std::string& text,
-                                   const std::string& key) {
+/// What follows 'key': in a Python literal, a list, tuple or text, without what encloses it;
+/// nothing where there is no such key.
+std::optional<std::string> python_value(const std::string& text, const std::string& key) {
+  constexpr const char* blanks = " \t\r\n";
+  for (const char quote : {'\'', '"'}) {
+    const std::string quoted = quote + key + quote;
+    const std::size_t found = text.find(quoted);
+    if (found == std::string::npos) continue;
+    const std::size_t colon = text.find_first_not_of(blanks, found + quoted.size());
+    if (colon == std::string::npos || text[colon] != ':') continue;
+    const std::size_t first = text.find_first_not_of(blanks, colon + 1);
+    if (first == std::string::npos) continue;
+    const bool in_quotes = text[first] == '\'' || text[first] == '"';
+    if (!in_quotes && text[first] != '[' && text[first] != '(') continue;
+    int depth = 1;
+    for (std::size_t last = first + 1; last < text.size(); ++last) {
+      const char here = text[last];
+      if (in_quotes ? here == text[first] : here == ']' || here == ')') {
+        --depth;
+      } else if (!in_quotes && (here == '[' || here == '(')) {
+        ++depth;
+      }
+      if (depth == 0) return text.substr(first + 1, last - first - 1);
+    }
+  }
+  return std::nullopt;
+}
+
+std::string required_value(const fs::path& file, const std::string& text, const std::string& key) {
+  const auto value = python_value(text, key);
+  if (!value) throw InputError(file, "lacks '" + key + "'");
+  return *value;
+}
+
+/// The numbers of a list, or of lists in one.
+std::vector<double> numbers_in(const fs::path& file, std::string list, const std::string& key) {
   std::vector<double> numbers;
-  std::string list = python_value(file, text, key);
-  std::replace(list.begin(), list.end(), ',', ' ');
+  constexpr std::string_view between = ",[]()";
+  std::ranges::replace_if(
+      list, [&](char c) { return between.find(c) != between.npos; }, ' ');
   std::istringstream stream(list);
   stream.imbue(std::locale::classic());
   for (double number = 0; stream >> number;) numbers.push_back(number);
@@ -56,10 +93,34 @@ std::vector<double> python_numbers(const fs::path& file, const std::string& text
   return numbers;
 }
 
-Camera camera_from_mrcal(const fs::path& file, const std::string& text) {
+std::vector<double> python_numbers(const fs::path& file, const std::string& text,
+                                   const std::string& key) {
+  return numbers_in(file, required_value(file, text, key), key);
+}
+
+/// mrcal closes the contour, and means by an empty one that the lens is known nowhere.
+ImageRegion region_from_mrcal(const fs::path& file, const std::string& text) {
+  const std::string key = "valid_intrinsics_region";
+  const auto value = python_value(text, key);
+  if (!value) return {};
+  const auto numbers = numbers_in(file, *value, key);
+  if (numbers.empty()) throw InputError(file, "'" + key + "' is empty: the lens is known nowhere");
+  ImageRegion region;
+  for (std::size_t i = 0; i + 1 < numbers.size(); i += 2) {
+    region.emplace_back(numbers[i], numbers[i + 1]);
+  }
+  if (region.size() > 1 && region.front() == region.back()) region.pop_back();
+  if (numbers.size() % 2 != 0 || region.size() < 3) {
+    throw InputError(file, "'" + key + "' should be three pixels or more");
+  }
+  return region;
+}
+
+AnyCamera camera_from_mrcal(const fs::path& file, const std::string& text) {
   // What the solve went in is long, and not looked at.
-  const std::string head = text.substr(0, text.find("'optimization_inputs'"));
-  const std::string name = python_value(file, head, "lensmodel");
+  const std::string literal = without_comments(text);
+  const std::string head = literal.substr(0, literal.find("'optimization_inputs'"));
+  const std::string name = required_value(file, head, "lensmodel");
   const auto model = lens_model_from_name(name);
   if (!model) {
     throw InputError(file, "has lens model " + name + "; the models are: " + lens_model_names());
@@ -74,7 +135,7 @@ Camera camera_from_mrcal(const fs::path& file, const std::string& text) {
   camera.lens_model = *model;
   camera.imager_px = {static_cast<int>(imager[0]), static_cast<int>(imager[1])};
   camera.intrinsics = python_numbers(file, head, "intrinsics");
-  return camera;
+  return {camera, region_from_mrcal(file, head)};
 }
 
 std::vector<double> yaml_numbers(const YAML::Node& node) {
@@ -149,7 +210,7 @@ Camera camera_from_yaml(const YAML::Node& document) {
 /// Pixels of the new lens against those of rays, and the normal equations of its parameters (of a
 /// splined lens of its core).
 struct LensFit {
-  double squares = 0, worst_px = 0;
+  double squares = 0;
   int count = 0;
   Eigen::MatrixXd normal;
   Eigen::VectorXd right;
@@ -168,7 +229,6 @@ LensFit lens_fit_at(const std::vector<double>& parameters, LensModel model,
     if (!at) continue;
     const Eigen::Vector2d off = pixel - at->pixel;
     step.squares += off.squaredNorm();
-    step.worst_px = std::max(step.worst_px, off.norm());
     ++step.count;
     step.normal += at->d_pixel_d_parameters.transpose() * at->d_pixel_d_parameters;
     step.right += at->d_pixel_d_parameters.transpose() * off;
@@ -178,12 +238,13 @@ LensFit lens_fit_at(const std::vector<double>& parameters, LensModel model,
 
 }  // namespace
 
-Camera read_any_camera(const fs::path& file) {
+AnyCamera read_any_camera(const fs::path& file) {
   std::string text = text_of(file);
-  Camera camera;
+  AnyCamera found;
+  Camera& camera = found.camera;
   if (text.find("'lensmodel'") != std::string::npos ||
       text.find("\"lensmodel\"") != std::string::npos) {
-    camera = camera_from_mrcal(file, text);
+    found = camera_from_mrcal(file, text);
   } else {
     if (text.starts_with("<?xml")) {
       throw InputError(file, "is XML, which is not read: have OpenCV write it as .yaml");
@@ -193,7 +254,11 @@ Camera read_any_camera(const fs::path& file) {
     try {
       const YAML::Node document = YAML::Load(text);
       if (!document.IsMap()) throw InputError(file, "holds no camera");
-      if (document["format"]) return read_calibration(file).camera;
+      if (document["format"]) {
+        const Calibration calibration = read_calibration(file);
+        const auto& report = calibration.intrinsics_report;
+        return {calibration.camera, report ? report->region_px : ImageRegion()};
+      }
       camera = camera_from_yaml(document);
     } catch (const YAML::Exception& error) {
       throw InputError(file, "holds no camera that is known here: " + error.msg);
@@ -210,15 +275,14 @@ Camera read_any_camera(const fs::path& file) {
   } catch (const std::invalid_argument& error) {
     throw InputError(file, error.what());
   }
-  return camera;
+  return found;
 }
 
 FittedCamera with_lens_model(const Camera& camera, LensModel model) {
   if (camera.lens_model == model) return {camera, 0, 1};
   const Lens from(camera.lens_model, camera.intrinsics);
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;
-  const auto pixels = pixel_grid(camera.imager_px);
-  for (const Eigen::Vector2d& pixel : pixels) {
+  for (const Eigen::Vector2d& pixel : pixel_grid(camera.imager_px)) {
     if (const auto ray = from.unproject(pixel)) rays.emplace_back(pixel, ray->direction);
   }
   FittedCamera fitted{camera, 0, 0};
@@ -261,12 +325,23 @@ FittedCamera with_lens_model(const Camera& camera, LensModel model) {
     damping = std::max(damping / 10, 1e-12);
     if (done) break;
   }
-  fitted.worst_px = at.worst_px;
-  fitted.share = static_cast<double>(at.count) / static_cast<double>(pixels.size());
-  if (at.count == 0 || !std::isfinite(at.worst_px)) {
+  if (at.count == 0 || !std::isfinite(at.squares)) {
     throw std::invalid_argument(std::string(name_of(model)) + " has no lens near " +
                                 std::string(name_of(camera.lens_model)));
   }
+  // Between the rays of the fit it may be farther off than at them.
+  constexpr int often = 201;
+  const Lens to(model, parameters);
+  const auto pixels = pixel_grid(camera.imager_px, often);
+  std::size_t shared = 0;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const auto ray = from.unproject(pixel);
+    const auto found = ray ? to.project(ray->direction) : std::nullopt;
+    if (!found) continue;
+    fitted.worst_px = std::max(fitted.worst_px, (*found - pixel).norm());
+    ++shared;
+  }
+  fitted.share = static_cast<double>(shared) / static_cast<double>(pixels.size());
   return fitted;
 }
 

@@ -4,10 +4,17 @@
 
 #include <filesystem>
 
+#include "calibration/intrinsics/known_region.h"
 #include "rig/calibration.h"
 
 namespace vlp {
 
+struct AnyCamera {
+  Camera camera;
+  /// Where its lens is known, which calibrations (region_px) and mrcal (valid_intrinsics_region)
+  /// tell; empty where nothing is said.
+  ImageRegion region;
+};
 /// The camera in a file, whose content tells what it is:
 ///   a calibration of this toolbox
 ///   mrcal's .cameramodel, of the models that the toolbox has
@@ -15,8 +22,8 @@ namespace vlp {
 ///     distortion_coefficients; distortion_model: fisheye for cv::fisheye
 ///   ROS camera_info: plumb_bob, rational_polynomial, equidistant
 ///   Kalibr's camchain, its cam0: pinhole with radtan, equidistant or none
-/// Skewed camera matrices are refused. Throws InputError.
-Camera read_any_camera(const std::filesystem::path& file);
+/// Skewed camera matrices are refused, and lenses that are known nowhere. Throws InputError.
+AnyCamera read_any_camera(const std::filesystem::path& file);
 
 /// A camera with a lens of another model, fitted to the pixels of the camera's rays all over the
 /// image (pixel_grid(); of a splined lens splined_like()), by least squares.

@@ -60,8 +60,8 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
     IntrinsicsSolver solver(input);
     if (!solver.start(focal_px)) continue;
     solver.start_symmetric();
-    if (!solver.refine() || !solver.weigh_regularization() ||
-        !solver.take_out_shifts(ShiftForm::even) || !solver.bend() ||
+    if (!solver.refine() || !solver.weigh_regularization() || !solver.take_bows() ||
+        !solver.take_out_shifts(ShiftForm::even) || !solver.bend() || !solver.take_bows() ||
         !solver.take_out_shifts(ShiftForm::changing) || !solver.weigh_regularization() ||
         !solver.leave_out_outliers() || !solver.weigh_regularization() || !solver.turn_to_axis()) {
       continue;

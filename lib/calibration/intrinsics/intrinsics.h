@@ -74,12 +74,13 @@ struct IntrinsicsSolution {
 ///     instead of a pixel, which would draw it off by more than the noise does; without the tags of
 ///     which OPENCV_FISHEYE leaves a corner elsewhere than its neighbours, to which it would bend
 ///     near the rim); views that fit no pose are dropped;
-///  4. the shift of the tags' edges, even over a view, taken out (edge_shifts()), and the model
+///  4. the corners of the tags with edges that bow as this lens bows them (take_bows_of_lens());
+///  5. the shift of the tags' edges, even over a view, taken out (edge_shifts()), and the model
 ///     again, at most twice;
-///  5. the board's warp (WarpChoice);
-///  6. what the shifts change over a view, as 4.;
-///  7. all of it without outliers;
-///  8. a splined lens turned to its axis.
+///  6. the board's warp (WarpChoice);
+///  7. the bows again, as 4., and what the shifts change over a view, as 5.;
+///  8. all of it without outliers;
+///  9. a splined lens turned to its axis.
 /// The control points of a splined lens make up for any turn of the camera, so that its frame is a
 /// convention: that of the OPENCV_FISHEYE which fits the same corners best, so that +Z is the axis
 /// of the lens, seen near (cx, cy), and +X the image's. Rays of that frame hold it in the solve

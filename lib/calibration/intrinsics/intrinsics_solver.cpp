@@ -11,6 +11,7 @@
 
 #include <Eigen/Geometry>
 
+#include "calibration/intrinsics/edge_bow.h"
 #include "calibration/intrinsics/edge_shift.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/rotation_vector.h"
@@ -156,10 +157,28 @@ bool IntrinsicsSolver::weigh_regularization() {
   return true;
 }
 
+void IntrinsicsSolver::move_points() {
+  const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    for (const auto& corner : input_.views[used_[i]]) {
+      problem_.points[(i * parts + corner.part) * count + corner.point].head<2>() = corner.pixel;
+    }
+  }
+}
+
+bool IntrinsicsSolver::take_bows() {
+  constexpr double settled_px = 0.002;
+  double most_px = 0;
+  const Lens lens = this->lens();
+  for (auto& view : input_.views) most_px = std::max(most_px, take_bows_of_lens(view, lens));
+  if (most_px < settled_px) return true;
+  move_points();
+  return solve(solved_for_);
+}
+
 bool IntrinsicsSolver::take_out_shifts(ShiftForm form) {
   constexpr int rounds = 2;
   constexpr double settled_px = 0.002;
-  const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   for (int round = 0; round < rounds; ++round) {
     auto views = input_.views;
     for (auto& view : views) view = input_.lattice.bent(std::move(view), problem_.warp_m);
@@ -172,11 +191,7 @@ bool IntrinsicsSolver::take_out_shifts(ShiftForm form) {
     for (std::size_t view = 0; view < input_.views.size(); ++view) {
       edge_shifts_px_[view] += take_out_shift(input_.views[view], shifts[view]);
     }
-    for (std::size_t i = 0; i < used_.size(); ++i) {
-      for (const auto& corner : input_.views[used_[i]]) {
-        problem_.points[(i * parts + corner.part) * count + corner.point].head<2>() = corner.pixel;
-      }
-    }
+    move_points();
     if (!solve(solved_for_)) return false;
   }
   return true;

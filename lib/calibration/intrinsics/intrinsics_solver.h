@@ -27,14 +27,16 @@ class IntrinsicsSolver {
   bool refine();
   /// Of a splined lens, the regularization made for the noise of the corners; no stage of others.
   bool weigh_regularization();
-  /// Stages 4, even ones, and 6: what edge_shifts() finds, twice at most, until it is below 0.002
+  /// Stages 4 and 7: take_bows_of_lens().
+  bool take_bows();
+  /// Stages 5, even ones, and 7: what edge_shifts() finds, twice at most, until it is below 0.002
   /// px.
   bool take_out_shifts(ShiftForm form);
-  /// Stage 5: the warp of the board, if it is to be.
+  /// Stage 6: the warp of the board, if it is to be.
   bool bend();
-  /// Stage 7.
+  /// Stage 8.
   bool leave_out_outliers();
-  /// Stage 8, of a splined lens: true also when the turn has not settled.
+  /// Stage 9, of a splined lens: true also when the turn has not settled.
   bool turn_to_axis();
 
   IntrinsicsSolution solution() const;
@@ -49,6 +51,8 @@ class IntrinsicsSolver {
   void seed(const Lens& lens);
   /// The problem of the views used, at their seeds.
   void assemble(const Lens& lens);
+  /// Where the corners of the input are now.
+  void move_points();
   /// Of the views used, in their order.
   std::vector<double> rms_of_views() const;
   /// Whether the lens can see all corners of most views. mrcal solves for points behind the camera,

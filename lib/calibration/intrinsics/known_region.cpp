@@ -81,11 +81,19 @@ ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
 }
 
 bool lies_in(const ImageRegion& region, const Eigen::Vector2d& pixel) {
-  constexpr double rounding = 1e-6;
+  constexpr double rounding_px = 1e-8;
+  if (region.size() < 3) return false;
+  bool inside = false;  // of the edges to the right of it an odd number
   for (std::size_t i = 0; i < region.size(); ++i) {
-    if (side(region[i], region[(i + 1) % region.size()], pixel) < -rounding) return false;
+    const Eigen::Vector2d &from = region[i], along = region[(i + 1) % region.size()] - from;
+    const Eigen::Vector2d here = pixel - from;
+    const double share = std::clamp(here.dot(along) / along.squaredNorm(), 0.0, 1.0);
+    if ((here - share * along).norm() <= rounding_px) return true;
+    const bool crossed = (here.y() < 0) != (here.y() < along.y());
+    const bool right = (here.x() * along.y() < here.y() * along.x()) == (along.y() > 0);
+    if (crossed && right) inside = !inside;
   }
-  return region.size() > 2;
+  return inside;
 }
 
 double share_of_image(const ImageRegion& region, const std::array<int, 2>& imager_px) {
@@ -93,7 +101,7 @@ double share_of_image(const ImageRegion& region, const std::array<int, 2>& image
   for (std::size_t i = 0; i < region.size(); ++i) {
     twice += side({0, 0}, region[i], region[(i + 1) % region.size()]);
   }
-  return twice / 2 / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
+  return std::abs(twice) / 2 / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
 }
 
 }  // namespace vlp

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/numpy_archive.h"
 #include "captures/number_text.h"
@@ -79,15 +80,8 @@ void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSoluti
   text += "],\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ";
   text.append(std::to_string(problem.imager_px[0])).append(", ");
   text.append(std::to_string(problem.imager_px[1])).append(" ],\n    'icam_intrinsics': 0,\n");
-  text.append("    'valid_intrinsics_region': [");
-  for (std::size_t i = 0; i <= region.size() && !region.empty(); ++i) {  // closed
-    const Eigen::Vector2d& corner = region[i % region.size()];
-    text.append(" [ ").append(significant(corner.x(), kDigits)).append(", ");
-    text.append(significant(corner.y(), kDigits)).append(" ],");
-  }
-  text.append(" ],\n    'optimization_inputs': b'")
-      .append(optimization_inputs(solution))
-      .append("',\n}\n");
+  text.append(mrcal_region(region)).append("    'optimization_inputs': b'");
+  text.append(optimization_inputs(solution)).append("',\n}\n");
   write_file(file, text);
 }
 

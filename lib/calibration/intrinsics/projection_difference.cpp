@@ -39,8 +39,7 @@ std::optional<Eigen::Matrix3d> b_from_a(const Lens& a, const Lens& b,
   return b_from_a(pairs);
 }
 
-std::vector<Eigen::Vector2d> pixel_grid(const std::array<int, 2>& imager_px) {
-  constexpr int cols = 41;
+std::vector<Eigen::Vector2d> pixel_grid(const std::array<int, 2>& imager_px, int cols) {
   const int rows =
       std::max(2, static_cast<int>(std::lround(cols * double(imager_px[1]) / imager_px[0])));
   std::vector<Eigen::Vector2d> pixels;

@@ -13,8 +13,9 @@
 
 namespace vlp {
 
-/// Pixels all over an image, its edges among them, about 1/40 of its width apart.
-std::vector<Eigen::Vector2d> pixel_grid(const std::array<int, 2>& imager_px);
+/// Pixels all over an image, its edges among them, so many from left to right and about as far
+/// apart from top to bottom.
+std::vector<Eigen::Vector2d> pixel_grid(const std::array<int, 2>& imager_px, int cols = 41);
 
 /// The rotation that takes the rays of `a` at the pixels to those of `b` with the least squares,
 /// where both have one; nothing for fewer than three.

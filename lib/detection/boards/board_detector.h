@@ -21,16 +21,36 @@ class TouchingTags;
 class SquareCorners;
 struct GreyLevels;
 
+/// How an edge of a tag bows between its corners, as the pixels beside it show it: outwards of the
+/// straight line by
+///   square_px (w^2 - 1) + cube_px (w^3 - w),     w = -1 at its first corner, 1 at its second,
+/// fitted together with the corners to pixels from -reach to reach. With reach 0 nobody knows.
+struct EdgeBow {
+  double square_px = 0, cube_px = 0, reach = 0;
+
+  double at(double w) const { return (w * w - 1) * (square_px + cube_px * w); }
+  bool operator==(const EdgeBow&) const = default;
+};
+
 /// A tag as an image shows it.
 struct SeenTag {
   /// As BoardTag::corners_m: bottom left, bottom right, top right, top left of the black border.
   using Corners = std::array<Eigen::Vector2d, 4>;
+  /// Of the edges from corner k to k + 1.
+  using Bows = std::array<EdgeBow, 4>;
+  struct Outline {
+    Corners corners_px;
+    Bows bows = {};
+
+    bool operator==(const Outline&) const = default;
+  };
 
   int id;
   Corners corners_px;
+  Bows bows = {};
   /// The same behind tone curves of kGammas beyond 1, until one is taken (take_common_curve()); of
   /// an image that has none for sure there are none.
-  std::vector<Corners> behind_curves_px = {};
+  std::vector<Outline> behind_curves = {};
 };
 
 /// A point of a board's lattice as an image shows it: a corner in which squares touch.

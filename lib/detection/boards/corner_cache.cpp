@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -21,7 +22,7 @@ namespace fs = std::filesystem;
 
 std::string settings_of(const Board& board) {
   std::string settings =
-      fmt::format("6 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+      fmt::format("7 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                   board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
                   board.border_bits, board.corner_squares, board.first_id, name_of(board.id_order));
   if (board.has_squares()) {
@@ -31,11 +32,25 @@ std::string settings_of(const Board& board) {
   return settings;
 }
 
-std::vector<std::string> row_of(int id, const SeenTag::Corners& pixels) {
+constexpr std::array kColumns{"id",      "u0",    "v0",     "u1",      "v1",    "u2",
+                              "v2",      "u3",    "v3",     "square0", "cube0", "reach0",
+                              "square1", "cube1", "reach1", "square2", "cube2", "reach2",
+                              "square3", "cube3", "reach3"};
+
+/// With zeros to its end.
+std::vector<std::string> row_of(std::vector<std::string> begin) {
+  begin.resize(kColumns.size(), "0");
+  return begin;
+}
+
+std::vector<std::string> row_of(int id, const SeenTag::Corners& pixels, const SeenTag::Bows& bows) {
   std::vector<std::string> row{std::to_string(id)};
   for (const Eigen::Vector2d& pixel : pixels) {
     row.push_back(shortest(pixel.x()));
     row.push_back(shortest(pixel.y()));
+  }
+  for (const auto& [square_px, cube_px, reach] : bows) {
+    row.insert(row.end(), {shortest(square_px), shortest(cube_px), shortest(reach)});
   }
   return row;
 }
@@ -44,23 +59,26 @@ std::vector<std::string> row_of(int id, const SeenTag::Corners& pixels) {
 /// cut left in part is known. Then come a row per tag, one per foreign tag, one per point, with its
 /// place, one per curve with its cost, and of more than two each tag behind those beyond the first.
 void write_view(const fs::path& file, const BoardView& view) {
-  CsvWriter csv(file, {"id", "u0", "v0", "u1", "v1", "u2", "v2", "u3", "v3"});
-  csv.row({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
-           std::to_string(view.seen.foreign.size()), std::to_string(view.seen.unusable),
-           std::to_string(view.seen.overexposed), std::to_string(view.seen.points.size()),
-           std::to_string(view.seen.tags.size()), std::to_string(view.seen.curve_costs.size())});
+  CsvWriter csv(file, {kColumns.begin(), kColumns.end()});
+  csv.row(row_of({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
+                  std::to_string(view.seen.foreign.size()), std::to_string(view.seen.unusable),
+                  std::to_string(view.seen.overexposed), std::to_string(view.seen.points.size()),
+                  std::to_string(view.seen.tags.size()),
+                  std::to_string(view.seen.curve_costs.size())}));
   for (const auto* tags : {&view.seen.tags, &view.seen.foreign}) {
-    for (const SeenTag& tag : *tags) csv.row(row_of(tag.id, tag.corners_px));
+    for (const SeenTag& tag : *tags) csv.row(row_of(tag.id, tag.corners_px, tag.bows));
   }
   for (const SeenPoint& point : view.seen.points) {
-    csv.row({std::to_string(point.index), shortest(point.pixel.x()), shortest(point.pixel.y()), "0",
-             "0", "0", "0", "0", "0"});
+    csv.row(row_of(
+        {std::to_string(point.index), shortest(point.pixel.x()), shortest(point.pixel.y())}));
   }
   for (const double cost : view.seen.curve_costs) {
-    csv.row({"-1", shortest(cost), "0", "0", "0", "0", "0", "0", "0"});
+    csv.row(row_of({"-1", shortest(cost)}));
   }
   for (const SeenTag& tag : view.seen.tags) {
-    for (const auto& corners : tag.behind_curves_px) csv.row(row_of(tag.id, corners));
+    for (const auto& [corners_px, bows] : tag.behind_curves) {
+      csv.row(row_of(tag.id, corners_px, bows));
+    }
   }
   csv.save_unsynced();
 }
@@ -83,16 +101,21 @@ BoardView read_view(const fs::path& file, const std::string& image) {
   if (1 + tags_seen + foreign + points + curves + behind * tags_seen != rows) {
     throw InputError(file, "is not of the cache");
   }
-  const auto pixels_of = [&](std::size_t row) -> SeenTag::Corners {
-    return {{{at(row, "u0"), at(row, "v0")},
-             {at(row, "u1"), at(row, "v1")},
-             {at(row, "u2"), at(row, "v2")},
-             {at(row, "u3"), at(row, "v3")}}};
+  const auto outline_of = [&](std::size_t row) {
+    SeenTag::Outline outline;
+    for (std::size_t k = 0; k < 4; ++k) {
+      outline.corners_px[k] = {at(row, kColumns[1 + 2 * k]), at(row, kColumns[2 + 2 * k])};
+      const std::size_t bow = 9 + 3 * k;
+      outline.bows[k] = {at(row, kColumns[bow]), at(row, kColumns[bow + 1]),
+                         at(row, kColumns[bow + 2])};
+    }
+    return outline;
   };
   std::size_t row = 1;
   for (const std::size_t end = row + tags_seen + foreign; row < end; ++row) {
     auto& tags = row <= tags_seen ? view.seen.tags : view.seen.foreign;
-    tags.push_back({static_cast<int>(at(row, "id")), pixels_of(row)});
+    const auto [corners_px, bows] = outline_of(row);
+    tags.push_back({static_cast<int>(at(row, "id")), corners_px, bows});
   }
   for (const std::size_t end = row + points; row < end; ++row) {
     view.seen.points.push_back(
@@ -100,7 +123,7 @@ BoardView read_view(const fs::path& file, const std::string& image) {
   }
   for (std::size_t i = 0; i < curves; ++i) view.seen.curve_costs.push_back(at(row++, "u0"));
   for (SeenTag& tag : view.seen.tags) {
-    for (std::size_t i = 0; i < behind; ++i) tag.behind_curves_px.push_back(pixels_of(row++));
+    for (std::size_t i = 0; i < behind; ++i) tag.behind_curves.push_back(outline_of(row++));
   }
   return view;
 }

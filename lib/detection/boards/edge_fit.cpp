@@ -63,22 +63,23 @@ class Edge {
     return true;
   }
 
-  /// By noise of one level.
-  double blur_variance(const Parameters& p) const {
+  /// Of a sum of parameters, by noise of one level.
+  double variance(const Parameters& p, const Parameters& sum) const {
     if (p != at_) evaluate(p);
     const Eigen::Matrix<double, NUM_PARAMETERS, NUM_PARAMETERS> normal =
         jacobian_.transpose() * jacobian_;
-    return normal.ldlt().solve(Parameters::Unit(0))[0];
+    return normal.ldlt().solve(sum).dot(sum);
   }
 
  private:
-  /// The last is the prior's.
-  Eigen::Index rows() const { return static_cast<Eigen::Index>(pixels_.size()) + 1; }
+  /// The last two are the prior's.
+  static constexpr Eigen::Index kPriors = 2;
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(pixels_.size()) + kPriors; }
 
   void evaluate(const Parameters& p) const {
     at_ = p;
     const Blur blur(p[0]);
-    for (Eigen::Index i = 0; i + 1 < rows(); ++i) {
+    for (Eigen::Index i = 0; i + kPriors < rows(); ++i) {
       const auto& [w, v, level, stripe_px, white] = pixels_[static_cast<std::size_t>(i)];
       double off = p[4 + terms];
       for (int k = terms - 2; k >= 0; --k) off = p[5 + k] + w * off;
@@ -101,10 +102,14 @@ class Edge {
       double by_term = -bright * p[2] * step.slope;
       for (int k = 0; k < terms; ++k, by_term *= w) row[5 + k] = by_term;
     }
-    const Eigen::Index last = rows() - 1;
-    residuals_[last] = prior_.blur_weight * (p[0] - prior_.blur_px);
-    jacobian_.row(last).setZero();
-    jacobian_(last, 0) = prior_.blur_weight;
+    const Eigen::Index blurs = rows() - 2, brights = rows() - 1;
+    jacobian_.template bottomRows<kPriors>().setZero();
+    residuals_[blurs] = prior_.blur_weight * (p[0] - prior_.blur_px);
+    jacobian_(blurs, 0) = prior_.blur_weight;
+    const double outside = p[2] < 0 ? -1 : 1;
+    residuals_[brights] = prior_.bright_weight * (p[1] + outside * p[2] - prior_.bright_light);
+    jacobian_(brights, 1) = prior_.bright_weight;
+    jacobian_(brights, 2) = outside * prior_.bright_weight;
   }
 
   const std::vector<EdgePixel>& pixels_;
@@ -148,7 +153,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   p.template tail<terms>() = edge.coefficients.head<terms>();
   const bool runs_over = sides.white_share >= enough_white;
   const double most_told = runs_over ? told_then : std::numeric_limits<double>::infinity();
-  const Step step(pixels, runs_over ? prior : EdgePrior{prior.gamma}, most_told);
+  const Step step(pixels, prior, most_told);
   ceres::TinySolver<Step> solver;
   // Blur, contrast and place of a step that is seen in part nearly make up for each other.
   solver.options.max_num_iterations = runs_over ? 60 : 15;
@@ -157,14 +162,20 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   edge.coefficients.setZero();
   edge.coefficients.head<terms>() = p.template tail<terms>();
   edge.blur_px = p[0];
-  EdgeFit result{2 * solver.summary.final_cost, pixels.size(), runs_over};
+  const double outside = p[2] < 0 ? -1 : 1;
+  EdgeFit result{2 * solver.summary.final_cost, pixels.size(), runs_over, p[1] + outside * p[2]};
   const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
   const double bright = Coded(p[1] + p[2], prior.gamma).level;
   const double contrast = std::abs(bright - Coded(p[1] - p[2], prior.gamma).level) / 2;
   const bool good = p.allFinite() && p[0] > least_blur_px && p[0] < most_blur_px &&
                     contrast > least_contrast && rms < unlike * contrast;
   if (!good) return {};
-  if (runs_over && prior.blur_weight == 0) result.blur_variance = step.blur_variance(p);
+  if (runs_over || prior.gamma != 1) {
+    typename Step::Parameters brighter = Step::Parameters::Zero();
+    brighter.template segment<2>(1) << 1, outside;
+    result.blur_variance = step.variance(p, Step::Parameters::Unit(0));
+    result.bright_variance = step.variance(p, brighter);
+  }
   return result;
 }
 

@@ -49,18 +49,24 @@ Eigen::Vector2d crossing(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d
 struct EdgePrior {
   /// Of the tone curve, level = 255 (light / 255)^(1 / gamma).
   double gamma = 1;
-  /// The blur, where white runs over, is about so much, which counts as a pixel with the residual
-  /// blur_weight (blur - blur_px), in levels.
+  /// About so much are the blur, and the light on the brighter side where white runs over: what
+  /// counts as pixels with the residuals weight (blur - blur_px) and weight (bright -
+  /// bright_light), in levels.
   double blur_px = 0, blur_weight = 0;
+  double bright_light = 0, bright_weight = 0;
 };
 
 struct EdgeFit {
   /// Of the levels that are left over.
   double squares;
   std::size_t pixels;
-  /// White runs over; then, without blur_weight, the variance of the blur by noise of one level.
+  /// White runs over.
   bool runs_over;
-  double blur_variance = 0;
+  /// The light on the brighter side, in levels behind no curve.
+  double bright_light;
+  /// Of blur and bright_light, by noise of one level; of edges behind no curve, and not over
+  /// white, 0 for that they are well known.
+  double blur_variance = 0, bright_variance = 0;
 };
 
 /// Fits an edge, from where it is, by least squares of

@@ -5,10 +5,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "detection/boards/blurred_step.h"
+#include "detection/boards/edge_field.h"
 #include "detection/boards/edge_fit.h"
 #include "detection/boards/tone_curve.h"
 #include "geometry/homography.h"
@@ -83,10 +86,11 @@ class TagEdges {
   double pixels() const;
 
   /// To the same pixels again, from where the edges are roughly.
-  void fit(const EdgePrior& prior);
+  void fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of);
 
-  /// Where the edges cross. Nothing when an edge is none, or a corner has gone too far.
-  std::optional<SeenTag::Corners> crossed() const;
+  /// Where the edges cross, and how they bow in between. Nothing when an edge is none, or a corner
+  /// has gone too far.
+  std::optional<SeenTag::Outline> crossed() const;
 
  private:
   void look_behind(const TagPrint& print);
@@ -102,6 +106,27 @@ class TagEdges {
   bool found_ = false;
 };
 
+/// Of an edge between its corners.
+EdgeBow bow_between(const EdgeCurve& edge, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                    const std::vector<EdgePixel>& pixels) {
+  const Eigen::Vector2d chord = to - from, along = chord.normalized();
+  Eigen::Vector2d across(-along.y(), along.x());
+  if (across.dot(edge.across) < 0) across = -across;
+  const double begin = edge.along.dot(from - edge.middle) / edge.half_px,
+               end = edge.along.dot(to - edge.middle) / edge.half_px;
+  const auto off_px = [&](double w) {
+    const double at = (begin + end + w * (end - begin)) / 2;
+    const Eigen::Vector2d x =
+        edge.middle + edge.along * (at * edge.half_px) + edge.across * edge.value_at(at);
+    return across.dot(x - from);
+  };
+  // As far as pixels that lie evenly reach.
+  double squares = 0;
+  for (const EdgePixel& pixel : pixels) squares += pixel.along * pixel.along;
+  const double reach = std::sqrt(3 * squares / static_cast<double>(pixels.size()));
+  return {-off_px(0), (off_px(-0.5) - off_px(0.5)) / 0.75, reach * 2 / (end - begin)};
+}
+
 double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCurve, 4>& b) {
   double most_px = 0;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -109,6 +134,8 @@ double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCur
   }
   return most_px;
 }
+
+EdgePrior without_curve(const EdgeCurve&) { return {}; }
 
 /// From the sides of the quad, which libapriltag has.
 TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& print) : tag_(tag) {
@@ -136,7 +163,7 @@ TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& p
   const Band band{std::clamp(print.inside() * bit_px - away_px, least_px, most_px),
                   std::clamp(print.outside() * bit_px - away_px, least_px, most_px)};
   look_beside(image, band);
-  fit({});
+  fit(without_curve);
   // A wide lens bends an edge out of a band along the quad's side, which ends beside the corners.
   for (int round = 0; round < most_rounds && found_ && bow_px_ > bent_px; ++round) {
     if (round > 0 && difference_px(edges_, roughly_) < settled_px) break;
@@ -145,7 +172,7 @@ TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& p
     }
     roughly_ = edges_;
     look_beside(image, band);
-    fit({});
+    fit(without_curve);
   }
 }
 
@@ -178,14 +205,14 @@ void TagEdges::look_beside(const cv::Mat1b& image, const Band& band) {
   }
 }
 
-void TagEdges::fit(const EdgePrior& prior) {
+void TagEdges::fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of) {
   constexpr double most_bow = 0.25;  // of the tag: beyond, the fit went to something else
   bow_px_ = 0;
   found_ = false;
   for (std::size_t k = 0; k < 4; ++k) {
     edges_[k].coefficients = roughly_[k].coefficients;
     edges_[k].blur_px = roughly_[k].blur_px;
-    const auto fitted = fit_edge(edges_[k], pixels_[k], prior);
+    const auto fitted = fit_edge(edges_[k], pixels_[k], prior_of(roughly_[k]));
     if (!fitted) return;
     fits_[k] = *fitted;
     bow_px_ = std::max(bow_px_, std::abs(edges_[k].coefficients[2]));
@@ -193,19 +220,23 @@ void TagEdges::fit(const EdgePrior& prior) {
   found_ = bow_px_ <= most_bow * width_px_;
 }
 
-std::optional<SeenTag::Corners> TagEdges::crossed() const {
+std::optional<SeenTag::Outline> TagEdges::crossed() const {
   constexpr double moved_px = 1.5, moved_share = 0.03;
   if (!found_) return {};
   // A straight line through all of an edge ends beside it by two thirds of what that bends, and at
   // a corner two do.
   const double most_moved_px = std::max(moved_px, moved_share * width_px_) + bow_px_;
-  SeenTag::Corners corners;
+  SeenTag::Outline outline;
+  SeenTag::Corners& corners = outline.corners_px;
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d& from = tag_.corners_px[k];
     corners[k] = crossing(edges_[(k + 3) % 4], edges_[k], from);
     if (!((corners[k] - from).norm() < most_moved_px)) return {};
   }
-  return corners;
+  for (std::size_t k = 0; k < 4; ++k) {
+    outline.bows[k] = bow_between(edges_[k], corners[k], corners[(k + 1) % 4], pixels_[k]);
+  }
+  return outline;
 }
 
 double TagEdges::squares() const {
@@ -229,35 +260,67 @@ double cost_of(std::span<const TagEdges> tags, std::span<const std::size_t> aske
   return pixels * std::log(std::max(std::sqrt(squares / pixels), least_rms));
 }
 
-/// Of values around a middle, whatever a few of them are.
-double variance_of(std::vector<double> values, double middle) {
-  constexpr double median_of_normal = 0.6745;
-  for (double& value : values) value = std::abs(value - middle);
-  const double sd = upper_median(std::move(values)) / median_of_normal;
-  return sd * sd;
+/// Whether white does at an edge of an image.
+bool runs_over(std::span<const TagEdges> tags) {
+  return std::ranges::any_of(tags, [](const TagEdges& tag) {
+    return tag.found() && std::ranges::any_of(tag.fits(), &EdgeFit::runs_over);
+  });
 }
 
-/// With the blur of an image's edges where white runs over: their median and, for its weight, by
-/// how much more they differ than by noise.
-EdgePrior with_blur_of(std::span<const TagEdges> tags, EdgePrior prior) {
-  constexpr double least_apart = 0.01;  // share of the blur
-  std::vector<double> blurs_px, variances;
+/// What the edges of an image have in common, from fits of each by itself.
+class CommonEdges {
+ public:
+  explicit CommonEdges(std::span<const TagEdges> tags);
+
+  /// Of an edge behind a tone curve: of its blur alone, or of its light, too.
+  EdgePrior with_blur(const EdgeCurve& edge, double gamma) const;
+  EdgePrior with_light(const EdgeCurve& edge, double gamma) const;
+
+ private:
+  /// Of a level.
+  double noise_ = 0;
+  std::optional<EdgeField> blur_, light_;
+};
+
+CommonEdges::CommonEdges(std::span<const TagEdges> tags) {
   double squares = 0, pixels = 0;
+  for (const TagEdges& tag : tags) {
+    if (!tag.found()) continue;
+    squares += tag.squares();
+    pixels += tag.pixels();
+  }
+  if (pixels == 0) return;
+  noise_ = std::sqrt(squares / pixels);
+  std::vector<EdgeFigure> blurs, lights;
   for (const TagEdges& tag : tags) {
     for (std::size_t k = 0; tag.found() && k < 4; ++k) {
       const EdgeFit& fit = tag.fits()[k];
-      if (!fit.runs_over) continue;
-      blurs_px.push_back(tag.edges()[k].blur_px);
-      variances.push_back(fit.blur_variance);
-      squares += fit.squares;
-      pixels += static_cast<double>(fit.pixels);
+      const EdgeCurve& edge = tag.edges()[k];
+      blurs.push_back({edge.middle, edge.along, edge.blur_px,
+                       noise_ * std::sqrt(fit.blur_variance) / edge.blur_px});
+      if (fit.bright_light > 0) {
+        lights.push_back({edge.middle, edge.along, fit.bright_light,
+                          noise_ * std::sqrt(fit.bright_variance) / fit.bright_light});
+      }
     }
   }
-  if (blurs_px.empty()) return prior;
-  prior.blur_px = upper_median(blurs_px);
-  const double noise = squares / pixels, least_px = least_apart * prior.blur_px;
-  const double apart = variance_of(blurs_px, prior.blur_px) - noise * upper_median(variances);
-  prior.blur_weight = std::sqrt(noise / std::max(apart, least_px * least_px));
+  blur_.emplace(blurs, EdgeField::Terms::place_and_direction);
+  if (!lights.empty()) light_.emplace(lights, EdgeField::Terms::place);
+}
+
+EdgePrior CommonEdges::with_blur(const EdgeCurve& edge, double gamma) const {
+  EdgePrior prior{gamma};
+  if (!blur_) return prior;
+  prior.blur_px = blur_->value(edge.middle, edge.along);
+  prior.blur_weight = noise_ / (blur_->apart() * prior.blur_px);
+  return prior;
+}
+
+EdgePrior CommonEdges::with_light(const EdgeCurve& edge, double gamma) const {
+  EdgePrior prior = with_blur(edge, gamma);
+  if (!light_) return prior;
+  prior.bright_light = light_->value(edge.middle, edge.along);
+  prior.bright_weight = noise_ / (light_->apart() * prior.bright_light);
   return prior;
 }
 
@@ -268,12 +331,12 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
   constexpr std::size_t most_asked = 8;
   constexpr double surely = 10;  // e^10 times more likely
   std::vector<TagEdges> edges;
-  std::vector<SeenTag::Corners> corners;  // where they were found last
-  std::vector<std::size_t> widest;        // of those that are found, the widest first
+  std::vector<SeenTag::Outline> outlines;  // as they were found last
+  std::vector<std::size_t> widest;         // of those that are found, the widest first
   for (std::size_t i = 0; i < tags.size(); ++i) {
     edges.emplace_back(tags[i], image, print);
     const auto crossed = edges[i].crossed();
-    corners.push_back(crossed.value_or(tags[i].corners_px));
+    outlines.push_back(crossed.value_or(SeenTag::Outline{tags[i].corners_px}));
     if (crossed) widest.push_back(i);
   }
   if (widest.empty()) return {};
@@ -282,28 +345,39 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
   });
   const auto asked = std::span(widest).first(std::min(widest.size(), most_asked));
   const auto others = std::span(widest).subspan(asked.size());
-  const auto fit = [&](std::span<const std::size_t> some, const EdgePrior& prior) {
-    for (const std::size_t i : some) edges[i].fit(prior);
+  const auto fit = [&](std::span<const std::size_t> some, const auto& prior_of) {
+    for (const std::size_t i : some) edges[i].fit(prior_of);
   };
   std::vector<double> costs;
-  std::vector<SeenTag::Corners> without_curve;
+  std::vector<SeenTag::Outline> behind_none;
   for (const double gamma : kGammas) {
-    if (gamma != 1) fit(asked, {gamma});
+    const auto alone = [&](const EdgeCurve&) { return EdgePrior{gamma}; };
+    if (gamma != 1) fit(asked, alone);
     costs.push_back(cost_of(edges, asked));
     if (costs.size() == 2 && costs[1] > costs[0] + surely) break;
-    if (gamma != 1) fit(others, {gamma});
-    const EdgePrior prior = with_blur_of(edges, {gamma});
-    if (prior.blur_weight > 0) fit(widest, prior);
-    for (const std::size_t i : widest) corners[i] = edges[i].crossed().value_or(corners[i]);
+    if (gamma != 1) fit(others, alone);
+    const bool over = runs_over(edges);
+    if (over || gamma != 1) {
+      const CommonEdges common(edges);
+      fit(widest, [&](const EdgeCurve& edge) { return common.with_blur(edge, gamma); });
+    }
+    if (over) {
+      const CommonEdges common(edges);
+      fit(widest, [&](const EdgeCurve& edge) { return common.with_light(edge, gamma); });
+    }
+    for (const std::size_t i : widest) outlines[i] = edges[i].crossed().value_or(outlines[i]);
     if (gamma == 1) {
-      without_curve = corners;
+      behind_none = outlines;
     } else {
       for (std::size_t i = 0; i < tags.size(); ++i) {
-        tags[i].behind_curves_px.push_back(corners[i]);
+        tags[i].behind_curves.push_back(outlines[i]);
       }
     }
   }
-  for (std::size_t i = 0; i < tags.size(); ++i) tags[i].corners_px = without_curve[i];
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    tags[i].corners_px = behind_none[i].corners_px;
+    tags[i].bows = behind_none[i].bows;
+  }
   return costs;
 }
 

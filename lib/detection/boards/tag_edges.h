@@ -21,13 +21,15 @@ namespace vlp {
 /// 3 % of the tag, and what its edges bend.
 ///
 /// Behind a tone curve an edge is steeper on its dark side, which draws the fit there, by more the
-/// narrower the stripes are. So they are fitted behind each of kGammas (SeenTag::behind_curves_px),
+/// narrower the stripes are. So they are fitted behind each of kGammas (SeenTag::behind_curves),
 /// unless the image tells that there is none.
 ///
-/// Where white runs over, blur, contrast and place of an edge are hard to tell apart. So such edges
-/// are fitted again with their median blur, which they may differ from by as much as they do beyond
-/// their noise, and corners are good to 0.03 px at 1.5 times the white that the sensor holds; a
-/// lens from views at three times is 0.07 to 0.17 px off.
+/// Behind a curve, and more so where white runs over, blur, contrast and place of an edge are hard
+/// to tell apart: at 1.5 times white its place alone is known ten times worse than with the blur
+/// known, and 2.5 times better again with the light that its white would show. Both change slowly
+/// over an image (EdgeField). So edges are fitted again with the blur that the others have there,
+/// and where white runs over once more with the light, too; each may differ from the others by as
+/// much as they do beyond their noise.
 ///
 /// Returns what the eight widest tags tell of the curve (SeenBoard::curve_costs).
 std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& image,

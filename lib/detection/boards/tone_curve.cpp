@@ -66,14 +66,18 @@ double take_common_curve(std::vector<BoardView>& views) {
   for (BoardView& view : views) {
     view.seen.curve_costs.clear();
     for (SeenTag& tag : view.seen.tags) {
-      std::vector<SeenTag::Corners> behind{tag.corners_px};
-      behind.insert(behind.end(), tag.behind_curves_px.begin(), tag.behind_curves_px.end());
-      tag.behind_curves_px.clear();
+      std::vector<SeenTag::Outline> behind{{tag.corners_px, tag.bows}};
+      behind.insert(behind.end(), tag.behind_curves.begin(), tag.behind_curves.end());
+      tag.behind_curves.clear();
       if (none || behind.size() < kGammas.size()) continue;
       for (std::size_t k = 0; k < 4; ++k) {
         tag.corners_px[k].setZero();
+        tag.bows[k].square_px = tag.bows[k].cube_px = 0;
         for (std::size_t i = 0; i < 3; ++i) {
-          tag.corners_px[k] += weights[i] * behind[near.first + i][k];
+          const auto& [corners_px, bows] = behind[near.first + i];
+          tag.corners_px[k] += weights[i] * corners_px[k];
+          tag.bows[k].square_px += weights[i] * bows[k].square_px;
+          tag.bows[k].cube_px += weights[i] * bows[k].cube_px;
         }
       }
     }

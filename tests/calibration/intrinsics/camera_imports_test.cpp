@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "calibration/intrinsics/camera_exports.h"
+#include "calibration/intrinsics/sample_cameras.h"
 #include "camera/spline_grid.h"
 #include "rig/input_error.h"
 #include "support/temporary_folder.h"
@@ -13,31 +14,12 @@
 namespace vlp {
 namespace {
 
-Camera camera_of(LensModel model) {
-  const std::vector<double> distortions{-0.2,   0.05,  1e-4, -2e-4, 0.01,  0.02,
-                                        -0.003, 0.001, 1e-4, 2e-5,  -1e-4, 3e-5};
-  Camera camera{"camera", {800, 600}, model, {520.25, 521, 402.3, 297.4}, {}, {}, {}};
-  camera.intrinsics.insert(
-      camera.intrinsics.end(), distortions.begin(),
-      distortions.begin() + static_cast<std::ptrdiff_t>(parameter_count(model) - 4));
-  if (model == LensModel::fisheye) {
-    camera.intrinsics = {290, 291, 402, 297, 0.03, -0.012, 0.004, -0.0006};
-  }
-  return camera;
-}
-
-/// As of a lens of 150 degrees.
-Camera splined_camera() {
-  const LensModel model = splined_lens({3, 13, 11, 150});
-  return with_lens_model(camera_of(LensModel::fisheye), model).camera;
-}
-
 class CameraFiles : public testing::Test {
  protected:
   const TemporaryFolder folder_;
 
   void comes_back(const Camera& camera, const std::string& text, LensModel as) const {
-    const Camera back = read_any_camera(folder_.file("camera.txt", text));
+    const Camera back = read_any_camera(folder_.file("camera.txt", text)).camera;
     EXPECT_EQ(back.lens_model, as);
     EXPECT_EQ(back.imager_px, camera.imager_px);
     std::vector<double> expected = camera.intrinsics;

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace vlp {
 namespace {
 
@@ -39,6 +41,23 @@ TEST(KnownRegion, OfASlantedSetIsSlanted) {
   EXPECT_TRUE(lies_in(region, {400, 300}));
   EXPECT_FALSE(lies_in(region, {700, 100}));
   EXPECT_LT(share_of_image(region, kImager), 0.3);
+}
+
+/// As mrcal's may be, in either direction round.
+TEST(KnownRegion, MayBeBent) {
+  ImageRegion region{{0, 0}, {400, 0}, {200, 100}, {400, 400}, {0, 400}};
+  for (int round = 0; round < 2; ++round) {
+    EXPECT_TRUE(lies_in(region, {199, 100}));
+    EXPECT_TRUE(lies_in(region, {200, 100}));
+    EXPECT_TRUE(lies_in(region, {300, 50}));
+    EXPECT_FALSE(lies_in(region, {201, 100}));
+    EXPECT_FALSE(lies_in(region, {300, 100}));
+    EXPECT_TRUE(lies_in(region, {300, 300}));
+    EXPECT_FALSE(lies_in(region, {-1, 100}));
+    EXPECT_FALSE(lies_in(region, {-1, 400}));
+    EXPECT_NEAR(share_of_image(region, kImager), 120000.0 / (800 * 600), 1e-12);
+    std::reverse(region.begin(), region.end());
+  }
 }
 
 TEST(KnownRegion, NeedsThreeCornersThatAreNotOnALine) {

@@ -70,7 +70,8 @@ TEST(CornerCache, KeepsCornersBehindCurves) {
   ASSERT_EQ(view.seen.curve_costs.size(), 5U);
   const auto spoilt = std::ranges::find(view.seen.tags, whole.id, &SeenTag::id);
   ASSERT_NE(spoilt, view.seen.tags.end());
-  ASSERT_EQ(spoilt->behind_curves_px, std::vector<SeenTag::Corners>(4, spoilt->corners_px));
+  ASSERT_EQ(spoilt->behind_curves,
+            std::vector<SeenTag::Outline>(4, {spoilt->corners_px, spoilt->bows}));
   cv::imwrite(folder / "coded.png", coded);
   const SourceImage image(folder / "coded.png");
   const BoardCache cache = corner_cache(folder / "cache", board);
@@ -81,7 +82,8 @@ TEST(CornerCache, KeepsCornersBehindCurves) {
   ASSERT_EQ(kept->seen.tags.size(), view.seen.tags.size());
   for (std::size_t i = 0; i < view.seen.tags.size(); ++i) {
     EXPECT_EQ(kept->seen.tags[i].corners_px, view.seen.tags[i].corners_px);
-    EXPECT_EQ(kept->seen.tags[i].behind_curves_px, view.seen.tags[i].behind_curves_px);
+    EXPECT_EQ(kept->seen.tags[i].bows, view.seen.tags[i].bows);
+    EXPECT_EQ(kept->seen.tags[i].behind_curves, view.seen.tags[i].behind_curves);
   }
 }
 

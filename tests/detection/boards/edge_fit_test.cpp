@@ -140,9 +140,28 @@ TEST(EdgeFit, WithItsBlurKnownIsBetterWhereWhiteRunsOver) {
   const double alone_px = scatter_px(step, {step.gamma});
   const double held_px = scatter_px(step, {step.gamma, step.blur_px, 60});
   EXPECT_LT(held_px, 0.5 * alone_px);
-  // Elsewhere the pixels tell it.
-  const Step seen{.noise = 4};
-  EXPECT_EQ(scatter_px(seen, {}), scatter_px(seen, {1, 2 * seen.blur_px, 1000}));
+  // With the light, too.
+  const double lit_px = scatter_px(step, {step.gamma, step.blur_px, 60, step.white, 1});
+  EXPECT_LT(lit_px, 0.6 * held_px);
+}
+
+TEST(EdgeFit, SaysWhatLightAndBlurAreKnownTo) {
+  const Step step{.white = 380, .gamma = 2.2, .noise = 1}, seen{.gamma = 2.2, .noise = 1};
+  constexpr unsigned sets = 100;
+  double lights = 0, blurs = 0;
+  for (unsigned seed = 1; seed <= sets; ++seed) {
+    EdgeCurve edge = step.start();
+    // Together they are known too badly for a linear theory.
+    const auto lit = fit_edge(edge, step.pixels(seed), {step.gamma, step.blur_px, 100});
+    ASSERT_TRUE(lit);
+    lights += std::pow(lit->bright_light - step.white, 2) / lit->bright_variance / sets;
+    edge = seen.start();
+    const auto blurred = fit_edge(edge, seen.pixels(seed), {seen.gamma});
+    ASSERT_TRUE(blurred);
+    blurs += std::pow(edge.blur_px - seen.blur_px, 2) / blurred->blur_variance / sets;
+  }
+  EXPECT_NEAR(lights, 1, 0.35);
+  EXPECT_NEAR(blurs, 1, 0.35);
 }
 
 TEST(EdgeFit, OfDimPaperIsFoundBehindTheSteepestCurve) {

@@ -17,12 +17,17 @@ BoardView image(double gamma, double clearly) {
     for (auto& corner : all) corner = {100 - 0.5 * x + 0.1 * x * x, 50 + 0.3 * x};
     return all;
   };
+  const auto bows = [](double x) {
+    SeenTag::Bows all;
+    all.fill({0.2 + 0.05 * x, -0.01 * x, 0.8});
+    return all;
+  };
   BoardView view{"image", {200, 100}, {}};
-  SeenTag tag{7, corners(0)};
+  SeenTag tag{7, corners(0), bows(0)};
   for (const double each : kGammas) {
     const double x = std::log(each);
     view.seen.curve_costs.push_back(300 + clearly * std::pow(x - std::log(gamma), 2));
-    if (each != 1) tag.behind_curves_px.push_back(corners(x));
+    if (each != 1) tag.behind_curves.push_back({corners(x), bows(x)});
   }
   view.seen.tags.push_back(tag);
   return view;
@@ -35,6 +40,10 @@ TEST(CommonCurve, IsWhatAnImageCallsForAndMovesItsCorners) {
     const double x = std::log(gamma);
     EXPECT_NEAR(images[0].seen.tags[0].corners_px[3].x(), 100 - 0.5 * x + 0.1 * x * x, 1e-9);
     EXPECT_NEAR(images[0].seen.tags[0].corners_px[3].y(), 50 + 0.3 * x, 1e-9);
+    const EdgeBow& bow = images[0].seen.tags[0].bows[2];
+    EXPECT_NEAR(bow.square_px, 0.2 + 0.05 * x, 1e-9);
+    EXPECT_NEAR(bow.cube_px, -0.01 * x, 1e-9);
+    EXPECT_EQ(bow.reach, 0.8);
   }
 }
 
@@ -63,7 +72,7 @@ TEST(CommonCurve, IsNoneWhereItIsLittle) {
 TEST(CommonCurve, LeavesImagesThatHaveNoneForSure) {
   BoardView plain = image(1, 500);
   plain.seen.curve_costs.resize(2);
-  plain.seen.tags[0].behind_curves_px.clear();
+  plain.seen.tags[0].behind_curves.clear();
   std::vector<BoardView> images{plain, image(2, 500), image(2, 500), {"none", {200, 100}, {}}};
   EXPECT_GT(take_common_curve(images), 1.5);
   EXPECT_EQ(images[0].seen.tags[0].corners_px[0].x(), 100);

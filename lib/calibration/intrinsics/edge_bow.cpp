@@ -1,0 +1,107 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/edge_bow.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+namespace vlp {
+namespace {
+
+/// An edge of a tag, between two pixels.
+struct Chord {
+  Eigen::Vector2d from, to, outwards;
+
+  Chord(const Eigen::Vector2d& begin, const Eigen::Vector2d& end, const Eigen::Vector2d& inside)
+      : from(begin), to(end), outwards(begin.y() - end.y(), end.x() - begin.x()) {
+    outwards.normalize();
+    if (outwards.dot(inside - from) > 0) outwards = -outwards;
+  }
+};
+
+/// How far outside of a chord the lens has the straight line between its ends, at w.
+std::optional<double> bow_of_lens(const Chord& chord, const Eigen::Vector3d& from_ray,
+                                  const Eigen::Vector3d& to_ray, const Lens& lens, double w) {
+  constexpr int rounds = 3;
+  const Eigen::Vector2d length = chord.to - chord.from;
+  double share = (1 + w) / 2;
+  for (int round = 0;; ++round) {
+    const auto pixel = lens.project((1 - share) * from_ray + share * to_ray);
+    if (!pixel) return {};
+    const Eigen::Vector2d off = *pixel - chord.from;
+    if (round + 1 == rounds) return chord.outwards.dot(off);
+    share += (1 + w) / 2 - length.dot(off) / length.squaredNorm();
+  }
+}
+
+/// What an edge's ends move outwards by, with the bow that the lens makes.
+struct MovedEdge {
+  std::array<double, 2> outwards_px;
+  EdgeBow bow;
+};
+
+std::optional<MovedEdge> moved(const Chord& chord, const EdgeBow& seen, const Lens& lens) {
+  const auto from_ray = lens.unproject(chord.from), to_ray = lens.unproject(chord.to);
+  if (!from_ray || !to_ray) return {};
+  const auto lens_at = [&](double w) {
+    return bow_of_lens(chord, from_ray->direction, to_ray->direction, lens, w);
+  };
+  // Gauss and Legendre's places and weights.
+  constexpr std::array<std::array<double, 2>, 4> rule{{{-0.8611363115940526, 0.3478548451374538},
+                                                       {-0.3399810435848563, 0.6521451548625461},
+                                                       {0.3399810435848563, 0.6521451548625461},
+                                                       {0.8611363115940526, 0.3478548451374538}}};
+  double mean = 0, slope = 0;
+  for (const auto& [place, weight] : rule) {
+    const double w = seen.reach * place;
+    const auto by_lens = lens_at(w);
+    if (!by_lens) return {};
+    const double apart = seen.at(w) - *by_lens;
+    mean += weight / 2 * apart;
+    slope += 3 * weight / 2 * apart * place / seen.reach;
+  }
+  const auto middle = lens_at(0), before = lens_at(-0.5), after = lens_at(0.5);
+  if (!middle || !before || !after) return {};
+  return MovedEdge{{mean - slope, mean + slope}, {-*middle, (*before - *after) / 0.75, seen.reach}};
+}
+
+}  // namespace
+
+double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
+  double most_px = 0;
+  for (std::size_t first = 0; first + 4 <= corners.size(); first += 4) {
+    const auto tag = corners.begin() + static_cast<std::ptrdiff_t>(first);
+    if (!std::all_of(tag, tag + 4, [](const auto& corner) { return corner.bow.reach > 0; })) {
+      continue;
+    }
+    const Eigen::Vector2d inside = (tag[0].pixel + tag[1].pixel + tag[2].pixel + tag[3].pixel) / 4;
+    std::array<std::optional<MovedEdge>, 4> edges;
+    std::array<Eigen::Vector2d, 4> outwards;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto at = static_cast<std::ptrdiff_t>(k),
+                 next = static_cast<std::ptrdiff_t>((k + 1) % 4);
+      const Chord chord(tag[at].pixel, tag[next].pixel, inside);
+      outwards[k] = chord.outwards;
+      edges[k] = moved(chord, tag[at].bow, lens);
+    }
+    if (!std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge; })) continue;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::size_t previous = (k + 3) % 4;
+      Eigen::Matrix2d normals;
+      normals << outwards[previous].transpose(), outwards[k].transpose();
+      const Eigen::Vector2d step =
+          normals.inverse() *
+          Eigen::Vector2d(edges[previous]->outwards_px[1], edges[k]->outwards_px[0]);
+      BoardLattice::Corner& corner = tag[static_cast<std::ptrdiff_t>(k)];
+      corner.pixel += step;
+      corner.bow = edges[k]->bow;
+      most_px = std::max(most_px, step.norm());
+    }
+  }
+  return most_px;
+}
+
+}  // namespace vlp

@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// board_trials [SCENE [SEEDS [PICTURE]]]: lenses from rendered boards behind the pictures that
+/// cameras make of them (tone curves, sharpening, JPEG, white that runs over), against the truth.
+/// SCENE is a folder of datasets/ (paper-rig); its boards are drawn with so many seeds (3), the
+/// scene's own first. PICTURE: of those whose name contains it.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <thread>
+
+#include "calibration/intrinsics/projection_difference.h"
+#include "captures/in_parallel.h"
+#include "detection/boards/tone_curve.h"
+#include "geometry/median.h"
+#include "session/lens_step.h"
+#include "simulation/exposure.h"
+#include "simulation/frame_renderer.h"
+#include "simulation/picture.h"
+
+namespace vlp {
+namespace {
+
+/// What a camera makes of the light of a board.
+struct Development {
+  std::string name;
+  /// White over what the sensor holds; 0: as the scene exposes it.
+  double white;
+  std::optional<Picture> picture;
+};
+
+Picture curve(double gamma, std::optional<int> jpeg_quality = {},
+              std::optional<Sharpening> sharpening = {}) {
+  Picture picture;
+  picture.gamma = gamma;
+  picture.jpeg_quality = jpeg_quality;
+  picture.sharpening = sharpening;
+  return picture;
+}
+
+std::vector<Development> developments() {
+  const Sharpening sharp{1, 1};
+  return {{"linear", 0, {}},
+          {"JPEG 80", 0, curve(1, 80)},
+          {"gamma 1.4", 0, curve(1.4)},
+          {"gamma 1.4, JPEG 80", 0, curve(1.4, 80)},
+          {"gamma 1.6", 0, curve(1.6)},
+          {"gamma 1.6, JPEG 80", 0, curve(1.6, 80)},
+          {"gamma 2.2, JPEG 90", 0, curve(2.2, 90)},
+          {"gamma 2.4", 0, curve(2.4)},
+          {"gamma 2.4, JPEG 80", 0, curve(2.4, 80)},
+          {"sharpened, JPEG 80", 0, curve(1, 80, sharp)},
+          {"gamma 2.2, sharpened, JPEG 90", 0, curve(2.2, 90, sharp)},
+          {"gamma 2.4, sharpened, JPEG 80", 0, curve(2.4, 80, sharp)},
+          {"1.5 times white", 1.5, {}},
+          {"1.25 times white, gamma 1.8, JPEG 90", 1.25, curve(1.8, 90)},
+          {"1.5 times white, gamma 2.2, JPEG 90", 1.5, curve(2.2, 90)},
+          {"1.5 times white, gamma 2.4, JPEG 80", 1.5, curve(2.4, 80)},
+          {"1.5 times white, sharpened, gamma 2.2, JPEG 80", 1.5, curve(2.2, 80, sharp)}};
+}
+
+cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t seed,
+                  const std::optional<Picture>& picture) {
+  const cv::Mat image = expose(scene.sensor, electrons, seed, picture);
+  return cv::imdecode(encoded(image, picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+}
+
+/// Over the pixels of a region, once the lenses are turned to agree best over the image.
+double worst_within(const ImageRegion& region, const Lens& truth, const Lens& lens,
+                    const std::array<int, 2>& imager_px) {
+  const auto pixels = pixel_grid(imager_px);
+  const auto turned = b_from_a(truth, lens, pixels);
+  double worst_px = 0;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const auto ray = truth.unproject(pixel);
+    if (!turned || !ray || !lies_in(region, pixel)) continue;
+    const auto seen = lens.project(*turned * ray->direction);
+    worst_px = std::max(worst_px, seen ? (*seen - pixel).norm() : INFINITY);
+  }
+  return worst_px;
+}
+
+void try_development(const Scene& scene, const CaptureSet& boards,
+                     const std::vector<cv::Mat1f>& electrons, const BoardDetector& detector,
+                     const Development& development) {
+  LensInput input;
+  input.board = scene.board->print;
+  input.camera = scene.camera;
+  input.views.resize(electrons.size());
+  const auto threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  const double holds_e =
+      (white_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e;
+  const double white_e = scene.board->white_e_per_s * boards.exposure_s;
+  const double exposures = development.white > 0 ? development.white * holds_e / white_e : 1;
+  in_parallel(electrons.size(), threads, [&](std::size_t i) {
+    const BoardShot shot = board_shot(scene, boards, i);
+    cv::Mat1f lit;
+    electrons[i].convertTo(lit, CV_32F, exposures);
+    const cv::Mat image = developed(scene, lit, shot.noise_seed, development.picture);
+    input.views[i] = {shot.image, {image.cols, image.rows}, detector.detect(image)};
+  });
+  std::size_t tags = 0, usable = 0;
+  for (const BoardView& view : input.views) {
+    usable += view.seen.tags.size();
+    tags += view.seen.tags.size() + static_cast<std::size_t>(view.seen.unusable);
+  }
+  const double gamma = take_common_curve(input.views);
+  const LensResult result = solve_lens(input, {});
+  const std::string share =
+      fmt::format("{:.1f}", 100 * static_cast<double>(usable) / static_cast<double>(tags));
+  if (!result.solution.ok()) {
+    fmt::print("{:48} {:5} % of the tags: no lens\n", development.name, share);
+    return;
+  }
+  const Camera& camera = scene.camera;
+  const Lens truth(camera.lens_model, camera.intrinsics), lens = result.solution.lens();
+  const auto even = [](const Eigen::Vector2d&) { return 1; };
+  const auto difference = projection_difference(truth, lens, camera.imager_px, even);
+  fmt::print(
+      "{:48} {:.4f} / {:.3f} px, in the region {:.3f}; {:.2f} x stated rms, worst stated {:.3f}, "
+      "{:.3f} "
+      "in the region; left {:.4f}, edges {:+.3f} px, gamma {:.2f}, {} % of {} tags\n",
+      development.name, difference->mean_px, difference->worst_px,
+      worst_within(result.report.region, truth, lens, camera.imager_px),
+      difference->rms_px / result.report.expected_rms_px,
+      std::max(result.report.uncertainty_worst_px, result.report.uncertainty_beyond_px),
+      result.report.uncertainty_worst_px, result.solution.rms_px,
+      upper_median(result.solution.edge_shifts_px), gamma, share, tags);
+}
+
+void try_seed(Scene scene, std::uint64_t seed, const std::string& wanted) {
+  scene.seed = seed;
+  const CaptureSet boards = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
+  const FrameRenderer renderer(scene);
+  const BoardDetector detector(scene.board->print);
+  std::vector<cv::Mat1f> electrons(shots_in(boards));
+  in_parallel(electrons.size(), static_cast<int>(std::thread::hardware_concurrency()),
+              [&](std::size_t i) {
+                electrons[i] = renderer.board_electrons(board_shot(scene, boards, i));
+              });
+  fmt::print("seed {}, {} views\n", seed, electrons.size());
+  for (const Development& development : developments()) {
+    if (development.name.find(wanted) == std::string::npos) continue;
+    try_development(scene, boards, electrons, detector, development);
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  constexpr int usual_seeds = 3;
+  const std::string name = argc > 1 ? argv[1] : "paper-rig";
+  const int seeds = argc > 2 ? std::atoi(argv[2]) : usual_seeds;
+  const vlp::Scene scene = vlp::read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
+  for (int i = 0; i < seeds; ++i) {
+    vlp::try_seed(scene, scene.seed + static_cast<std::uint64_t>(i), argc > 3 ? argv[3] : "");
+  }
+}

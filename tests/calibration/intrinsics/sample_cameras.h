@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "calibration/intrinsics/camera_imports.h"
+#include "camera/spline_grid.h"
+
+namespace vlp {
+
+/// 800 x 600, of any model but the splined ones.
+inline Camera camera_of(LensModel model) {
+  const std::vector<double> distortions{-0.2,   0.05,  1e-4, -2e-4, 0.01,  0.02,
+                                        -0.003, 0.001, 1e-4, 2e-5,  -1e-4, 3e-5};
+  Camera camera{"camera", {800, 600}, model, {520.25, 521, 402.3, 297.4}, {}, {}, {}};
+  if (model == LensModel::fisheye) {  // up to 104 degrees off the axis
+    camera.intrinsics = {290, 291, 402, 297, 0.03, -0.012, 0.004, -0.0006};
+    return camera;
+  }
+  camera.intrinsics.insert(
+      camera.intrinsics.end(), distortions.begin(),
+      distortions.begin() + static_cast<std::ptrdiff_t>(parameter_count(model) - 4));
+  return camera;
+}
+
+/// As of a lens of 150 degrees.
+inline Camera splined_camera(const SplineGrid& grid = {3, 13, 11, 150}) {
+  return with_lens_model(camera_of(LensModel::fisheye), splined_lens(grid)).camera;
+}
+
+}  // namespace vlp

@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/boards/edge_field.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+/// A blur that grows to the rim, and along a motion.
+double blur_px(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) {
+  const Eigen::Vector2d x = (at_px - Eigen::Vector2d(400, 300)) / 400;
+  return 0.8 * std::exp(0.3 * x.squaredNorm() + 0.1 * x.x() - 0.2 * along.x() * along.y());
+}
+
+/// Known to 2 %, and different by `apart`.
+std::vector<EdgeFigure> figures(int count, double apart, double noise = 0.02) {
+  Random random(5);
+  std::vector<EdgeFigure> all;
+  for (int i = 0; i < count; ++i) {
+    const double u = random.uniform(50, 750), v = random.uniform(50, 550);
+    const double angle = random.uniform(0, 3);
+    const Eigen::Vector2d at(u, v), along(std::cos(angle), std::sin(angle));
+    const double off = apart * random.normal() + noise * random.normal();
+    all.push_back({at, along, blur_px(at, along) * std::exp(off), noise});
+  }
+  return all;
+}
+
+TEST(EdgeField, IsExactWithoutNoise) {
+  const auto all = figures(60, 0, 0);
+  const EdgeField field(all, EdgeField::Terms::place_and_direction);
+  for (const EdgeFigure& figure : all) {
+    EXPECT_NEAR(field.value(figure.at_px, figure.along) / figure.value, 1, 1e-6);
+  }
+}
+
+TEST(EdgeField, TellsHowFarFiguresAreApartBeyondTheirNoise) {
+  for (const double apart : {0.05, 0.2}) {
+    const EdgeField field(figures(300, apart), EdgeField::Terms::place_and_direction);
+    EXPECT_NEAR(field.apart() / apart, 1, 0.15);
+  }
+  const EdgeField alike(figures(300, 0), EdgeField::Terms::place_and_direction);
+  EXPECT_LE(alike.apart(), 0.012);
+  const EdgeField without_direction(figures(300, 0), EdgeField::Terms::place);
+  EXPECT_GT(without_direction.apart(), 0.05);
+}
+
+TEST(EdgeField, StaysWhereSomeFiguresAreOfSomethingElse) {
+  auto all = figures(100, 0);
+  for (std::size_t i = 0; i < all.size(); i += 8) all[i].value *= 4;
+  const EdgeField field(all, EdgeField::Terms::place_and_direction);
+  const EdgeFigure& figure = all[1];
+  EXPECT_NEAR(field.value(figure.at_px, figure.along) / blur_px(figure.at_px, figure.along), 1,
+              0.03);
+}
+
+TEST(EdgeField, OfFewFiguresIsTheirMiddle) {
+  const std::vector<EdgeFigure> few{
+      {{10, 10}, {1, 0}, 0.5, 0.1}, {{90, 10}, {1, 0}, 0.8, 0.1}, {{50, 80}, {0, 1}, 2.0, 0.1}};
+  const EdgeField field(few, EdgeField::Terms::place);
+  EXPECT_EQ(field.value({0, 0}, {1, 0}), field.value({500, 700}, {0, 1}));
+  EXPECT_NEAR(field.value({0, 0}, {1, 0}), 0.9, 0.2);
+  EXPECT_GT(field.apart(), 0.3);
+}
+
+}  // namespace
+}  // namespace vlp
