@@ -179,6 +179,9 @@ void run(const CLI::App& app, const Options& options) {
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
   const std::string failed = words_of_missed(check_gates(gates, lens.metrics));
   if (failed.empty()) return;
+  if (lens.better_model) {
+    throw GateNotMet(fmt::format("{}; take --lens {}", failed, name_of(*lens.better_model)));
+  }
   if (std::isfinite(lens.report.uncertainty_worst_px)) {
     throw GateNotMet(fmt::format("{}; add views, next {}", failed, next_view(lens.coverage)));
   }

@@ -5,11 +5,14 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/spline_fit.h"
 #include "camera/spline_surface.h"
@@ -38,6 +41,17 @@ std::string too_few(const Board& board, const SeenBoard& seen) {
     words += fmt::format(", {} more are blurred, hidden or cut", seen.unusable);
   }
   return words;
+}
+
+/// Whether white runs over most of the tags that cannot be used in views of too little.
+bool overexposed(const std::vector<BoardView>& views, const BoardLattice& lattice) {
+  int unusable = 0, overexposed = 0;
+  for (const BoardView& view : views) {
+    if (lattice.enough(view.seen)) continue;
+    unusable += view.seen.unusable;
+    overexposed += view.seen.overexposed;
+  }
+  return 2 * overexposed > unusable;
 }
 
 /// Whether two views show the board in the same place: what both show is 1 % of the image's width
@@ -187,6 +201,12 @@ std::string why_not_this_grid(IntrinsicsInput input) {
       angle_deg(seen.farthest.y()), name_of(reaching(grid, reach.cwiseMax(more * seen.farthest))));
 }
 
+std::string but_fits(LensModel wanted, const IntrinsicsSolution& other) {
+  const std::string name(name_of(other.problem.lens_model));
+  return fmt::format("no lens of {} is found, but {} fits to {:.2f} px: take --lens {}",
+                     name_of(wanted), name, other.rms_px, name);
+}
+
 /// Why no lens of the model fits: the model, if another one does.
 std::string why_none_fits(IntrinsicsInput input) {
   const LensModel wanted = input.lens_model;
@@ -198,10 +218,60 @@ std::string why_none_fits(IntrinsicsInput input) {
     const IntrinsicsSolution solution = solve_intrinsics(input);
     if (!solution.ok() || solution.rms_px >= best_px) continue;
     best_px = solution.rms_px;
-    words = fmt::format("{} cannot be this lens, but {} fits to {:.2f} px: take --lens {}",
-                        name_of(wanted), name_of(other), solution.rms_px, name_of(other));
+    words = but_fits(wanted, solution);
   }
   return words;
+}
+
+bool is_opencv(LensModel model) {
+  return model == LensModel::opencv4 || model == LensModel::opencv5 ||
+         model == LensModel::opencv8 || model == LensModel::opencv12;
+}
+
+/// Whether a lens leaves no more than another, up to what the corners do not tell: 20 times the
+/// mean square of its residuals, as for the warp.
+bool fits_as_well(const IntrinsicsSolution& one, const IntrinsicsSolution& other) {
+  constexpr double much = 20;
+  const double ratio = one.rms_px / other.rms_px;
+  return ratio * ratio <= 1 + much / (2.0 * other.corners);
+}
+
+/// Where it is more than noise explains, how far the two lenses are apart where the lens is said to
+/// be known, is how well it is.
+void state_how_far_apart(const Lens& lens, const Lens& other, CalibrationReport& report,
+                         const std::array<int, 2>& imager_px) {
+  std::vector<Eigen::Vector2d> pixels = pixel_grid(imager_px);
+  std::erase_if(pixels, [&](const auto& pixel) { return !lies_in(report.region, pixel); });
+  const auto lens_from_other = b_from_a(other, lens, pixels);
+  if (!lens_from_other) return;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const auto ray = other.unproject(pixel);
+    const auto seen = ray ? lens.project(*lens_from_other * ray->direction) : std::nullopt;
+    const double apart_px = seen ? (*seen - pixel).norm() : std::numeric_limits<double>::infinity();
+    if (apart_px <= report.uncertainty_worst_px) continue;
+    report.uncertainty_worst_px = apart_px;
+    report.uncertainty_worst_at = pixel;
+  }
+}
+
+/// That OPENCV_FISHEYE is the lens to take, when it fits clearly better or the board is seen nearly
+/// as far off the axis as the rays of the lens go.
+void tell_better(const FisheyeFit& fisheye, LensResult& result) {
+  constexpr double clearly = 0.95, near_rad = 1.3;
+  const IntrinsicsSolution& solution = result.solution;
+  const LensModel model = solution.problem.lens_model;
+  if (fisheye.solution.rms_px > clearly * solution.rms_px && fisheye.farthest_rad < near_rad) {
+    result.details.push_back(
+        fmt::format("{} fits the views as well as {}, so that nothing is known beyond the corners",
+                    name_of(LensModel::fisheye), name_of(model)));
+    return;
+  }
+  result.better_model = LensModel::fisheye;
+  result.warnings.push_back(fmt::format(
+      "the board is seen up to {:.0f} degrees off the axis, and {} fits it to {:.3f} px, {} to "
+      "{:.3f} px, with no rays from 90 degrees on: take --lens {}",
+      deg_from_rad(fisheye.farthest_rad), name_of(LensModel::fisheye), fisheye.solution.rms_px,
+      name_of(model), solution.rms_px, name_of(LensModel::fisheye)));
 }
 
 }  // namespace
@@ -246,11 +316,31 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
       return result;
     }
   }
+  std::optional<FisheyeFit> fisheye;
+  if (is_opencv(camera.lens_model) && may_be_wide(views.solved)) {
+    fisheye = fit_fisheye(views.solved);
+    if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) {
+      result.fail(
+          StepFailure::undetermined,
+          fmt::format(
+              "{} views with the board: it is seen up to {:.0f} degrees off the axis, where "
+              "{} has no rays: take --lens {}",
+              views.solved.views.size(), deg_from_rad(fisheye->farthest_rad),
+              name_of(camera.lens_model), name_of(LensModel::fisheye)));
+      return result;
+    }
+  }
   result.solution = solve_intrinsics(views.solved);
   const IntrinsicsSolution& solution = result.solution;
   if (!solution.ok()) {
     std::string why;
-    if (solution.status == IntrinsicsStatus::no_solution) why = why_none_fits(views.solved);
+    if (solution.status == IntrinsicsStatus::no_solution) {
+      why = fisheye ? but_fits(camera.lens_model, fisheye->solution) : why_none_fits(views.solved);
+    }
+    if (solution.status == IntrinsicsStatus::too_few_views &&
+        overexposed(input.views, views.solved.lattice)) {
+      why = "in the others white is overexposed and runs over the corners; expose shorter";
+    }
     if (why.empty()) why = explanation_of(solution.status);
     result.fail(StepFailure::undetermined,
                 fmt::format("{} views with the board: {}", views.solved.views.size(), why));
@@ -274,7 +364,13 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
     result.fail(StepFailure::wrong_board, exact.problem, input.board_file);
     return result;
   }
+  result.solution.another_fits = fisheye && fits_as_well(fisheye->solution, solution);
   result.report = report_on(solution, views.solved);
+  if (solution.another_fits) {
+    state_how_far_apart(solution.lens(), fisheye->solution.lens(), result.report,
+                        views.solved.imager_px);
+    if (!input.choose_lens_model) tell_better(*fisheye, result);
+  }
   result.coverage = coverage_of(solution, views.solved);
   result.held_out = held_out_fit(solution, views.held_out);
   result.calibration = with_camera(camera_of(camera, solution.problem),

@@ -16,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 const std::string kFaulty = VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered";
 
@@ -106,6 +107,29 @@ TEST_F(IntrinsicsRefusals, NamesWhatIsWrongWithTheBoard) {
   EXPECT_THAT(spacing.errors, HasSubstr("tag_spacing is 0.5, but the images show gaps of "));
 }
 
+TEST_F(IntrinsicsRefusals, NamesTheOrderOfASquareKalibrBoard) {
+  std::string scene =
+      TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
+  const std::string rows = "rows: 5,";
+  scene.replace(scene.find(rows), rows.size(), "rows: 6,");
+  const std::string file = folder.file("scene.yaml", scene).string();
+  const std::string rig = (folder / "rig").string();
+  ASSERT_EQ(run_program("vlp-simulate -q " + file + " --only sample-boards -o " + rig).exit_code,
+            0);
+  const std::string board = TemporaryFolder::content_of(rig + "/board.yaml");
+  const std::string right = "row-major-from-bottom-left";
+  for (const char* wrong : {"row-major-from-top-left", "row-major-from-bottom-right",
+                            "column-major-from-top-left", "column-major-from-bottom-right"}) {
+    std::string changed = board;
+    changed.replace(changed.find(right), right.size(), wrong);
+    const auto result =
+        calibrate(rig + "/sample-boards", folder.file("board.yaml", changed).string());
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.errors,
+                HasSubstr("board.yaml: the images show cols 6, rows 6, id_order " + right));
+  }
+}
+
 TEST_F(IntrinsicsRefusals, RefusesMixedSizesAndSkipsWhatIsNoImage) {
   const std::string images = copies({"0.png", "1.png"});
   folder.file("images/2.png", "no image\n");
@@ -153,6 +177,29 @@ TEST_F(IntrinsicsRefusals, SaysThatWhatItSeesIsOverexposed) {
   const auto result = calibrate((folder / "white").string(), kFaulty + "/board.yaml");
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.errors, HasSubstr("overexposed"));
+}
+
+TEST_F(IntrinsicsRefusals, SaysThatBurntOutBoardsAreOverexposed) {
+  const std::string text =
+      TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
+  const std::string usual = "folder: boards\n    exposure_s: 0.004\n    views: {count: 36,";
+  const auto at = text.find(usual);
+  ASSERT_NE(at, std::string::npos);
+  // Ten and forty times white: of some tags enough is left to see them, and of none.
+  for (const std::string exposure : {"0.05", "0.2"}) {
+    std::string scene = text;
+    scene.replace(at, usual.size(),
+                  "folder: boards\n    exposure_s: " + exposure + "\n    views: {count: 3,");
+    const std::string file = folder.file("scene.yaml", scene).string();
+    const std::string rig = (folder / ("rig" + exposure)).string();
+    ASSERT_EQ(run_program("vlp-simulate -q " + file + " --only boards -o " + rig).exit_code, 0);
+    const auto result = calibrate(rig + "/boards", rig + "/board.yaml");
+    EXPECT_EQ(result.exit_code, 3);
+    const std::string error = result.errors.substr(result.errors.find("error: "));
+    EXPECT_THAT(error, HasSubstr("overexposed"));
+    EXPECT_THAT(error, HasSubstr("expose shorter"));
+    EXPECT_THAT(result.errors, Not(HasSubstr("border_bits")));
+  }
 }
 
 TEST_F(IntrinsicsRefusals, RefusesBadOptions) {

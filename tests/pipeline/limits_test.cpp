@@ -195,6 +195,32 @@ TEST(Limits, WritesNothingWhenItsPictureCannotBe) {
   EXPECT_FALSE(std::filesystem::exists(map));
 }
 
+TEST(Limits, OfAFisheyeReachAsFarAsItSees) {
+  const TemporaryFolder folder;
+  const auto map_of = [&](const Camera& camera) {
+    write_calibration(folder / "camera.yaml", {camera, {}, {}, {}, {}});
+    const auto result =
+        run_program("vlp-limits --lamps " VLP_SOURCE_DIR
+                    "/datasets/example/lamps.yaml --height-m 0 "
+                    "--noise-px 0.1 --floor-m -1.5 1.5 0 0.5 --step-m 0.5 --calibration " +
+                    (folder / "camera.yaml").string() + " --map " + (folder / "map.csv").string());
+    EXPECT_EQ(result.exit_code, 0) << result.errors;
+    return CsvTable(folder / "map.csv");
+  };
+  const CsvTable by_fisheye = map_of(fisheye_camera()), by_other = map_of(synthetic_camera());
+  ASSERT_EQ(by_fisheye.rows(), by_other.rows());
+  int more = 0;
+  for (std::size_t row = 0; row < by_fisheye.rows(); ++row) {
+    const auto lamps = [row](const CsvTable& map) {
+      return map.number(row, map.required("lamps"));
+    };
+    EXPECT_GE(lamps(by_fisheye), lamps(by_other));
+    if (lamps(by_fisheye) > lamps(by_other)) ++more;
+    EXPECT_GT(by_fisheye.number(row, by_fisheye.required("noise_m")), 0);
+  }
+  EXPECT_GT(more, 0);
+}
+
 TEST(Limits, WritesNoTwoResultsToOneFile) {
   const TemporaryFolder folder;
   const auto result = run_program("cd '" + (folder / "").string() + "' && " + kLimits +

@@ -191,5 +191,30 @@ TEST(ExactFix, WithASplinedLens) {
   expect_exact(rig);
 }
 
+TEST(ExactFix, WithAFisheye) {
+  SyntheticRig rig = rig_of(8, false);
+  rig.calibration.camera = fisheye_camera();
+  for (int yaw_deg = -180; yaw_deg <= 180; yaw_deg += 20) {
+    rig.camera = {{0.1, 0.1, 0}, rad_from_deg(yaw_deg)};
+    expect_exact(rig);
+  }
+}
+
+TEST(ExactFix, WithLampsBeyondARightAngleOffTheAxisOfAFisheye) {
+  SyntheticRig rig = rig_of(8, false);
+  rig.calibration.camera = fisheye_camera();
+  rig.camera = {{0.1, 0.1, 0}, 1};
+  rig.inclination = {1.3, 0.2};
+  const Lens lens(LensModel::fisheye, rig.calibration.camera.intrinsics);
+  int beyond = 0;
+  for (const Detection& detection : seen_from(rig)) {
+    const auto ray = lens.unproject(detection.pixel);
+    ASSERT_TRUE(ray);
+    if (ray->direction.z() < 0) ++beyond;
+  }
+  EXPECT_GT(beyond, 0);
+  expect_exact(rig, {rig.inclination, 0, {}});
+}
+
 }  // namespace
 }  // namespace vlp

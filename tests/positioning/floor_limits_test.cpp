@@ -4,9 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <stdexcept>
 
+#include "positioning/positioner.h"
 #include "support/near.h"
+#include "support/random.h"
+#include "support/scatter.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {
@@ -91,6 +95,27 @@ TEST(FloorLimits, OfACameraThatMayMoveHavePartsForIt) {
   }
   EXPECT_GT(with_fix, 0);
   EXPECT_GT(without, 0) << "some see too few lamps for a lean";
+}
+
+TEST(FloorLimits, OfAFisheyeAreTheScatterOfItsFixes) {
+  constexpr int draws = 4000;
+  const FloorGrid grid{-1.2, 1.2, 0.2, 0.2, 0.8};
+  SyntheticRig rig{synthetic_lamps(), {fisheye_camera(), {}, {}, {}, {}}, {}, {}};
+  const auto limits = floor_limits(rig.map, rig.calibration.camera, grid, 0.2, 0.5, kNoise);
+  ASSERT_EQ(limits.places.size(), 4);
+  const Positioner positioner(rig.map, rig.calibration);
+  Random random{23};
+  for (const auto& place : limits.places) {
+    EXPECT_EQ(place.lamps, 8);
+    rig.camera = place.camera;
+    const auto exact = seen_from(rig, kNoise.noise_px);
+    Scatter scatter(place.camera, place.parts[0]);
+    for (int i = 0; i < draws; ++i) {
+      scatter.add(positioner.locate(with_noise(exact, random)).estimate.pose);
+    }
+    // Four standard deviations of a standard deviation of so many draws.
+    EXPECT_LT(scatter.excess().cwiseAbs().maxCoeff(), 4 / std::sqrt(2.0 * draws));
+  }
 }
 
 TEST(FloorLimits, HaveNoBudgetWhereNoLampsAreSeen) {

@@ -11,9 +11,17 @@
 #include "simulation/plain_scene.h"
 #include "simulation/truth.h"
 #include "support/mrcal_oracle.h"
+#include "support/synthetic_rig.h"
 
 namespace vlp {
 namespace {
+
+Camera splined() {
+  Camera camera = splined_camera();
+  camera.row_time_s = 3e-5;
+  camera.readout = Readout::rows;
+  return camera;
+}
 
 struct Seen {
   Camera camera;
@@ -132,7 +140,8 @@ INSTANTIATE_TEST_SUITE_P(Lenses, LampCenter,
                          testing::Values(Seen{paper_rig_camera(), 0, 0, "PaperRig"},
                                          Seen{paper_rig_camera(), 0.03, 0.7, "PaperRigTilted"},
                                          Seen{wide_camera(), 0.05, 0, "Wide"},
-                                         Seen{stereographic_camera(), 0.1, 0.5, "Stereographic"}),
+                                         Seen{stereographic_camera(), 0.1, 0.5, "Stereographic"},
+                                         Seen{splined(), 0.05, 0.5, "Splined"}),
                          [](const auto& instance) { return std::string(instance.param.name); });
 
 }  // namespace

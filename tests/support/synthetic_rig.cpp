@@ -30,6 +30,13 @@ Camera splined_camera() {
   return camera;
 }
 
+Camera fisheye_camera() {
+  Camera camera = synthetic_camera();
+  camera.lens_model = LensModel::fisheye;
+  camera.intrinsics = {290, 291, 403, 296, 0.03, -0.012, 0.004, -0.0006};
+  return camera;
+}
+
 LampMap lamp_map_of(const std::vector<Eigen::Vector3d>& positions_m) {
   LampMap map;
   for (const auto& position_m : positions_m) {

@@ -23,6 +23,9 @@ Camera synthetic_camera();
 /// Of the same size, with a splined lens of 130 degrees.
 Camera splined_camera();
 
+/// Of the same size, with OPENCV_FISHEYE: its lens sees to 95 degrees off the axis and beyond.
+Camera fisheye_camera();
+
 /// Lamps with ids 1, 2, ...
 LampMap lamp_map_of(const std::vector<Eigen::Vector3d>& positions_m);
 

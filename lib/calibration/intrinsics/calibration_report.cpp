@@ -24,7 +24,8 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   const ProjectionUncertainty uncertainty(solution, input.lattice);
   const Lens lens = solution.lens();
   const Eigen::MatrixXd by_views = covariance_by_views(solution);
-  ImageRegion region = known_region(seen_px(solution.problem), input.imager_px, lens.model());
+  ImageRegion region =
+      known_region(seen_px(solution.problem), input.imager_px, lens.model(), solution.another_fits);
   // Beyond it splines are anything.
   const ImageRegion compared = is_splined(lens.model()) ? region : ImageRegion();
   const auto expected =
@@ -58,6 +59,17 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
     report.uncertainty_worst_at = pixel;
   }
   report.uncertainty_mean_px /= std::max(inside, 1.0);
+  if (!is_splined(lens.model())) {
+    // Of few views each of them may chance to be small.
+    const ProjectionUncertainty independent(solution);
+    for (const Eigen::MatrixXd& covariance :
+         {uncertainty.intrinsics_covariance(), independent.intrinsics_covariance(), by_views}) {
+      if (!covariance.allFinite()) continue;
+      report.uncertainty_worst_px =
+          std::max(report.uncertainty_worst_px,
+                   expected_worst_px(lens, input.imager_px, covariance, report.region));
+    }
+  }
   const IntrinsicsSolution even = solve_every_other(solution, 0);
   const IntrinsicsSolution odd = solve_every_other(solution, 1);
   if (!even.ok() || !odd.ok()) return report;

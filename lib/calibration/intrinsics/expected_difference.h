@@ -26,4 +26,10 @@ ExpectedDifference expected_difference(const Lens& lens, const std::array<int, 2
                                        const Eigen::MatrixXd& covariance,
                                        const ImageRegion& region = {});
 
+/// Root of the expected square of the largest difference over the same, which is more than the
+/// largest standard deviation of a place, as chance has many places to choose from. By 200 draws,
+/// the same ones every time.
+double expected_worst_px(const Lens& lens, const std::array<int, 2>& imager_px,
+                         const Eigen::MatrixXd& covariance, const ImageRegion& region = {});
+
 }  // namespace vlp

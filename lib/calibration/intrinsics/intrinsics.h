@@ -62,6 +62,8 @@ struct IntrinsicsSolution {
   Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
   /// Intrinsics (of a splined lens but for the core), and the warp or not.
   SolveFor solved_for{true, true, true, false};
+  /// Another lens model fits the corners as well, so that they do not tell what is beyond them.
+  bool another_fits = false;
 };
 
 /// Solves for lens, poses and the board's warp, with no guess of the focal length:

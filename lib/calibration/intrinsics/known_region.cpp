@@ -58,8 +58,8 @@ ImageRegion cut(const ImageRegion& region, int axis, double limit, double sign) 
 }  // namespace
 
 ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
-                         const std::array<int, 2>& imager_px, LensModel model) {
-  const double margin = is_splined(model) ? 0 : 0.04;
+                         const std::array<int, 2>& imager_px, LensModel model, bool another_fits) {
+  const double margin = is_splined(model) || another_fits ? 0 : 0.04;
   const Eigen::Vector2d last(imager_px[0] - 1, imager_px[1] - 1);
   const double margin_px = margin * last.norm();
   // The hull grown by a square, whose corners reach an image's corner as its edges are reached.

@@ -17,9 +17,11 @@ using ImageRegion = std::vector<Eigen::Vector2d>;
 /// of 4 % of the image's diagonal, the image's edges permitting; the whole image when that leaves
 /// less than 1.5 % of it. Convex, clockwise as the image shows it. Beyond it no corner contradicts
 /// a lens model that is wrong. A splined lens, which corners tell nothing of where they are not,
-/// has no margin. Empty without three corners that are not on a line.
+/// has no margin, nor has a lens whose model the corners do not tell from another (another_fits).
+/// Empty without three corners that are not on a line.
 ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
-                         const std::array<int, 2>& imager_px, LensModel model);
+                         const std::array<int, 2>& imager_px, LensModel model,
+                         bool another_fits = false);
 
 /// Whether a pixel lies in it or on its edge.
 bool lies_in(const ImageRegion& region, const Eigen::Vector2d& pixel);

@@ -9,8 +9,10 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/pose_seeds.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
 
@@ -22,23 +24,6 @@ using Squares = std::vector<double>;
 /// By their number of parameters.
 constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
                              LensModel::opencv8, LensModel::opencv12};
-
-/// The angle of the corner farthest off the axis, when a lens that fits has it at 90 degrees or
-/// beyond; else 0.
-double beyond_right_angle_rad(IntrinsicsInput input) {
-  constexpr double fits_px = 2;
-  input.lens_model = LensModel::fisheye;
-  const IntrinsicsSolution solution = solve_intrinsics(input);
-  if (!solution.ok() || solution.rms_px > fits_px) return 0;
-  const Lens lens = solution.lens();
-  double least = 1;
-  for (const Eigen::Vector2d& pixel : seen_px(solution.problem)) {
-    if (const auto ray = lens.unproject(pixel)) {
-      least = std::min(least, ray->direction.normalized().z());
-    }
-  }
-  return least <= 0 ? std::acos(least) : 0;
-}
 
 /// The mean squared residual per axis of each view, from solves without it, infinite where it has
 /// no pose; nothing when a solve fails.
@@ -111,10 +96,40 @@ void leave_out_bad_views(std::vector<std::optional<Squares>>& of_models) {
 
 }  // namespace
 
+std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input) {
+  constexpr double fits_px = 2;
+  input.lens_model = LensModel::fisheye;
+  IntrinsicsSolution solution = solve_intrinsics(input);
+  if (!solution.ok() || solution.rms_px > fits_px) return {};
+  const Lens lens = solution.lens();
+  double least = 1;
+  for (const Eigen::Vector2d& pixel : seen_px(solution.problem)) {
+    if (const auto ray = lens.unproject(pixel)) {
+      least = std::min(least, ray->direction.normalized().z());
+    }
+  }
+  return FisheyeFit{std::move(solution), std::acos(least)};
+}
+
+bool may_be_wide(const IntrinsicsInput& input) {
+  constexpr double wide_rad = 0.7;
+  if (input.views.empty()) return false;
+  const Lens lens = stereographic(input, focal_lengths(input).front());
+  double farthest_px = 0;
+  for (const auto& corners : input.views) {
+    for (const auto& corner : corners) {
+      farthest_px = std::max(farthest_px, (corner.pixel - lens.center_px()).norm());
+    }
+  }
+  return 2 * std::atan(farthest_px / lens.focal_px().x() / 2) > wide_rad;
+}
+
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
   if (input.views.size() < kLeastViewsToChoose) return {};
   LensChoice choice{};
-  choice.beyond_rad = beyond_right_angle_rad(input);
+  const auto fisheye = fit_fisheye(input);
+  if (fisheye && fisheye->farthest_rad >= kRightAngle_rad)
+    choice.beyond_rad = fisheye->farthest_rad;
   std::vector<std::optional<Squares>> squares;
   for (const LensModel model : kModels) {
     IntrinsicsInput with_model = input;

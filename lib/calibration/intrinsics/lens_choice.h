@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,21 @@ struct LensChoice {
   /// rays, at a right angle or beyond; else 0.
   double beyond_rad = 0;
 };
+
+/// From here on no OPENCVn has rays.
+inline constexpr double kRightAngle_rad = std::numbers::pi / 2;
+
+/// A lens of OPENCV_FISHEYE, and how far off its axis there are corners.
+struct FisheyeFit {
+  IntrinsicsSolution solution;
+  double farthest_rad;
+};
+/// Nothing when none fits the views to 2 px. input.lens_model is not looked at.
+std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input);
+
+/// Whether there may be corners far off the axis, 40 degrees or more by the focal length with which
+/// the views' poses fit best. Takes a small part of the time of a solve.
+bool may_be_wide(const IntrinsicsInput& input);
 
 /// The lens model that the views call for, by cross-validation: the views go into three parts in
 /// turn, every model with distortion is solved for with two of them (solve_intrinsics()) and judged

@@ -70,7 +70,8 @@ std::string optimization_inputs(const IntrinsicsSolution& solution) {
 
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const ImageRegion region = known_region(seen_px(problem), problem.imager_px, problem.lens_model);
+  const ImageRegion region =
+      known_region(seen_px(problem), problem.imager_px, problem.lens_model, solution.another_fits);
   std::string text = "{\n    'lensmodel':  '";
   text.append(name_of(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {

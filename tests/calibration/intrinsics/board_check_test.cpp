@@ -66,6 +66,26 @@ TEST_P(BoardCheckOf, AnotherOrderIsNamed) {
   EXPECT_THAT(problem(board), HasSubstr("cols 6, rows 5"));
 }
 
+TEST_P(BoardCheckOf, AnotherOrderOfASquareBoardIsNamed) {
+  Board truth = views_.board;
+  truth.rows = truth.cols;
+  const SyntheticViews views{truth, views_.lens};
+  Random random(22);
+  std::vector<BoardView> seen;
+  for (int i = 0; i < 8; ++i) {
+    seen.push_back({"", views.imager_px, views.random_view(random, 0.05)});
+  }
+  EXPECT_THAT(check_board(truth, seen, {}).problem, IsEmpty());
+  for (const bool column_major : {false, true}) {
+    for (const auto from : {BoardCorner::bottom_right, BoardCorner::top_left}) {
+      Board board = truth;
+      board.id_order = {column_major, from};
+      EXPECT_THAT(check_board(board, seen, {}).problem,
+                  HasSubstr("cols 6, rows 6, id_order row-major-from-bottom-left"));
+    }
+  }
+}
+
 TEST_P(BoardCheckOf, OtherNumbersOfTagsAreNamed) {
   for (const int cols : {4, 5, 7}) {
     Board board = views_.board;

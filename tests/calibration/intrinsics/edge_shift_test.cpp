@@ -13,27 +13,6 @@
 namespace vlp {
 namespace {
 
-/// The tag with its edges moved inwards: each corner where the moved lines cross.
-SeenTag shrunk(const SeenTag& tag, double shift_px) {
-  SeenTag result = tag;
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  for (const auto& corner : tag.corners_px) middle += corner / 4;
-  for (std::size_t k = 0; k < 4; ++k) {
-    Eigen::Matrix2d normals;
-    Eigen::Vector2d offsets;
-    for (int i = 0; i < 2; ++i) {
-      const Eigen::Vector2d& other = tag.corners_px[(k + (i == 0 ? 1 : 3)) % 4];
-      const Eigen::Vector2d along = (other - tag.corners_px[k]).normalized();
-      Eigen::Vector2d inward(-along.y(), along.x());
-      if (inward.dot(middle - tag.corners_px[k]) < 0) inward = -inward;
-      normals.row(i) = inward.transpose();
-      offsets[i] = inward.dot(tag.corners_px[k]) + shift_px;
-    }
-    result.corners_px[k] = normals.inverse() * offsets;
-  }
-  return result;
-}
-
 /// A board of separate tags, with gaps as wide as a tag, or narrower.
 class ShrunkTags : public testing::TestWithParam<double> {
  protected:

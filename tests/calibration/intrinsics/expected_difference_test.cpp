@@ -18,6 +18,7 @@ constexpr double kNoise = 0.1;
 /// Mean squares, over the seeds, of what lenses are apart from the truth and of what is expected.
 struct Scatter {
   double found = 0, by_noise = 0, by_views = 0, freedoms = 0;
+  double worst_found = 0, worst_by_noise = 0;
 };
 
 /// Each view's board may be bent otherwise, which no model of the solver knows.
@@ -43,6 +44,10 @@ Scatter scatter(double bent_m) {
     sum.by_noise += noise.rms_px * noise.rms_px / kSeeds;
     sum.by_views += by_views.rms_px * by_views.rms_px / kSeeds;
     sum.freedoms += noise.freedoms;
+    const double worst_px = expected_worst_px(
+        lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
+    sum.worst_found += difference->worst_px * difference->worst_px / kSeeds;
+    sum.worst_by_noise += worst_px * worst_px / kSeeds;
   }
   return sum;
 }
@@ -53,6 +58,8 @@ TEST(ExpectedDifference, IsWhatLensesAreApartFromTheTruth) {
   const double sd = std::sqrt(2 / of.freedoms);
   EXPECT_LT(sd, 0.3);
   EXPECT_NEAR(of.found / of.by_noise, 1, 3 * sd);
+  // One place tells less than all of them: of as few terms as there are lenses.
+  EXPECT_NEAR(of.worst_found / of.worst_by_noise, 1, 3 * std::sqrt(2.0 / kSeeds));
   // Views carry independent noise here, so that leaving them out tells the same; the jackknife is
   // somewhat too large.
   EXPECT_GT(of.by_views / of.by_noise, 0.7);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include "calibration/intrinsics/intrinsics.h"
 #include "rig/board_layout.h"
@@ -31,6 +32,28 @@ inline Lens synthetic_lens() {
   const std::array parameters{520.0,  521.0,   402.0,  297.0, -0.25, 0.08,
                               0.0002, -0.0001, -0.012, 0.01,  0.002, 0.0001};
   return Lens(LensModel::opencv8, parameters);
+}
+
+/// The tag with its edges moved inwards, as tone curves do: each corner where the moved lines
+/// cross.
+inline SeenTag shrunk(const SeenTag& tag, double shift_px) {
+  SeenTag result = tag;
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const auto& corner : tag.corners_px) middle += corner / 4;
+  for (std::size_t k = 0; k < 4; ++k) {
+    Eigen::Matrix2d normals;
+    Eigen::Vector2d offsets;
+    for (int i = 0; i < 2; ++i) {
+      const Eigen::Vector2d& other = tag.corners_px[(k + (i == 0 ? 1 : 3)) % 4];
+      const Eigen::Vector2d along = (other - tag.corners_px[k]).normalized();
+      Eigen::Vector2d inward(-along.y(), along.x());
+      if (inward.dot(middle - tag.corners_px[k]) < 0) inward = -inward;
+      normals.row(i) = inward.transpose();
+      offsets[i] = inward.dot(tag.corners_px[k]) + shift_px;
+    }
+    result.corners_px[k] = normals.inverse() * offsets;
+  }
+  return result;
 }
 
 struct SyntheticViews {

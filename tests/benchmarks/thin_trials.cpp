@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// thin_trials [SETS]: lenses from sets of views that tell little, with known truth, and whether
+/// the default gates let one pass that is worse than it says: further off, anywhere in the region
+/// that is claimed, than three times the worst uncertainty stated there. Every set has another
+/// lens; boards are plain, plain and shrunk by a tone curve, or Kalibr's. Exit code 1 when a lens
+/// passed that is worse, or none that is called good did.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "session/thin_sets.h"
+
+namespace vlp {
+namespace {
+
+struct Counts {
+  int sets = 0, passed = 0, worse = 0;
+  double most = 0;
+};
+
+bool try_sets(int sets) {
+  constexpr double sigmas = 3;
+  const std::vector<Thin>& kinds = thin_kinds();
+  std::vector<Counts> of_kinds(kinds.size());
+  for (int set = 0; set < sets; ++set) {
+    const auto index = static_cast<std::size_t>(set);
+    const std::size_t kind = index % kinds.size(), board = index / kinds.size() % 3;
+    Random random(2000 + index);
+    Counts& counts = of_kinds[kind];
+    ++counts.sets;
+    const auto ratio = error_over_stated(thin_set(kinds[kind], board == 1, board == 2, random));
+    if (!ratio) continue;
+    ++counts.passed;
+    counts.most = std::max(counts.most, *ratio);
+    if (*ratio <= sigmas) continue;
+    ++counts.worse;
+    fmt::print("set {}: {}, {:.2f} times what is stated\n", set, kinds[kind].name, *ratio);
+  }
+  Counts all;
+  fmt::print("{:30} {:>5} {:>7} {:>6} {:>24}\n", "", "sets", "passed", "worse",
+             "largest error over stated");
+  for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
+    const Counts& counts = of_kinds[kind];
+    fmt::print("{:30} {:5} {:7} {:6} {:24.2f}\n", kinds[kind].name, counts.sets, counts.passed,
+               counts.worse, counts.most);
+    all.sets += counts.sets;
+    all.passed += counts.passed;
+    all.worse += counts.worse;
+    all.most = std::max(all.most, counts.most);
+  }
+  fmt::print("{:30} {:5} {:7} {:6} {:24.2f}\n", "all", all.sets, all.passed, all.worse, all.most);
+  return all.worse == 0 && (of_kinds.back().sets == 0 || of_kinds.back().passed > 0);
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  constexpr int usual_sets = 400;
+  return vlp::try_sets(argc > 1 ? std::atoi(argv[1]) : usual_sets) ? 0 : 1;
+}

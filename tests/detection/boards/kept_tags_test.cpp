@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// How many of the tags that can be told at all keep their corners, as white runs over and tone
+/// curves, sharpening and JPEG do their part: against the finders, which only count.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+
+#include "detection/boards/board_detector.h"
+#include "detection/boards/tag_finder.h"
+#include "rig/board_layout.h"
+#include "simulation/exposure.h"
+#include "simulation/frame_renderer.h"
+#include "simulation/picture.h"
+#include "simulation/scene.h"
+
+namespace vlp {
+namespace {
+
+struct Pictures {
+  const char* scene;
+  /// How bright the board's white is, over what an image shows as white.
+  double white;
+  std::optional<Picture> picture;
+  /// The least share of the tags that keep their corners.
+  double kept;
+  const char* name;
+
+  friend void PrintTo(const Pictures& pictures, std::ostream* out) { *out << pictures.name; }
+};
+
+class KeptTags : public testing::TestWithParam<Pictures> {
+ protected:
+  const Scene scene =
+      read_scene(std::string(VLP_SOURCE_DIR "/datasets/") + GetParam().scene + "/scene.yaml");
+  const Board& board = scene.board->print;
+
+  cv::Mat image(const FrameRenderer& renderer, const CaptureSet& set, std::size_t index) const {
+    const BoardShot shot = board_shot(scene, set, index);
+    const auto& picture = GetParam().picture;
+    const cv::Mat exposed =
+        expose(scene.sensor, renderer.board_electrons(shot), shot.noise_seed, picture);
+    return cv::imdecode(encoded(exposed, picture), cv::IMREAD_GRAYSCALE);
+  }
+  std::set<int> told(const TagFinder& finder, const cv::Mat& image) const {
+    std::set<int> ids;
+    for (const SeenTag& tag : finder.find(image)) ids.insert(tag.id);
+    std::set<int> of_board;
+    for (const BoardTag& tag : board_layout(board)) {
+      if (ids.contains(tag.id)) of_board.insert(tag.id);
+    }
+    return of_board;
+  }
+};
+
+TEST_P(KeptTags, AreNearlyAllThatCanBeTold) {
+  constexpr std::size_t views = 36, apart = 3;
+  CaptureSet set = *std::find_if(scene.sets.begin(), scene.sets.end(),
+                                 [](const CaptureSet& each) { return each.folder == "boards"; });
+  const double white_e =
+      (white_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e;
+  set.exposure_s = GetParam().white * white_e / scene.board->white_e_per_s;
+  const FrameRenderer renderer(scene);
+  const BoardDetector detector(board);
+  const auto finder = board.corner_squares ? aruco_finder(board) : apriltag_finder(board);
+  double all = 0, kept = 0;
+  for (std::size_t index = 0; index < views; index += apart) {
+    const cv::Mat picture = image(renderer, set, index);
+    const std::set<int> ids = told(*finder, picture);
+    all += static_cast<double>(ids.size());
+    for (const SeenTag& tag : detector.detect(picture).tags) kept += ids.contains(tag.id) ? 1 : 0;
+  }
+  RecordProperty("told", std::to_string(all));
+  RecordProperty("kept", std::to_string(kept));
+  EXPECT_GE(kept, GetParam().kept * all) << kept << " of " << all;
+  EXPECT_GT(all, 0);
+}
+
+constexpr Picture kCoded{2.4, Sharpening{1, 1}, 80};
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, KeptTags,
+    testing::Values(Pictures{"paper-rig", 1, {}, 0.98, "PlainOfWhite"},
+                    Pictures{"paper-rig", 1.5, {}, 0.98, "PlainOfOneAndAHalfTimesWhite"},
+                    Pictures{"paper-rig", 2, {}, 0.98, "PlainOfTwiceWhite"},
+                    Pictures{"paper-rig", 3, {}, 0.97, "PlainOfThriceWhite"},
+                    Pictures{"paper-rig", 0.76, kCoded, 0.98, "PlainCoded"},
+                    Pictures{"paper-rig-faulty", 1, {}, 0.98, "KalibrOfWhite"},
+                    Pictures{"paper-rig-faulty", 1.5, {}, 0.98, "KalibrOfOneAndAHalfTimesWhite"},
+                    Pictures{"paper-rig-faulty", 2, {}, 0.98, "KalibrOfTwiceWhite"},
+                    Pictures{"paper-rig-faulty", 3, {}, 0.95, "KalibrOfThriceWhite"},
+                    Pictures{"paper-rig-faulty", 0.76, kCoded, 0.98, "KalibrCoded"}),
+    [](const auto& instance) { return std::string(instance.param.name); });
+
+}  // namespace
+}  // namespace vlp

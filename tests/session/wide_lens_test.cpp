@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// What is said of a wide lens when LENSMODEL_OPENCVn is asked for.
+#include <gmock/gmock.h>
+
+#include "calibration/intrinsics/wide_views.h"
+#include "geometry/angles.h"
+#include "session/lens_step.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+/// Views of the board up to so far off the axis of a lens of 190 degrees.
+LensInput wide_set(double reach_deg, LensModel model) {
+  constexpr std::size_t count = 30;
+  constexpr double noise_px = 0.05;
+  const SyntheticViews views = wide_views(true);
+  LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};
+  input.camera.lens_model = model;
+  const BoardLattice lattice(views.board);
+  Random random(71);
+  WideBoards boards;
+  boards.reach_rad = rad_from_deg(reach_deg);
+  while (input.views.size() < count) {
+    const SeenBoard seen = wide_view(views, random, noise_px, boards);
+    if (!enough_of(seen, lattice)) continue;
+    input.views.push_back({std::to_string(input.views.size()), views.imager_px, seen});
+  }
+  return input;
+}
+
+class WideLens : public testing::TestWithParam<LensModel> {};
+
+TEST_P(WideLens, IsRefusedWhereTheModelHasNoRays) {
+  const LensResult result = solve_lens(wide_set(180, GetParam()), {});
+  EXPECT_EQ(result.failure, StepFailure::undetermined);
+  EXPECT_THAT(result.why,
+              AllOf(HasSubstr("30 views with the board: it is seen up to 10"),
+                    HasSubstr("degrees off the axis, where " + std::string(name_of(GetParam())) +
+                              " has no rays: take --lens OPENCV_FISHEYE"),
+                    Not(HasSubstr("add views"))));
+}
+
+/// Up to 87 degrees: a lens that passes is as good as it says where it says so.
+TEST_P(WideLens, IsToldAndStatedWhereTheModelHardlyHasRays) {
+  constexpr double sigmas = 3;
+  for (const double reach_deg : {60, 75, 87}) {
+    const LensResult result = solve_lens(wide_set(reach_deg, GetParam()), {});
+    if (!result.ok()) {
+      EXPECT_THAT(result.why, HasSubstr("take --lens OPENCV_FISHEYE"));
+      continue;
+    }
+    if (reach_deg > 60) {
+      EXPECT_THAT(result.warnings, Contains(HasSubstr("take --lens OPENCV_FISHEYE")));
+      EXPECT_EQ(result.better_model, LensModel::fisheye);
+    }
+    if (!words_of_missed(check_gates(lens_gates(), result.metrics)).empty()) continue;
+    const auto difference = projection_difference(
+        wide_lens(), result.solution.lens(), kWideImager, [&](const Eigen::Vector2d& pixel) {
+          return lies_in(result.report.region, pixel) ? 1.0 : INFINITY;
+        });
+    ASSERT_TRUE(difference);
+    EXPECT_LE(difference->worst_px, sigmas * result.report.uncertainty_worst_px) << reach_deg;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, WideLens, testing::Values(LensModel::opencv8, LensModel::opencv12),
+                         [](const auto& instance) {
+                           return instance.param == LensModel::opencv8 ? "Opencv8" : "Opencv12";
+                         });
+
+/// OPENCV5 fits no lens so wide, which takes seconds to find.
+TEST(WideLensOfFewParameters, IsNotBlamedOnTheBoard) {
+  const LensResult result = solve_lens(wide_set(87, LensModel::opencv5), {});
+  ASSERT_EQ(result.failure, StepFailure::undetermined);
+  EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits to 0.05 px"),
+                                HasSubstr("take --lens OPENCV_FISHEYE"),
+                                Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
+}
+
+TEST(LensThatIsNotWide, OfItsOwnModelKeepsTheMarginAroundItsCorners) {
+  constexpr int count = 30;
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};
+  input.camera.lens_model = LensModel::opencv8;
+  Random random(5);
+  for (int i = 0; i < count; ++i) {
+    input.views.push_back({std::to_string(i), views.imager_px, views.random_view(random, 0.05)});
+  }
+  const LensResult result = solve_lens(input, {});
+  ASSERT_TRUE(result.ok()) << result.why;
+  EXPECT_FALSE(result.solution.another_fits);
+  EXPECT_FALSE(result.better_model);
+  EXPECT_THAT(result.warnings, testing::IsEmpty());
+  EXPECT_GT(result.report.region_share, 0.95);
+}
+
+}  // namespace
+}  // namespace vlp
