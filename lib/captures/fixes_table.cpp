@@ -29,13 +29,14 @@ struct FixColumns {
         time_s(csv.optional("time_s")),
         velocity{csv.optional("vx_m_per_s"), csv.optional("vy_m_per_s")},
         lean{csv.optional("roll_rad"), csv.optional("pitch_rad")},
-        rejected(csv.optional("rejected")) {}
+        rejected(csv.optional("rejected")),
+        outside_region(csv.optional("outside_region")) {}
 
   std::array<CsvTable::Column, 4> pose;
   std::array<std::optional<CsvTable::Column>, 4> sd, noise_sd;
   std::optional<CsvTable::Column> residual_px, time_s;
   std::array<std::optional<CsvTable::Column>, 2> velocity, lean;
-  std::optional<CsvTable::Column> rejected;
+  std::optional<CsvTable::Column> rejected, outside_region;
 };
 
 std::optional<Eigen::Vector2d> pair_in(
@@ -124,16 +125,17 @@ std::string lean_of(const FixRow& row) {
   return fixed((*row.fix->inclination).*angle, kDigits);
 }
 
-std::string rejected_of(const FixRow& row) {
+template <std::vector<int> FixRow::*lamps>
+std::string ids_of(const FixRow& row) {
   std::string ids;
-  for (const int id : row.rejected) {
+  for (const int id : row.*lamps) {
     if (!ids.empty()) ids += ' ';
     ids += std::to_string(id);
   }
   return ids;
 }
 
-constexpr std::array<AddedColumn, 10> kAddedColumns{
+constexpr std::array<AddedColumn, 11> kAddedColumns{
     {{"time_s", time_of},
      {"noise_sd_x_m", noise_sd_of<0>},
      {"noise_sd_y_m", noise_sd_of<1>},
@@ -143,7 +145,8 @@ constexpr std::array<AddedColumn, 10> kAddedColumns{
      {"vy_m_per_s", velocity_of<1>},
      {"roll_rad", lean_of<&Inclination::roll_rad>},
      {"pitch_rad", lean_of<&Inclination::pitch_rad>},
-     {"rejected", rejected_of}}};
+     {"rejected", ids_of<&FixRow::rejected>},
+     {"outside_region", ids_of<&FixRow::outside_region>}}};
 
 std::vector<AddedColumn> columns_that_some_have(const std::vector<FixRow>& rows) {
   std::vector<AddedColumn> columns;
@@ -205,6 +208,7 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
     }
     if (read.status == "ok") read.fix = fix_in(csv, row, columns);
     if (columns.rejected) read.rejected = ids_in(csv, row, *columns.rejected);
+    if (columns.outside_region) read.outside_region = ids_in(csv, row, *columns.outside_region);
     if (columns.time_s) read.time_s = csv.optional_number(row, *columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "holds no fix");

@@ -38,21 +38,23 @@ struct FixRow {
   std::size_t line = 0;
   /// Ids of lamps that were left out because the others contradict them.
   std::vector<int> rejected = {};
+  /// Ids of lamps that it rests on where the lens is not known, IntrinsicsReport::region_px.
+  std::vector<int> outside_region = {};
   /// When the capture was taken, where it is known.
   std::optional<double> time_s = {};
 };
 
 /// Writes image, status, x_m, y_m, z_m, yaw_rad, sd_x_m, sd_y_m, sd_z_m, sd_yaw_rad, lamps,
 /// residual_px, and then, where a row has them, time_s, noise_sd_x_m, noise_sd_y_m, noise_sd_z_m,
-/// noise_sd_yaw_rad, vx_m_per_s, vy_m_per_s, roll_rad, pitch_rad, rejected (ids, separated by
-/// blanks), whole or not at all; what there is not is left empty. Throws InputError.
+/// noise_sd_yaw_rad, vx_m_per_s, vy_m_per_s, roll_rad, pitch_rad, rejected and outside_region (ids,
+/// separated by blanks), whole or not at all; what there is not is left empty. Throws InputError.
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows);
 
 /// Reads what write_fixes() writes. Only image, status, x_m, y_m, z_m and yaw_rad are needed; an sd
 /// that is not there for all four is none; where the status is not "ok", the figures are not
 /// looked at. Throws InputError: see CsvTable; an image or a status that is empty; an image twice;
 /// a fix whose figures are not finite or further off than kFarthest_m, or an sd that is negative;
-/// lamps left out that are no ids; no rows.
+/// lamps that are no ids; no rows.
 std::vector<FixRow> read_fixes(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -178,8 +178,9 @@ void warn_of_image(LocateResult& result, const LocateInput& input) {
       outside, width, height));
 }
 
-/// A lens that boards showed in part of the image is only known there.
-void warn_of_region(LocateResult& result, const LocateInput& input) {
+/// A lens that boards showed in part of the image is only known there. Marks the fixes that rest on
+/// lamps elsewhere.
+void mark_outside_region(LocateResult& result, const LocateInput& input) {
   const auto& report = input.calibration.intrinsics_report;
   if (!report || report->region_px.empty()) return;
   std::size_t outside = 0, fixes = 0;
@@ -188,21 +189,24 @@ void warn_of_region(LocateResult& result, const LocateInput& input) {
     ++fixes;
     const auto& detections = input.frames[i].detections;
     const auto& rejected = result.rows[i].rejected;
-    const auto seen =
-        std::count_if(detections.begin(), detections.end(), [&](const Detection& one) {
-          return !lies_in(report->region_px, one.pixel) &&
-                 find_lamp(input.lamps.lamps, one.lamp) != nullptr &&
-                 std::find(rejected.begin(), rejected.end(), one.lamp) == rejected.end();
-        });
-    if (seen == 0) continue;
+    auto& marked = result.rows[i].outside_region;
+    for (const Detection& one : detections) {
+      if (lies_in(report->region_px, one.pixel)) continue;
+      if (find_lamp(input.lamps.lamps, one.lamp) == nullptr) continue;
+      if (std::find(rejected.begin(), rejected.end(), one.lamp) != rejected.end()) continue;
+      marked.push_back(one.lamp);
+    }
+    if (marked.empty()) continue;
     ++outside;
     result.details.push_back(fmt::format("{}: {} of {} lamps are where the lens is not known",
-                                         input.frames[i].image, seen, detections.size()));
+                                         input.frames[i].image, marked.size(), detections.size()));
   }
   if (outside == 0) return;
   result.warnings.push_back(fmt::format(
-      "{} of {} fixes rest on lamps where no board was seen (region_px of the calibration): the "
-      "lens may be wrong there; add views of the board there",
+      "{} of {} fixes rest on lamps where no board was seen (region_px of the calibration; "
+      "outside_region of the fixes says which): the lens may be wrong there; add views of the "
+      "board "
+      "there",
       outside, fixes));
 }
 
@@ -350,7 +354,7 @@ LocateResult locate_frames(const LocateInput& input) {
     result.rows.push_back(row_of(input.frames[i], input.captures, result.fixes[i], noise_known));
   }
   warn_of_image(result, input);
-  warn_of_region(result, input);
+  mark_outside_region(result, input);
   warn_of_map(result, input);
   warn_of_captures(result, input);
   tell_of_lamps_left_out(result, input);

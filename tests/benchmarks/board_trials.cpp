@@ -1,9 +1,10 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// board_trials [SCENE [SEEDS [PICTURE]]]: lenses from rendered boards behind the pictures that
-/// cameras make of them (tone curves, sharpening, JPEG, white that runs over), against the truth.
-/// SCENE is a folder of datasets/ (paper-rig); its boards are drawn with so many seeds (3), the
-/// scene's own first. PICTURE: of those whose name contains it.
+/// board_trials [SCENE [SEEDS [VIEWS [PICTURE]]]]: lenses from rendered boards behind the pictures
+/// that cameras make of them (tone curves, sharpening, JPEG, white that runs over), against the
+/// truth. SCENE is a folder of datasets/ (paper-rig); its boards are drawn with so many seeds (3),
+/// the scene's own first, in so many views (0: the scene's). PICTURE: of those whose name contains
+/// it.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -57,6 +58,8 @@ std::vector<Development> developments() {
           {"gamma 2.2, sharpened, JPEG 90", 0, curve(2.2, 90, sharp)},
           {"gamma 2.4, sharpened, JPEG 80", 0, curve(2.4, 80, sharp)},
           {"1.5 times white", 1.5, {}},
+          {"2 times white", 2, {}},
+          {"3 times white", 3, {}},
           {"1.25 times white, gamma 1.8, JPEG 90", 1.25, curve(1.8, 90)},
           {"1.5 times white, gamma 2.2, JPEG 90", 1.5, curve(2.2, 90)},
           {"1.5 times white, gamma 2.4, JPEG 80", 1.5, curve(2.4, 80)},
@@ -132,9 +135,10 @@ void try_development(const Scene& scene, const CaptureSet& boards,
       upper_median(result.solution.edge_shifts_px), gamma, share, tags);
 }
 
-void try_seed(Scene scene, std::uint64_t seed, const std::string& wanted) {
+void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wanted) {
   scene.seed = seed;
-  const CaptureSet boards = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
+  CaptureSet boards = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
+  if (views > 0) boards.board->count = views;
   const FrameRenderer renderer(scene);
   const BoardDetector detector(scene.board->print);
   std::vector<cv::Mat1f> electrons(shots_in(boards));
@@ -159,6 +163,7 @@ int main(int argc, char** argv) {
   const int seeds = argc > 2 ? std::atoi(argv[2]) : usual_seeds;
   const vlp::Scene scene = vlp::read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
   for (int i = 0; i < seeds; ++i) {
-    vlp::try_seed(scene, scene.seed + static_cast<std::uint64_t>(i), argc > 3 ? argv[3] : "");
+    vlp::try_seed(scene, scene.seed + static_cast<std::uint64_t>(i),
+                  argc > 3 ? std::atoi(argv[3]) : 0, argc > 4 ? argv[4] : "");
   }
 }

@@ -105,19 +105,22 @@ TEST(FixesTable, HasTheNoisesPartAndTheLampsLeftOutWhereThereAreAny) {
   whole.image = "b";
   whole.fix->noise_sd = Eigen::Vector4d(0.25, 0.25, 0.5, 0.125);
   whole.rejected = {7, 12};
+  whole.outside_region = {3, 5};
   write_fixes(folder / "plain.csv", {plain});
   EXPECT_THAT(folder.content_of(folder / "plain.csv"),
               testing::Not(testing::HasSubstr("noise_sd_x_m")));
   write_fixes(folder / "whole.csv", {plain, whole});
   EXPECT_THAT(folder.content_of(folder / "whole.csv"),
               HasSubstr("residual_px,noise_sd_x_m,noise_sd_y_m,noise_sd_z_m,noise_sd_yaw_rad,"
-                        "rejected\n"));
+                        "rejected,outside_region\n"));
   EXPECT_THAT(folder.content_of(folder / "whole.csv"), HasSubstr("7 12"));
   const auto read = read_fixes(folder / "whole.csv");
   EXPECT_FALSE(read[0].fix->noise_sd);
   EXPECT_EQ(read[1].fix->noise_sd, whole.fix->noise_sd);
   EXPECT_TRUE(read[0].rejected.empty());
   EXPECT_EQ(read[1].rejected, whole.rejected);
+  EXPECT_TRUE(read[0].outside_region.empty());
+  EXPECT_EQ(read[1].outside_region, whole.outside_region);
 }
 
 TEST(FixesTable, RefusesLampsLeftOutThatAreNoIds) {

@@ -132,8 +132,17 @@ TEST(LocateFrames, WarnsOfLampsWhereTheLensIsNotKnown) {
   EXPECT_THAT(locate_frames(input).warnings, IsEmpty());
   const double right_px = input.frames[0].detections[0].pixel.x() - 1;
   report.region_px = {{-1e4, -1e4}, {right_px, -1e4}, {right_px, 1e4}, {-1e4, 1e4}};
-  EXPECT_THAT(locate_frames(input).warnings,
+  const LocateResult marked = locate_frames(input);
+  EXPECT_THAT(marked.warnings,
               ElementsAre(HasSubstr("fixes rest on lamps where no board was seen")));
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    if (!marked.rows[i].fix) continue;
+    std::vector<int> beyond;
+    for (const Detection& one : input.frames[i].detections) {
+      if (one.pixel.x() > right_px) beyond.push_back(one.lamp);
+    }
+    EXPECT_EQ(marked.rows[i].outside_region, beyond);
+  }
 }
 
 TEST(LocateFrames, IsUndeterminedWithoutAFix) {
