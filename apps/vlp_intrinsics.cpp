@@ -134,6 +134,14 @@ std::vector<Gate> gates_of(const Options& options) {
   return with_changes(lens_gates(), gates_of(options.gates, metric_kinds({MetricSource::lens})));
 }
 
+/// Whether it is the lens that misses a gate, and not only the views.
+bool fits_badly(const std::vector<CheckedMetric>& gates) {
+  return std::ranges::any_of(gates, [](const CheckedMetric& gate) {
+    return !gate.met() &&
+           (gate.name == "rms_px" || gate.name == "uncertainty_px" || gate.name == "halves_px");
+  });
+}
+
 void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = gates_of(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
@@ -177,9 +185,10 @@ void run(const CLI::App& app, const Options& options) {
   if (!options.plot.empty()) draw(options.plot, lens.drawing());
   if (lens.choice) fmt::print("lens model    {}\n", words_of(*lens.choice));
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
-  const std::string failed = words_of_missed(check_gates(gates, lens.metrics));
+  const auto checked = check_gates(gates, lens.metrics);
+  const std::string failed = words_of_missed(checked);
   if (failed.empty()) return;
-  if (lens.better_model) {
+  if (lens.better_model && fits_badly(checked)) {
     throw GateNotMet(fmt::format("{}; take --lens {}", failed, name_of(*lens.better_model)));
   }
   if (std::isfinite(lens.report.uncertainty_worst_px)) {

@@ -35,10 +35,11 @@ double Fisheye::angle_rad(double at_distance, double valid_rad, double start_rad
     const double error = distance(angle) - at_distance;
     (error > 0 ? high : low) = angle;
     double next = angle - error / slope(angle);
-    if (!(next >= low && next <= high)) next = (low + high) / 2;
+    const bool by_newton = next >= low && next <= high;
+    if (!by_newton) next = (low + high) / 2;
     const double moved = std::abs(next - angle);
     angle = next;
-    if (moved <= 1e-7 * angle) break;  // Newton squares it
+    if (moved <= (by_newton ? 1e-7 : 1e-14) * angle) break;  // Newton squares it
   }
   return std::clamp(angle, 0.0, valid_rad);
 }
@@ -54,7 +55,8 @@ FisheyeAngles::FisheyeAngles(const Fisheye& fisheye)
         i + 1 == kIntervals ? valid_rad_ : fisheye.angle_rad((i + 1) * interval, valid_rad_, start);
     // At a fold the angle goes up at once.
     const double way = to - from, steepest = 3 * way;
-    const double to_slope = std::min(interval / fisheye.slope(to), steepest);
+    const double slope = fisheye.slope(to);
+    const double to_slope = slope > 0 ? std::min(interval / slope, steepest) : steepest;
     starts_[static_cast<std::size_t>(i)] = {from, from_slope, 3 * way - 2 * from_slope - to_slope,
                                             from_slope + to_slope - 2 * way};
     from = to, from_slope = to_slope;

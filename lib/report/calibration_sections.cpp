@@ -62,7 +62,7 @@ std::string intrinsics_table(const IntrinsicsReport& report) {
                   {"residual, rms per axis", significant(report.rms_px, 3) + " px"}};
   }
   if (report.uncertainty_px) {
-    table.rows.push_back({"worst uncertainty of the projection, one standard deviation",
+    table.rows.push_back({"largest error of the projection that is to be expected",
                           significant(*report.uncertainty_px, 3) + " px"});
   }
   if (!report.region_px.empty()) {

@@ -44,8 +44,8 @@ struct IntrinsicsReport {
   double rms_px;
   /// Deflection of the board's centre from flat, along x and y (mrcal's calobject_warp).
   std::optional<std::array<double, 2>> board_warp_m;
-  /// Worst standard deviation of a projection over the region. Infinite where the lens has no ray;
-  /// that is not written.
+  /// What the largest error of a projection over the region is expected to be. Infinite where the
+  /// lens has no ray; that is not written.
   std::optional<double> uncertainty_px;
   /// Of the intrinsics, in their order; of a splined lens, none or of fx, fy, cx, cy alone, as
   /// wherever errors of the intrinsics are told of below.

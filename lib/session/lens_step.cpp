@@ -208,12 +208,12 @@ std::string but_fits(LensModel wanted, const IntrinsicsSolution& other) {
 }
 
 /// Why no lens of the model fits: the model, if another one does.
-std::string why_none_fits(IntrinsicsInput input) {
+std::string why_none_fits(IntrinsicsInput input, const std::optional<FisheyeFit>& fisheye) {
   const LensModel wanted = input.lens_model;
-  std::string words;
-  double best_px = 2;  // more is no fit
+  std::string words = fisheye ? but_fits(wanted, fisheye->solution) : "";
+  double best_px = fisheye ? fisheye->solution.rms_px : 2;  // more is no fit
   for (const LensModel other : {LensModel::opencv4, LensModel::opencv8, LensModel::fisheye}) {
-    if (other == wanted) continue;
+    if (other == wanted || (other == LensModel::fisheye && fisheye)) continue;
     input.lens_model = other;
     const IntrinsicsSolution solution = solve_intrinsics(input);
     if (!solution.ok() || solution.rms_px >= best_px) continue;
@@ -318,7 +318,7 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
   }
   std::optional<FisheyeFit> fisheye;
   if (is_opencv(camera.lens_model) && may_be_wide(views.solved)) {
-    fisheye = fit_fisheye(views.solved);
+    fisheye = result.choice ? result.choice->fisheye : fit_fisheye(views.solved);
     if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) {
       result.fail(
           StepFailure::undetermined,
@@ -335,7 +335,7 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
   if (!solution.ok()) {
     std::string why;
     if (solution.status == IntrinsicsStatus::no_solution) {
-      why = fisheye ? but_fits(camera.lens_model, fisheye->solution) : why_none_fits(views.solved);
+      why = why_none_fits(views.solved, fisheye);
     }
     if (solution.status == IntrinsicsStatus::too_few_views &&
         overexposed(input.views, views.solved.lattice)) {

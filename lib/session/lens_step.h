@@ -39,7 +39,8 @@ struct LensResult : StepResult {
   HeldOut held_out{};
   /// When it was asked for.
   std::optional<LensChoice> choice{};
-  /// One that fits clearly better than the camera's, which was asked for.
+  /// One that fits clearly better than the camera's, which was asked for, or as well where the
+  /// board is seen near a right angle off the axis.
   std::optional<LensModel> better_model{};
   /// Images of the views that were solved for, in their order.
   std::vector<std::string> images;

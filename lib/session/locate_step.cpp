@@ -205,8 +205,7 @@ void mark_outside_region(LocateResult& result, const LocateInput& input) {
   result.warnings.push_back(fmt::format(
       "{} of {} fixes rest on lamps where no board was seen (region_px of the calibration; "
       "outside_region of the fixes says which): the lens may be wrong there; add views of the "
-      "board "
-      "there",
+      "board there",
       outside, fixes));
 }
 

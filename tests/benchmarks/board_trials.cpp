@@ -68,7 +68,8 @@ std::vector<Development> developments() {
 
 cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t seed,
                   const std::optional<Picture>& picture) {
-  const cv::Mat image = expose(scene.sensor, electrons, seed, picture);
+  cv::Mat image = expose(scene.sensor, electrons, seed, picture);
+  if (scene.camera.readout == Readout::columns) image = image.t();  // lines are columns
   return cv::imdecode(encoded(image, picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 

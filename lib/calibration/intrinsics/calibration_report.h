@@ -22,7 +22,8 @@ struct CalibrationReport {
   /// ProjectionUncertainty::worst_px(), by tags, over the pixel_grid() of the region: the mean, the
   /// worst and where it is; and the worst beyond. The worst is no less than what the largest error
   /// over the region is expected to be, expected_worst_px(), by tags, by independent corners and by
-  /// views; but of a splined lens.
+  /// views; but of a splined lens. Where another model fits as well, solve_lens() makes it what
+  /// lies between the two.
   double uncertainty_mean_px, uncertainty_worst_px;
   Eigen::Vector2d uncertainty_worst_at;
   double uncertainty_beyond_px;

@@ -104,7 +104,11 @@ ImageRegion region_from_mrcal(const fs::path& file, const std::string& text) {
   const auto value = python_value(text, key);
   if (!value) return {};
   const auto numbers = numbers_in(file, *value, key);
-  if (numbers.empty()) throw InputError(file, "'" + key + "' is empty: the lens is known nowhere");
+  if (numbers.empty())
+    throw InputError(
+        file,
+        "'" + key +
+            "' is empty: the lens is known nowhere; without the key it is all over the image");
   ImageRegion region;
   for (std::size_t i = 0; i + 1 < numbers.size(); i += 2) {
     region.emplace_back(numbers[i], numbers[i + 1]);

@@ -71,6 +71,7 @@ std::optional<MovedEdge> moved(const Chord& chord, const EdgeBow& seen, const Le
 }  // namespace
 
 double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
+  constexpr double much = 0.25;  // of an edge: no corner, or none of these edges
   double most_px = 0;
   for (std::size_t first = 0; first + 4 <= corners.size(); first += 4) {
     const auto tag = corners.begin() + static_cast<std::ptrdiff_t>(first);
@@ -88,17 +89,23 @@ double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens&
       edges[k] = moved(chord, tag[at].bow, lens);
     }
     if (!std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge; })) continue;
+    std::array<Eigen::Vector2d, 4> steps;
+    bool small = true;
     for (std::size_t k = 0; k < 4; ++k) {
-      const std::size_t previous = (k + 3) % 4;
+      const std::size_t previous = (k + 3) % 4, next = (k + 1) % 4;
       Eigen::Matrix2d normals;
       normals << outwards[previous].transpose(), outwards[k].transpose();
-      const Eigen::Vector2d step =
-          normals.inverse() *
-          Eigen::Vector2d(edges[previous]->outwards_px[1], edges[k]->outwards_px[0]);
+      steps[k] = normals.inverse() *
+                 Eigen::Vector2d(edges[previous]->outwards_px[1], edges[k]->outwards_px[0]);
+      const auto at = static_cast<std::ptrdiff_t>(k), after = static_cast<std::ptrdiff_t>(next);
+      small = small && steps[k].norm() < much * (tag[after].pixel - tag[at].pixel).norm();
+    }
+    if (!small) continue;
+    for (std::size_t k = 0; k < 4; ++k) {
       BoardLattice::Corner& corner = tag[static_cast<std::ptrdiff_t>(k)];
-      corner.pixel += step;
+      corner.pixel += steps[k];
       corner.bow = edges[k]->bow;
-      most_px = std::max(most_px, step.norm());
+      most_px = std::max(most_px, steps[k].norm());
     }
   }
   return most_px;

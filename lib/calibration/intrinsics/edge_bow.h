@@ -18,7 +18,7 @@ namespace vlp {
 /// other: with the bow seen, b(w), and the lens' one, l(w),
 ///   end += (straight line fitted to b - l over the pixels) at the end, outwards.
 /// Corners have the lens' bows then. Corners without bows stay: of touching squares, and from
-/// files. Returns by how much one moved at most, in px.
+/// files that do not tell them. Returns by how much one moved at most, in px.
 double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens& lens);
 
 }  // namespace vlp

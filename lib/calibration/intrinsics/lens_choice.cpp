@@ -127,9 +127,10 @@ bool may_be_wide(const IntrinsicsInput& input) {
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
   if (input.views.size() < kLeastViewsToChoose) return {};
   LensChoice choice{};
-  const auto fisheye = fit_fisheye(input);
-  if (fisheye && fisheye->farthest_rad >= kRightAngle_rad)
-    choice.beyond_rad = fisheye->farthest_rad;
+  choice.fisheye = fit_fisheye(input);
+  if (choice.fisheye && choice.fisheye->farthest_rad >= kRightAngle_rad) {
+    choice.beyond_rad = choice.fisheye->farthest_rad;
+  }
   std::vector<std::optional<Squares>> squares;
   for (const LensModel model : kModels) {
     IntrinsicsInput with_model = input;

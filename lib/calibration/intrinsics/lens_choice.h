@@ -22,6 +22,12 @@ struct TriedLens {
 
 constexpr std::size_t kLeastViewsToChoose = 6;
 
+/// A lens of OPENCV_FISHEYE, and how far off its axis there are corners.
+struct FisheyeFit {
+  IntrinsicsSolution solution;
+  double farthest_rad;
+};
+
 /// A lens model for a camera, and what it was chosen by.
 struct LensChoice {
   LensModel model;
@@ -30,17 +36,14 @@ struct LensChoice {
   /// How far off the axis the board is seen, by OPENCV_FISHEYE, when that is where no OPENCVn has
   /// rays, at a right angle or beyond; else 0.
   double beyond_rad = 0;
+  /// When one fits.
+  std::optional<FisheyeFit> fisheye = {};
 };
 
 /// From here on no OPENCVn has rays.
 inline constexpr double kRightAngle_rad = std::numbers::pi / 2;
 
-/// A lens of OPENCV_FISHEYE, and how far off its axis there are corners.
-struct FisheyeFit {
-  IntrinsicsSolution solution;
-  double farthest_rad;
-};
-/// Nothing when none fits the views to 2 px. input.lens_model is not looked at.
+/// OPENCV_FISHEYE; nothing when none fits the views to 2 px. input.lens_model is not looked at.
 std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input);
 
 /// Whether there may be corners far off the axis, 40 degrees or more by the focal length with which

@@ -62,13 +62,19 @@ SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
 
 constexpr std::array kBowColumns{"bow_square_px", "bow_cube_px", "bow_reach"};
 
+/// None where the table has no such columns.
 EdgeBow bow_of(const CsvTable& csv, std::size_t row) {
-  std::array<double, 3> figures{};
-  for (std::size_t i = 0; i < figures.size(); ++i) {
-    if (const auto column = csv.optional(kBowColumns[i])) figures[i] = csv.number(row, *column);
+  constexpr double least_reach = 0.01, most_reach = 2;
+  if (std::ranges::none_of(kBowColumns, [&](auto name) { return csv.optional(name).has_value(); }))
+    return {};
+  const auto reach_at = csv.required(kBowColumns[2]);
+  const double reach = csv.number(row, reach_at);
+  if (reach != 0 && !(reach >= least_reach && reach <= most_reach)) {
+    throw csv.error(row, reach_at,
+                    "should be how far an edge's pixels reach, 0.01 to 2, or 0 of none");
   }
-  const auto [square_px, cube_px, reach] = figures;
-  return {square_px, cube_px, reach};
+  return {csv.number(row, csv.required(kBowColumns[0])),
+          csv.number(row, csv.required(kBowColumns[1])), reach};
 }
 
 /// Counted as board.yaml says, points of another board do not lie in rows.

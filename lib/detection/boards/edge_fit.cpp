@@ -63,6 +63,10 @@ class Edge {
     return true;
   }
 
+  double squares_of_priors(const Parameters& p) const {
+    if (p != at_) evaluate(p);
+    return residuals_.template tail<kPriors>().squaredNorm();
+  }
   /// Of a sum of parameters, by noise of one level.
   double variance(const Parameters& p, const Parameters& sum) const {
     if (p != at_) evaluate(p);
@@ -163,7 +167,8 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   edge.coefficients.head<terms>() = p.template tail<terms>();
   edge.blur_px = p[0];
   const double outside = p[2] < 0 ? -1 : 1;
-  EdgeFit result{2 * solver.summary.final_cost, pixels.size(), runs_over, p[1] + outside * p[2]};
+  const double squares = 2 * solver.summary.final_cost - step.squares_of_priors(p);
+  EdgeFit result{squares, pixels.size(), runs_over, p[1] + outside * p[2]};
   const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
   const double bright = Coded(p[1] + p[2], prior.gamma).level;
   const double contrast = std::abs(bright - Coded(p[1] - p[2], prior.gamma).level) / 2;

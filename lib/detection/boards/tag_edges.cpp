@@ -260,17 +260,33 @@ double cost_of(std::span<const TagEdges> tags, std::span<const std::size_t> aske
   return pixels * std::log(std::max(std::sqrt(squares / pixels), least_rms));
 }
 
-/// Whether white does at an edge of an image.
-bool runs_over(std::span<const TagEdges> tags) {
-  return std::ranges::any_of(tags, [](const TagEdges& tag) {
-    return tag.found() && std::ranges::any_of(tag.fits(), &EdgeFit::runs_over);
-  });
-}
+/// Some of an image's tags.
+struct SomeTags {
+  std::span<const TagEdges> all;
+  std::span<const std::size_t> which;
 
-/// What the edges of an image have in common, from fits of each by itself.
+  /// Each edge of those that are found.
+  template <typename Edge>
+  void for_each_edge(Edge edge) const {
+    for (const std::size_t i : which) {
+      for (std::size_t k = 0; all[i].found() && k < 4; ++k)
+        edge(all[i].edges()[k], all[i].fits()[k]);
+    }
+  }
+  bool run_over() const {
+    bool any = false;
+    for_each_edge([&](const EdgeCurve&, const EdgeFit& fit) { any = any || fit.runs_over; });
+    return any;
+  }
+};
+
+/// What the edges of an image have in common.
 class CommonEdges {
  public:
-  explicit CommonEdges(std::span<const TagEdges> tags);
+  /// Their blur and the noise, from fits of each by itself.
+  explicit CommonEdges(const SomeTags& tags);
+  /// The light, from fits with the blur.
+  void take_light(const SomeTags& tags);
 
   /// Of an edge behind a tone curve: of its blur alone, or of its light, too.
   EdgePrior with_blur(const EdgeCurve& edge, double gamma) const;
@@ -282,30 +298,38 @@ class CommonEdges {
   std::optional<EdgeField> blur_, light_;
 };
 
-CommonEdges::CommonEdges(std::span<const TagEdges> tags) {
+/// Nothing of figures that a fit did not tell.
+std::optional<EdgeField> field_of(std::vector<EdgeFigure> figures, EdgeField::Terms terms) {
+  std::erase_if(figures, [](const EdgeFigure& figure) {
+    return !(figure.value > 0 && figure.sd >= 0 && std::isfinite(figure.value + figure.sd));
+  });
+  if (figures.empty()) return {};
+  return EdgeField(figures, terms);
+}
+
+CommonEdges::CommonEdges(const SomeTags& tags) {
   double squares = 0, pixels = 0;
-  for (const TagEdges& tag : tags) {
-    if (!tag.found()) continue;
-    squares += tag.squares();
-    pixels += tag.pixels();
-  }
+  tags.for_each_edge([&](const EdgeCurve&, const EdgeFit& fit) {
+    squares += fit.squares;
+    pixels += static_cast<double>(fit.pixels);
+  });
   if (pixels == 0) return;
   noise_ = std::sqrt(squares / pixels);
-  std::vector<EdgeFigure> blurs, lights;
-  for (const TagEdges& tag : tags) {
-    for (std::size_t k = 0; tag.found() && k < 4; ++k) {
-      const EdgeFit& fit = tag.fits()[k];
-      const EdgeCurve& edge = tag.edges()[k];
-      blurs.push_back({edge.middle, edge.along, edge.blur_px,
-                       noise_ * std::sqrt(fit.blur_variance) / edge.blur_px});
-      if (fit.bright_light > 0) {
-        lights.push_back({edge.middle, edge.along, fit.bright_light,
-                          noise_ * std::sqrt(fit.bright_variance) / fit.bright_light});
-      }
-    }
-  }
-  blur_.emplace(blurs, EdgeField::Terms::place_and_direction);
-  if (!lights.empty()) light_.emplace(lights, EdgeField::Terms::place);
+  std::vector<EdgeFigure> blurs;
+  tags.for_each_edge([&](const EdgeCurve& edge, const EdgeFit& fit) {
+    blurs.push_back({edge.middle, edge.along, edge.blur_px,
+                     noise_ * std::sqrt(fit.blur_variance) / edge.blur_px});
+  });
+  blur_ = field_of(std::move(blurs), EdgeField::Terms::place_and_direction);
+}
+
+void CommonEdges::take_light(const SomeTags& tags) {
+  std::vector<EdgeFigure> lights;
+  tags.for_each_edge([&](const EdgeCurve& edge, const EdgeFit& fit) {
+    lights.push_back({edge.middle, edge.along, fit.bright_light,
+                      noise_ * std::sqrt(fit.bright_variance) / fit.bright_light});
+  });
+  light_ = field_of(std::move(lights), EdgeField::Terms::place);
 }
 
 EdgePrior CommonEdges::with_blur(const EdgeCurve& edge, double gamma) const {
@@ -356,16 +380,22 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
     costs.push_back(cost_of(edges, asked));
     if (costs.size() == 2 && costs[1] > costs[0] + surely) break;
     if (gamma != 1) fit(others, alone);
-    const bool over = runs_over(edges);
+    const auto take = [&] {
+      for (const std::size_t i : widest) outlines[i] = edges[i].crossed().value_or(outlines[i]);
+    };
+    take();
+    const SomeTags found{edges, widest};
+    const bool over = found.run_over();
     if (over || gamma != 1) {
-      const CommonEdges common(edges);
+      CommonEdges common(found);
       fit(widest, [&](const EdgeCurve& edge) { return common.with_blur(edge, gamma); });
+      if (over) {
+        take();
+        common.take_light(found);
+        fit(widest, [&](const EdgeCurve& edge) { return common.with_light(edge, gamma); });
+      }
+      take();
     }
-    if (over) {
-      const CommonEdges common(edges);
-      fit(widest, [&](const EdgeCurve& edge) { return common.with_light(edge, gamma); });
-    }
-    for (const std::size_t i : widest) outlines[i] = edges[i].crossed().value_or(outlines[i]);
     if (gamma == 1) {
       behind_none = outlines;
     } else {
