@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <optional>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -29,15 +28,6 @@ namespace {
 Eigen::Vector3d normal_of(const BoardPose& pose) {
   return Eigen::AngleAxisd(pose.rotation.norm(), pose.rotation.normalized()) *
          Eigen::Vector3d::UnitZ();
-}
-
-/// Which a model contains.
-std::optional<LensModel> smaller_model(LensModel model) {
-  constexpr std::array models{LensModel::opencv4, LensModel::opencv5, LensModel::opencv8,
-                              LensModel::opencv12};
-  const auto found = std::find(models.begin() + 1, models.end(), model);
-  if (found == models.end()) return {};
-  return *(found - 1);
 }
 
 void turn(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
@@ -127,19 +117,6 @@ bool IntrinsicsSolver::turn_to_axis() {
 }
 
 bool IntrinsicsSolver::refine() {
-  const auto smaller = smaller_model(input_.lens_model);
-  const std::optional<IntrinsicsSolver> before = smaller ? std::optional(*this) : std::nullopt;
-  if (fit_model()) return true;
-  if (!smaller) return false;
-  const LensModel wanted = input_.lens_model;
-  *this = *before;
-  input_.lens_model = *smaller;
-  if (!refine()) return false;
-  input_.lens_model = wanted;
-  return fit_model();
-}
-
-bool IntrinsicsSolver::fit_model() {
   constexpr int rounds = 6;
   constexpr std::size_t core = 4;
   problem_.lens_model = input_.lens_model;

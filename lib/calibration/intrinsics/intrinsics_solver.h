@@ -23,7 +23,7 @@ class IntrinsicsSolver {
   bool start(double focal_px);
   /// Of a splined lens the start of stage 3, the symmetric one; no stage of others.
   void start_symmetric();
-  /// Stage 3; where it fails, from what the next smaller model of its kind gives.
+  /// Stage 3.
   bool refine();
   /// Of a splined lens, the regularization made for the noise of the corners; no stage of others.
   bool weigh_regularization();
@@ -47,8 +47,6 @@ class IntrinsicsSolver {
 
   Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
   bool solve(SolveFor what);
-  /// Stage 3 with the input's model, from where the solver is.
-  bool fit_model();
   /// Poses of every view through this lens; views without one wait for another lens.
   void seed(const Lens& lens);
   /// The problem of the views used, at their seeds.

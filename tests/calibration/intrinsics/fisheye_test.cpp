@@ -98,21 +98,5 @@ TEST(WideLensScatter, IsThatOfTheCovarianceByTags) {
   EXPECT_GT(by_corners, 2.0);
 }
 
-// Boards up to 75 degrees off the axis. By itself OPENCV12 ends at lenses that see half of the
-// views.
-TEST(WideLens, IsFittedByAModelThatContainsOneThatFits) {
-  Random random(21);
-  IntrinsicsInput input = wide_input(false, 24, random, 0.03, {0, 0}, {0.12, 0.3, 1.3});
-  input.lens_model = LensModel::opencv8;
-  const IntrinsicsSolution smaller = solve_intrinsics(input);
-  ASSERT_TRUE(smaller.ok());
-  EXPECT_LT(smaller.rms_px, 0.035);
-  input.lens_model = LensModel::opencv12;
-  const IntrinsicsSolution larger = solve_intrinsics(input);
-  ASSERT_TRUE(larger.ok());
-  EXPECT_LE(larger.rms_px, smaller.rms_px);
-  EXPECT_EQ(larger.views.size(), input.views.size());
-}
-
 }  // namespace
 }  // namespace vlp
