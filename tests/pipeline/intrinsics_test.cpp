@@ -37,7 +37,9 @@ TEST_P(RenderedRig, GivesItsLensWhateverTheThreads) {
   EXPECT_LT(difference->mean_px, 0.05);
   EXPECT_LT(difference->worst_px, 0.2);
   ASSERT_TRUE(found.intrinsics_report);
-  EXPECT_LT(found.intrinsics_report->rms_px, 0.03);  // measured: 0.018 and 0.013
+  // Without the bows of the lens the plain tags of paper-rig leave 0.014 px.
+  const bool plain = GetParam() == std::string("paper-rig");
+  EXPECT_LT(found.intrinsics_report->rms_px, plain ? 0.012 : 0.03);
   ASSERT_EQ(found.history.size(), 1U);
   EXPECT_EQ(found.history[0].inputs.size(), 37U);
 
