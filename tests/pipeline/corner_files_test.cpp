@@ -146,7 +146,8 @@ TEST_F(CornerFiles, GiveTheLensOfTheImagesToTheLastBit) {
     const auto mrcal = run_program(
         "cd " + (folder / "mrcal").string() +
         " && rm -f camera-0.cameramodel && mrcal-calibrate-cameras --corners-cache corners.vnl "
-        "--lensmodel LENSMODEL_OPENCV8 --object-spacing 0.02 --object-width-n 12 "
+        "--corners-cache-has-weights --lensmodel LENSMODEL_OPENCV8 --object-spacing 0.02 "
+        "--object-width-n 12 "
         "--object-height-n 10 --imagersize 800 600 --skip-outlier-rejection --outdir . --focal " +
         focal + " '*.png'");
     const std::string before = "## RMS error: ";

@@ -96,7 +96,8 @@ std::vector<BoardLattice::Corner> BoardLattice::corners(const SeenBoard& seen) c
                      static_cast<std::size_t>(row * cols_ + col),
                      touching_ ? Eigen::Vector2d::Zero() : inward_at(tag, k),
                      1,
-                     tag.bows[k]});
+                     tag.bows[k],
+                     tag.sds_px[k]});
     }
   }
   return all;

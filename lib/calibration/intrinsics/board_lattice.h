@@ -44,6 +44,8 @@ class BoardLattice {
     double weight = 1;
     /// Of its tag's edge to the tag's next corner.
     EdgeBow bow = {};
+    /// SeenTag::Deviations; 0 where nobody knows.
+    double sd_px = 0;
   };
   /// Every corner of what was seen, of a flat board: its points, or four of each tag, in its order.
   std::vector<Corner> corners(const SeenBoard& seen) const;

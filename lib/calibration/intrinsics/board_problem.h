@@ -29,11 +29,11 @@ struct BoardProblem {
   double spacing_m;
   Eigen::Vector2d warp_m = Eigen::Vector2d::Zero();
   std::vector<BoardPose> poses;
-  /// u_px, v_px, weight; row by row, pose by pose. The weight, at most 1, is what the residual is
-  /// multiplied by; kUnseen, or another below 0 for an outlier. Every pose needs four points or
-  /// more, not on a line.
+  /// u_px, v_px, weight; row by row, pose by pose. The weight is what the residual is multiplied
+  /// by; kUnseen, or another below 0 for an outlier. Every pose needs four points or more, not on a
+  /// line.
   std::vector<Eigen::Vector3d> points;
-  static constexpr double kUnseen = -2;
+  static constexpr double kUnseen = -1e9;  // no weight is as large
   /// Of the corners, for which the regularization is made: of a pixel, as mrcal makes it. Of
   /// corners that are better known its share of all squares would be the larger, and draw the lens
   /// off.

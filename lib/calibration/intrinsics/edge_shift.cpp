@@ -18,7 +18,7 @@ constexpr int kPose = 6, kUnknowns = kPose + 4;
 using Square = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 using Column = Eigen::Matrix<double, kUnknowns, 1>;
 
-/// The normal equations of a view's pose and shift, for corners of variance 1.
+/// The normal equations of a view's pose and shift, for corners of variance 1 / weight^2.
 struct ShiftEquations {
   Square normal = Square::Zero();
   Column right = Column::Zero();
@@ -61,8 +61,9 @@ ShiftEquations equations_of(const std::vector<BoardLattice::Corner>& corners, co
     Eigen::Matrix<double, 2, kUnknowns> jacobian;
     jacobian << -projection->d_pixel_d_point * cross_matrix(turned), projection->d_pixel_d_point,
         corner.inward * Eigen::RowVector4d(1, x.x(), x.y(), x.squaredNorm());
+    jacobian *= corner.weight;
     equations.normal += jacobian.transpose() * jacobian;
-    equations.right += jacobian.transpose() * (corner.pixel - projection->pixel);
+    equations.right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
   }
   equations.any = true;
   return equations;

@@ -61,9 +61,10 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
     if (!solver.start(focal_px)) continue;
     solver.start_symmetric();
     if (!solver.refine() || !solver.weigh_regularization() || !solver.take_bows() ||
-        !solver.take_out_shifts(ShiftForm::even) || !solver.bend() || !solver.take_bows() ||
-        !solver.take_out_shifts(ShiftForm::changing) || !solver.weigh_regularization() ||
-        !solver.leave_out_outliers() || !solver.weigh_regularization() || !solver.turn_to_axis()) {
+        !solver.take_out_shifts(ShiftForm::even) || !solver.bend() || !solver.weigh_corners() ||
+        !solver.take_bows() || !solver.take_out_shifts(ShiftForm::changing) ||
+        !solver.weigh_corners() || !solver.weigh_regularization() || !solver.leave_out_outliers() ||
+        !solver.weigh_regularization() || !solver.turn_to_axis()) {
       continue;
     }
     IntrinsicsSolution solution = solver.solution();

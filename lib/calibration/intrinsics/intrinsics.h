@@ -78,7 +78,8 @@ struct IntrinsicsSolution {
 ///  5. the shift of the tags' edges, even over a view, taken out (edge_shifts()), and the model
 ///     again, at most twice;
 ///  6. the board's warp (WarpChoice);
-///  7. the bows again, as 4., and what the shifts change over a view, as 5.;
+///  7. corners weighted by what they are good for, where their images tell it (corner_variance());
+///     the bows again, as 4., what the shifts change over a view, as 5., and the weights again;
 ///  8. all of it without outliers;
 ///  9. a splined lens turned to its axis.
 /// The control points of a splined lens make up for any turn of the camera, so that its frame is a

@@ -11,6 +11,7 @@
 
 #include <Eigen/Geometry>
 
+#include "calibration/intrinsics/corner_variance.h"
 #include "calibration/intrinsics/edge_bow.h"
 #include "calibration/intrinsics/edge_shift.h"
 #include "calibration/intrinsics/projection_difference.h"
@@ -161,7 +162,8 @@ void IntrinsicsSolver::move_points() {
   const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      problem_.points[(i * parts + corner.part) * count + corner.point].head<2>() = corner.pixel;
+      Eigen::Vector3d& point = problem_.points[(i * parts + corner.part) * count + corner.point];
+      point << corner.pixel, std::copysign(corner.weight, point.z());
     }
   }
 }
@@ -213,6 +215,35 @@ bool IntrinsicsSolver::bend() {
     solved_for_.warp = false;
   }
   return true;
+}
+
+bool IntrinsicsSolver::weigh_corners() {
+  const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
+  const auto residuals = residuals_of(problem_);
+  std::vector<CornerError> errors;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    for (const auto& corner : input_.views[used_[i]]) {
+      if (!(corner.sd_px > 0)) continue;
+      const auto& residual = residuals[(i * parts + corner.part) * count + corner.point];
+      if (residual.allFinite()) errors.push_back({residual.squaredNorm() / 2, corner.sd_px});
+    }
+  }
+  if (std::ranges::all_of(errors, [](const auto& error) { return error.square_px2 == 0; })) {
+    return true;
+  }
+  const CornerVariance variance = corner_variance(errors);
+  // Their mean square is 1, so that rms_px stays what corners are off; of those that nobody knows
+  // it is 1, too.
+  double sum = 0;
+  for (const CornerError& error : errors) sum += 1 / variance.of(error.sd_px);
+  const double mean = sum / static_cast<double>(errors.size());
+  for (auto& view : input_.views) {
+    for (auto& corner : view) {
+      if (corner.sd_px > 0) corner.weight = 1 / std::sqrt(mean * variance.of(corner.sd_px));
+    }
+  }
+  move_points();
+  return solve(solved_for_);
 }
 
 bool IntrinsicsSolver::leave_out_outliers() {

@@ -34,6 +34,9 @@ class IntrinsicsSolver {
   bool take_out_shifts(ShiftForm form);
   /// Stage 6: the warp of the board, if it is to be.
   bool bend();
+  /// Stage 7: corners weighted by what they are good for (corner_variance()), those of which their
+  /// images tell it.
+  bool weigh_corners();
   /// Stage 8.
   bool leave_out_outliers();
   /// Stage 9, of a splined lens: true also when the turn has not settled.
@@ -51,7 +54,7 @@ class IntrinsicsSolver {
   void seed(const Lens& lens);
   /// The problem of the views used, at their seeds.
   void assemble(const Lens& lens);
-  /// Where the corners of the input are now.
+  /// Where the corners of the input are now, and what they weigh.
   void move_points();
   /// Of the views used, in their order.
   std::vector<double> rms_of_views() const;

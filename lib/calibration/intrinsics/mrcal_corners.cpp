@@ -105,10 +105,7 @@ class CornerRows {
   double weight_of(std::size_t line, std::optional<double> fourth) const {
     constexpr double most_level = 30;
     if (!fourth || *fourth < 0) return 0;
-    if (weights_) {
-      if (*fourth > 1) throw error(line, "a weight should be within 0 and 1");
-      return *fourth;
-    }
+    if (weights_) return *fourth;
     if (*fourth > most_level) throw error(line, "a level should be within 0 and 30");
     return std::exp2(-std::floor(*fourth));
   }

@@ -24,8 +24,9 @@ namespace vlp {
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
 
 /// Writes the corners that were solved for as mrcal-calibrate-cameras reads them (--corners-cache):
-/// filename x y level, with level -log2(weight), row by row of the lattice, "-" for a corner not
-/// seen or left out. Of a board in four parts each image stands four times, as NAME-corner0 to
+/// filename x y level, with level -log2(weight), or, of weights that no whole levels have, filename
+/// x y weight (--corners-cache-has-weights), row by row of the lattice, "-" for a corner not seen
+/// or left out. Of a board in four parts each image stands four times, as NAME-corner0 to
 /// NAME-corner3. images: the names of the input's views; where folders have images of one name, the
 /// second is NAME-2, because the table knows views by their names. Throws InputError.
 void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
@@ -34,8 +35,8 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
 /// Corners of a board as mrcal's tools keep them (--corners-cache; of mrgingham, or what
 /// write_corners() wrote): `filename x y level`, every point of the board's lattice, row by row,
 /// image after image. The residual of a point is weighted by 2^-level, the level rounded down and
-/// 30 at most, or by a fourth column named `weight`, of 0 to 1; without a fourth column by 1. A
-/// point with "-" or a negative x, y or level was not seen; a single row with "-" is an image
+/// 30 at most, or by a fourth column named `weight`; without a fourth column by 1. A point
+/// with "-" or a negative x, y, level or weight was not seen; a single row with "-" is an image
 /// without the board. Throws InputError, with file and line.
 std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,
                                     const std::array<int, 2>& imager_px);

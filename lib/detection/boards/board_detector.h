@@ -38,9 +38,13 @@ struct SeenTag {
   using Corners = std::array<Eigen::Vector2d, 4>;
   /// Of the edges from corner k to k + 1.
   using Bows = std::array<EdgeBow, 4>;
+  /// Of a corner, along any direction in the mean, by the noise of the pixels that its edges are
+  /// fitted to, with their bows known; 0 where nobody knows.
+  using Deviations = std::array<double, 4>;
   struct Outline {
     Corners corners_px;
     Bows bows = {};
+    Deviations sds_px = {};
 
     bool operator==(const Outline&) const = default;
   };
@@ -48,6 +52,7 @@ struct SeenTag {
   int id;
   Corners corners_px;
   Bows bows = {};
+  Deviations sds_px = {};
   /// The same behind tone curves of kGammas beyond 1, until one is taken (take_common_curve()); of
   /// an image that has none for sure there are none.
   std::vector<Outline> behind_curves = {};

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 std::string settings_of(const Board& board) {
   std::string settings =
-      fmt::format("7 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+      fmt::format("8 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                   board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
                   board.border_bits, board.corner_squares, board.first_id, name_of(board.id_order));
   if (board.has_squares()) {
@@ -32,10 +32,10 @@ std::string settings_of(const Board& board) {
   return settings;
 }
 
-constexpr std::array kColumns{"id",      "u0",    "v0",     "u1",      "v1",    "u2",
-                              "v2",      "u3",    "v3",     "square0", "cube0", "reach0",
-                              "square1", "cube1", "reach1", "square2", "cube2", "reach2",
-                              "square3", "cube3", "reach3"};
+constexpr std::array kColumns{
+    "id",      "u0",    "v0",     "u1",      "v1",    "u2",     "v2",      "u3",    "v3",
+    "square0", "cube0", "reach0", "square1", "cube1", "reach1", "square2", "cube2", "reach2",
+    "square3", "cube3", "reach3", "sd0",     "sd1",   "sd2",    "sd3"};
 
 /// With zeros to its end.
 std::vector<std::string> row_of(std::vector<std::string> begin) {
@@ -43,15 +43,16 @@ std::vector<std::string> row_of(std::vector<std::string> begin) {
   return begin;
 }
 
-std::vector<std::string> row_of(int id, const SeenTag::Corners& pixels, const SeenTag::Bows& bows) {
+std::vector<std::string> row_of(int id, const SeenTag::Outline& outline) {
   std::vector<std::string> row{std::to_string(id)};
-  for (const Eigen::Vector2d& pixel : pixels) {
+  for (const Eigen::Vector2d& pixel : outline.corners_px) {
     row.push_back(shortest(pixel.x()));
     row.push_back(shortest(pixel.y()));
   }
-  for (const auto& [square_px, cube_px, reach] : bows) {
+  for (const auto& [square_px, cube_px, reach] : outline.bows) {
     row.insert(row.end(), {shortest(square_px), shortest(cube_px), shortest(reach)});
   }
+  for (const double sd_px : outline.sds_px) row.push_back(shortest(sd_px));
   return row;
 }
 
@@ -66,7 +67,9 @@ void write_view(const fs::path& file, const BoardView& view) {
                   std::to_string(view.seen.tags.size()),
                   std::to_string(view.seen.curve_costs.size())}));
   for (const auto* tags : {&view.seen.tags, &view.seen.foreign}) {
-    for (const SeenTag& tag : *tags) csv.row(row_of(tag.id, tag.corners_px, tag.bows));
+    for (const SeenTag& tag : *tags) {
+      csv.row(row_of(tag.id, {tag.corners_px, tag.bows, tag.sds_px}));
+    }
   }
   for (const SeenPoint& point : view.seen.points) {
     csv.row(row_of(
@@ -76,9 +79,7 @@ void write_view(const fs::path& file, const BoardView& view) {
     csv.row(row_of({"-1", shortest(cost)}));
   }
   for (const SeenTag& tag : view.seen.tags) {
-    for (const auto& [corners_px, bows] : tag.behind_curves) {
-      csv.row(row_of(tag.id, corners_px, bows));
-    }
+    for (const SeenTag::Outline& outline : tag.behind_curves) csv.row(row_of(tag.id, outline));
   }
   csv.save_unsynced();
 }
@@ -108,14 +109,15 @@ BoardView read_view(const fs::path& file, const std::string& image) {
       const std::size_t bow = 9 + 3 * k;
       outline.bows[k] = {at(row, kColumns[bow]), at(row, kColumns[bow + 1]),
                          at(row, kColumns[bow + 2])};
+      outline.sds_px[k] = at(row, kColumns[21 + k]);
     }
     return outline;
   };
   std::size_t row = 1;
   for (const std::size_t end = row + tags_seen + foreign; row < end; ++row) {
     auto& tags = row <= tags_seen ? view.seen.tags : view.seen.foreign;
-    const auto [corners_px, bows] = outline_of(row);
-    tags.push_back({static_cast<int>(at(row, "id")), corners_px, bows});
+    const auto [corners_px, bows, sds_px] = outline_of(row);
+    tags.push_back({static_cast<int>(at(row, "id")), corners_px, bows, sds_px});
   }
   for (const std::size_t end = row + points; row < end; ++row) {
     view.seen.points.push_back(

@@ -26,6 +26,7 @@ struct ImageCorners {
   struct Corner {
     Eigen::Vector2d pixel;
     EdgeBow bow;
+    double sd_px;
   };
 
   std::string image;
@@ -45,6 +46,7 @@ SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
       if (!corner) continue;
       tag.corners_px[k] = corner->pixel;
       tag.bows[k] = corner->bow;
+      tag.sds_px[k] = corner->sd_px;
     }
     if (!whole) {
       seen.unusable += ids.contains(id) ? 1 : 0;
@@ -75,6 +77,18 @@ EdgeBow bow_of(const CsvTable& csv, std::size_t row) {
   }
   return {csv.number(row, csv.required(kBowColumns[0])),
           csv.number(row, csv.required(kBowColumns[1])), reach};
+}
+
+constexpr const char* kDeviationColumn = "sd_px";
+
+double sd_px_of(const CsvTable& csv, std::size_t row) {
+  const auto column = csv.optional(kDeviationColumn);
+  if (!column) return 0;
+  const double sd_px = csv.number(row, *column);
+  if (sd_px < 0) {
+    throw csv.error(row, *column, "should be a standard deviation, or 0 where nobody knows it");
+  }
+  return sd_px;
 }
 
 /// Counted as board.yaml says, points of another board do not lie in rows.
@@ -164,7 +178,7 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
     if (first) corners.tags.push_back(id);
     auto& place = tag->second[static_cast<std::size_t>(corner)];
     if (place) throw twice();
-    place = {pixel, bow_of(csv, row)};
+    place = {pixel, bow_of(csv, row), sd_px_of(csv, row)};
   }
   if (images.empty()) throw InputError(file, "holds no corner");
   if (too_many_outside(outside, seen)) throw InputError(*first_outside);
@@ -192,6 +206,7 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
     header.erase(header.begin() + 1);
   } else {
     header.insert(header.end(), kBowColumns.begin(), kBowColumns.end());
+    header.emplace_back(kDeviationColumn);
   }
   CsvWriter csv(file, header);
   for (const BoardView& view : views) {
@@ -214,7 +229,7 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
           csv.row({view.image, std::to_string(tag.id), std::to_string(k),
                    shortest(tag.corners_px[k].x()), shortest(tag.corners_px[k].y()),
                    shortest(tag.bows[k].square_px), shortest(tag.bows[k].cube_px),
-                   shortest(tag.bows[k].reach)});
+                   shortest(tag.bows[k].reach), shortest(tag.sds_px[k])});
         }
       }
     }

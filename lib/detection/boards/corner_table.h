@@ -16,10 +16,10 @@ namespace vlp {
 /// v_px`, with the corners of a tag from 0 to 3 as in BoardTag::corners_m, or, of a board of
 /// squares, `image, corner, u_px, v_px`, with corners as in SeenPoint::index, or counted up the
 /// columns (order_lattice()). Of tags also, where the table has it, the EdgeBow from each corner to
-/// the next: `bow_square_px, bow_cube_px, bow_reach`. An image without any corner has one row,
-/// empty but for its name. Tags without all four corners are left out, those that the board does
-/// not have are foreign. Throws InputError, with file and line, also for a corner that stands
-/// twice, and when too_many_outside() the image.
+/// the next: `bow_square_px, bow_cube_px, bow_reach`, and the corner's SeenTag::Deviations:
+/// `sd_px`. An image without any corner has one row, empty but for its name. Tags without all four
+/// corners are left out, those that the board does not have are foreign. Throws InputError, with
+/// file and line, also for a corner that stands twice, and when too_many_outside() the image.
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px);
 

@@ -74,6 +74,16 @@ class Edge {
         jacobian_.transpose() * jacobian_;
     return normal.ldlt().solve(sum).dot(sum);
   }
+  /// Of the ends, in the mean, when the terms of the bow are known.
+  double end_variance(const Parameters& p) const {
+    constexpr int straight = 7;
+    using Square = Eigen::Matrix<double, straight, straight>;
+    if (p != at_) evaluate(p);
+    const auto without_bow = jacobian_.template leftCols<straight>();
+    const Square inverse =
+        Square(without_bow.transpose() * without_bow).ldlt().solve(Square::Identity());
+    return inverse(straight - 2, straight - 2) + inverse(straight - 1, straight - 1);
+  }
 
  private:
   /// The last two are the prior's.
@@ -175,6 +185,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   const bool good = p.allFinite() && p[0] > least_blur_px && p[0] < most_blur_px &&
                     contrast > least_contrast && rms < unlike * contrast;
   if (!good) return {};
+  result.end_variance = step.end_variance(p);
   if (runs_over || prior.gamma != 1) {
     typename Step::Parameters brighter = Step::Parameters::Zero();
     brighter.template segment<2>(1) << 1, outside;

@@ -64,6 +64,9 @@ struct EdgeFit {
   bool runs_over;
   /// The light on the brighter side, in levels behind no curve.
   double bright_light;
+  /// Of where an end is across the edge, in the mean of both, by noise of one level and with the
+  /// bow known, in px^2.
+  double end_variance = 0;
   /// Of blur and bright_light, by noise of one level; of edges behind no curve, and not over
   /// white, 0 for that they are well known.
   double blur_variance = 0, bright_variance = 0;

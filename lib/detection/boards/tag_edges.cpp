@@ -127,6 +127,17 @@ EdgeBow bow_between(const EdgeCurve& edge, const Eigen::Vector2d& from, const Ei
   return {-off_px(0), (off_px(-0.5) - off_px(0.5)) / 0.75, reach * 2 / (end - begin)};
 }
 
+/// Of where two edges cross: of the place of one across it, and the other,
+///   mean of both axes = (v_a + v_b) / (2 sin^2 of the angle between them).
+double crossing_sd_px(const EdgeCurve& a, const EdgeFit& fit_a, const EdgeCurve& b,
+                      const EdgeFit& fit_b) {
+  const auto variance = [](const EdgeFit& fit) {
+    return fit.squares / static_cast<double>(fit.pixels) * fit.end_variance;
+  };
+  const double sine = a.along.x() * b.along.y() - a.along.y() * b.along.x();
+  return std::sqrt((variance(fit_a) + variance(fit_b)) / 2) / std::abs(sine);
+}
+
 double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCurve, 4>& b) {
   double most_px = 0;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -235,6 +246,8 @@ std::optional<SeenTag::Outline> TagEdges::crossed() const {
   }
   for (std::size_t k = 0; k < 4; ++k) {
     outline.bows[k] = bow_between(edges_[k], corners[k], corners[(k + 1) % 4], pixels_[k]);
+    const std::size_t previous = (k + 3) % 4;
+    outline.sds_px[k] = crossing_sd_px(edges_[previous], fits_[previous], edges_[k], fits_[k]);
   }
   return outline;
 }
@@ -407,6 +420,7 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
   for (std::size_t i = 0; i < tags.size(); ++i) {
     tags[i].corners_px = behind_none[i].corners_px;
     tags[i].bows = behind_none[i].bows;
+    tags[i].sds_px = behind_none[i].sds_px;
   }
   return costs;
 }

@@ -66,18 +66,19 @@ double take_common_curve(std::vector<BoardView>& views) {
   for (BoardView& view : views) {
     view.seen.curve_costs.clear();
     for (SeenTag& tag : view.seen.tags) {
-      std::vector<SeenTag::Outline> behind{{tag.corners_px, tag.bows}};
+      std::vector<SeenTag::Outline> behind{{tag.corners_px, tag.bows, tag.sds_px}};
       behind.insert(behind.end(), tag.behind_curves.begin(), tag.behind_curves.end());
       tag.behind_curves.clear();
       if (none || behind.size() < kGammas.size()) continue;
       for (std::size_t k = 0; k < 4; ++k) {
         tag.corners_px[k].setZero();
-        tag.bows[k].square_px = tag.bows[k].cube_px = 0;
+        tag.bows[k].square_px = tag.bows[k].cube_px = tag.sds_px[k] = 0;
         for (std::size_t i = 0; i < 3; ++i) {
-          const auto& [corners_px, bows] = behind[near.first + i];
+          const auto& [corners_px, bows, sds_px] = behind[near.first + i];
           tag.corners_px[k] += weights[i] * corners_px[k];
           tag.bows[k].square_px += weights[i] * bows[k].square_px;
           tag.bows[k].cube_px += weights[i] * bows[k].cube_px;
+          tag.sds_px[k] += weights[i] * sds_px[k];
         }
       }
     }

@@ -113,6 +113,7 @@ TEST(EdgeBows, LeaveLessOfTheNoise) {
   const BoardLattice lattice(scene.board->print);
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
   std::array<double, 2> squares{}, of_tags{};
+  double stated = 0;
   std::size_t corners = 0;
   for (std::size_t index = 0; index < 8; ++index) {
     const BoardShot shot = board_shot(scene, views, index);
@@ -135,12 +136,16 @@ TEST(EdgeBows, LeaveLessOfTheNoise) {
       }
       take_bows_of_lens(all, lens);
     }
+    for (const auto& corner : all) stated += 2 * corner.sd_px * corner.sd_px;
     corners += all.size();
   }
   ASSERT_GT(corners, 400U);
   const auto px = [&](double sum) { return std::sqrt(sum / (2 * double(corners))); };
   EXPECT_LT(px(squares[1]), 0.75 * px(squares[0]));
   EXPECT_LT(px(4 * of_tags[1]), 0.62 * px(4 * of_tags[0]));
+  // What the noise of their pixels leaves, which is most of it.
+  EXPECT_NEAR(px(stated) / px(squares[1]), 1, 0.2);
+  RecordProperty("stated_px", std::to_string(px(stated)));
   RecordProperty("seen_px", std::to_string(px(squares[0])));
   RecordProperty("with_lens_px", std::to_string(px(squares[1])));
   RecordProperty("tags_seen_px", std::to_string(px(4 * of_tags[0])));

@@ -71,7 +71,7 @@ TEST(CornerCache, KeepsCornersBehindCurves) {
   const auto spoilt = std::ranges::find(view.seen.tags, whole.id, &SeenTag::id);
   ASSERT_NE(spoilt, view.seen.tags.end());
   ASSERT_EQ(spoilt->behind_curves,
-            std::vector<SeenTag::Outline>(4, {spoilt->corners_px, spoilt->bows}));
+            std::vector<SeenTag::Outline>(4, {spoilt->corners_px, spoilt->bows, spoilt->sds_px}));
   cv::imwrite(folder / "coded.png", coded);
   const SourceImage image(folder / "coded.png");
   const BoardCache cache = corner_cache(folder / "cache", board);
@@ -83,6 +83,7 @@ TEST(CornerCache, KeepsCornersBehindCurves) {
   for (std::size_t i = 0; i < view.seen.tags.size(); ++i) {
     EXPECT_EQ(kept->seen.tags[i].corners_px, view.seen.tags[i].corners_px);
     EXPECT_EQ(kept->seen.tags[i].bows, view.seen.tags[i].bows);
+    EXPECT_EQ(kept->seen.tags[i].sds_px, view.seen.tags[i].sds_px);
     EXPECT_EQ(kept->seen.tags[i].behind_curves, view.seen.tags[i].behind_curves);
   }
 }

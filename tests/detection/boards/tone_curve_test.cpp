@@ -23,11 +23,16 @@ BoardView image(double gamma, double clearly) {
     return all;
   };
   BoardView view{"image", {200, 100}, {}};
-  SeenTag tag{7, corners(0), bows(0)};
+  const auto sds = [](double x) {
+    SeenTag::Deviations all;
+    all.fill(0.02 + 0.01 * x);
+    return all;
+  };
+  SeenTag tag{7, corners(0), bows(0), sds(0)};
   for (const double each : kGammas) {
     const double x = std::log(each);
     view.seen.curve_costs.push_back(300 + clearly * std::pow(x - std::log(gamma), 2));
-    if (each != 1) tag.behind_curves.push_back({corners(x), bows(x)});
+    if (each != 1) tag.behind_curves.push_back({corners(x), bows(x), sds(x)});
   }
   view.seen.tags.push_back(tag);
   return view;
@@ -44,6 +49,7 @@ TEST(CommonCurve, IsWhatAnImageCallsForAndMovesItsCorners) {
     EXPECT_NEAR(bow.square_px, 0.2 + 0.05 * x, 1e-9);
     EXPECT_NEAR(bow.cube_px, -0.01 * x, 1e-9);
     EXPECT_EQ(bow.reach, 0.8);
+    EXPECT_NEAR(images[0].seen.tags[0].sds_px[1], 0.02 + 0.01 * x, 1e-9);
   }
 }
 
