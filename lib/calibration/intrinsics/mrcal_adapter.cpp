@@ -15,10 +15,11 @@ extern "C" {
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include <limits>
 #include <mutex>
 #include <span>
 #include <stdexcept>
+#include <thread>
 
 #include "calibration/intrinsics/board_problem.h"
 
@@ -93,35 +94,24 @@ void unpack(Unpack* function, double* state, const Arguments& the) {
   }
 }
 
-/// mrcal reports outliers on stderr, asked or not; a library should not. The whole process is
-/// without stderr meanwhile.
-class Silence {
- public:
-  Silence() : alone_(only_one()) {
-    std::fflush(stderr);
-    const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
-    if (nowhere < 0) return;
-    kept_ = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
-    if (kept_ >= 0) ::dup2(nowhere, STDERR_FILENO);
-    ::close(nowhere);
-  }
-  ~Silence() {
-    if (kept_ < 0) return;
-    std::fflush(stderr);
-    ::dup2(kept_, STDERR_FILENO);
-    ::close(kept_);
-  }
-  Silence(const Silence&) = delete;
-  Silence& operator=(const Silence&) = delete;
-
- private:
-  static std::mutex& only_one() {
-    static std::mutex mutex;
-    return mutex;
-  }
-  std::lock_guard<std::mutex> alone_;
-  int kept_ = -1;
-};
+/// mrcal reports outliers on stderr, asked or not; a library should not. It works in a thread that
+/// has open files of its own, among them nothing for stderr: without the process's, what other
+/// threads say meanwhile would be lost. Where the system does not grant that, mrcal is heard. One
+/// at a time: mrcal does not say that more may be.
+template <typename Work>
+void in_silence(const Work& work) {
+  static std::mutex only_one;
+  const std::lock_guard alone(only_one);
+  std::thread([&] {
+    // Those that are not for mrcal are closed, lest what others close stays open here.
+    constexpr unsigned first = STDERR_FILENO + 1, last = std::numeric_limits<unsigned>::max();
+    if (::close_range(first, last, CLOSE_RANGE_UNSHARE) == 0) {
+      const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+      if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
+    }
+    work();
+  }).join();
+}
 
 }  // namespace
 
@@ -130,15 +120,17 @@ bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what) {
   if (the.measurements < the.states) return false;
   Eigen::VectorXd state(the.states), residuals(the.measurements);
   auto points = weighted_points(problem);
-  const Silence silence;
-  const mrcal_stats_t stats = mrcal_optimize(
-      state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()),
-      problem.intrinsics.data(), nullptr, reinterpret_cast<mrcal_pose_t*>(problem.poses.data()),
-      the.points.data(), reinterpret_cast<mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0,
-      the.frames, the.fixed, the.fixed, the.observations.data(), the.seen_points.data(), the.frames,
-      the.fixed, reinterpret_cast<mrcal_point3_t*>(points.data()), &the.lens,
-      problem.imager_px.data(), the.selections, &the.constants, problem.spacing_m, problem.cols,
-      problem.rows, false, false);
+  mrcal_stats_t stats{};
+  in_silence([&] {
+    stats = mrcal_optimize(
+        state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()),
+        problem.intrinsics.data(), nullptr, reinterpret_cast<mrcal_pose_t*>(problem.poses.data()),
+        the.points.data(), reinterpret_cast<mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0,
+        the.frames, the.fixed, the.fixed, the.observations.data(), the.seen_points.data(),
+        the.frames, the.fixed, reinterpret_cast<mrcal_point3_t*>(points.data()), &the.lens,
+        problem.imager_px.data(), the.selections, &the.constants, problem.spacing_m, problem.cols,
+        problem.rows, false, false);
+  });
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (points[i].z() < 0 && problem.points[i].z() > 0) problem.points[i].z() *= -1;
   }
@@ -168,15 +160,17 @@ Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& w
   jacobian.dtype = CHOLMOD_DOUBLE;
   jacobian.sorted = 1;
   jacobian.packed = 1;
-  const Silence silence;
-  const bool done = mrcal_optimizer_callback(
-      state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()), &jacobian,
-      problem.intrinsics.data(), nullptr,
-      reinterpret_cast<const mrcal_pose_t*>(problem.poses.data()), nullptr,
-      reinterpret_cast<const mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, the.frames, 0,
-      0, the.observations.data(), nullptr, the.frames, 0,
-      reinterpret_cast<const mrcal_point3_t*>(points.data()), &the.lens, problem.imager_px.data(),
-      the.selections, &the.constants, problem.spacing_m, problem.cols, problem.rows, false);
+  bool done = false;
+  in_silence([&] {
+    done = mrcal_optimizer_callback(
+        state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()), &jacobian,
+        problem.intrinsics.data(), nullptr,
+        reinterpret_cast<const mrcal_pose_t*>(problem.poses.data()), nullptr,
+        reinterpret_cast<const mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, the.frames, 0,
+        0, the.observations.data(), nullptr, the.frames, 0,
+        reinterpret_cast<const mrcal_point3_t*>(points.data()), &the.lens, problem.imager_px.data(),
+        the.selections, &the.constants, problem.spacing_m, problem.cols, problem.rows, false);
+  });
   if (!done) throw std::runtime_error("mrcal_optimizer_callback failed");
   // In pixels again, all of it.
   residuals *= problem.noise_px;
