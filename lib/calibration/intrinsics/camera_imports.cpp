@@ -35,13 +35,24 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Without the comments, which are whole lines in mrcal's files.
+/// A Python literal without its comments, from a # that is in no string to the end of the line.
 std::string without_comments(const std::string& text) {
   std::string rest;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    const std::size_t first = line.find_first_not_of(" \t");
-    if (first == std::string::npos || line[first] != '#') rest.append(line).append("\n");
+  char quote = 0;  // that ends the string; 0 outside
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (quote == 0 && text[i] == '#') {
+      i = text.find('\n', i);
+      if (i == std::string::npos) break;
+    }
+    const char here = text[i];
+    rest += here;
+    if (quote != 0 && here == '\\' && i + 1 < text.size()) {
+      rest += text[++i];
+    } else if (here == quote) {
+      quote = 0;
+    } else if (quote == 0 && (here == '\'' || here == '"')) {
+      quote = here;
+    }
   }
   return rest;
 }

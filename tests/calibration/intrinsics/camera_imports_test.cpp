@@ -123,6 +123,19 @@ TEST_F(CameraFiles, ThatAreNotKnownAreRefused) {
   EXPECT_THAT(refusal(skewed), testing::HasSubstr("camera_matrix is skewed"));
 }
 
+/// As of Python: to the end of the line, from a # that is in no string.
+TEST_F(CameraFiles, OfMrcalAreReadWithoutTheirComments) {
+  const std::string text =
+      "# 'lensmodel': 'LENSMODEL_OPENCV4'\n"
+      "{ 'made_by': 'camera #3, \\'left\\'', 'lensmodel': 'LENSMODEL_PINHOLE', # isn't \"wide\"\n"
+      "  'intrinsics': [ 520.25, 521.5, # focal lengths, [px]\n"
+      "                  402, 297 ], # 'intrinsics': [ 1, 2, 3, 4 ]\n"
+      "  \"imagersize\": (800, 600), # 'imagersize': [ 8, 6 ]\n"
+      "} # end";
+  comes_back({"camera", {800, 600}, LensModel::pinhole, {520.25, 521.5, 402, 297}, {}, {}, {}},
+             text, LensModel::pinhole);
+}
+
 TEST_F(CameraFiles, AreFittedWhereTheModelsDiffer) {
   // A model that holds the other is met exactly, another one as well as it can.
   const auto exact = with_lens_model(camera_of(LensModel::opencv4), LensModel::opencv8);
