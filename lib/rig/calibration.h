@@ -40,7 +40,8 @@ struct IntrinsicsReport {
   int views;
   int corners;
   int outliers;
-  /// Per axis, over the corners that are not outliers.
+  /// Per axis, over the corners that are not outliers, weighted as they are in the solve; the mean
+  /// square of the weights is 1.
   double rms_px;
   /// Deflection of the board's centre from flat, along x and y (mrcal's calobject_warp).
   std::optional<std::array<double, 2>> board_warp_m;
