@@ -8,10 +8,12 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/rotation_vector.h"
 #include "camera/lens.h"
+#include "camera/spline_grid.h"
 
 namespace vlp {
 namespace {
@@ -186,6 +188,28 @@ bool mark_outliers(BoardProblem& problem) {
   return any;
 }
 
+/// What a lens leaves of the points that are no outliers.
+struct Left {
+  explicit Left(const BoardProblem& problem) {
+    const auto residuals = residuals_of(problem);
+    double squares = 0, count = 0;
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      const double weight = problem.points[i].z();
+      if (!(weight > 0)) continue;
+      if (!residuals[i].allFinite()) {
+        sees_all = false;
+        continue;
+      }
+      squares += weight * weight * residuals[i].squaredNorm();
+      ++count;
+    }
+    rms_px = std::sqrt(squares / (2 * count));
+  }
+
+  bool sees_all = true;
+  double rms_px;  // of those that it sees
+};
+
 }  // namespace
 
 std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem) {
@@ -199,8 +223,18 @@ std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem) {
 bool has_mrcal(LensModel model) { return name_of(model).starts_with("LENSMODEL_"); }
 
 bool solve(BoardProblem& problem, const SolveFor& what) {
-  return has_mrcal(problem.lens_model) ? solve_by_mrcal(problem, what)
-                                       : solve_by_ceres(problem, what);
+  if (!has_mrcal(problem.lens_model)) return solve_by_ceres(problem, what);
+  constexpr double as_well = 1.05;
+  const BoardProblem start = problem;
+  if (!solve_by_mrcal(problem, what)) return false;
+  const Left left(problem);
+  if (left.sees_all || is_splined(problem.lens_model) || !Left(start).sees_all) return true;
+  BoardProblem without_poles = start;
+  if (solve_by_ceres(without_poles, what) &&
+      !(Left(without_poles).rms_px > as_well * left.rms_px)) {
+    problem = std::move(without_poles);
+  }
+  return true;
 }
 
 Linearization linearized(const BoardProblem& problem, const SolveFor& what) {

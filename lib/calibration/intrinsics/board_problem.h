@@ -33,7 +33,7 @@ struct BoardProblem {
   /// by; kUnseen, or another below 0 for an outlier. Every pose needs four points or more, not on a
   /// line.
   std::vector<Eigen::Vector3d> points;
-  static constexpr double kUnseen = -1e9;  // no weight is as large
+  static constexpr double kUnseen = -1e9;  // weights are 1e6 at most
   /// Of the corners, for which the regularization is made: of a pixel, as mrcal makes it. Of
   /// corners that are better known its share of all squares would be the larger, and draw the lens
   /// off.
@@ -63,14 +63,17 @@ struct SolveFor {
 };
 
 /// Minimizes the residuals in place, by mrcal_optimize, or by Ceres for the models that mrcal does
-/// not have: without regularization, outliers beyond 5 sigmas. False when it fails: points that no
-/// lens of the model can see there, or too few for the unknowns.
+/// not have: without regularization, outliers beyond 5 sigmas. By Ceres, too, where mrcal goes from
+/// a lens that sees all points to one that does not, unless that fits worse: the quotient of
+/// OPENCV8 and OPENCV12 can have poles between the points and fit them all the same, which mrcal's
+/// steps go over; Ceres takes no step to a lens that does not see a point. False when it fails:
+/// points that no lens of the model can see there, or too few for the unknowns.
 bool solve(BoardProblem& problem, const SolveFor& what);
 
 /// The problem at its solution. State and Jacobian are packed: the state is divided by `scale`, so
 /// that its entries are of like size.
 struct Linearization {
-  /// Of the points, u and v in turn, in their order; 0 for those with a negative weight.
+  /// Of the points, u and v in turn, in their order, weighted; 0 for those with a negative weight.
   Eigen::VectorXd residuals_px;
   /// Of the regularization; none of the models that mrcal does not have.
   Eigen::VectorXd regularization;

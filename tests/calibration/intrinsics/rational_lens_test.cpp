@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// OPENCV8 and OPENCV12 of boards that a wide lens sees far off its axis: their quotient can have
+/// poles between the corners.
+#include <gtest/gtest.h>
+
+#include "calibration/intrinsics/wide_views.h"
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+class RationalLens : public testing::TestWithParam<LensModel> {};
+
+TEST_P(RationalLens, SeesAllCornersOfBoardsFarOffTheAxis) {
+  constexpr int views = 36;
+  constexpr double noise_px = 0.05;
+  for (const double reach_deg : {69, 80}) {
+    Random random(static_cast<std::uint64_t>(reach_deg));
+    WideBoards boards;
+    boards.reach_rad = rad_from_deg(reach_deg);
+    IntrinsicsInput input = wide_input(false, views, random, noise_px, {0, 0}, boards);
+    input.lens_model = GetParam();
+    const IntrinsicsSolution solution = solve_intrinsics(input);
+    ASSERT_TRUE(solution.ok()) << reach_deg;
+    EXPECT_EQ(solution.views.size(), views) << reach_deg;
+    EXPECT_NEAR(solution.rms_px, noise_px, 0.05 * noise_px) << reach_deg;
+    const auto difference = up_to(reach_deg - 2, solution.lens());
+    EXPECT_LT(difference.mean_px, 0.05) << reach_deg;
+    EXPECT_LT(difference.worst_px, 0.2) << reach_deg;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, RationalLens,
+                         testing::Values(LensModel::opencv8, LensModel::opencv12),
+                         [](const auto& instance) {
+                           return instance.param == LensModel::opencv8 ? "Opencv8" : "Opencv12";
+                         });
+
+}  // namespace
+}  // namespace vlp
