@@ -63,6 +63,8 @@ double take_common_curve(std::vector<BoardView>& views) {
       near.least({sums[near.first], sums[near.first + 1], sums[near.first + 2]});
   const bool none = log_gamma < std::log(least_gamma);
   const auto weights = near.weights(log_gamma);
+  const std::size_t lower = log_gamma < near.x(1) ? 0 : 1, below = near.first + lower;
+  const double share = (log_gamma - near.x(lower)) / (near.x(lower + 1) - near.x(lower));
   for (BoardView& view : views) {
     view.seen.curve_costs.clear();
     for (SeenTag& tag : view.seen.tags) {
@@ -72,13 +74,17 @@ double take_common_curve(std::vector<BoardView>& views) {
       if (none || behind.size() < kGammas.size()) continue;
       for (std::size_t k = 0; k < 4; ++k) {
         tag.corners_px[k].setZero();
-        tag.bows[k].square_px = tag.bows[k].cube_px = tag.sds_px[k] = 0;
+        tag.bows[k].square_px = tag.bows[k].cube_px = 0;
+        // A parabola can go below 0.
+        const double below_px = behind[below].sds_px[k], above_px = behind[below + 1].sds_px[k];
+        const bool known = below_px > 0 && above_px > 0;
+        tag.sds_px[k] = known ? (1 - share) * below_px + share * above_px : 0;
         for (std::size_t i = 0; i < 3; ++i) {
-          const auto& [corners_px, bows, sds_px] = behind[near.first + i];
+          const SeenTag::Corners& corners_px = behind[near.first + i].corners_px;
+          const SeenTag::Bows& bows = behind[near.first + i].bows;
           tag.corners_px[k] += weights[i] * corners_px[k];
           tag.bows[k].square_px += weights[i] * bows[k].square_px;
           tag.bows[k].cube_px += weights[i] * bows[k].cube_px;
-          tag.sds_px[k] += weights[i] * sds_px[k];
         }
       }
     }

@@ -53,6 +53,18 @@ TEST(CommonCurve, IsWhatAnImageCallsForAndMovesItsCorners) {
   }
 }
 
+TEST(CommonCurve, LeavesDeviationsBetweenThoseBesideIt) {
+  std::vector<BoardView> images{image(1.8, 500)};
+  SeenTag& tag = images[0].seen.tags[0];
+  const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
+  for (std::size_t i = 0; i < 4; ++i)
+    tag.behind_curves[i].sds_px[0] = std::array{0.024, 0.024, 0.026, 0.19}[i];
+  tag.behind_curves[2].sds_px[1] = 0;  // nobody knows it behind one of them
+  take_common_curve(images);
+  EXPECT_NEAR(images[0].seen.tags[0].sds_px[0], 0.024 + at * 0.002, 1e-9);
+  EXPECT_EQ(images[0].seen.tags[0].sds_px[1], 0);
+}
+
 TEST(CommonCurve, IsOneForAllImages) {
   std::vector<BoardView> images{image(1.6, 300), image(2.0, 300), image(1.1, 10)};
   const double gamma = take_common_curve(images);
