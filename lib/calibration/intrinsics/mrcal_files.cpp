@@ -109,9 +109,10 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
   const BoardProblem& problem = solution.problem;
   const std::size_t parts = problem.poses.size() / solution.views.size();
   const std::size_t count = problem.points_of_a_board();
-  // mrcal cuts levels off to whole ones; it takes weights as well, when it is told to.
+  // mrcal cuts levels off to whole ones from 0 on; it takes weights as well, when it is told to.
   const bool weights = std::ranges::any_of(problem.points, [](const Eigen::Vector3d& point) {
-    return point.z() > 0 && std::log2(point.z()) != std::floor(std::log2(point.z()));
+    const double level = -std::log2(point.z());
+    return point.z() > 0 && (level < 0 || level != std::floor(level));
   });
   const std::vector<std::string> names = names_in_table(solution, images);
   std::string text = weights ? "# filename x y weight\n" : "# filename x y level\n";

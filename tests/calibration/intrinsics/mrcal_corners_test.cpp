@@ -5,6 +5,7 @@
 #include "calibration/intrinsics/mrcal_files.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "support/refused.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -104,6 +105,39 @@ TEST(MrcalTable, WeighsCornersByTheirLevels) {
   const auto by_weight = read("# filename x y weight\n");
   EXPECT_EQ(by_weight[0].seen.points[0].weight, 0.5);
   EXPECT_EQ(by_weight[0].seen.points[1].weight, 1);
+}
+
+TEST(MrcalTable, RefusesAWeightWithoutMeasure) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("corners.vnl", "# filename x y weight\n" + row("100 100", "1e7"));
+  EXPECT_EQ(refusal_of([&] { read_corners(file, chessboard(), kImager_px); }),
+            file.string() + ":2: a weight should be within 0 and 1e6");
+}
+
+/// Levels are from 0 on, so that weights beyond 1 are written as weights, powers of two as well.
+TEST(MrcalTable, ComesBackWithItsWeights) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  Random random(6);
+  IntrinsicsInput input = views.input(6, random, 0.05);
+  for (const double most : {1.0, 2.0}) {
+    for (auto& view : input.views) {
+      for (std::size_t i = 0; i < view.size(); ++i) view[i].weight = most / (i % 2 == 0 ? 1 : 4);
+    }
+    const IntrinsicsSolution solution = solve_intrinsics(input);
+    ASSERT_TRUE(solution.ok());
+    const TemporaryFolder folder;
+    const auto file = folder / "corners.vnl";
+    const std::vector<std::string> names{"0", "1", "2", "3", "4", "5"};
+    write_corners(file, solution, names);
+    std::size_t corners = 0;
+    for (const BoardView& view : read_corners(file, views.board, kImager_px)) {
+      for (const SeenPoint& point : view.seen.points) {
+        EXPECT_TRUE(point.weight == most || point.weight == most / 4) << point.weight;
+        ++corners;
+      }
+    }
+    EXPECT_EQ(corners, static_cast<std::size_t>(solution.corners));
+  }
 }
 
 /// With either solver: corners of large errors that weigh little spoil little.
