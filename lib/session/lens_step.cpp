@@ -248,9 +248,7 @@ void state_how_far_apart(const Lens& lens, const Lens& other, CalibrationReport&
     const auto ray = other.unproject(pixel);
     const auto seen = ray ? lens.project(*lens_from_other * ray->direction) : std::nullopt;
     const double apart_px = seen ? (*seen - pixel).norm() : std::numeric_limits<double>::infinity();
-    if (apart_px <= report.uncertainty_worst_px) continue;
-    report.uncertainty_worst_px = apart_px;
-    report.uncertainty_worst_at = pixel;
+    report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, apart_px);
   }
 }
 

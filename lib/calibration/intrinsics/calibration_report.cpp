@@ -35,7 +35,6 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
                            region_share,
                            0,
                            0,
-                           {0, 0},
                            0,
                            uncertainty.focal_sd_px(),
                            std::sqrt(by_views(0, 0)),
@@ -54,9 +53,7 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
     }
     ++inside;
     report.uncertainty_mean_px += sigma_px;
-    if (sigma_px <= report.uncertainty_worst_px) continue;
-    report.uncertainty_worst_px = sigma_px;
-    report.uncertainty_worst_at = pixel;
+    report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, sigma_px);
   }
   report.uncertainty_mean_px /= std::max(inside, 1.0);
   if (!is_splined(lens.model())) {

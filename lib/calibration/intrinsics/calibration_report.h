@@ -19,13 +19,12 @@ struct CalibrationReport {
   /// Where the lens is known, and its share of the image.
   ImageRegion region;
   double region_share;
-  /// ProjectionUncertainty::worst_px(), by tags, over the pixel_grid() of the region: the mean, the
-  /// worst and where it is; and the worst beyond. The worst is no less than what the largest error
+  /// ProjectionUncertainty::worst_px(), by tags, over the pixel_grid() of the region: the mean and
+  /// the worst; and the worst beyond. The worst is no less than what the largest error
   /// over the region is expected to be, expected_worst_px(), by tags, by independent corners and by
   /// views; but of a splined lens. Where another model fits as well, solve_lens() makes it what
   /// lies between the two.
   double uncertainty_mean_px, uncertainty_worst_px;
-  Eigen::Vector2d uncertainty_worst_at;
   double uncertainty_beyond_px;
   /// Standard deviation of fx: by the noise of the tags, and by covariance_by_views().
   double focal_sd_px, focal_sd_by_views_px;
@@ -42,7 +41,8 @@ struct CalibrationReport {
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
 
 /// What a solution leaves of each of some views that took no part in it, rms per axis: their poses
-/// and the shifts of their edges are fitted, nothing else. Infinite of a view without a pose.
+/// and the shifts of their edges are fitted, nothing else. All corners count as they are given, so
+/// that lens models can be compared by it. Infinite of a view without a pose.
 std::vector<double> held_out_rms_px(const IntrinsicsSolution& solution,
                                     const IntrinsicsInput& held_out);
 

@@ -34,9 +34,8 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
                report.focal_sd_by_views_px);
   }
   fmt::print("centre        {:.2f}, {:.2f} px\n", parameters[2], parameters[3]);
-  fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst, at ({:.0f}, {:.0f})\n",
-             report.uncertainty_mean_px, report.uncertainty_worst_px,
-             report.uncertainty_worst_at.x(), report.uncertainty_worst_at.y());
+  fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst\n", report.uncertainty_mean_px,
+             report.uncertainty_worst_px);
   if (report.region_share > 0.999) {
     fmt::print("board seen    all over the image\n");
   } else {
