@@ -4,6 +4,9 @@
 /// lens is worse than it says. Benchmark thin_trials tries more of them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <map>
 #include <string>
 
 #include "session/thin_sets.h"
@@ -11,20 +14,43 @@
 namespace vlp {
 namespace {
 
-TEST(ThinViews, AreNotCalledGoodWhereTheyAreNot) {
-  constexpr double sigmas = 3;
-  int good = 0;
+/// What became of sets that tell little for one reason, of three boards: plain, shrunk, Kalibr's.
+struct Outcome {
+  int passed = 0;
+  double worst = 0;  // the largest error over what is stated
+};
+
+std::map<std::string, Outcome> outcomes() {
+  std::map<std::string, Outcome> outcomes;
   std::uint64_t seed = 500;
   for (const Thin& thin : thin_kinds()) {
-    for (const bool kalibr : {false, true}) {
+    Outcome& outcome = outcomes[thin.name];
+    for (const auto& [kalibr, shrinks] : {std::pair{false, false}, {false, true}, {true, false}}) {
       Random random(seed++);
-      const auto ratio = error_over_stated(thin_set(thin, kalibr, false, random));
+      const auto ratio = error_over_stated(thin_set(thin, kalibr, shrinks, random));
       if (!ratio) continue;
-      if (thin.name == std::string("good")) ++good;
-      EXPECT_LE(*ratio, sigmas) << thin.name << (kalibr ? ", Kalibr's board" : "");
+      ++outcome.passed;
+      outcome.worst = std::max(outcome.worst, *ratio);
     }
   }
-  EXPECT_GT(good, 0) << "sets that are not thin pass";
+  return outcomes;
+}
+
+TEST(ThinViews, AreNotCalledGoodWhereTheyAreNot) {
+  // Of these sets; of more, one in some hundreds is a little beyond three.
+  constexpr double most = 2.5;
+  int passed = 0;
+  const auto all = outcomes();
+  for (const auto& [name, outcome] : all) {
+    EXPECT_LE(outcome.worst, most) << name;
+    passed += outcome.passed;
+  }
+  for (const auto* untold :
+       {"one corner", "alike in one corner", "hardly tilted", "one distance, hardly tilted"}) {
+    EXPECT_EQ(all.at(untold).passed, 0) << untold;
+  }
+  EXPECT_EQ(all.at("good").passed, 3) << "sets that are not thin do not pass";
+  EXPECT_GE(passed, 20) << "gates refuse what tells enough";
 }
 
 }  // namespace
