@@ -19,6 +19,7 @@ extern "C" {
 #include <mutex>
 #include <span>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include "calibration/intrinsics/board_problem.h"
@@ -96,13 +97,13 @@ void unpack(Unpack* function, double* state, const Arguments& the) {
 
 /// mrcal reports outliers on stderr, asked or not; a library should not. It works in a thread that
 /// has open files of its own, among them nothing for stderr: without the process's, what other
-/// threads say meanwhile would be lost. Where the system does not grant that, mrcal is heard. One
-/// at a time: mrcal does not say that more may be.
+/// threads say meanwhile would be lost. Where the system does not grant that, or no thread, mrcal
+/// is heard. One at a time: mrcal does not say that more may be.
 template <typename Work>
 void in_silence(const Work& work) {
   static std::mutex only_one;
   const std::lock_guard alone(only_one);
-  std::thread([&] {
+  const auto silent_work = [&] {
     // Those that are not for mrcal are closed, lest what others close stays open here.
     constexpr unsigned first = STDERR_FILENO + 1, last = std::numeric_limits<unsigned>::max();
     if (::close_range(first, last, CLOSE_RANGE_UNSHARE) == 0) {
@@ -110,7 +111,12 @@ void in_silence(const Work& work) {
       if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
     }
     work();
-  }).join();
+  };
+  try {
+    std::thread(silent_work).join();
+  } catch (const std::system_error&) {
+    work();
+  }
 }
 
 }  // namespace
