@@ -40,8 +40,9 @@ struct IntrinsicsReport {
   int views;
   int corners;
   int outliers;
-  /// Per axis, over the corners that are not outliers, weighted as they are in the solve; the mean
-  /// square of the weights is 1.
+  /// Per axis, over the corners that are not outliers, each multiplied by its weight. By those of
+  /// the solve's own it is what corners are off (CornerWeights); by those of a table of corners it
+  /// is as large as they are.
   double rms_px;
   /// Deflection of the board's centre from flat, along x and y (mrcal's calobject_warp).
   std::optional<std::array<double, 2>> board_warp_m;

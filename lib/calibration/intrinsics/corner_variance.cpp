@@ -5,13 +5,18 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 namespace vlp {
+namespace {
+
+constexpr double kMostSigmas = 3;
+
+}  // namespace
 
 CornerVariance corner_variance(std::span<const CornerError> errors) {
   constexpr int rounds = 10;
-  constexpr double most_sigmas = 3;
-  constexpr double least_share = 1e-6;  // of the mean square: no corner weighs all
+  constexpr double least_share = 0.002;  // of the mean square: no corner weighs all
   double mean_px2 = 0;
   for (const CornerError& error : errors) {
     mean_px2 += error.square_px2 / static_cast<double>(errors.size());
@@ -20,19 +25,39 @@ CornerVariance corner_variance(std::span<const CornerError> errors) {
   for (int round = 0; round < rounds; ++round) {
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    double told_px2 = 0;
     for (const auto& [square_px2, sd_px] : errors) {
       const double expected = variance.of(sd_px);
       const Eigen::Vector2d row = Eigen::Vector2d(1, sd_px * sd_px) / expected;
       normal += row * row.transpose();
-      right += row * std::min(square_px2 / expected, most_sigmas * most_sigmas);
+      const double square = std::min(square_px2 / expected, kMostSigmas * kMostSigmas);
+      right += row * square;
+      told_px2 += square * expected / static_cast<double>(errors.size());
     }
     Eigen::Vector2d both = normal.inverse() * right;
     // Of corners that are all as good only the sum is known.
     if (!both.allFinite() || both[1] < 0) both = {right[0] / normal(0, 0), 0};
     if (both[0] < 0) both = {0, right[1] / normal(1, 1)};
-    variance = {std::max(both[0], least_share * mean_px2), both[1]};
+    variance = {std::max(both[0], least_share * told_px2), both[1]};
   }
   return variance;
+}
+
+CornerWeights::CornerWeights(std::span<const CornerError> told, std::span<const CornerError> untold)
+    : variance_(corner_variance(told)), untold_px2_(0), mean_px2_(0) {
+  const auto count = static_cast<double>(told.size());
+  for (const auto& [square_px2, sd_px] : told) {
+    const double variance_px2 = variance_.of(sd_px);
+    untold_px2_ += variance_px2 / count;
+    mean_px2_ += std::min(square_px2, kMostSigmas * kMostSigmas * variance_px2) / count;
+  }
+  if (std::ranges::any_of(untold, [](const auto& error) { return error.square_px2 > 0; })) {
+    untold_px2_ = std::max(untold_px2_, corner_variance(untold).of(0));
+  }
+}
+
+double CornerWeights::of(double sd_px) const {
+  return std::sqrt(mean_px2_ / (sd_px > 0 ? variance_.of(sd_px) : untold_px2_));
 }
 
 }  // namespace vlp

@@ -24,8 +24,29 @@ struct CornerVariance {
 };
 
 /// The variance components by least squares of the squares that are left, each over its variance,
-/// neither below 0; beyond three standard deviations a residual counts as that. Precondition: there
-/// are errors, not all of them 0.
+/// neither below 0; beyond three standard deviations a residual counts as that. No corner is taken
+/// for better than 4 % of what all are off in the mean, lest it weighs all. Precondition: there are
+/// errors, not all of them 0; deviations are finite.
 CornerVariance corner_variance(std::span<const CornerError> errors);
+
+/// What a solve multiplies residuals by:
+///   weight^2 = mean of the squares of the residuals / variance,
+/// the mean of corners of which a deviation is known, so that the rms of weighted residuals is what
+/// those are off. Corners of which nobody knows a deviation, whose edges were not found, have a
+/// variance of their own, by what is left of them, no less than the others' in the mean. Beyond
+/// three standard deviations a residual counts as that.
+class CornerWeights {
+ public:
+  /// Of corners of which the deviation is known, and of those of which it is not. Precondition:
+  /// there are some of the first, not all of them 0.
+  CornerWeights(std::span<const CornerError> told, std::span<const CornerError> untold);
+
+  /// By a corner's deviation, 0 where nobody knows it.
+  double of(double sd_px) const;
+
+ private:
+  CornerVariance variance_;
+  double untold_px2_, mean_px2_;
+};
 
 }  // namespace vlp

@@ -51,8 +51,8 @@ struct IntrinsicsSolution {
   /// How far the edges of the tags had gone towards the dark in each of `views`, in the mean; it is
   /// taken out of the corners (edge_shifts()).
   std::vector<double> edge_shifts_px;
-  /// Root of the sum of the squared residuals over 2 x corners, those that are no outliers: per
-  /// axis.
+  /// Root of the sum of the squared, weighted residuals over 2 x corners, those that are no
+  /// outliers: per axis.
   double rms_px;
   int corners, outliers;
 
@@ -78,7 +78,7 @@ struct IntrinsicsSolution {
 ///  5. the shift of the tags' edges, even over a view, taken out (edge_shifts()), and the model
 ///     again, at most twice;
 ///  6. the board's warp (WarpChoice);
-///  7. corners weighted by what they are good for, where their images tell it (corner_variance());
+///  7. corners weighted by what they are good for, where their images tell it (CornerWeights);
 ///     the bows again, as 4., what the shifts change over a view, as 5., and the weights again;
 ///  8. all of it without outliers;
 ///  9. a splined lens turned to its axis.
@@ -94,7 +94,8 @@ struct IntrinsicsSolution {
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
 
 /// Of every other view of a solution, from that solution on: their lens, poses and warp are solved
-/// for again, with the shifts of edges, the outliers and a warp or none as all views told them.
+/// for again, with the shifts of edges, the weights, the outliers and a warp or none as all views
+/// told them.
 /// Precondition: whole.ok().
 IntrinsicsSolution solve_every_other(const IntrinsicsSolution& whole, std::size_t first);
 

@@ -158,11 +158,14 @@ bool IntrinsicsSolver::weigh_regularization() {
   return true;
 }
 
+std::size_t IntrinsicsSolver::point_of(std::size_t used, const BoardLattice::Corner& corner) const {
+  return (used * input_.lattice.parts() + corner.part) * input_.lattice.points() + corner.point;
+}
+
 void IntrinsicsSolver::move_points() {
-  const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      Eigen::Vector3d& point = problem_.points[(i * parts + corner.part) * count + corner.point];
+      Eigen::Vector3d& point = problem_.points[point_of(i, corner)];
       point << corner.pixel, std::copysign(corner.weight, point.z());
     }
   }
@@ -218,29 +221,21 @@ bool IntrinsicsSolver::bend() {
 }
 
 bool IntrinsicsSolver::weigh_corners() {
-  const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   const auto residuals = residuals_of(problem_);
-  std::vector<CornerError> errors;
+  std::vector<CornerError> told, untold;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      if (!(corner.sd_px > 0)) continue;
-      const auto& residual = residuals[(i * parts + corner.part) * count + corner.point];
-      if (residual.allFinite()) errors.push_back({residual.squaredNorm() / 2, corner.sd_px});
+      const Eigen::Vector2d& residual = residuals[point_of(i, corner)];
+      if (!residual.allFinite()) continue;
+      (corner.sd_px > 0 ? told : untold).push_back({residual.squaredNorm() / 2, corner.sd_px});
     }
   }
-  if (std::ranges::all_of(errors, [](const auto& error) { return error.square_px2 == 0; })) {
+  if (std::ranges::all_of(told, [](const auto& error) { return error.square_px2 == 0; })) {
     return true;
   }
-  const CornerVariance variance = corner_variance(errors);
-  // Their mean square is 1, so that rms_px stays what corners are off; of those that nobody knows
-  // it is 1, too.
-  double sum = 0;
-  for (const CornerError& error : errors) sum += 1 / variance.of(error.sd_px);
-  const double mean = sum / static_cast<double>(errors.size());
+  const CornerWeights weights(told, untold);
   for (auto& view : input_.views) {
-    for (auto& corner : view) {
-      if (corner.sd_px > 0) corner.weight = 1 / std::sqrt(mean * variance.of(corner.sd_px));
-    }
+    for (auto& corner : view) corner.weight = weights.of(corner.sd_px);
   }
   move_points();
   return solve(solved_for_);
@@ -303,10 +298,8 @@ void IntrinsicsSolver::assemble(const Lens& lens) {
     }
     const auto& corners = input_.views[used_[i]];
     for (std::size_t k = 0; k < corners.size(); ++k) {
-      const std::size_t board = i * lattice.parts() + corners[k].part;
       const double sign = slips_.contains({used_[i], k}) ? -1 : 1;
-      problem_.points[board * lattice.points() + corners[k].point] << corners[k].pixel,
-          sign * corners[k].weight;
+      problem_.points[point_of(i, corners[k])] << corners[k].pixel, sign * corners[k].weight;
     }
   }
 }
@@ -335,14 +328,13 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
   constexpr double sigmas = 8, least_px = 0.1, median_of_normal = 0.6745;
   // Where OPENCV_FISHEYE is not the lens, neighbours differ among themselves, too.
   constexpr double beside_sigmas = 5;
-  const std::size_t count = input_.lattice.points(), parts = input_.lattice.parts();
   const auto residuals = residuals_of(problem_);
   std::map<CornerOfView, double> apart_px;
   std::vector<double> all_px;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const auto& corners = input_.views[used_[i]];
     const auto residual = [&](std::size_t k) -> const Eigen::Vector2d& {
-      return residuals[(i * parts + corners[k].part) * count + corners[k].point];
+      return residuals[point_of(i, corners[k])];
     };
     for (std::size_t k = 0; k < corners.size(); ++k) {
       std::vector<std::pair<double, std::size_t>> near;

@@ -34,8 +34,8 @@ class IntrinsicsSolver {
   bool take_out_shifts(ShiftForm form);
   /// Stage 6: the warp of the board, if it is to be.
   bool bend();
-  /// Stage 7: corners weighted by what they are good for (corner_variance()), those of which their
-  /// images tell it.
+  /// Stage 7: corners weighted by what they are good for (CornerWeights), when images tell it of
+  /// some.
   bool weigh_corners();
   /// Stage 8.
   bool leave_out_outliers();
@@ -54,6 +54,8 @@ class IntrinsicsSolver {
   void seed(const Lens& lens);
   /// The problem of the views used, at their seeds.
   void assemble(const Lens& lens);
+  /// Of the problem, by a view's place in used_.
+  std::size_t point_of(std::size_t used, const BoardLattice::Corner& corner) const;
   /// Where the corners of the input are now, and what they weigh.
   void move_points();
   /// Of the views used, in their order.

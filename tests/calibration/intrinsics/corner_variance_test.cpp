@@ -55,22 +55,40 @@ TEST(CornerVariances, OfCornersThatAreAllAsGoodAreOne) {
   EXPECT_NEAR(corner_variance(errors).of(0.01), 2e-4, 1e-9);
 }
 
+/// Corners of 16 views, those at the rim of the image ten times as far off as those in its middle,
+/// which know it.
+IntrinsicsInput uneven_input(const SyntheticViews& views, Random& random) {
+  IntrinsicsInput input = views.input(16, random, 0);
+  input.warp = WarpChoice::off;
+  for (auto& view : input.views) {
+    for (auto& corner : view) {
+      const double off = (corner.pixel - Eigen::Vector2d(400, 300)).norm() / 500;
+      corner.sd_px = 0.01 * std::exp(3 * off);
+      corner.pixel += corner.sd_px * Eigen::Vector2d(random.normal(), random.normal());
+    }
+  }
+  return input;
+}
+
+/// Per axis, of the corners that are no outliers, each counting alike.
+double off_px(const IntrinsicsSolution& solution) {
+  double squares = 0, count = 0;
+  const auto residuals = residuals_of(solution.problem);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (!(solution.problem.points[i].z() > 0)) continue;
+    squares += residuals[i].squaredNorm();
+    count += 2;
+  }
+  return std::sqrt(squares / count);
+}
+
 /// Least squares of corners that know how good they are, or do not.
-TEST(CornerVariances, MakeTheBestOfCorners) {
+TEST(CornerWeighting, MakesTheBestOfCorners) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   double told_px2 = 0, untold_px2 = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     Random random(seed);
-    IntrinsicsInput input = views.input(16, random, 0);
-    input.warp = WarpChoice::off;
-    for (auto& view : input.views) {
-      for (auto& corner : view) {
-        // From the middle to a corner of the image.
-        const double off = (corner.pixel - Eigen::Vector2d(400, 300)).norm() / 500;
-        corner.sd_px = 0.01 * std::exp(3 * off);
-        corner.pixel += corner.sd_px * Eigen::Vector2d(random.normal(), random.normal());
-      }
-    }
+    IntrinsicsInput input = uneven_input(views, random);
     const auto square_px2 = [&] {
       const IntrinsicsSolution solution = solve_intrinsics(input);
       EXPECT_TRUE(solution.ok());
@@ -84,24 +102,53 @@ TEST(CornerVariances, MakeTheBestOfCorners) {
     }
     untold_px2 += square_px2();
   }
-  EXPECT_LT(std::sqrt(told_px2 / untold_px2), 0.85);
+  EXPECT_LT(std::sqrt(told_px2 / untold_px2), 0.9);
   RecordProperty("told_over_untold", std::to_string(std::sqrt(told_px2 / untold_px2)));
 }
 
-/// Their mean square is 1, so that what is left is in px.
-TEST(CornerVariances, LeaveResidualsInPixels) {
+TEST(CornerWeighting, LeavesResidualsInPixels) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(3);
-  IntrinsicsInput input = views.input(16, random, 0.05);
-  const IntrinsicsSolution untold = solve_intrinsics(input);
-  double sd_px = 0.01;
+  const IntrinsicsSolution solution = solve_intrinsics(uneven_input(views, random));
+  ASSERT_TRUE(solution.ok());
+  EXPECT_NEAR(solution.rms_px, off_px(solution), 0.05 * off_px(solution));
+}
+
+/// Some corners have no deviation, and are far worse than the others.
+TEST(CornerWeighting, IsNotSpoiltByCornersOfWhichNobodyKnows) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  Random random(4);
+  IntrinsicsInput input = uneven_input(views, random);
+  const IntrinsicsSolution without = solve_intrinsics(input);
+  int unknown = 0;
   for (auto& view : input.views) {
-    for (auto& corner : view)
-      corner.sd_px = sd_px = 0.04 - sd_px;  // which has nothing to do with it
+    for (std::size_t i = 0; i < view.size(); i += 25, ++unknown) {
+      view[i].sd_px = 0;
+      view[i].pixel += 0.5 * Eigen::Vector2d(random.normal(), random.normal());
+    }
   }
-  const IntrinsicsSolution told = solve_intrinsics(input);
-  ASSERT_TRUE(told.ok() && untold.ok());
-  EXPECT_NEAR(told.rms_px, untold.rms_px, 0.02 * untold.rms_px);
+  const IntrinsicsSolution with = solve_intrinsics(input);
+  ASSERT_TRUE(without.ok() && with.ok());
+  EXPECT_LT(with.outliers, without.outliers + unknown / 4);
+  const auto apart = projection_difference(without.lens(), with.lens(), views.imager_px, even);
+  EXPECT_LT(apart->rms_px, 0.02);
+}
+
+TEST(CornerWeights, AreOfTheVariancesAndTheMeanSquare) {
+  Random random(5);
+  const CornerVariance truth{1e-4, 1};
+  const auto told = errors_of(truth, random);
+  const CornerWeights weights(told, {});
+  EXPECT_NEAR(weights.of(0.01) / weights.of(0.1), std::sqrt(truth.of(0.1) / truth.of(0.01)), 0.3);
+  double squares = 0, weighted = 0;
+  for (const auto& [square_px2, sd_px] : told) {
+    squares += square_px2;
+    weighted += std::pow(weights.of(sd_px), 2) * square_px2;
+  }
+  EXPECT_NEAR(std::sqrt(weighted / squares), 1, 0.03);
+  // Few corners without a deviation that happen to fit are no better than the others.
+  const std::vector<CornerError> untold{{1e-8, 0}, {2e-8, 0}};
+  EXPECT_LT(CornerWeights(told, untold).of(0), weights.of(0.01));
 }
 
 }  // namespace
