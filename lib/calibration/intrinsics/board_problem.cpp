@@ -188,6 +188,12 @@ bool mark_outliers(BoardProblem& problem) {
   return any;
 }
 
+bool has_lens(const BoardProblem& problem) {
+  const auto& intrinsics = problem.intrinsics;
+  return intrinsics[0] > 0 && intrinsics[1] > 0 &&
+         std::ranges::all_of(intrinsics, [](double value) { return std::isfinite(value); });
+}
+
 /// What a lens leaves of the points that are no outliers.
 struct Left {
   explicit Left(const BoardProblem& problem) {
@@ -223,10 +229,10 @@ std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem) {
 bool has_mrcal(LensModel model) { return name_of(model).starts_with("LENSMODEL_"); }
 
 bool solve(BoardProblem& problem, const SolveFor& what) {
-  if (!has_mrcal(problem.lens_model)) return solve_by_ceres(problem, what);
+  if (!has_mrcal(problem.lens_model)) return solve_by_ceres(problem, what) && has_lens(problem);
   constexpr double as_well = 1.05;
   const BoardProblem start = problem;
-  if (!solve_by_mrcal(problem, what)) return false;
+  if (!solve_by_mrcal(problem, what) || !has_lens(problem)) return false;
   const Left left(problem);
   if (left.sees_all || is_splined(problem.lens_model) || !Left(start).sees_all) return true;
   BoardProblem without_poles = start;

@@ -33,7 +33,7 @@ struct BoardProblem {
   /// by; kUnseen, or another below 0 for an outlier. Every pose needs four points or more, not on a
   /// line.
   std::vector<Eigen::Vector3d> points;
-  static constexpr double kUnseen = -1e9;  // weights are 1e6 at most
+  static constexpr double kUnseen = -1e9;  // weights are 1000 at most
   /// Of the corners, for which the regularization is made: of a pixel, as mrcal makes it. Of
   /// corners that are better known its share of all squares would be the larger, and draw the lens
   /// off.
@@ -67,7 +67,8 @@ struct SolveFor {
 /// a lens that sees all points to one that does not, unless that fits worse: the quotient of
 /// OPENCV8 and OPENCV12 can have poles between the points and fit them all the same, which mrcal's
 /// steps go over; Ceres takes no step to a lens that does not see a point. False when it fails:
-/// points that no lens of the model can see there, or too few for the unknowns.
+/// points that no lens of the model can see there, too few for the unknowns, or a focal length that
+/// is not above 0.
 bool solve(BoardProblem& problem, const SolveFor& what);
 
 /// The problem at its solution. State and Jacobian are packed: the state is divided by `scale`, so

@@ -437,11 +437,8 @@ bool all_alike(const BoardProblem& problem) {
 }
 
 bool solve_for_lens(BoardProblem& problem, SolveFor what) {
-  const std::vector<double>& intrinsics = problem.intrinsics;
-  what.distortions = what.distortions && intrinsics.size() > 4;
-  return solve(problem, what) && intrinsics[0] > 0 && intrinsics[1] > 0 &&
-         std::all_of(intrinsics.begin(), intrinsics.end(),
-                     [](double value) { return std::isfinite(value); });
+  what.distortions = what.distortions && problem.intrinsics.size() > 4;
+  return solve(problem, what);
 }
 
 }  // namespace vlp

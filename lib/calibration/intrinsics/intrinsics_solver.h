@@ -90,7 +90,7 @@ class IntrinsicsSolver {
 /// No two boards are tilted differently, by five degrees or more.
 bool all_alike(const BoardProblem& problem);
 
-/// solve(), without the distortions of a model that has none; whether it gave a lens.
+/// solve(), without the distortions of a model that has none.
 bool solve_for_lens(BoardProblem& problem, SolveFor what);
 
 }  // namespace vlp
