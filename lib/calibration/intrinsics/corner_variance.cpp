@@ -6,22 +6,39 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <vector>
+
+#include "geometry/median.h"
 
 namespace vlp {
 namespace {
 
 constexpr double kMostSigmas = 3;
 
+/// The median of a figure of corners that is not 0, the mean when that is.
+template <typename Figure>
+double usual(std::span<const CornerError> errors, const Figure& figure) {
+  std::vector<double> values;
+  double sum = 0;
+  for (const CornerError& error : errors) {
+    values.push_back(figure(error));
+    sum += values.back();
+  }
+  const double median = upper_median(values);
+  return median > 0 ? median : sum / static_cast<double>(errors.size());
+}
+
 }  // namespace
 
 CornerVariance corner_variance(std::span<const CornerError> errors) {
   constexpr int rounds = 10;
   constexpr double least_share = 0.002;  // of the mean square: no corner weighs all
-  double mean_px2 = 0;
-  for (const CornerError& error : errors) {
-    mean_px2 += error.square_px2 / static_cast<double>(errors.size());
-  }
-  CornerVariance variance{mean_px2, 0};
+  // Half by the noise of pixels: from the rest alone, one corner with a large deviation by chance
+  // would tell that deviations mean nothing.
+  const double usual_px2 = usual(errors, [](const auto& error) { return error.square_px2; });
+  const double usual_sd_px = usual(errors, [](const auto& error) { return error.sd_px; });
+  CornerVariance variance{usual_px2 / 2, 0};
+  if (usual_sd_px > 0) variance.scale2 = usual_px2 / 2 / (usual_sd_px * usual_sd_px);
   for (int round = 0; round < rounds; ++round) {
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();

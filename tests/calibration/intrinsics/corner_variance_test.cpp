@@ -50,6 +50,19 @@ TEST(CornerVariances, AreNotThoseOfAFewOutliers) {
   }
 }
 
+TEST(CornerVariances, AreNotThoseOfOneDeviationThatIsNone) {
+  Random random(2);
+  const CornerVariance truth{1e-4, 1};
+  for (const double sd_px : {0.5, 1.0, 1e9}) {
+    auto errors = errors_of(truth, random);
+    errors[3].sd_px = sd_px;
+    const CornerVariance found = corner_variance(errors);
+    for (const double known_px : {0.01, 0.1}) {
+      EXPECT_NEAR(std::sqrt(found.of(known_px) / truth.of(known_px)), 1, 0.08) << sd_px;
+    }
+  }
+}
+
 TEST(CornerVariances, OfCornersThatAreAllAsGoodAreOne) {
   const std::vector<CornerError> errors{{4e-4, 0.01}, {1e-4, 0.01}, {1e-4, 0.01}};
   EXPECT_NEAR(corner_variance(errors).of(0.01), 2e-4, 1e-9);
