@@ -103,9 +103,11 @@ class CornerRows {
 
   /// 0 where nothing was seen.
   double weight_of(std::size_t line, std::optional<double> fourth) const {
-    constexpr double most_level = 30, most_weight = 1e6;
+    constexpr double most_level = 30, most_weight = 1000;
     if (!fourth || *fourth < 0) return 0;
-    if (weights_ && *fourth > most_weight) throw error(line, "a weight should be within 0 and 1e6");
+    if (weights_ && *fourth > most_weight) {
+      throw error(line, fmt::format("a weight of {:.6g}: weights go up to 1000", *fourth));
+    }
     if (weights_) return *fourth;
     if (*fourth > most_level) throw error(line, "a level should be within 0 and 30");
     return std::exp2(-std::floor(*fourth));

@@ -35,7 +35,7 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
 /// Corners of a board as mrcal's tools keep them (--corners-cache; of mrgingham, or what
 /// write_corners() wrote): `filename x y level`, every point of the board's lattice, row by row,
 /// image after image. The residual of a point is weighted by 2^-level, the level rounded down and
-/// 30 at most, or by a fourth column named `weight`, 1e6 at most; without a fourth column by 1. A
+/// 30 at most, or by a fourth column named `weight`, 1000 at most; without a fourth column by 1. A
 /// point with "-" or a negative x, y, level or weight was not seen; a single row with "-" is an
 /// image without the board. Throws InputError, with file and line.
 std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,

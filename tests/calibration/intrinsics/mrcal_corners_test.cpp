@@ -111,7 +111,7 @@ TEST(MrcalTable, RefusesAWeightWithoutMeasure) {
   const TemporaryFolder folder;
   const auto file = folder.file("corners.vnl", "# filename x y weight\n" + row("100 100", "1e7"));
   EXPECT_EQ(refusal_of([&] { read_corners(file, chessboard(), kImager_px); }),
-            file.string() + ":2: a weight should be within 0 and 1e6");
+            file.string() + ":2: a weight of 1e+07: weights go up to 1000");
 }
 
 /// Levels are from 0 on, so that weights beyond 1 are written as weights, powers of two as well.
