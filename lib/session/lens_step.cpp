@@ -110,12 +110,17 @@ Sorted sorted(const LensInput& input, LensResult& result) {
     }
     different.push_back(&view);
     corners_of_different.push_back(std::move(corners));
-    const bool held_out = input.held_out > 0 && ++usable % input.held_out == 0;
+    ++usable;
+    const bool held_out = input.held_out > 0 && usable % input.held_out == 0;
     auto& part = held_out ? sorted.held_out : sorted.solved;
     part.views.push_back(none.lattice.corners(view.seen));
     if (!held_out) result.images.push_back(view.image);
   }
   skipped.tell(result);
+  if (input.held_out > 0 && sorted.held_out.views.empty()) {
+    result.warnings.push_back(
+        fmt::format("of {} views none is held out: every {}th would be", usable, input.held_out));
+  }
   return sorted;
 }
 
@@ -272,6 +277,17 @@ void tell_better(const FisheyeFit& fisheye, LensResult& result) {
       name_of(model), solution.rms_px, name_of(LensModel::fisheye)));
 }
 
+/// A shift of the edges that a wrong gap between the tags makes rather than a camera.
+void tell_shift(const IntrinsicsSolution& solution, LensResult& result) {
+  constexpr double much_px = 0.4;  // cameras, behind tone curves and at three times white: 0.15
+  const double shift_px = upper_median(solution.edge_shifts_px);
+  if (std::abs(shift_px) <= much_px) return;
+  result.warnings.push_back(fmt::format(
+      "the edges of the tags are {:.2f} px towards the {}, more than a camera that is in "
+      "focus makes; is tag_spacing of board.yaml right?",
+      std::abs(shift_px), shift_px < 0 ? "light" : "dark"));
+}
+
 }  // namespace
 
 WarpChoice possible_warp(const Board& board, WarpChoice wanted) {
@@ -362,6 +378,7 @@ LensResult solve_lens(const LensInput& input, HistoryEntry entry) {
     result.fail(StepFailure::wrong_board, exact.problem, input.board_file);
     return result;
   }
+  tell_shift(solution, result);
   result.solution.another_fits = fisheye && fits_as_well(fisheye->solution, solution);
   result.report = report_on(solution, views.solved);
   if (solution.another_fits) {

@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// What passes with a doubt says so.
+#include <gmock/gmock.h>
+
+#include "calibration/intrinsics/synthetic_views.h"
+#include "session/lens_step.h"
+
+namespace vlp {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// Views of a plain board of which the edges went so far towards the dark.
+LensInput views_with_edges(double shift_px) {
+  const SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};
+  input.camera.lens_model = LensModel::opencv8;
+  Random random(8);
+  for (int i = 0; i < 20; ++i) {
+    SeenBoard seen = views.random_view(random, 0.05);
+    for (SeenTag& tag : seen.tags) tag = shrunk(tag, shift_px);
+    input.views.push_back({std::to_string(i), views.imager_px, seen});
+  }
+  return input;
+}
+
+TEST(LensWarnings, TellEdgesThatAreFurtherOffThanACameraMakesThem) {
+  EXPECT_THAT(solve_lens(views_with_edges(0.3), {}).warnings, IsEmpty());
+  const LensResult result = solve_lens(views_with_edges(0.6), {});
+  ASSERT_TRUE(result.ok()) << result.why;
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("0.60 px towards the dark")));
+  EXPECT_THAT(result.warnings, Contains(HasSubstr("is tag_spacing of board.yaml right?")));
+}
+
+TEST(LensWarnings, TellThatNothingIsHeldOut) {
+  LensInput input = views_with_edges(0);
+  input.held_out = 30;
+  EXPECT_THAT(solve_lens(input, {}).warnings,
+              Contains("of 20 views none is held out: every 30th would be"));
+  input.held_out = 10;
+  EXPECT_THAT(solve_lens(input, {}).warnings, IsEmpty());
+}
+
+}  // namespace
+}  // namespace vlp
