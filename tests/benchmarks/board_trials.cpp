@@ -66,6 +66,18 @@ std::vector<Development> developments() {
           {"1.5 times white, sharpened, gamma 2.2, JPEG 80", 1.5, curve(2.2, 80, sharp)}};
 }
 
+/// JPEG has 8 bits: of a sensor with more, white is where its wells are full.
+Sensor sensor_behind(const Sensor& sensor, const std::optional<Picture>& picture) {
+  constexpr int bits = 8;
+  constexpr double black_dn = 2, white_dn = 255;
+  if (!picture || !picture->jpeg_quality || sensor.bits == bits) return sensor;
+  Sensor coarse = sensor;
+  coarse.bits = bits;
+  coarse.black_level_dn = black_dn;
+  coarse.gain_dn_per_e = (white_dn - black_dn) / sensor.full_well_e;
+  return coarse;
+}
+
 cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t seed,
                   const std::optional<Picture>& picture) {
   cv::Mat image = expose(scene.sensor, electrons, seed, picture);
@@ -88,9 +100,9 @@ double worst_within(const ImageRegion& region, const Lens& truth, const Lens& le
   return worst_px;
 }
 
-void try_development(const Scene& scene, const CaptureSet& boards,
-                     const std::vector<cv::Mat1f>& electrons, const BoardDetector& detector,
-                     const Development& development) {
+void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv::Mat1f>& electrons,
+                     const BoardDetector& detector, const Development& development) {
+  scene.sensor = sensor_behind(scene.sensor, development.picture);
   LensInput input;
   input.board = scene.board->print;
   input.camera = scene.camera;
