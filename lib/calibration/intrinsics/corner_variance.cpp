@@ -61,15 +61,14 @@ CornerVariance corner_variance(std::span<const CornerError> errors) {
 }
 
 CornerWeights::CornerWeights(std::span<const CornerError> told, std::span<const CornerError> untold)
-    : variance_(corner_variance(told)), untold_px2_(0), mean_px2_(0) {
-  const auto count = static_cast<double>(told.size());
+    : variance_(corner_variance(told)), mean_px2_(0) {
   for (const auto& [square_px2, sd_px] : told) {
-    const double variance_px2 = variance_.of(sd_px);
-    untold_px2_ += variance_px2 / count;
-    mean_px2_ += std::min(square_px2, kMostSigmas * kMostSigmas * variance_px2) / count;
+    mean_px2_ += std::min(square_px2, kMostSigmas * kMostSigmas * variance_.of(sd_px)) /
+                 static_cast<double>(told.size());
   }
+  untold_px2_ = mean_px2_;
   if (std::ranges::any_of(untold, [](const auto& error) { return error.square_px2 > 0; })) {
-    untold_px2_ = std::max(untold_px2_, corner_variance(untold).of(0));
+    untold_px2_ = std::max(mean_px2_, corner_variance(untold).of(0));
   }
 }
 

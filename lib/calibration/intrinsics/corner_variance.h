@@ -33,8 +33,8 @@ CornerVariance corner_variance(std::span<const CornerError> errors);
 ///   weight^2 = mean of the squares of the residuals / variance,
 /// the mean of corners of which a deviation is known, so that the rms of weighted residuals is what
 /// those are off. Corners of which nobody knows a deviation, whose edges were not found, have a
-/// variance of their own, by what is left of them, no less than the others' in the mean. Beyond
-/// three standard deviations a residual counts as that.
+/// variance of their own, by what is left of them, no less than that mean. Beyond three standard
+/// deviations a residual counts as that.
 class CornerWeights {
  public:
   /// Of corners of which the deviation is known, and of those of which it is not. Precondition:

@@ -69,13 +69,14 @@ TEST(CornerVariances, OfCornersThatAreAllAsGoodAreOne) {
 }
 
 /// Corners of 16 views, those at the rim of the image ten times as far off as those in its middle,
-/// which know it.
+/// which know it. Their edges stay, lest what is known of shifts beforehand is tested with it.
 IntrinsicsInput uneven_input(const SyntheticViews& views, Random& random) {
   IntrinsicsInput input = views.input(16, random, 0);
   input.warp = WarpChoice::off;
   for (auto& view : input.views) {
     for (auto& corner : view) {
       const double off = (corner.pixel - Eigen::Vector2d(400, 300)).norm() / 500;
+      corner.inward.setZero();
       corner.sd_px = 0.01 * std::exp(3 * off);
       corner.pixel += corner.sd_px * Eigen::Vector2d(random.normal(), random.normal());
     }
@@ -115,7 +116,7 @@ TEST(CornerWeighting, MakesTheBestOfCorners) {
     }
     untold_px2 += square_px2();
   }
-  EXPECT_LT(std::sqrt(told_px2 / untold_px2), 0.9);
+  EXPECT_LT(std::sqrt(told_px2 / untold_px2), 0.85);
   RecordProperty("told_over_untold", std::to_string(std::sqrt(told_px2 / untold_px2)));
 }
 
