@@ -118,8 +118,8 @@ Sorted sorted(const LensInput& input, LensResult& result) {
   }
   skipped.tell(result);
   if (input.held_out > 0 && sorted.held_out.views.empty()) {
-    result.warnings.push_back(
-        fmt::format("of {} views none is held out: every {}th would be", usable, input.held_out));
+    result.warnings.push_back(fmt::format("of {} views none is held out: there are fewer than {}",
+                                          usable, input.held_out));
   }
   return sorted;
 }

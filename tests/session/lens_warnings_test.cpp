@@ -39,7 +39,7 @@ TEST(LensWarnings, TellThatNothingIsHeldOut) {
   LensInput input = views_with_edges(0);
   input.held_out = 30;
   EXPECT_THAT(solve_lens(input, {}).warnings,
-              Contains("of 20 views none is held out: every 30th would be"));
+              Contains("of 20 views none is held out: there are fewer than 30"));
   input.held_out = 10;
   EXPECT_THAT(solve_lens(input, {}).warnings, IsEmpty());
 }
