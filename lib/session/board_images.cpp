@@ -10,6 +10,7 @@
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/board_lattice.h"
+#include "calibration/intrinsics/common_curve.h"
 #include "calibration/intrinsics/corner_blunders.h"
 #include "calibration/intrinsics/mrcal_files.h"
 #include "detection/boards/corner_cache.h"
@@ -287,6 +288,7 @@ SeenBoards see_boards(const BoardImages& input, const StepProgress& progress) {
                                [](const BoardView& view) { return view.seen.any(); });
   if (!any) explain_no_tags(input, seen);
   tell_turned(seen, input.board);
+  take_common_curve(seen.views, input.board);
   return seen;
 }
 

@@ -279,7 +279,7 @@ void tell_better(const FisheyeFit& fisheye, LensResult& result) {
 
 /// A shift of the edges that a wrong gap between the tags makes rather than a camera.
 void tell_shift(const IntrinsicsSolution& solution, LensResult& result) {
-  constexpr double much_px = 0.4;  // cameras, behind tone curves and at three times white: 0.15
+  constexpr double much_px = 0.4;  // cameras, sharpened and at three times white: 0.25
   const double shift_px = upper_median(solution.edge_shifts_px);
   if (std::abs(shift_px) <= much_px) return;
   result.warnings.push_back(fmt::format(

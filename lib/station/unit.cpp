@@ -302,7 +302,7 @@ StepResult Unit::solve(StationStep step, bool all_in) const {
   try {
     switch (step) {
       case StationStep::boards:
-        result = solve_boards(config_, camera_id_, views_of(state));
+        result = solve_boards(config_, camera_id_, views_of(state, config_.board));
         break;
       case StationStep::rotation:
         result = solve_rotation(config_, before, frames_of(state));

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "detection/boards/tone_curve.h"
+#include "calibration/intrinsics/common_curve.h"
 #include "geometry/median.h"
 
 namespace vlp {
@@ -24,12 +24,12 @@ int UnitStep::used() const {
   }));
 }
 
-std::vector<BoardView> views_of(const UnitStep& boards) {
+std::vector<BoardView> views_of(const UnitStep& boards, const Board& board) {
   std::vector<BoardView> views;
   for (const auto& [name, image] : boards.images) {
     if (image.refused.empty()) views.push_back(*image.view);
   }
-  take_common_curve(views);
+  take_common_curve(views, board);
   return views;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
+#include "rig/board.h"
 #include "session/step_result.h"
 #include "station/step_picture.h"
 #include "station/unit_image.h"
@@ -42,8 +43,9 @@ struct UnitStep {
   int used() const;
 };
 
-/// The views that are used, by name, behind the tone curve that they call for together.
-std::vector<BoardView> views_of(const UnitStep& boards);
+/// The views that are used, by name, behind the tone curve that they call for together
+/// (take_common_curve()).
+std::vector<BoardView> views_of(const UnitStep& boards, const Board& board);
 /// The frames of the images that are used, by name.
 std::vector<Frame> frames_of(const UnitStep& step);
 

@@ -47,7 +47,7 @@ class Verification {
     UnitStep step = step_of(folder_ / "boards", threads_, [&](const fs::path& file) {
       return look_at_board(file, config_, detector);
     });
-    const auto views = views_of(step);
+    const auto views = views_of(step, config_.board);
     if (!views.empty()) add("boards", solve_boards(config_, golden_.camera_id, views));
     note(StationStep::boards, step);
   }

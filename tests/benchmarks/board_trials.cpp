@@ -14,9 +14,9 @@
 #include <string>
 #include <thread>
 
+#include "calibration/intrinsics/common_curve.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "captures/in_parallel.h"
-#include "detection/boards/tone_curve.h"
 #include "geometry/median.h"
 #include "session/lens_step.h"
 #include "simulation/exposure.h"
@@ -109,7 +109,8 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   input.views.resize(electrons.size());
   const auto threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const double holds_e =
-      (white_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e;
+      std::min(scene.sensor.full_well_e,
+               (white_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e);
   const double white_e = scene.board->white_e_per_s * boards.exposure_s;
   const double exposures = development.white > 0 ? development.white * holds_e / white_e : 1;
   in_parallel(electrons.size(), threads, [&](std::size_t i) {
@@ -124,7 +125,7 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
     usable += view.seen.tags.size();
     tags += view.seen.tags.size() + static_cast<std::size_t>(view.seen.unusable);
   }
-  const double gamma = take_common_curve(input.views);
+  const double gamma = take_common_curve(input.views, input.board);
   const LensResult result = solve_lens(input, {});
   const std::string share =
       fmt::format("{:.1f}", 100 * static_cast<double>(usable) / static_cast<double>(tags));

@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "calibration/intrinsics/common_curve.h"
 #include "detection/boards/detect_boards.h"
 #include "detection/image_file.h"
 #include "support/datasets.h"
@@ -38,9 +39,10 @@ TEST(UnitStep, HasCornersBehindTheCurveThatAllItsImagesCallFor) {
     step.images[name] = image;
   }
   ImageSource source(files);
-  const auto together = detect_boards(detector, source, 1, {}, [](auto) {}).views;
+  auto together = detect_boards(detector, source, 1, {}, [](auto) {}).views;
+  take_common_curve(together, board);
   for (int times = 0; times < 2; ++times) {
-    const auto views = views_of(step);
+    const auto views = views_of(step, board);
     ASSERT_EQ(views.size(), 2U);
     for (std::size_t view = 0; view < 2; ++view) {
       ASSERT_EQ(views[view].seen.tags.size(), together[view].seen.tags.size());

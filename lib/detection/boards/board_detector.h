@@ -53,7 +53,7 @@ struct SeenTag {
   Corners corners_px;
   Bows bows = {};
   Deviations sds_px = {};
-  /// The same behind tone curves of kGammas beyond 1, until one is taken (take_common_curve()); of
+  /// The same behind tone curves of kGammas beyond 1, until one is taken (take_curve()); of
   /// an image that has none for sure there are none.
   std::vector<Outline> behind_curves = {};
 };

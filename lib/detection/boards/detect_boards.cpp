@@ -7,7 +7,6 @@
 #include <mutex>
 #include <utility>
 
-#include "detection/boards/tone_curve.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -68,7 +67,6 @@ FoundBoards detect_boards(const BoardDetector& detector, ImageSource& images, in
       result.refused.push_back(std::move(outcome.refused));
     }
   }
-  take_common_curve(result.views);
   return result;
 }
 

@@ -37,8 +37,8 @@ struct FoundBoards {
   std::vector<std::filesystem::path> images;
 };
 
-/// Detects the board in each image, so many at a time, with the corners of tags behind the tone
-/// curve that all images call for (take_common_curve()). An image that cannot be read, or has more
+/// Detects the board in each image, so many at a time, with the corners of tags behind each tone
+/// curve that an image may have (SeenTag::behind_curves). An image that cannot be read, or has more
 /// than max_mpx million pixels and is not in the cache, is refused and does not end it. The result
 /// does not depend on the threads. `progress` gets the images done so far; its calls do not
 /// overlap, while those of `cache`, whose functions may be empty, do.

@@ -36,10 +36,23 @@ struct Parabola {
   }
 };
 
-/// Sums over images, each with the best of its own as 0.
-std::array<double, kGammas.size()> sums_of(const std::vector<BoardView>& views) {
-  constexpr double most = 1000;  // of one image, whatever is in it
-  std::array<double, kGammas.size()> sums{};
+/// Through the least of some costs and its neighbours.
+Parabola near_least(const PerCurve& costs) {
+  const auto best =
+      static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+  return {std::clamp<std::size_t>(best, 1, kGammas.size() - 2) - 1};
+}
+
+double least_log_gamma(const PerCurve& costs) {
+  const Parabola near = near_least(costs);
+  return near.least({costs[near.first], costs[near.first + 1], costs[near.first + 2]});
+}
+
+}  // namespace
+
+PerCurve costs_of_levels(const std::vector<BoardView>& views) {
+  constexpr double most = 1000;
+  PerCurve sums{};
   for (const BoardView& view : views) {
     const auto& costs = view.seen.curve_costs;
     if (costs.empty()) continue;
@@ -51,17 +64,13 @@ std::array<double, kGammas.size()> sums_of(const std::vector<BoardView>& views) 
   return sums;
 }
 
-}  // namespace
+double gamma_of(const PerCurve& costs) { return std::exp(least_log_gamma(costs)); }
 
-double take_common_curve(std::vector<BoardView>& views) {
-  constexpr double least_gamma = 1.2;
-  const auto sums = sums_of(views);
-  const auto best =
-      static_cast<std::size_t>(std::min_element(sums.begin(), sums.end()) - sums.begin());
-  const Parabola near{std::clamp<std::size_t>(best, 1, kGammas.size() - 2) - 1};
-  const double log_gamma =
-      near.least({sums[near.first], sums[near.first + 1], sums[near.first + 2]});
-  const bool none = log_gamma < std::log(least_gamma);
+double take_curve(std::vector<BoardView>& views, const PerCurve& costs) {
+  constexpr double least_taken = 1.2;
+  const Parabola near = near_least(costs);
+  const double log_gamma = least_log_gamma(costs);
+  const bool none = log_gamma < std::log(least_taken);
   const auto weights = near.weights(log_gamma);
   const std::size_t lower = log_gamma < near.x(1) ? 0 : 1, below = near.first + lower;
   const double share = (log_gamma - near.x(lower)) / (near.x(lower + 1) - near.x(lower));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "detection/boards/detect_boards.h"
@@ -13,13 +14,21 @@ namespace vlp {
 /// none to the steepest of cameras for people.
 inline constexpr std::array kGammas{1.0, 1.3, 1.6, 2.0, 2.4};
 
-/// Puts corners where they are behind the curve that all images of a camera call for together
-/// (SeenBoard::curve_costs): the least of a parabola through the least of the costs' sums and its
-/// neighbours, by the logarithm of gamma, and corners between those of kGammas likewise. Of less
-/// than 1.2 it is taken for none, as sharpening makes so much. JPEG and sharpening make curves look
-/// flatter (tests/ACCURACY.md); what one leaves over is alike all over a view, as it is one for all
-/// images, and taken out with the lens (edge_shifts()). An image that has none for sure keeps its
-/// corners. Returns gamma, 1 of none; what it went by is gone from the views then.
-double take_common_curve(std::vector<BoardView>& views);
+/// A figure for each of kGammas.
+using PerCurve = std::array<double, kGammas.size()>;
+
+/// What the levels beside the edges of tags say against each curve (SeenBoard::curve_costs), of all
+/// images together: each counts 1000 at most, whatever is in it.
+PerCurve costs_of_levels(const std::vector<BoardView>& views);
+
+/// Gamma where costs are least, by a parabola through the least and its neighbours, over the
+/// logarithm of gamma.
+double gamma_of(const PerCurve& costs);
+
+/// Puts corners where they are behind the curve of gamma_of(), which is returned: by a parabola
+/// through those of the same three of kGammas. Of less than 1.2 it is taken for none, 1, as
+/// sharpening makes so much. An image that has none for sure keeps its corners. What curves make of
+/// corners is gone from the views then.
+double take_curve(std::vector<BoardView>& views, const PerCurve& costs);
 
 }  // namespace vlp

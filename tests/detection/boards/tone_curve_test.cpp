@@ -38,10 +38,14 @@ BoardView image(double gamma, double clearly) {
   return view;
 }
 
-TEST(CommonCurve, IsWhatAnImageCallsForAndMovesItsCorners) {
+double take_levels_curve(std::vector<BoardView>& views) {
+  return take_curve(views, costs_of_levels(views));
+}
+
+TEST(CurveOfLevels, IsWhatAnImageCallsForAndMovesItsCorners) {
   for (const double gamma : {1.25, 1.7, 2.2, 2.4}) {
     std::vector<BoardView> images{image(gamma, 500)};
-    EXPECT_NEAR(take_common_curve(images), gamma, 1e-9);
+    EXPECT_NEAR(take_levels_curve(images), gamma, 1e-9);
     const double x = std::log(gamma);
     EXPECT_NEAR(images[0].seen.tags[0].corners_px[3].x(), 100 - 0.5 * x + 0.1 * x * x, 1e-9);
     EXPECT_NEAR(images[0].seen.tags[0].corners_px[3].y(), 50 + 0.3 * x, 1e-9);
@@ -53,62 +57,62 @@ TEST(CommonCurve, IsWhatAnImageCallsForAndMovesItsCorners) {
   }
 }
 
-TEST(CommonCurve, LeavesDeviationsBetweenThoseBesideIt) {
+TEST(CurveOfLevels, LeavesDeviationsBetweenThoseBesideIt) {
   std::vector<BoardView> images{image(1.8, 500)};
   SeenTag& tag = images[0].seen.tags[0];
   const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
   for (std::size_t i = 0; i < 4; ++i)
     tag.behind_curves[i].sds_px[0] = std::array{0.024, 0.024, 0.026, 0.19}[i];
   tag.behind_curves[2].sds_px[1] = 0;  // nobody knows it behind one of them
-  take_common_curve(images);
+  take_levels_curve(images);
   EXPECT_NEAR(images[0].seen.tags[0].sds_px[0], 0.024 + at * 0.002, 1e-9);
   EXPECT_EQ(images[0].seen.tags[0].sds_px[1], 0);
 }
 
-TEST(CommonCurve, IsOneForAllImages) {
+TEST(CurveOfLevels, IsOneForAllImages) {
   std::vector<BoardView> images{image(1.6, 300), image(2.0, 300), image(1.1, 10)};
-  const double gamma = take_common_curve(images);
+  const double gamma = take_levels_curve(images);
   EXPECT_NEAR(gamma, 1.76, 0.03);
   for (const BoardView& each : images) {
     EXPECT_NEAR(each.seen.tags[0].corners_px[0].y(), 50 + 0.3 * std::log(gamma), 1e-9);
   }
 }
 
-TEST(CommonCurve, IsNotMadeByAnImageThatShowsSomethingElse) {
+TEST(CurveOfLevels, IsNotMadeByAnImageThatShowsSomethingElse) {
   std::vector<BoardView> images(12, image(1, 500));
   images.push_back(image(2.4, 1e7));
-  EXPECT_EQ(take_common_curve(images), 1);
+  EXPECT_EQ(take_levels_curve(images), 1);
   EXPECT_EQ(images.back().seen.tags[0].corners_px[0].x(), 100);
 }
 
-TEST(CommonCurve, IsNoneWhereItIsLittle) {
+TEST(CurveOfLevels, IsNoneWhereItIsLittle) {
   std::vector<BoardView> images{image(1.15, 500)};
-  EXPECT_EQ(take_common_curve(images), 1);
+  EXPECT_EQ(take_levels_curve(images), 1);
   EXPECT_EQ(images[0].seen.tags[0].corners_px[0].x(), 100);
 }
 
-TEST(CommonCurve, LeavesImagesThatHaveNoneForSure) {
+TEST(CurveOfLevels, LeavesImagesThatHaveNoneForSure) {
   BoardView plain = image(1, 500);
   plain.seen.curve_costs.resize(2);
   plain.seen.tags[0].behind_curves.clear();
   std::vector<BoardView> images{plain, image(2, 500), image(2, 500), {"none", {200, 100}, {}}};
-  EXPECT_GT(take_common_curve(images), 1.5);
+  EXPECT_GT(take_levels_curve(images), 1.5);
   EXPECT_EQ(images[0].seen.tags[0].corners_px[0].x(), 100);
   EXPECT_LT(images[1].seen.tags[0].corners_px[0].x(), 99.8);
 }
 
-TEST(CommonCurve, IsTakenOnce) {
+TEST(CurveOfLevels, IsTakenOnce) {
   std::vector<BoardView> images{image(2, 500)};
-  take_common_curve(images);
+  take_levels_curve(images);
   const auto once = images[0].seen.tags[0].corners_px;
-  EXPECT_EQ(take_common_curve(images), 1);
+  EXPECT_EQ(take_levels_curve(images), 1);
   EXPECT_EQ(images[0].seen.tags[0].corners_px, once);
 }
 
-TEST(CommonCurve, IsNoneWithoutImages) {
+TEST(CurveOfLevels, IsNoneWithoutImages) {
   std::vector<BoardView> none, without(2);
-  EXPECT_EQ(take_common_curve(none), 1);
-  EXPECT_EQ(take_common_curve(without), 1);
+  EXPECT_EQ(take_levels_curve(none), 1);
+  EXPECT_EQ(take_levels_curve(without), 1);
 }
 
 }  // namespace

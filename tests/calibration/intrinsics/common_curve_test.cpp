@@ -1,0 +1,158 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/common_curve.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "calibration/intrinsics/synthetic_views.h"
+#include "detection/boards/tone_curve.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kCornerNoise_px = 0.02;
+
+/// A camera with a tone curve whose levels call for another one.
+struct CodedCamera {
+  double gamma, levels_gamma;
+  /// How much more the edges of some tags shift than those of others.
+  double uneven = 0.5;
+
+  double shift_px(int id, double behind_gamma) const {
+    const double share = 1 + uneven * (id % 5 - 2);
+    return 0.3 * share * std::log(gamma / behind_gamma);
+  }
+
+  /// As they are behind no curve.
+  std::vector<BoardView> uncoded(int count, std::uint64_t seed) const {
+    const SyntheticViews boards{synthetic_board(false), synthetic_lens()};
+    Random random(seed);
+    std::vector<BoardView> views;
+    for (int i = 0; i < count; ++i) {
+      views.push_back({"image", boards.imager_px, boards.random_view(random, kCornerNoise_px)});
+    }
+    return views;
+  }
+  std::vector<BoardView> views(int count, std::uint64_t seed) const {
+    auto views = uncoded(count, seed);
+    for (BoardView& view : views) {
+      for (SeenTag& tag : view.seen.tags) tag = coded(tag);
+      for (const double each : kGammas) {
+        view.seen.curve_costs.push_back(500 * std::pow(std::log(each / levels_gamma), 2));
+      }
+    }
+    return views;
+  }
+
+ private:
+  SeenTag coded(const SeenTag& truth) const {
+    SeenTag tag = shrunk(truth, shift_px(truth.id, 1));
+    tag.sds_px.fill(kCornerNoise_px);
+    for (const double each : kGammas) {
+      if (each == 1) continue;
+      tag.behind_curves.push_back(
+          {shrunk(truth, shift_px(truth.id, each)).corners_px, {}, tag.sds_px});
+    }
+    return tag;
+  }
+};
+
+double worst_px(const std::vector<BoardView>& views, const std::vector<BoardView>& truth) {
+  double worst_px = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    for (std::size_t tag = 0; tag < views[i].seen.tags.size(); ++tag) {
+      for (std::size_t k = 0; k < 4; ++k) {
+        worst_px = std::max(
+            worst_px,
+            (views[i].seen.tags[tag].corners_px[k] - truth[i].seen.tags[tag].corners_px[k]).norm());
+      }
+    }
+  }
+  return worst_px;
+}
+
+/// Of more views than are looked at, too.
+TEST(CommonCurve, IsThatBehindWhichTheCornersLieOnABoard) {
+  for (const auto& [gamma, levels_gamma, count] : {std::tuple{2.0, 1.5, 40}, {1.5, 2.2, 16}}) {
+    const CodedCamera camera{gamma, levels_gamma};
+    auto views = camera.views(count, 1);
+    const auto truth = camera.uncoded(count, 1);
+    EXPECT_GT(worst_px(views, truth), 0.2);
+    EXPECT_NEAR(std::log(take_common_curve(views, synthetic_board(false)) / gamma), 0, 0.04);
+    EXPECT_LT(worst_px(views, truth), 0.05);
+    EXPECT_TRUE(views[0].seen.tags[0].behind_curves.empty());
+  }
+}
+
+/// Images without the board do not count.
+TEST(CommonCurve, IsLookedForWhereTheBoardIsOftenOutOfView) {
+  auto views = CodedCamera{2, 1.5}.views(12, 1);
+  views.resize(30, {"none", {800, 600}, {}});
+  EXPECT_NEAR(std::log(take_common_curve(views, synthetic_board(false)) / 2), 0, 0.04);
+}
+
+TEST(CommonCurve, IsNoneWhereOnlyTheLevelsCallForOne) {
+  auto views = CodedCamera{1, 1.46}.views(16, 2);
+  const auto before = views;
+  EXPECT_EQ(take_common_curve(views, synthetic_board(false)), 1);
+  EXPECT_EQ(views[5].seen.tags[3].corners_px, before[5].seen.tags[3].corners_px);
+}
+
+/// Behind any curve the corners lie on a board then, once the shift is taken out.
+TEST(CommonCurve, IsThatOfTheLevelsWhereAllEdgesShiftAlike) {
+  for (const double levels_gamma : {1.4, 2.2}) {
+    auto views = CodedCamera{1.8, levels_gamma, 0}.views(16, 3);
+    const double gamma = take_common_curve(views, synthetic_board(false));
+    EXPECT_NEAR(std::log(gamma / levels_gamma), 0, 0.05) << gamma;
+  }
+}
+
+TEST(CommonCurve, IsThatOfTheLevelsWithoutALensOrWhatNoiseMakes) {
+  const Board board = synthetic_board(false);
+  auto untold = CodedCamera{2, 1.5}.views(8, 4), of_another = untold;
+  for (BoardView& view : untold) {
+    for (SeenTag& tag : view.seen.tags) {
+      tag.sds_px.fill(0);
+      for (auto& outline : tag.behind_curves) outline.sds_px.fill(0);
+    }
+  }
+  EXPECT_NEAR(take_common_curve(untold, board), 1.5, 1e-9);
+  Board other = board;
+  other.tag_spacing = 0.7;
+  EXPECT_NEAR(take_common_curve(of_another, other), 1.5, 1e-9);
+  auto few = CodedCamera{1, 1.5}.views(2, 4);
+  EXPECT_NEAR(take_common_curve(few, board), 1.5, 1e-9);
+  std::vector<BoardView> none;
+  EXPECT_EQ(take_common_curve(none, board), 1);
+}
+
+TEST(CommonCurve, IsNotLookedForInImagesThatHaveNoneForSure) {
+  auto views = CodedCamera{1, 1.5}.views(4, 5);
+  for (const BoardView& view : CodedCamera{1, 1}.views(4, 6)) {
+    views.push_back(view);
+    views.back().seen.curve_costs = {0, 40};
+    for (SeenTag& tag : views.back().seen.tags) tag.behind_curves.clear();
+  }
+  const double by_levels = gamma_of(costs_of_levels(views));
+  EXPECT_GT(by_levels, 1.2);
+  EXPECT_NEAR(take_common_curve(views, synthetic_board(false)), by_levels, 1e-9);
+}
+
+TEST(CommonCurve, IsTakenOnce) {
+  auto views = CodedCamera{2, 2}.views(8, 7);
+  take_common_curve(views, synthetic_board(false));
+  const auto once = views[0].seen.tags[0].corners_px;
+  EXPECT_EQ(take_common_curve(views, synthetic_board(false)), 1);
+  EXPECT_EQ(views[0].seen.tags[0].corners_px, once);
+}
+
+}  // namespace
+}  // namespace vlp
