@@ -129,7 +129,7 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   const LensResult result = solve_lens(input, {});
   const std::string share =
       fmt::format("{:.1f}", 100 * static_cast<double>(usable) / static_cast<double>(tags));
-  if (!result.solution.ok()) {
+  if (!result.ok()) {
     fmt::print("{:48} {:5} % of the tags: no lens\n", development.name, share);
     return;
   }
