@@ -12,7 +12,7 @@
 
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
-#include "detection/lights/lights_table.h"
+#include "detection/lights_table.h"
 #include "detection/video.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"

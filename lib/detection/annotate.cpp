@@ -11,7 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "detection/lights/lights_table.h"
+#include "detection/lights_table.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 

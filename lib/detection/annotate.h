@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "detection/lights/light.h"
+#include "lamps/shape/light.h"
 #include "rig/calibration.h"
 
 namespace vlp {

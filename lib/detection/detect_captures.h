@@ -13,8 +13,8 @@
 
 #include "captures/detections_table.h"
 #include "detection/image_source.h"
-#include "detection/lamp_detector.h"
-#include "detection/lights/lights_table.h"
+#include "lamps/lamp_detector.h"
+#include "detection/lights_table.h"
 
 namespace vlp {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "detection/image_source.h"
-#include "detection/lamp_detector.h"
+#include "lamps/lamp_detector.h"
 
 namespace vlp {
 

@@ -25,8 +25,8 @@
 #include "captures/detections_table.h"
 #include "captures/fixes_table.h"
 #include "captures/truth_table.h"
-#include "detection/identity/lamp_classifier.h"
-#include "detection/lamp_detector.h"
+#include "lamps/signal/lamp_classifier.h"
+#include "lamps/lamp_detector.h"
 #include "positioning/positioner.h"
 #include "rig/input_error.h"
 

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "detection/detect_captures.h"
-#include "detection/identity/lamp_map_check.h"
-#include "detection/readout.h"
+#include "lamps/signal/lamp_map_check.h"
+#include "lamps/readout.h"
 #include "detection/video.h"
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"

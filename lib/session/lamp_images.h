@@ -14,7 +14,7 @@
 #include "detection/detect_captures.h"
 #include "detection/detect_lights.h"
 #include "detection/image_source.h"
-#include "detection/lights/lights_table.h"
+#include "detection/lights_table.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 #include "session/step_result.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "detection/lamp_detector.h"
+#include "lamps/lamp_detector.h"
 #include "geometry/angles.h"
 #include "positioning/correction.h"
 #include "positioning/inclination_rotation.h"

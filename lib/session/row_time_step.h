@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "detection/identity/labelled_lights.h"
+#include "detection/labelled_lights.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 #include "session/step_result.h"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "calibration/levelling/map_diagnosis.h"
-#include "detection/identity/lamp_rule.h"
+#include "lamps/signal/lamp_rule.h"
 #include "positioning/positioner.h"
 
 namespace vlp {

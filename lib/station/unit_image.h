@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "detection/boards/detect_boards.h"
-#include "detection/lamp_detector.h"
+#include "lamps/lamp_detector.h"
 #include "rig/detection.h"
 #include "station/station_config.h"
 

@@ -14,8 +14,8 @@
 
 #include "captures/csv_reader.h"
 #include "detection/image_file.h"
-#include "detection/lamp_detector.h"
-#include "detection/lights/background.h"
+#include "lamps/lamp_detector.h"
+#include "lamps/image/background.h"
 
 namespace vlp {
 namespace {

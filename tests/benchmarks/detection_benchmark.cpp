@@ -9,8 +9,8 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "detection/lamp_detector.h"
-#include "detection/lights/background.h"
+#include "lamps/lamp_detector.h"
+#include "lamps/image/background.h"
 #include "simulation/exposure.h"
 #include "simulation/truth.h"
 

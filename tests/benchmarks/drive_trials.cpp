@@ -24,7 +24,7 @@
 #include <string>
 #include <vector>
 
-#include "detection/lamp_detector.h"
+#include "lamps/lamp_detector.h"
 #include "geometry/angles.h"
 #include "positioning/body_limit.h"
 #include "positioning/positioner.h"

@@ -14,7 +14,7 @@
 
 #include "camera/lens_model.h"
 #include "detection/image_file.h"
-#include "detection/lights/lights_table.h"
+#include "detection/lights_table.h"
 #include "detection/video.h"
 #include "geometry/angles.h"
 #include "program/progress.h"

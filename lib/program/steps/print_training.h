@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "detection/identity/row_time.h"
+#include "lamps/signal/row_time.h"
 #include "rig/calibration.h"
 #include "session/train_step.h"
 

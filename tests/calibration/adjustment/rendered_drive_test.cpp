@@ -9,7 +9,7 @@
 
 #include "calibration/adjustment/adjustment.h"
 #include "calibration/levelling/levelling.h"
-#include "detection/lamp_detector.h"
+#include "lamps/lamp_detector.h"
 #include "geometry/angles.h"
 #include "simulation/exposure.h"
 #include "simulation/truth.h"

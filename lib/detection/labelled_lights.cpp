@@ -1,0 +1,76 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/labelled_lights.h"
+
+#include <unordered_map>
+
+namespace vlp {
+namespace {
+
+std::unordered_map<std::string, const Frame*> frames_by_image(const std::vector<Frame>& labels) {
+  std::unordered_map<std::string, const Frame*> frames;
+  for (const Frame& frame : labels) frames[frame.image] = &frame;
+  return frames;
+}
+
+bool may_be_lamp(const Light& light, const cv::Size& size) {
+  return flickers(light) && wholly_in_view(light, size);
+}
+
+}  // namespace
+
+const Light* light_at(const ImageLights& image, const Eigen::Vector2d& pixel) {
+  constexpr double nearest_share = 0.5;
+  const Light* nearest = nullptr;
+  for (const Light& light : image.lights) {
+    if (!may_be_lamp(light, image.size)) continue;
+    const double distance = (light.pixel - pixel).norm();
+    if (distance > nearest_share * light.radius_px) continue;
+    if (nearest == nullptr || distance < (nearest->pixel - pixel).norm()) nearest = &light;
+  }
+  return nearest;
+}
+
+void add_labelled(const std::vector<ImageLights>& images, const std::vector<Frame>& labels,
+                  Labelled& labelled) {
+  const auto frames = frames_by_image(labels);
+  std::size_t number = labelled.lights.empty() ? 0 : labelled.lights.back().image + 1;
+  for (const ImageLights& image : images) {
+    const auto frame = frames.find(image.file.filename().string());
+    if (frame == frames.end() || !image.refused.empty()) continue;
+    for (const Detection& label : frame->second->detections) {
+      ++labelled.labels;
+      if (const Light* light = light_at(image, label.pixel)) {
+        labelled.lights.push_back({label.lamp, light->stripes, number});
+      } else {
+        ++labelled.without_light;
+      }
+    }
+    ++number;
+  }
+}
+
+std::vector<MeasuredPeriod> measured_periods(const std::vector<ImageLights>& images,
+                                             const std::vector<Frame>& labels) {
+  const auto frames = frames_by_image(labels);
+  std::vector<MeasuredPeriod> periods;
+  const auto add = [&](const Light& light, std::optional<int> lamp) {
+    if (trustworthy(light.stripes)) periods.push_back({light.stripes.period_lines, lamp});
+  };
+  for (const ImageLights& image : images) {
+    if (labels.empty()) {
+      for (const Light& light : image.lights) {
+        if (may_be_lamp(light, image.size)) add(light, std::nullopt);
+      }
+      continue;
+    }
+    const auto frame = frames.find(image.file.filename().string());
+    if (frame == frames.end()) continue;
+    for (const Detection& label : frame->second->detections) {
+      if (const Light* light = light_at(image, label.pixel)) add(*light, label.lamp);
+    }
+  }
+  return periods;
+}
+
+}  // namespace vlp

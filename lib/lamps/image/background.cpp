@@ -1,0 +1,138 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/image/background.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace vlp {
+namespace {
+
+/// How often each level occurs.
+class Histogram {
+ public:
+  explicit Histogram(int levels) : counts_(static_cast<std::size_t>(levels), 0) {}
+
+  void add(int level) {
+    ++counts_[static_cast<std::size_t>(level)];
+    ++count_;
+    highest_ = std::max(highest_, level);
+  }
+  int count() const { return count_; }
+  int count_within(double low, double high) const {
+    int sum = 0;
+    for_each([&](int level, int count) { sum += level >= low && level <= high ? count : 0; });
+    return sum;
+  }
+  /// The level that so many are below, or of.
+  int level_at(int rank) const {
+    int level = 0;
+    for (int passed = counts_[0]; passed <= rank; passed += counts_[std::size_t(level)]) ++level;
+    return level;
+  }
+  /// Of the levels that occur, the lowest first.
+  template <typename Function>
+  void for_each(Function&& function) const {
+    for (int level = 0; level <= highest_; ++level) {
+      const int count = counts_[static_cast<std::size_t>(level)];
+      if (count > 0) function(level, count);
+    }
+  }
+
+ private:
+  std::vector<int> counts_;
+  int count_ = 0, highest_ = 0;
+};
+
+template <typename Level>
+Histogram sample_of(const cv::Mat& image) {
+  constexpr double enough = 8000;
+  const double pixels = static_cast<double>(image.rows) * image.cols;
+  // An odd step that shifts from row to row meets every kind of row and column.
+  const int step = static_cast<int>(std::sqrt(pixels / enough)) | 1;
+  Histogram sample(std::numeric_limits<Level>::max() + 1);
+  for (int row = std::min(step / 2, image.rows / 2); row < image.rows; row += step) {
+    const auto* line = image.ptr<Level>(row);
+    for (int column = row / step % step; column < image.cols; column += step) {
+      sample.add(line[column]);
+    }
+  }
+  if (sample.count() == 0) sample.add(*image.ptr<Level>(0));
+  return sample;
+}
+
+/// The least difference between two levels: of 12 bits in 16, or of 8, it is more than 1. Few
+/// levels do not tell.
+double step_of(const Histogram& sample) {
+  constexpr int enough = 16;
+  int step = std::numeric_limits<int>::max(), levels = 0, before = 0;
+  sample.for_each([&](int level, int) {
+    if (levels++ > 0) step = std::min(step, level - before);
+    before = level;
+  });
+  return levels >= enough ? step : 1;
+}
+
+/// Whether levels below the median are missing, because it is the least there is: with noise, which
+/// fills the levels next to the dark more than those that one pixel of ten is above. What is lit
+/// does not, and a dark without noise has nothing below, either.
+bool clipped(const Histogram& sample, int median, double step) {
+  const int tenth = sample.level_at(static_cast<int>(std::int64_t{sample.count()} * 9 / 10));
+  const double next = median + std::max(step, (tenth - median) / 2.0);
+  const double most = std::numeric_limits<int>::max();
+  const int below = sample.count_within(0, median - 1);
+  const int above = sample.count_within(median + 1, most);
+  const int near = sample.count_within(median + 1, next);
+  return 4 * below < above && 10 * near >= above;
+}
+
+/// One pixel of five is brighter than 0.84 standard deviations, and one of ten than 1.28; or, if
+/// so many are lit, much brighter.
+double noise_above(const Histogram& sample, int median) {
+  const auto above = [&](int per_cent) {
+    const auto rank = std::int64_t{sample.count()} * per_cent / 100;
+    return double(sample.level_at(static_cast<int>(rank)) - median);
+  };
+  return std::min(above(80) / 0.8416, above(90) / 1.2816);
+}
+
+Background background(const Histogram& sample) {
+  const double step = step_of(sample);
+  const int half = sample.count() / 2, median = sample.level_at(half);
+  // Lit pixels are above; what is below is noise alone.
+  double squares = 0;
+  sample.for_each([&](int level, int count) {
+    if (level < median) squares += count * std::pow(median - level, 2);
+  });
+  double noise = std::sqrt(squares / std::max(1, half));
+  const bool no_noise_below = clipped(sample, median, step);
+  if (no_noise_below) noise = std::max(noise, noise_above(sample, median));
+  // Grey levels are coarse: of those around, the mean and the scatter say more.
+  constexpr double around = 3;
+  const double least_noise = 0.3 * step;
+  double near = 0, sum = 0, sum_of_squares = 0;
+  sample.for_each([&](int level, int count) {
+    const double off = level - median;
+    if (std::abs(off) > around * noise) return;
+    near += count;
+    sum += count * off;
+    sum_of_squares += count * off * off;
+  });
+  const double level = median + sum / near;
+  if (!no_noise_below) noise = std::sqrt(sum_of_squares / near - std::pow(sum / near, 2));
+  noise = std::max(noise, least_noise);
+  constexpr double clear = 4.5, least = 1.6;
+  return {level, noise, level + std::max(clear * noise, least * step)};
+}
+
+}  // namespace
+
+Background background_of(const cv::Mat& image) {
+  return background(image.depth() == CV_8U ? sample_of<std::uint8_t>(image)
+                                           : sample_of<std::uint16_t>(image));
+}
+
+}  // namespace vlp

@@ -1,0 +1,183 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/image/runs.h"
+
+#include <algorithm>
+#include <cstdint>
+
+namespace vlp {
+namespace {
+
+/// Whether a pixel of a tile's row is lit. Without a branch inside, so that it is compiled to
+/// vectors.
+template <typename Level>
+bool any_above(const Level* pixels, int count, Level threshold) {
+  Level brightest = 0;
+  if (count == kTile_px) {
+    for (int i = 0; i < kTile_px; ++i) brightest = std::max(brightest, pixels[i]);
+  } else {
+    for (int i = 0; i < count; ++i) brightest = std::max(brightest, pixels[i]);
+  }
+  return brightest > threshold;
+}
+
+int tiles_in(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
+
+/// No level is above the threshold.
+bool is_above_all(const cv::Mat& image, double threshold) {
+  return threshold >= (image.depth() == CV_8U ? 255 : 65535);
+}
+
+template <typename Level>
+void mark_lit(const cv::Mat& image, Level threshold, cv::Mat1b& lit) {
+  for (int row = 0; row < image.rows; ++row) {
+    const auto* pixels = image.ptr<Level>(row);
+    auto* of_row = lit.ptr(row / kTile_px);
+    for (int tile = 0; tile < lit.cols; ++tile) {
+      const auto* first = pixels + tile * kTile_px;
+      const int count = std::min(kTile_px, image.cols - tile * kTile_px);
+      if (of_row[tile] > 1 || !any_above(first, count, threshold)) continue;
+      const auto lit_pixels =
+          std::count_if(first, first + count, [&](Level level) { return level > threshold; });
+      of_row[tile] = of_row[tile] + lit_pixels > 1 ? 2 : 1;
+    }
+  }
+}
+
+template <typename Level>
+void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
+                     const std::vector<int>& tiles, std::vector<Run>& runs) {
+  constexpr int most_gap = 2, least_width = 3;
+  Run run{row, 0, -1};  // none yet
+  const auto finish = [&] {
+    if (run.width() >= least_width) runs.push_back(run);
+    run.end = -1;
+  };
+  for (const int tile : tiles) {
+    const int begin = tile * kTile_px, end = std::min(begin + kTile_px, columns);
+    if (!any_above(pixels + begin, end - begin, threshold)) continue;
+    for (int column = begin; column < end; ++column) {
+      if (pixels[column] <= threshold) continue;
+      if (run.end >= 0 && column - run.end > most_gap) finish();
+      if (run.end < 0) run.begin = column;
+      run.end = column + 1;
+    }
+  }
+  if (run.end >= 0) finish();
+}
+
+template <typename Level>
+std::vector<Run> runs_of(const cv::Mat& image, Level threshold, const cv::Mat1b& lit) {
+  std::vector<Run> runs;
+  std::vector<int> tiles;
+  for (int top = 0; top < image.rows; top += kTile_px) {
+    tiles.clear();
+    for (int tile = 0; tile < tiles_in(image.cols); ++tile) {
+      if (lit.empty() || lit(top / kTile_px, tile) != 0) tiles.push_back(tile);
+    }
+    for (int row = top; row < std::min(top + kTile_px, image.rows); ++row) {
+      add_runs_of_row(image.ptr<Level>(row), image.cols, row, threshold, tiles, runs);
+    }
+  }
+  return runs;
+}
+
+/// A blob while it grows, and the columns of its last two lit rows.
+struct Growing {
+  Growing(const Run& run) : blob{{run}}, last_row(run.row), last(run), before(run) {}
+
+  bool meets(const Run& run) const {
+    return run.begin < std::max(last.end, before.end) &&
+           run.end > std::min(last.begin, before.begin);
+  }
+  void add(const Run& run) {
+    blob.runs.push_back(run);
+    if (run.row != last_row) before = last, last = run;
+    last = {run.row, std::min(last.begin, run.begin), std::max(last.end, run.end)};
+    last_row = run.row;
+  }
+  void absorb(Growing& other) {
+    blob.runs.insert(blob.runs.end(), other.blob.runs.begin(), other.blob.runs.end());
+    last.begin = std::min(last.begin, other.last.begin);
+    last.end = std::max(last.end, other.last.end);
+    other.alive = false;
+  }
+
+  Blob blob;
+  int last_row;
+  Run last, before;
+  bool alive = true;
+};
+
+}  // namespace
+
+cv::Rect Blob::box() const {
+  int begin = runs[0].begin, end = runs[0].end;
+  for (const Run& run : runs) {
+    begin = std::min(begin, run.begin);
+    end = std::max(end, run.end);
+  }
+  return {begin, top(), end - begin, bottom() + 1 - top()};
+}
+
+cv::Mat1b lit_tiles(const cv::Mat& image, double threshold) {
+  cv::Mat1b lit(tiles_in(image.rows), tiles_in(image.cols), std::uint8_t(0));
+  if (is_above_all(image, threshold)) return lit;
+  if (image.depth() == CV_8U) {
+    mark_lit(image, static_cast<std::uint8_t>(threshold), lit);
+  } else {
+    mark_lit(image, static_cast<std::uint16_t>(threshold), lit);
+  }
+  return lit;
+}
+
+std::vector<Run> find_runs(const cv::Mat& image, double threshold, const cv::Mat1b& lit) {
+  if (is_above_all(image, threshold)) return {};
+  return image.depth() == CV_8U ? runs_of(image, static_cast<std::uint8_t>(threshold), lit)
+                                : runs_of(image, static_cast<std::uint16_t>(threshold), lit);
+}
+
+std::vector<Blob> group_runs(const std::vector<Run>& runs, int most_dark_rows) {
+  std::vector<Growing> growing;
+  std::vector<Blob> done;
+  const auto retire = [&](int row) {
+    for (std::size_t i = 0; i < growing.size();) {
+      if (growing[i].alive && row - growing[i].last_row <= most_dark_rows + 1) {
+        ++i;
+        continue;
+      }
+      if (growing[i].alive) done.push_back(std::move(growing[i].blob));
+      growing[i] = std::move(growing.back());
+      growing.pop_back();
+    }
+  };
+  for (const Run& run : runs) {
+    retire(run.row);
+    Growing* home = nullptr;
+    for (Growing& each : growing) {
+      if (!each.alive || !each.meets(run)) continue;
+      if (home == nullptr) {
+        home = &each;
+      } else {
+        home->absorb(each);  // the run joins two blobs
+      }
+    }
+    if (home == nullptr) {
+      growing.emplace_back(run);
+    } else {
+      home->add(run);
+    }
+  }
+  for (Growing& each : growing) {
+    if (each.alive) done.push_back(std::move(each.blob));
+  }
+  const auto by_place = [](const Run& a, const Run& b) {
+    return a.row != b.row ? a.row < b.row : a.begin < b.begin;
+  };
+  for (Blob& blob : done) std::sort(blob.runs.begin(), blob.runs.end(), by_place);
+  std::sort(done.begin(), done.end(),
+            [&](const Blob& a, const Blob& b) { return by_place(a.runs[0], b.runs[0]); });
+  return done;
+}
+
+}  // namespace vlp

@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "lamps/signal/lamp_classifier.h"
+#include "lamps/shape/light.h"
+#include "lamps/shape/light_parts.h"
+#include "lamps/shape/light_shape.h"
+#include "rig/calibration.h"
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// Whether the image's edge cuts no part of the light.
+bool wholly_in_view(const Light& light, const cv::Size& size);
+
+/// Of a calibration; rows are taken for the read-out when it is not stated.
+DetectorCamera detector_camera(const Calibration& calibration);
+
+/// Finds and identifies the lamps of a map in images of a rolling shutter. Const and safe to share
+/// between threads.
+///
+/// Centre: from the outline of the lit lines, never from brightness, see LightShape. A lamp that
+/// is lit unevenly is outlined by its rim, see rim_of(). Rectangles are looked for when the map has
+/// one, see rectangle_of(). A light that has no edge because it glows is
+/// outlined where it passes a tenth of its brightest level; how round its glow is limits its centre
+/// then, and sigma_px may be too small. Identity: a lamp of
+/// frequency f has stripes of 1 / (f row_time) lines (Chen and Guan, section 2.1), or what a
+/// trained classifier says.
+class LampDetector {
+ public:
+  LampDetector(const LampMap& lamps, const DetectorCamera& camera,
+               std::optional<LampClassifier> classifier = {});
+
+  /// The lights of an image, from the top. It has one channel of 8 or 16 bits and is not empty.
+  std::vector<Light> detect(const cv::Mat& image) const;
+
+  /// The same detector for a camera that leans otherwise, with its level_from_camera; nothing: as
+  /// nobody knows. Then ellipses are fitted in the image, as without a lens.
+  LampDetector leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
+
+  Readout readout() const { return camera_.readout; }
+
+ private:
+  /// What may be lights: a blob by its edge, several when it is of several lights that touch, or by
+  /// its glow when it has no edge.
+  std::vector<LightPart> parts_of(const cv::Mat& lines, const Blob& blob,
+                                  const Background& background) const;
+  /// The outline once more, exactly, and the stripes.
+  void measure(const cv::Mat& lines, const Background& background, Light& light) const;
+  /// The centres of lights that a moving camera sees in part, see Shear.
+  void correct_shear(std::vector<Light>& lights) const;
+  void identify(std::vector<Light>& lights, const cv::Size& size) const;
+  /// How far a light is from that lamp's shape, round, or a rectangle with its sides' ratio: the
+  /// logarithm of what the ratio is off by, 0 of discs; nothing when it has another shape.
+  std::optional<double> shape_off(const Light& light, int lamp) const;
+  /// The lamp whose stripes these are; nothing when none or two may be.
+  std::optional<int> lamp_of(const Stripes& stripes) const;
+
+  LampMap lamps_;
+  DetectorCamera camera_;
+  LightShape shape_;
+  std::optional<LampClassifier> classifier_;
+  int most_dark_rows_;
+  bool has_rectangles_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/light_parts.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "lamps/shape/rectangle.h"
+
+namespace vlp {
+namespace {
+
+bool covers(const Light& light, const Eigen::Vector2d& pixel) {
+  if (is_rectangle(light)) return contains(light.face, pixel);
+  return (light.pixel - pixel).norm() < light.radius_px;
+}
+
+/// Whether two blobs may be parts of one light.
+bool near(const cv::Rect& a, const cv::Rect& b) {
+  const int gap_across = std::max(a.x, b.x) - std::min(a.x + a.width, b.x + b.width);
+  const int gap_along = std::max(a.y, b.y) - std::min(a.y + a.height, b.y + b.height);
+  const int size = std::max({a.width, a.height, b.width, b.height});
+  return 2 * gap_across < size && 2 * gap_along < size;
+}
+
+/// Whether it is no part of a light that something in the way splits.
+bool whole(const LightPart& part) {
+  return part.light && (part.light->glows || part.light->uneven || is_rectangle(*part.light));
+}
+
+std::size_t points_of(const LightPart& part) { return part.light ? part.light->outline.size() : 0; }
+
+/// Whether that light is of both parts: two lamps side by side have more of their points on a
+/// circle each than on one together. `points` are there in all.
+bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std::size_t points) {
+  constexpr double least_share = 0.6, least_gain = 1.25, least_of_both = 0.8, most_hidden = 1.5;
+  const cv::Rect box = a.box | b.box;
+  if (2 * whole.radius_px > most_hidden * std::max(box.width, box.height)) return false;
+  const auto on_circle = double(whole.outline.size());
+  const auto of_a = double(points_of(a)), of_b = double(points_of(b));
+  return on_circle >= least_share * double(points) && on_circle >= least_of_both * (of_a + of_b) &&
+         on_circle >= least_gain * std::max(of_a, of_b);
+}
+
+/// Why a part has no form.
+LightReason reason_of(const LightPart& part, const cv::Size& size) {
+  const cv::Rect& box = part.box;
+  const bool inside = box.x > 0 && box.y > 0 && box.br().x < size.width && box.br().y < size.height;
+  if (!inside) return LightReason::at_edge;
+  // What is not of the light itself takes up some of the points.
+  const bool small = part.outline.size() < 2 * kLeastOutlinePoints;
+  return small ? LightReason::small : LightReason::no_outline;
+}
+
+bool overlap(const Light& a, const Light& b) {
+  if (!is_rectangle(a) && !is_rectangle(b)) {
+    return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
+  }
+  return covers(a, b.pixel) || covers(b, a.pixel);
+}
+
+/// No two lights overlap: the one with more of an outline stands, the other is a piece of it.
+std::vector<Light> without_pieces(std::vector<Light> found) {
+  std::stable_sort(found.begin(), found.end(), [](const Light& a, const Light& b) {
+    return a.outline.size() > b.outline.size();
+  });
+  std::vector<Light> lights;
+  for (Light& light : found) {
+    const bool piece = std::any_of(lights.begin(), lights.end(),
+                                   [&](const Light& other) { return overlap(light, other); });
+    if (!piece) lights.push_back(std::move(light));
+  }
+  return lights;
+}
+
+}  // namespace
+
+std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
+                        const Background& background) {
+  // A lamp is in a few pieces; an image of thousands of them shows something else.
+  constexpr int most_tries = 2000;
+  int tries = 0;
+  for (std::size_t i = 0; i < parts.size() && tries < most_tries; ++i) {
+    for (std::size_t j = i + 1; j < parts.size() && tries < most_tries; ++j) {
+      if (whole(parts[i]) || whole(parts[j]) || !near(parts[i].box, parts[j].box)) continue;
+      ++tries;
+      std::vector<EdgePoint> both = parts[i].outline;
+      both.insert(both.end(), parts[j].outline.begin(), parts[j].outline.end());
+      both = outermost(std::move(both));
+      auto one = shape.light_of(both, background);
+      if (!one || !is_of_both(*one, parts[i], parts[j], both.size())) continue;
+      parts[i] = {std::move(one), std::move(both), parts[i].box | parts[j].box};
+      parts.erase(parts.begin() + std::ptrdiff_t(j));
+      j = i;  // the whole may have more parts
+    }
+  }
+  std::vector<Light> found;
+  for (LightPart& part : parts) {
+    if (part.light) found.push_back(std::move(*part.light));
+  }
+  std::erase_if(parts, [](const LightPart& part) { return part.light.has_value(); });
+  return without_pieces(std::move(found));
+}
+
+std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vector<Light>& lights,
+                                   const LightShape& shape, const cv::Size& size) {
+  constexpr int least_px = 5;
+  std::vector<Light> formless;
+  for (LightPart& part : parts) {
+    const cv::Rect& box = part.box;
+    if (std::min(box.width, box.height) < least_px) continue;
+    Light light{};
+    light.kind = LightKind::formless;
+    light.reason = reason_of(part, size);
+    light.low = shape.turned({box.x - 0.5, box.y - 0.5});
+    light.high = shape.turned({box.br().x - 0.5, box.br().y - 0.5});
+    light.pixel = (light.low + light.high) / 2;
+    light.radius_px = (light.high - light.low).mean() / 2;
+    const bool inside = std::any_of(lights.begin(), lights.end(),
+                                    [&](const Light& other) { return covers(other, light.pixel); });
+    if (inside) continue;
+    light.outline = std::move(part.outline);
+    formless.push_back(std::move(light));
+  }
+  return formless;
+}
+
+}  // namespace vlp

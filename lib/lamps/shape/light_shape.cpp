@@ -1,0 +1,245 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/light_shape.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numbers>
+
+#include "lamps/shape/robust_circle.h"
+#include "lamps/shape/robust_ellipse.h"
+#include "geometry/median.h"
+#include "rig/detection.h"
+
+namespace vlp {
+namespace {
+
+/// The diagonal of the box around the points.
+double extent(const std::vector<Eigen::Vector2d>& points) {
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& point : points) box.extend(point);
+  return box.diagonal().norm();
+}
+
+double median_rise_px(const std::vector<EdgePoint>& outline) {
+  std::vector<double> rises;
+  rises.reserve(outline.size());
+  for (const EdgePoint& edge : outline) rises.push_back(edge.rise_px);
+  return upper_median(std::move(rises));
+}
+
+/// The points of the circle, but those next to a point that is not: where the edge of what hides a
+/// part of the light meets the outline, both are blurred.
+std::vector<bool> on_circle(const std::vector<EdgePoint>& outline,
+                            const std::vector<bool>& inliers) {
+  constexpr double reach_px = 4;
+  std::vector<Eigen::Vector2d> others;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    if (!inliers[i]) others.push_back(outline[i].pixel);
+  }
+  std::vector<bool> clear = inliers;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    clear[i] = clear[i] && std::none_of(others.begin(), others.end(), [&](const auto& other) {
+                 return (other - outline[i].pixel).squaredNorm() < reach_px * reach_px;
+               });
+  }
+  const auto count = [](const std::vector<bool>& points) {
+    return std::count(points.begin(), points.end(), true);
+  };
+  return 2 * count(clear) < count(inliers) ? inliers : clear;
+}
+
+/// The ratio of an ellipse's axes.
+double slenderness(const Matrix2& rim_from_circle) {
+  const double half_square = rim_from_circle.squaredNorm() / 2;
+  const double area = std::abs(rim_from_circle.determinant());
+  const double difference = std::sqrt(std::max(0.0, half_square * half_square - area * area));
+  return (half_square + difference) / area;
+}
+
+/// How many points err together: the sum of the products of their errors with those of their
+/// neighbours and their own, over that of their squares. Of points that err each by itself the fit,
+/// which takes off three unknowns, leaves products of -3 / n of the mean square.
+double points_together(const std::vector<Eigen::Vector2d>& points,
+                       const std::vector<EdgePoint>& outline, const std::vector<bool>& counted,
+                       const RobustEllipse& fit) {
+  constexpr double neighbours_px = 4, unknowns = 3;
+  const Matrix2 circle_from_rim = fit.rim_from_circle.inverse();
+  std::vector<double> errors(points.size(), 0);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (counted[i]) errors[i] = (circle_from_rim * (points[i] - fit.center)).norm() - 1;
+  }
+  double squares = 0, products = 0, pairs = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    squares += errors[i] * errors[i];
+    for (std::size_t j = 0; j < i && counted[i]; ++j) {
+      if (!counted[j] || (outline[i].pixel - outline[j].pixel).norm() >= neighbours_px) continue;
+      products += 2 * errors[i] * errors[j];
+      pairs += 2;
+    }
+  }
+  if (!(squares > 0)) return 1;
+  const auto count = double(std::count(counted.begin(), counted.end(), true));
+  const double taken = unknowns / count * pairs / count;
+  return std::max(1.0, 1 + products / squares + taken);
+}
+
+/// A circle is an ellipse, too.
+RobustEllipse as_ellipse(RobustCircle fit) {
+  return {fit.circle.center, fit.circle.radius * Matrix2::Identity(), fit.center_covariance,
+          std::move(fit.inliers), fit.count};
+}
+
+}  // namespace
+
+Eigen::Vector2d LightShape::turned(const Eigen::Vector2d& at) const {
+  return camera_.readout == Readout::rows ? at : Eigen::Vector2d(at.reverse());
+}
+
+std::vector<Eigen::Vector2d> LightShape::turned(std::vector<Eigen::Vector2d> points) const {
+  for (Eigen::Vector2d& point : points) point = turned(point);
+  return points;
+}
+
+std::optional<Eigen::Vector2d> LightShape::plane_of(const Eigen::Vector2d& pixel) const {
+  if (!camera_.lens) return pixel;
+  const auto ray = camera_.lens->unproject(pixel);
+  if (!ray) return std::nullopt;
+  const Eigen::Vector3d level = camera_.level_from_camera * ray->direction;
+  if (!(level.z() > 0)) return std::nullopt;
+  return level.head<2>() / level.z();
+}
+
+std::optional<Eigen::Vector2d> LightShape::pixel_of(const Eigen::Vector2d& plane) const {
+  if (!camera_.lens) return plane;
+  return camera_.lens->project(camera_.level_from_camera.transpose() * plane.homogeneous());
+}
+
+std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
+                                          const Background& background, bool mottled) const {
+  std::vector<Eigen::Vector2d> points, pixels;
+  double brightest = 0;
+  std::erase_if(outline, [&](const EdgePoint& edge) {
+    const auto plane = plane_of(turned(edge.pixel));
+    if (plane) {
+      points.push_back(*plane);
+      pixels.push_back(edge.pixel);
+    }
+    brightest = std::max(brightest, edge.level);
+    return !plane;
+  });
+  if (points.size() < kLeastOutlinePoints) return std::nullopt;
+  std::vector<double> weights;
+  weights.reserve(outline.size());
+  for (const EdgePoint& edge : outline) weights.push_back(std::pow(edge.level / brightest, 2));
+  const double per_px = extent(points) / extent(pixels);
+  if (!(per_px > 0)) return std::nullopt;
+  // Half a level is passed within half a pixel or so; noise blurs that, and a soft edge.
+  const double tolerance_px =
+      std::max({0.35, 8 * background.noise / brightest, 0.4 * median_rise_px(outline)});
+  const double tolerance = tolerance_px * per_px;
+  std::optional<RobustEllipse> fit;
+  std::optional<Circle> circle;
+  if (camera_.lens) {
+    if (auto found = fit_robust_circle(points, weights, tolerance)) {
+      circle = found->circle;
+      fit = as_ellipse(std::move(*found));
+    }
+  } else {
+    constexpr double nearly_round = 3;
+    fit = fit_robust_ellipse(points, weights, tolerance);
+    if (!fit && camera_.most_slender > nearly_round) {
+      fit = fit_slender_ellipse(points, weights, tolerance);
+    }
+  }
+  if (!fit || fit->count < static_cast<int>(kLeastOutlinePoints)) return std::nullopt;
+  if (!camera_.lens && slenderness(fit->rim_from_circle) > camera_.most_slender)
+    return std::nullopt;
+
+  Light light{};
+  const auto pixel = pixel_of(fit->center);
+  if (!pixel) return std::nullopt;
+  light.pixel = light.low = light.high = *pixel;
+  for (int i = 0; i < 16; ++i) {
+    const double angle = std::numbers::pi / 8 * i;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    const auto rim = pixel_of(fit->center + fit->rim_from_circle * direction);
+    if (!rim) return std::nullopt;
+    light.low = light.low.cwiseMin(*rim);
+    light.high = light.high.cwiseMax(*rim);
+  }
+  light.plane_center = fit->center;
+  light.unit_from_plane = fit->rim_from_circle.inverse();
+  light.radius_px = std::sqrt(fit->rim_from_circle.determinant()) / per_px;
+  const std::vector<bool> shown = on_circle(outline, fit->inliers);
+  const double together = mottled ? points_together(points, outline, shown, *fit) : 1;
+  const double sigma_px = std::sqrt(together * fit->center_covariance.trace() / 2) / per_px;
+  if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
+  light.sigma_px = std::max(kMinSigma_px, sigma_px);
+  light.roundness = double(fit->count) / double(outline.size());
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    if (shown[i]) light.outline.push_back(outline[i]);
+  }
+  if (circle) light.sums = {points, weights, shown, *circle, line_slope_at(*circle), together};
+  light.rise_px = median_rise_px(light.outline);
+  return light;
+}
+
+Eigen::Vector2d LightShape::line_slope_at(const Circle& circle) const {
+  const auto line = [&](double x, double y) {
+    const auto pixel = pixel_of(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
+    return pixel ? turned(*pixel).y() : std::numeric_limits<double>::quiet_NaN();
+  };
+  return Eigen::Vector2d(line(1, 0) - line(-1, 0), line(0, 1) - line(0, -1)) / circle.radius;
+}
+
+Eigen::Vector2d LightShape::read_off(const Circle& circle,
+                                     const Eigen::Vector2d& motion_per_line) const {
+  constexpr int directions = 16;
+  const auto center = pixel_of(circle.center);
+  Eigen::Vector2d off = Eigen::Vector2d::Zero();
+  for (int i = 0; i < directions; ++i) {
+    const double angle = 2 * std::numbers::pi / directions * i;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    const auto rim = pixel_of(circle.center + circle.radius * direction);
+    if (!center || !rim) return Eigen::Vector2d::Zero();
+    const double later = turned(*rim).y() - turned(*center).y();
+    off += 2.0 / directions * motion_per_line.dot(direction) * later * direction;
+  }
+  return off;
+}
+
+void LightShape::shift(const Oval& oval, const Eigen::Vector2d& motion_per_line,
+                       Light& light) const {
+  const auto estimate = light.sums.solved(oval);
+  if (!estimate) return;
+  const Circle& circle = light.sums.circle();
+  const auto pixel = pixel_of(circle.center + circle.radius * estimate->p.head<2>() -
+                              read_off(circle, motion_per_line));
+  if (!pixel) return;
+  light.pixel = *pixel;
+  const double sigma_px =
+      light.radius_px * std::sqrt(estimate->covariance.topLeftCorner<2, 2>().trace() / 2);
+  light.sigma_px = std::clamp(sigma_px, kMinSigma_px, kMaxSigma_px);
+}
+
+std::vector<EdgePoint> LightShape::outside(const Light& light,
+                                           const std::vector<EdgePoint>& outline) const {
+  // Of the ellipse in its box, although the light may be one that lies aslant in it.
+  constexpr double clear = 1.1, clear_px = 1.5;
+  const Eigen::Vector2d center = (light.low + light.high) / 2;
+  const Eigen::Vector2d half =
+      clear * (light.high - light.low) / 2 + Eigen::Vector2d(clear_px, clear_px);
+  std::vector<EdgePoint> result;
+  std::copy_if(outline.begin(), outline.end(), std::back_inserter(result),
+               [&](const EdgePoint& edge) {
+                 return (turned(edge.pixel) - center).cwiseQuotient(half).norm() > 1;
+               });
+  return result;
+}
+
+}  // namespace vlp

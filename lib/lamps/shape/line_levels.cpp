@@ -1,0 +1,118 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/line_levels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "lamps/signal/lamp_map_check.h"
+#include "lamps/signal/stripes.h"
+
+namespace vlp {
+
+namespace {
+
+/// Of the pixels of a chord, above the dark: their mean, and the moment about their middle.
+struct ChordSums {
+  double middle, mean, moment, spread;
+};
+
+template <typename Level>
+ChordSums sums_of(const Level* pixels, const Run& chord, double dark) {
+  const double count = chord.width(), middle = (chord.begin + chord.end - 1) / 2.0;
+  double sum = 0, moment = 0;
+  for (int column = chord.begin; column < chord.end; ++column) {
+    sum += pixels[column] - dark;
+    moment += (pixels[column] - dark) * (column - middle);
+  }
+  return {middle, sum / count, moment, count * (count * count - 1) / 12};
+}
+
+}  // namespace
+
+LineLevels::LineLevels(const cv::Mat& lines, const std::vector<Run>& chords,
+                       const Background& background)
+    : first_(chords.front().row) {
+  constexpr double unevenness = 0.005, steepest = 0.01;
+  std::vector<ChordSums> sums;
+  sums.reserve(chords.size());
+  double moment = 0, spread = 0;
+  for (const Run& chord : chords) {
+    sums.push_back(lines.depth() == CV_8U
+                       ? sums_of(lines.ptr<std::uint8_t>(chord.row), chord, background.level)
+                       : sums_of(lines.ptr<std::uint16_t>(chord.row), chord, background.level));
+    middle_ += sums.back().middle / double(chords.size());
+    moment += sums.back().moment;
+    spread += std::max(0.0, sums.back().mean) * sums.back().spread;
+  }
+  if (spread > 0) slope_ = std::clamp(moment / spread, -steepest, steepest);
+  std::vector<double> signal;
+  signal.reserve(sums.size());
+  for (const ChordSums& line : sums) {
+    signal.push_back(std::max(0.0, line.mean / share_at(line.middle)));
+    brightest_ = std::max(brightest_, signal.back());
+  }
+  if (!(brightest_ > 0)) brightest_ = 1;
+  measured_.reserve(signal.size());
+  for (std::size_t i = 0; i < signal.size(); ++i) {
+    const double noise = background.noise / brightest_ / std::sqrt(chords[i].width());
+    const double level = signal[i] / brightest_;
+    measured_.push_back({level, std::hypot(noise, unevenness * level)});
+  }
+  const Stripes stripes = stripes_of(signal);
+  if (!(stripes.contrast >= kLeastContrast)) return;
+  period_lines_ = stripes.period_lines;
+  period_sd_ = period_sd(period_lines_, double(signal.size()) / kUsedHeight, 0) * period_lines_;
+}
+
+std::optional<LineLevel> LineLevels::at(int line) const {
+  const int last = first_ + static_cast<int>(measured_.size()) - 1;
+  if (line >= first_ && line <= last) return measured_[static_cast<std::size_t>(line - first_)];
+  if (period_lines_ > 0) {
+    const LineLevel level = predicted(line);
+    return level.sd < 1 ? std::optional(level) : std::nullopt;
+  }
+  constexpr int nearest = 6;
+  constexpr double steady_sd = 0.02;
+  double sum = 0;
+  for (int i = 0; i < nearest; ++i) {
+    sum += measured_[static_cast<std::size_t>(line < first_ ? i : last - first_ - i)].level;
+  }
+  return LineLevel{sum / nearest, steady_sd};
+}
+
+LineLevel LineLevels::predicted(int line) const {
+  constexpr int most = 4;
+  constexpr double lamp_sd = 0.01, alone_sd = 0.05;  // how alike the stripes of a lamp are
+  constexpr double missed = 1.5;  // between two lines where a stripe begins or ends
+  const int last = first_ + static_cast<int>(measured_.size()) - 1;
+  const int sign = line < first_ ? 1 : -1;
+  double sum = 0, squares = 0, variance = 0;
+  int count = 0;
+  for (int k = 1; count < most; ++k) {
+    const double at = line + sign * k * period_lines_;
+    const int before = static_cast<int>(std::floor(at));
+    if (sign > 0 ? before + 2 > last : before - 1 < first_) break;
+    if (before - 1 < first_ || before + 2 > last) continue;
+    const auto level = [&](int i) {
+      return measured_[static_cast<std::size_t>(before + i - first_)].level;
+    };
+    const double share = at - before, value = level(0) + share * (level(1) - level(0));
+    const double bend = std::abs(level(-1) - level(0) - level(1) + level(2)) / 2;
+    const double slope = level(1) - level(0);
+    variance += std::pow(missed * share * (1 - share) * bend, 2) +
+                std::pow(slope * k * period_sd_, 2) +
+                std::pow(measured_[static_cast<std::size_t>(before - first_)].sd, 2);
+    sum += value;
+    squares += value * value;
+    ++count;
+  }
+  if (count == 0) return {0, 1};
+  const double mean = sum / count;
+  const double scatter =
+      count > 1 ? std::max(0.0, squares - count * mean * mean) / (count - 1) : alone_sd * alone_sd;
+  return {mean, std::sqrt(lamp_sd * lamp_sd + variance / count + scatter / count)};
+}
+
+}  // namespace vlp

@@ -1,0 +1,332 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/outline.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "lamps/shape/profile.h"
+#include "geometry/median.h"
+#include "geometry/normal_equations.h"
+
+namespace vlp {
+namespace {
+
+template <typename Level>
+void add_edge(const Profile<Level>& profile, int width, int row, double dark,
+              std::vector<EdgePoint>& points) {
+  constexpr int outside = -6, inside = 3, samples = 4;
+  if (!profile.has(outside)) return;
+  // Of the light: a few pixels from 3 px inside on; further in for soft edges, whose run is wide.
+  const auto level_at = [&](int first) {
+    double sum = 0;
+    for (int i = first; i < first + samples; ++i) sum += profile(i);
+    return sum / samples - dark;
+  };
+  const int reach = width / 2;
+  const auto rough = profile.crossing(dark + level_at(inside) / 2, outside, reach);
+  if (!rough) return;
+  const int first = std::min(static_cast<int>(*rough) + inside, width - samples);
+  const double level = level_at(first);
+  const auto at = profile.crossing(dark + level / 2, outside, reach);
+  const auto low = profile.crossing(dark + level / 4, outside, reach);
+  const auto high = profile.crossing(dark + 3 * level / 4, outside, reach);
+  if (!at || level <= 0) return;
+  const double rise_px = low && high ? *high - *low : reach;
+  points.push_back(
+      {{profile.edge + profile.direction * *at, row}, level, rise_px, profile.direction > 0});
+}
+
+template <typename Level>
+std::vector<EdgePoint> outline(const cv::Mat& image, const Blob& blob, double dark) {
+  constexpr int least_width = 8;
+  std::vector<EdgePoint> points;
+  points.reserve(2 * blob.runs.size());
+  for (const Run& run : blob.runs) {
+    if (run.width() < least_width) continue;
+    const auto* row = image.ptr<Level>(run.row);
+    add_edge(Profile<Level>{row, image.cols, run.begin, 1}, run.width(), run.row, dark, points);
+    add_edge(Profile<Level>{row, image.cols, run.end - 1, -1}, run.width(), run.row, dark, points);
+  }
+  // Between the stripes of a saturated lamp its charge spills over: no outline of its own.
+  constexpr double least_share = 0.35;
+  double brightest = 0;
+  for (const EdgePoint& point : points) brightest = std::max(brightest, point.level);
+  std::erase_if(points, [&](const EdgePoint& p) { return p.level < least_share * brightest; });
+  return points;
+}
+
+/// The ellipse of a disc's rim, upright in its box.
+class RimEllipse {
+ public:
+  explicit RimEllipse(const DiscImage& disc)
+      : disc_(disc), center_((disc.low + disc.high) / 2), half_((disc.high - disc.low) / 2) {}
+
+  /// Across the rim, outwards. Precondition: the point is near it.
+  Eigen::Vector2d normal_at(const Eigen::Vector2d& point) const {
+    return (point - center_).cwiseQuotient(half_.cwiseAbs2()).normalized();
+  }
+  /// Of the curvature where the normal is that.
+  double radius_px(const Eigen::Vector2d& normal) const {
+    return std::pow(half_.prod(), 2) / std::pow(half_.cwiseProduct(normal).norm(), 3);
+  }
+  double chord_px(double row) const {
+    const double up = (row - center_.y()) / half_.y();
+    return 2 * half_.x() * std::sqrt(std::max(0.0, 1 - up * up));
+  }
+  /// From the image of the disc's centre to the rim's first or last column.
+  double half_width_px(bool begins) const {
+    return begins ? disc_.center.x() - disc_.low.x() : disc_.high.x() - disc_.center.x();
+  }
+  /// From the image of the disc's centre outwards.
+  double outwards_px(double column, bool begins) const {
+    return begins ? disc_.center.x() - column : column - disc_.center.x();
+  }
+
+ private:
+  DiscImage disc_;
+  Eigen::Vector2d center_, half_;
+};
+
+/// The standard deviation of the blur along the rows, times the cosine there, from how steeply the
+/// levels rise. Of a slower rise no more is corrected: it may be the lamp itself.
+double blur_px(const std::vector<EdgePoint>& points, const RimEllipse& rim) {
+  constexpr double quarters = 1.349;  // of a normal distribution, in standard deviations
+  constexpr double most = 1.5;
+  std::vector<double> blurs;
+  blurs.reserve(points.size());
+  for (const EdgePoint& point : points) {
+    blurs.push_back(point.rise_px * std::abs(rim.normal_at(point.pixel).x()) / quarters);
+  }
+  return std::min(upper_median(std::move(blurs)), most);
+}
+
+/// The light next to the edge in a row: a line through a few pixels further in, because lamps
+/// darken towards their rim, and the lens towards the image's.
+struct InnerLevel {
+  EdgePoint point;
+  Eigen::Vector2d normal;
+  /// The column from which a profile inwards counts.
+  int origin;
+  /// The first pixel of the line in that profile, and the middle of all.
+  int first;
+  double middle;
+  /// At the middle, above the dark; how much more with each pixel inwards.
+  double level, slope;
+
+  int direction() const { return point.begins ? 1 : -1; }
+  double cosine() const { return std::abs(normal.x()); }
+  double column(double i) const { return origin + direction() * i; }
+};
+
+constexpr int kBefore = 8, kSamples = 8;
+/// Of the places on a line.
+constexpr double kVariance = (kSamples * kSamples - 1) / 12.0;
+
+template <typename Level>
+Profile<Level> profile_of(const cv::Mat& image, const InnerLevel& inner) {
+  return {image.ptr<Level>(static_cast<int>(inner.point.pixel.y())), image.cols, inner.origin,
+          inner.direction()};
+}
+
+template <typename Level>
+std::vector<InnerLevel> inner_levels(const cv::Mat& image, const std::vector<EdgePoint>& points,
+                                     const RimEllipse& rim, double dark) {
+  constexpr double flattest = 0.35, depth_px = 3, most_bent = 0.35;
+  constexpr double square = kSamples * (kSamples * kSamples - 1) / 12.0;
+  std::vector<InnerLevel> result;
+  result.reserve(points.size());
+  for (const EdgePoint& point : points) {
+    // The cosine of the angle between the row and the outline's normal.
+    InnerLevel inner{};
+    inner.point = point;
+    inner.normal = rim.normal_at(point.pixel);
+    if (inner.cosine() < flattest) continue;
+    const double depth = depth_px / inner.cosine();
+    if (2 * depth + kSamples > rim.chord_px(point.pixel.y())) continue;
+    inner.origin = static_cast<int>(std::lround(point.pixel.x())) - inner.direction() * kBefore;
+    inner.first = kBefore + static_cast<int>(std::lround(depth));
+    inner.middle = inner.first + (kSamples - 1) / 2.0;
+    const auto profile = profile_of<Level>(image, inner);
+    if (!profile.has(0) || !profile.has(inner.first + kSamples)) continue;
+    double sum = 0, moment = 0;
+    for (int i = inner.first; i < inner.first + kSamples; ++i) {
+      sum += profile(i);
+      moment += (i - inner.middle) * profile(i);
+    }
+    inner.level = sum / kSamples - dark;
+    inner.slope = moment / square;
+    // What hides the light further in bends the line too much.
+    const double change = std::abs(inner.slope) * (inner.middle - kBefore);
+    if (change < most_bent * inner.level) result.push_back(inner);
+  }
+  return result;
+}
+
+/// Where the profile passes its edge, near `at`, by all of its pixels there; `width` is the
+/// standard deviation of the blur along it. See refined().
+template <typename Level>
+std::optional<double> blurred_edge(const Profile<Level>& profile, double at, double width,
+                                   double level, double dark) {
+  constexpr int rounds = 4;
+  constexpr double reach = 3, least_reach_px = 2, further_in_px = 1, far = 2;
+  const double reach_px =
+      std::max(reach * width, least_reach_px);  // four unknowns want more pixels
+  const int begin = static_cast<int>(std::ceil(at - reach_px));
+  const int end = static_cast<int>(std::floor(at + reach_px + further_in_px));
+  if (!profile.has(begin) || !profile.has(end)) return std::nullopt;
+  double edge = at, outside = 0, inside = level, slope = 0;
+  for (int round = 0; round < rounds; ++round) {
+    Normal<4> normal;
+    for (int i = begin; i <= end; ++i) {
+      const double t = i - edge, u = t / width;
+      const double lit = std::erfc(-u / std::numbers::sqrt2) / 2;
+      const double density = std::exp(-u * u / 2) / std::sqrt(2 * std::numbers::pi);
+      const double rise = t * lit + width * density;
+      const double model = outside * (1 - lit) + inside * lit + slope * rise;
+      const double by_edge = -(inside - outside) / width * density - slope * lit;
+      normal.add_row(std::array{by_edge, 1 - lit, lit, rise}, model + dark - profile(i));
+    }
+    const Cholesky<4> factor(normal);
+    if (!factor.determines(1e-9)) return std::nullopt;
+    const auto step = factor.solve(normal.gradient);
+    edge -= step[0], outside -= step[1], inside -= step[2], slope -= step[3];
+    if (!(std::abs(edge - at) < far * width)) return std::nullopt;
+  }
+  return edge;
+}
+
+/// How a light's levels bend: q of 1 + q (u / w)^2, u pixels along a row from the image of the
+/// disc's centre, w from there to the rim. Of a light that is darker at its rim it is negative. The
+/// median by the slopes of each side, and the mean of both, which a change from one side to the
+/// other leaves as it is. None of a light too small for slopes away from the middle,
+/// or of which something hides a side.
+double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
+  constexpr double least_u = 1 / 3.0;  // of w: nearer to the middle no slope shows the bend
+  constexpr double most = 0.8;
+  std::array<std::vector<double>, 2> bends;
+  for (const InnerLevel& inner : levels) {
+    const bool begins = inner.point.begins;
+    const double width_px = rim.half_width_px(begins);
+    const double share = rim.outwards_px(inner.column(inner.middle), begins) / width_px;
+    if (share < least_u) continue;
+    bends[begins ? 0 : 1].push_back(-inner.slope * width_px / (2 * share * inner.level));
+  }
+  const std::size_t fewer = std::min(bends[0].size(), bends[1].size());
+  const std::size_t more = std::max(bends[0].size(), bends[1].size());
+  if (fewer == 0 || 2 * fewer < more) return 0;
+  const double bend = (upper_median(std::move(bends[0])) + upper_median(std::move(bends[1]))) / 2;
+  return std::clamp(bend, -most, most);
+}
+
+/// Whether what the lines of the levels leave, bent as they are, goes on from pixel to pixel:
+/// beyond chance, and by enough to move the outline. Of noise the mean product of neighbours is
+/// -1/4 of the mean square, because a line was taken off, and of the n = 6 that 8 pixels have left
+/// per line its standard deviation is 1 / sqrt(n).
+template <typename Level>
+bool mottled(const cv::Mat& image, const std::vector<InnerLevel>& levels, const RimEllipse& rim,
+             double bend, double dark) {
+  constexpr double by_chance = -0.25, beyond_chance = 3.5, least_share = 0.003;
+  constexpr int left = kSamples - 2;
+  double squares = 0, products = 0, level_squares = 0;
+  for (const InnerLevel& inner : levels) {
+    const auto profile = profile_of<Level>(image, inner);
+    const double bent = inner.level * bend / std::pow(rim.half_width_px(inner.point.begins), 2);
+    double before = 0;
+    for (int i = inner.first; i < inner.first + kSamples; ++i) {
+      const double away = i - inner.middle;
+      const double line = inner.level + inner.slope * away + bent * (away * away - kVariance);
+      const double off = profile(i) - dark - line;
+      squares += off * off;
+      products += before * off;
+      before = off;
+    }
+    level_squares += left * inner.level * inner.level;
+  }
+  const double beyond = products - by_chance * squares;
+  const double count = left * double(levels.size());
+  return beyond > beyond_chance / std::sqrt(count) * squares &&
+         beyond > least_share * least_share * level_squares;
+}
+
+template <typename Level>
+RefinedOutline refine(const cv::Mat& image, const std::vector<EdgePoint>& points,
+                      const DiscImage& disc, double dark) {
+  // Of more blur the tail reaches the samples, and would pass for a bend.
+  constexpr double most_blur_to_bend_px = 1.3;
+  // Of the blur that rises show: they are taken from levels between pixels.
+  constexpr double between_pixels = 1 / 8.0;
+  constexpr double least_width_px = 0.4;
+  if (points.empty()) return {};
+  const RimEllipse rim(disc);
+  const double blur = blur_px(points, rim), square = blur * blur;
+  const double square_across = std::max(0.0, square - between_pixels);
+  const auto levels = inner_levels<Level>(image, points, rim, dark);
+  const bool inside_only = blur < most_blur_to_bend_px;
+  const double bend = inside_only ? bend_of(levels, rim) : 0;
+  RefinedOutline result{{}, inside_only && mottled<Level>(image, levels, rim, bend, dark)};
+  result.points.reserve(levels.size());
+  for (const InnerLevel& inner : levels) {
+    const bool begins = inner.point.begins;
+    const double back = inner.middle - kBefore, width_px = rim.half_width_px(begins);
+    const double bent = bend * (back * back - kVariance) / (width_px * width_px);
+    const double level = inner.level * (1 + bent) - inner.slope * back;
+    if (level <= 0) continue;
+    const auto profile = profile_of<Level>(image, inner);
+    const auto at = profile.crossing(dark + level / 2, 0, inner.first);
+    if (!at) continue;
+    // The lamp's own slope at its rim, inwards: the lens darkens what is blurred already.
+    const double rim_px = rim.outwards_px(inner.column(kBefore), begins);
+    const double slope = -2 * bend * inner.level * rim_px / (width_px * width_px);
+    // Blurred, the half of a level lies further out where the light grows inwards, and further in
+    // behind a bent rim: for a standard deviation s of the blur across it and a radius r of the
+    // rim by s^2 slope / level and s^2 / (2 r), to first order.
+    const double cosine = inner.cosine();
+    const double behind_bend = square_across / (2 * rim.radius_px(inner.normal) * cosine);
+    double edge = *at + square * slope / (level * cosine * cosine) - behind_bend;
+    if (result.mottled) {
+      const double width = std::max(std::sqrt(square_across), least_width_px) / cosine;
+      const auto fitted = blurred_edge(profile, *at, width, level, dark);
+      if (!fitted) continue;
+      edge = *fitted - behind_bend;
+    }
+    EdgePoint better = inner.point;
+    better.pixel.x() = inner.column(edge);
+    better.level = level;
+    result.points.push_back(better);
+  }
+  return result;
+}
+
+}  // namespace
+
+RefinedOutline refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
+                       const DiscImage& disc, const Background& background) {
+  return image.depth() == CV_8U ? refine<std::uint8_t>(image, points, disc, background.level)
+                                : refine<std::uint16_t>(image, points, disc, background.level);
+}
+
+std::vector<EdgePoint> outermost(std::vector<EdgePoint> points) {
+  const auto further_out = [](const EdgePoint& a, const EdgePoint& b) {
+    if (a.pixel.y() != b.pixel.y()) return a.pixel.y() < b.pixel.y();
+    if (a.begins != b.begins) return a.begins;
+    return a.begins ? a.pixel.x() < b.pixel.x() : a.pixel.x() > b.pixel.x();
+  };
+  const auto same_side = [](const EdgePoint& a, const EdgePoint& b) {
+    return a.pixel.y() == b.pixel.y() && a.begins == b.begins;
+  };
+  std::sort(points.begin(), points.end(), further_out);
+  points.erase(std::unique(points.begin(), points.end(), same_side), points.end());
+  return points;
+}
+
+std::vector<EdgePoint> outline_of(const cv::Mat& image, const Blob& blob,
+                                  const Background& background) {
+  return image.depth() == CV_8U ? outline<std::uint8_t>(image, blob, background.level)
+                                : outline<std::uint16_t>(image, blob, background.level);
+}
+
+}  // namespace vlp

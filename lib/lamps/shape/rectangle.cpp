@@ -1,0 +1,458 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/rectangle.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "lamps/shape/straight_edge.h"
+#include "geometry/angles.h"
+#include "geometry/symmetric.h"
+#include "rig/detection.h"
+
+namespace vlp {
+namespace {
+
+using Corners = std::array<Eigen::Vector2d, 4>;
+using Sides = std::array<Side, 4>;
+
+double cross_of(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+std::optional<Eigen::Vector2d> meeting(const Side& a, const Side& b) {
+  constexpr double flattest = 0.05;
+  const Eigen::Vector2d along = a.way(), other = b.way();
+  const double sine = cross_of(along, other);
+  if (!(std::abs(sine) > flattest)) return std::nullopt;
+  return a.from + cross_of(b.from - a.from, other) / sine * along;
+}
+
+Sides sides_of(const Corners& corners) {
+  return {Side{corners[0], corners[1]},
+          {corners[1], corners[2]},
+          {corners[2], corners[3]},
+          {corners[3], corners[0]}};
+}
+
+/// Corner i is where side i begins.
+std::optional<Corners> corners_of(const Sides& sides) {
+  Corners corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto corner = meeting(sides[(i + 3) % 4], sides[i]);
+    if (!corner) return std::nullopt;
+    corners[i] = *corner;
+  }
+  return corners;
+}
+
+std::optional<Eigen::Vector2d> center_of(const Sides& sides) {
+  const auto corners = corners_of(sides);
+  if (!corners) return std::nullopt;
+  return meeting({(*corners)[0], (*corners)[2]}, {(*corners)[1], (*corners)[3]});
+}
+
+/// Whether the angles are right, nearly.
+bool rectangular(const Sides& sides) {
+  const double most_off = std::sin(rad_from_deg(20));
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d way = sides[i].way(), next = sides[(i + 1) % 4].way();
+    if (!(std::abs(way.dot(next)) < most_off && cross_of(way, next) > 0)) return false;
+  }
+  return true;
+}
+
+/// Long over short.
+double aspect_of(const Sides& sides) {
+  const auto length = [&](std::size_t i) { return (sides[i].to - sides[i].from).norm(); };
+  const double ratio = (length(0) + length(2)) / (length(1) + length(3));
+  return std::max(ratio, 1 / ratio);
+}
+
+/// Of the logarithm of aspect_of().
+double aspect_sd_of(const std::array<StraightEdge, 4>& edges, double per_px) {
+  constexpr double of_blur = 0.25;
+  const auto square = [](double value) { return value * value; };
+  double variance = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const StraightEdge &edge = edges[i], &opposite = edges[(i + 2) % 4];
+    const Eigen::Vector2d across = opposite.side.from - edge.side.from;
+    const double apart_px = std::abs(across.dot(edge.side.inwards())) / per_px;
+    const double middle_variance = edge.covariance_px.sum() / 4;
+    variance += (middle_variance + square(of_blur * edge.blur_px)) / square(apart_px);
+  }
+  return std::sqrt(variance);
+}
+
+/// The rectangle of the least area around the points, the light on the left of its sides.
+Corners rectangle_around(const std::vector<Eigen::Vector2d>& points, double per_px) {
+  const Eigen::Vector2d& origin = points.front();
+  std::vector<cv::Point2f> scaled;
+  scaled.reserve(points.size());
+  for (const Eigen::Vector2d& point : points) {
+    const Eigen::Vector2f at = ((point - origin) / per_px).cast<float>();
+    scaled.emplace_back(at.x(), at.y());
+  }
+  std::array<cv::Point2f, 4> around;
+  cv::minAreaRect(scaled).points(around.data());
+  Corners corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    corners[i] = origin + per_px * Eigen::Vector2d(around[i].x, around[i].y);
+  }
+  if (cross_of(corners[1] - corners[0], corners[2] - corners[1]) < 0) {
+    std::reverse(corners.begin(), corners.end());
+  }
+  return corners;
+}
+
+double off(const Side& side, const Eigen::Vector2d& point) {
+  return std::abs((point - side.from).dot(side.inwards()));
+}
+
+std::size_t nearest(const Sides& sides, const Eigen::Vector2d& point) {
+  const auto closer = [&](const Side& a, const Side& b) { return off(a, point) < off(b, point); };
+  return static_cast<std::size_t>(std::min_element(sides.begin(), sides.end(), closer) -
+                                  sides.begin());
+}
+
+/// The sides through the points next to them; a side along the lines has few, and stays.
+Sides through(const std::vector<Eigen::Vector2d>& points, Sides sides, double within) {
+  constexpr std::size_t least = 6;
+  constexpr double least_spread = 0.25;
+  const Sides before = sides;
+  std::array<std::vector<Eigen::Vector2d>, 4> of_sides;
+  for (const Eigen::Vector2d& point : points) {
+    const std::size_t i = nearest(before, point);
+    if (off(before[i], point) < within) of_sides[i].push_back(point);
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (of_sides[i].size() < least) continue;
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& point : of_sides[i]) mean += point / double(of_sides[i].size());
+    Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+    for (const Eigen::Vector2d& point : of_sides[i]) {
+      spread += (point - mean) * (point - mean).transpose();
+    }
+    const auto axes = symmetric_eigen(spread);
+    Eigen::Vector2d way = axes.vectors.col(1);
+    const double length = std::sqrt(axes.values[1] / double(of_sides[i].size()) * 12);
+    if (length < least_spread * (sides[i].to - sides[i].from).norm()) continue;
+    if (way.dot(before[i].way()) < 0) way = -way;
+    sides[i] = {mean - way * length / 2, mean + way * length / 2};
+  }
+  return sides;
+}
+
+/// The rectangle's corners before its edges are looked at, and the share of the points next to its
+/// sides; nothing when the outline has another shape.
+struct FirstCorners {
+  Corners corners;
+  double near;
+};
+
+std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& points,
+                                          double per_px) {
+  constexpr double near_px = 2, least_share = 0.7;
+  constexpr double coarse_share = 0.08;
+  Corners corners = rectangle_around(points, per_px);
+  const double size = std::min((corners[1] - corners[0]).norm(), (corners[2] - corners[1]).norm());
+  double within = std::max(4 * per_px, coarse_share * size);
+  for (int round = 0; round < 3; ++round) {
+    const auto better = corners_of(through(points, sides_of(corners), within));
+    if (!better) return std::nullopt;
+    corners = *better;
+    within = std::max(within / 2, near_px * per_px);
+  }
+  const Sides sides = sides_of(corners);
+  if (!rectangular(sides)) return std::nullopt;
+  const auto near = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& point) {
+    return off(sides[nearest(sides, point)], point) < near_px * per_px;
+  });
+  if (double(near) < least_share * double(points.size())) return std::nullopt;
+  return FirstCorners{corners, double(near) / double(points.size())};
+}
+
+/// The same of a slender one that a lens bends which nobody knows: its corners are those of the
+/// best of many that are bent back, which leaves its ends where they are.
+std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& points) {
+  constexpr double most_px = 6, step_px = 0.5, least_aspect = 3;
+  const Sides around = sides_of(rectangle_around(points, 1));
+  if (aspect_of(around) < least_aspect) return std::nullopt;
+  const bool first =
+      (around[0].to - around[0].from).norm() > (around[1].to - around[1].from).norm();
+  const Side& side = around[first ? 0 : 1];
+  const double length = (side.to - side.from).norm();
+  std::optional<FirstCorners> best;
+  std::vector<Eigen::Vector2d> straight = points;
+  for (double bow_px = -most_px; bow_px <= most_px; bow_px += step_px) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double along = 2 * (points[i] - side.from).dot(side.way()) / length - 1;
+      straight[i] = points[i] - bow_px * (1 - along * along) * side.inwards();
+    }
+    const auto corners = first_corners(straight, 1);
+    if (corners && (!best || corners->near > best->near)) best = corners;
+  }
+  return best;
+}
+
+/// The image of the centre under a lens that nobody knows: p (1 + k |p|^2), p from the image's
+/// middle. To first order of k an edge of the half-length h that stands off the middle by p bows by
+/// -k h^2 p . n across it, and the diagonals cross k (a^2 + b^2) p off the centre, a and b half of
+/// the sides. What is known of k beforehand is that of an equidistant lens of 115 degrees from
+/// corner to corner, give or take.
+struct Unbent {
+  Eigen::Vector2d shift;
+  double sd_px;
+};
+
+Unbent unbent(const std::array<StraightEdge, 4>& edges, const Eigen::Vector2d& center,
+              const Eigen::Vector2d& middle) {
+  constexpr double bow_sd = 2, of_shift = 0.1;  // over that of the ends; higher orders
+  const double focal_px = middle.norm(), known_sd = 1 / (3 * focal_px * focal_px);
+  double information = 1 / (known_sd * known_sd), moment = 0;
+  Eigen::Vector2d by_k = Eigen::Vector2d::Zero();
+  for (const StraightEdge& edge : edges) {
+    const Eigen::Vector2d way = edge.side.to - edge.side.from, in = edge.side.inwards();
+    const double half_square = way.squaredNorm() / 4;
+    const Eigen::Vector2d at = (edge.side.from + edge.side.to) / 2 - middle;
+    const double slope = -half_square * at.dot(in);
+    const double variance = bow_sd * bow_sd * edge.covariance_px.trace() / 2;
+    information += slope * slope / variance;
+    moment += slope * edge.bow_px / variance;
+    by_k -= half_square / 2 * (center - middle);
+  }
+  const double k = moment / information;
+  const double sd_px = std::hypot(1 / std::sqrt(information), of_shift * k) * by_k.norm();
+  return {k * by_k, sd_px / std::numbers::sqrt2};
+}
+
+/// Around what lies so deep inside, (u, v); empty when the lens does not describe it.
+std::vector<Eigen::Vector2d> face_of(const Sides& sides, double inset, const LightShape& shape) {
+  constexpr int pieces = 8;
+  Sides inside = sides;
+  for (Side& side : inside) {
+    const Eigen::Vector2d in = inset * side.inwards();
+    side.from += in;
+    side.to += in;
+  }
+  const auto corners = corners_of(inside);
+  std::vector<Eigen::Vector2d> face;
+  if (!corners) return face;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d &from = (*corners)[i], &to = (*corners)[(i + 1) % 4];
+    for (int piece = 0; piece < pieces; ++piece) {
+      const auto pixel = shape.pixel_of(from + (to - from) * piece / pieces);
+      if (!pixel) return {};
+      face.push_back(*pixel);
+    }
+  }
+  return face;
+}
+
+/// Of the centre, in pixels of the image: by the ends of the sides, each side by itself.
+std::optional<Matrix2> center_covariance(const std::array<StraightEdge, 4>& edges, double per_px,
+                                         const LightShape& shape) {
+  constexpr double moved_px = 0.05;
+  Sides sides;
+  for (std::size_t i = 0; i < 4; ++i) sides[i] = edges[i].side;
+  const auto pixel_with = [&](const Sides& moved) -> std::optional<Eigen::Vector2d> {
+    const auto center = center_of(moved);
+    return center ? shape.pixel_of(*center) : std::nullopt;
+  };
+  const auto here = pixel_with(sides);
+  Matrix2 covariance = Matrix2::Zero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    Matrix2 slope;
+    const Eigen::Vector2d move = moved_px * per_px * sides[i].inwards();
+    for (const int end : {0, 1}) {
+      Sides moved = sides;
+      (end == 0 ? moved[i].from : moved[i].to) += move;
+      const auto there = pixel_with(moved);
+      if (!here || !there) return std::nullopt;
+      slope.col(end) = (*there - *here) / moved_px;
+    }
+    covariance += slope * edges[i].covariance_px * slope.transpose();
+  }
+  return covariance;
+}
+
+/// By the cross products of its corners, one after the other.
+double area_of(const std::vector<Eigen::Vector2d>& polygon) {
+  double twice = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    twice += cross_of(polygon[i], polygon[(i + 1) % polygon.size()]);
+  }
+  return std::abs(twice) / 2;
+}
+
+/// Whether the outline reaches into the corners, as no disc's does: (2 u / length)^2 +
+/// (2 v / width)^2 is 1 on an ellipse within the sides, and up to 2 on the sides.
+bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
+                 const Eigen::Vector2d& center) {
+  constexpr double beyond = 1.35, least_share = 0.1;
+  const auto off_middle = [&](const Eigen::Vector2d& at, std::size_t i) {
+    const double length = (sides[i].to - sides[i].from).norm();
+    return std::pow(2 * (at - center).dot(sides[i].way()) / length, 2);
+  };
+  const auto far = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
+    return off_middle(at, 0) + off_middle(at, 1) > beyond;
+  });
+  return double(far) >= least_share * double(points.size());
+}
+
+/// `points` are the outline in the plane.
+std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& sides, double per_px,
+                              const std::vector<Eigen::Vector2d>& points,
+                              const Eigen::Vector2d& middle, const LightShape& shape) {
+  constexpr double stray_px = 3;
+  if (!rectangular(sides)) return std::nullopt;
+  const auto center = center_of(sides);
+  if (!center || !has_corners(points, sides, *center)) return std::nullopt;
+  const auto covariance = center_covariance(edges, per_px, shape);
+  auto pixel = shape.pixel_of(*center);
+  const auto around = face_of(sides, 0, shape);
+  if (!pixel || !covariance || around.empty()) return std::nullopt;
+  Light light{};
+  double lens_sd_px = 0;
+  if (!shape.has_lens()) {
+    const Unbent behind = unbent(edges, *center, shape.turned(middle));
+    *pixel += behind.shift;
+    lens_sd_px = behind.sd_px;
+  }
+  light.pixel = light.low = light.high = *pixel;
+  for (const Eigen::Vector2d& at : around) {
+    light.low = light.low.cwiseMin(at);
+    light.high = light.high.cwiseMax(at);
+  }
+  light.radius_px = std::sqrt(area_of(around) / std::numbers::pi);
+  double bow_px = 0;
+  light.roundness = 1;
+  for (StraightEdge& edge : edges) {
+    bow_px = std::max(bow_px, std::abs(edge.bow_px));
+    light.rise_px = std::max(light.rise_px, edge.points.empty() ? 0 : edge.points[0].rise_px);
+    light.roundness = std::min(light.roundness, edge.share);
+    light.outline.insert(light.outline.end(), edge.points.begin(), edge.points.end());
+  }
+  const double sigma_px = std::hypot(std::sqrt(covariance->trace() / 2), lens_sd_px);
+  if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
+  light.sigma_px = std::max(kMinSigma_px, sigma_px);
+  const auto strays = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
+    return std::any_of(sides.begin(), sides.end(), [&](const Side& side) {
+      return (at - side.from).dot(side.inwards()) < -(stray_px + bow_px) * per_px;
+    });
+  });
+  light.outside = double(strays) / double(points.size());
+  light.face = face_of(sides, stray_px * per_px, shape);
+  light.aspect = aspect_of(sides);
+  light.aspect_sd = aspect_sd_of(edges, per_px);
+  return light.face.empty() ? std::nullopt : std::optional(std::move(light));
+}
+
+}  // namespace
+
+std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const cv::Size& size) {
+  constexpr int least_px = 4;
+  double top = size.height, bottom = -1;
+  for (const Eigen::Vector2d& point : polygon) {
+    top = std::min(top, point.y());
+    bottom = std::max(bottom, point.y());
+  }
+  std::vector<Run> chords;
+  const int first = std::max(0, static_cast<int>(std::ceil(top)));
+  const int last = std::min(size.height - 1, static_cast<int>(std::floor(bottom)));
+  for (int row = first; row <= last; ++row) {
+    double left = size.width, right = -1;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+      if ((a.y() - row) * (b.y() - row) > 0 || a.y() == b.y()) continue;
+      const double at = a.x() + (row - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+      left = std::min(left, at);
+      right = std::max(right, at);
+    }
+    const int begin = std::max(0, static_cast<int>(std::ceil(left)));
+    const int end = std::min(size.width, static_cast<int>(std::floor(right)) + 1);
+    if (end - begin >= least_px) chords.push_back({row, begin, end});
+  }
+  return chords;
+}
+
+bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point) {
+  bool left = false, right = false;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double side = cross_of(b - a, point - a);
+    left = left || side > 0;
+    right = right || side < 0;
+  }
+  return !(left && right);
+}
+
+std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
+                                  const std::vector<EdgePoint>& outline,
+                                  const Background& background, const LightShape& shape) {
+  constexpr double least_px = 10, most_slender = 40;
+  constexpr std::size_t least_lines = 8;
+  const cv::Rect box = blob.box();
+  if (outline.size() < kLeastOutlinePoints || std::min(box.width, box.height) < least_px) return {};
+  std::vector<Eigen::Vector2d> points;
+  points.reserve(outline.size());
+  Eigen::AlignedBox2d in_plane, in_image;
+  for (const EdgePoint& edge : outline) {
+    const auto point = shape.plane_of(shape.turned(edge.pixel));
+    if (!point) return std::nullopt;
+    points.push_back(*point);
+    in_plane.extend(*point);
+    in_image.extend(edge.pixel);
+  }
+  const double per_px = in_plane.diagonal().norm() / in_image.diagonal().norm();
+  auto first = first_corners(points, per_px);
+  if (!shape.has_lens()) {
+    const auto bent = bent_corners(points);
+    if (bent && (!first || bent->near > first->near)) first = bent;
+  }
+  if (!first) return std::nullopt;
+  std::optional<Corners> corners = first->corners;
+
+  double bow_px = 0;
+  std::array<StraightEdge, 4> edges;
+  struct Pass {
+    double inset_px;
+    EdgeSearch search;
+  };
+  for (auto [inset_px, search] : {Pass{5, {7, 48}}, Pass{3.5, {5, 48}}, Pass{3.5, {4, 96}}}) {
+    const Sides sides = sides_of(*corners);
+    const double narrow =
+        std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
+    if (!(narrow > least_px * per_px) || aspect_of(sides) > most_slender) return std::nullopt;
+    const double inset = std::min((inset_px + bow_px) * per_px, narrow / 3);
+    const auto chords = chords_within(shape.turned(face_of(sides, inset, shape)), lines.size());
+    if (chords.size() < least_lines) return std::nullopt;
+    // Lines that follow one another, or levels would be taken for those of others.
+    const int rows = chords.back().row - chords.front().row + 1;
+    if (rows != static_cast<int>(chords.size())) return std::nullopt;
+    const LineLevels levels(lines, chords, background);
+    search.reach_px = std::min(search.reach_px + bow_px, narrow / per_px / 2);
+    Sides found;
+    for (std::size_t i = 0; i < 4; ++i) {
+      auto edge =
+          straight_edge_at(lines, sides[i], levels, background.level, per_px, search, shape);
+      if (!edge) return std::nullopt;
+      edges[i] = std::move(*edge);
+      found[i] = edges[i].side;
+    }
+    bow_px = 0;
+    for (const StraightEdge& edge : edges) bow_px = std::max(bow_px, std::abs(edge.bow_px));
+    corners = rectangular(found) ? corners_of(found) : std::nullopt;
+    if (!corners) return std::nullopt;
+  }
+  const Eigen::Vector2d middle((lines.cols - 1) / 2.0, (lines.rows - 1) / 2.0);
+  return light_of(edges, sides_of(*corners), per_px, points, middle, shape);
+}
+
+}  // namespace vlp

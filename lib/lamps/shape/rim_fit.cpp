@@ -1,0 +1,357 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/rim_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <utility>
+
+#include "lamps/shape/m_estimate.h"
+#include "geometry/median.h"
+#include "geometry/normal_equations.h"
+
+namespace vlp {
+namespace {
+
+/// From this level on a pixel is clipped, and tells only that its light is no less: a little below
+/// the brightest there can be, because of sharpening and compression.
+constexpr double kClipped = 0.98 * 255;
+
+/// Levels of an image as those of 8 bits: of more bits the brightest of a light is 255.
+class Levels {
+ public:
+  Levels(const cv::Mat& image, const Eigen::Vector2d& low, const Eigen::Vector2d& high)
+      : image_(image) {
+    if (image.depth() == CV_8U) return;
+    const cv::Rect box(cv::Point(static_cast<int>(low.x()), static_cast<int>(low.y())),
+                       cv::Point(static_cast<int>(high.x()) + 1, static_cast<int>(high.y()) + 1));
+    const cv::Mat pixels = image(box & cv::Rect({0, 0}, image.size()));
+    double brightest = 0;
+    if (!pixels.empty()) cv::minMaxLoc(pixels, nullptr, &brightest);
+    if (brightest > 0) scale_ = 255 / brightest;
+  }
+
+  int columns() const { return image_.cols; }
+  double of(double level) const { return scale_ * level; }
+  double at(int row, int column) const {
+    return image_.depth() == CV_8U ? double(image_.at<std::uint8_t>(row, column))
+                                   : of(image_.at<std::uint16_t>(row, column));
+  }
+
+ private:
+  const cv::Mat& image_;
+  double scale_ = 1;
+};
+
+/// A pixel next to the rim: behind it; along it, in lines; its level.
+struct StepSample {
+  double depth_px, along, level;
+
+  bool clipped() const { return level >= kClipped; }
+};
+
+/// Where a line crosses the outline, and how much deeper each column is there.
+struct Crossing {
+  int line;
+  double column, per_column;
+};
+
+struct Piece {
+  std::vector<StepSample> samples;
+  std::vector<Crossing> crossings;
+};
+
+/// The unknowns; levels and the blur as their logarithms.
+enum StepUnknown { kAt, kOut, kOutSlope, kIn, kInSlope, kAlong, kLogBlur, kStepUnknowns };
+using StepVector = Eigen::Matrix<double, kStepUnknowns, 1>;
+
+struct StepModel {
+  StepVector x;
+  double gamma;
+  /// What is seen where there is no light.
+  double floor;
+
+  CurveDistance<kStepUnknowns> residual(const StepSample& sample) const {
+    const auto share = [](double v) { return std::erfc(-v / std::numbers::sqrt2) / 2; };
+    const auto density = [](double v) {
+      return std::exp(-v * v / 2) / std::sqrt(2 * std::numbers::pi);
+    };
+    const double u = sample.depth_px - x[kAt], s = std::exp(x[kLogBlur]);
+    const double p = x[kOutSlope], q = x[kInSlope];
+    const double outer = std::exp(x[kAlong] * sample.along + x[kOut] + p * u + p * p * s * s / 2);
+    const double inner = std::exp(x[kAlong] * sample.along + x[kIn] + q * u + q * q * s * s / 2);
+    const double before = -u / s - p * s, behind = u / s + q * s;
+    const double out = outer * share(before), in = inner * share(behind);
+    const double at_out = outer * density(before), at_in = inner * density(behind);
+    const double light = out + in + std::pow(floor, gamma);
+    const double shown = std::pow(light, 1 / gamma), by_light = shown / light / gamma;
+    CurveDistance<kStepUnknowns> result;
+    result.error = shown - std::min(sample.level, kClipped);
+    result.slope[kAt] = -by_light * (p * out - at_out / s + q * in + at_in / s);
+    result.slope[kOut] = by_light * out;
+    result.slope[kOutSlope] = by_light * (out * (u + p * s * s) - at_out * s);
+    result.slope[kIn] = by_light * in;
+    result.slope[kInSlope] = by_light * (in * (u + q * s * s) + at_in * s);
+    result.slope[kAlong] = by_light * (out + in) * sample.along;
+    result.slope[kLogBlur] =
+        by_light * s *
+        (p * p * s * out + at_out * (u / (s * s) - p) + q * q * s * in - at_in * (u / (s * s) - q));
+    return result;
+  }
+};
+
+/// Neighbouring lines, so many at most.
+std::vector<std::vector<int>> pieces_of(const std::vector<int>& lines, int most) {
+  std::vector<std::vector<int>> pieces;
+  for (std::size_t begin = 0; begin < lines.size();) {
+    std::size_t end = begin + 1;
+    while (end < lines.size() && lines[end] == lines[end - 1] + 1) ++end;
+    const std::size_t all = end - begin, parts = (all + std::size_t(most) - 1) / std::size_t(most);
+    for (std::size_t i = 0; i < parts; ++i) {
+      const auto first = lines.begin() + std::ptrdiff_t(begin);
+      pieces.emplace_back(first + std::ptrdiff_t(all * i / parts),
+                          first + std::ptrdiff_t(all * (i + 1) / parts));
+    }
+    begin = end;
+  }
+  return pieces;
+}
+
+/// The outline of a light as lines cross it.
+class CrossedOutline {
+ public:
+  CrossedOutline(const Light& light, const LightShape& shape)
+      : light_(light),
+        shape_(shape),
+        low_(shape.turned(light.low)),
+        high_(shape.turned(light.high)) {}
+
+  /// Of a pixel behind the outline.
+  double depth_px(double column, double line) const {
+    constexpr double half = 0.5;
+    const double radii = radii_at(column, line);
+    const Eigen::Vector2d slope(radii_at(column + half, line) - radii_at(column - half, line),
+                                radii_at(column, line + half) - radii_at(column, line - half));
+    return (1 - radii) / slope.norm();
+  }
+
+  Eigen::Vector2d inwards(const Crossing& at) const {
+    const double per_line =
+        (depth_px(at.column, at.line + 1) - depth_px(at.column, at.line - 1)) / 2;
+    return Eigen::Vector2d(at.per_column, per_line).normalized();
+  }
+
+  std::optional<Crossing> crossing(int line, bool begins) const {
+    constexpr double flattest = 0.3;
+    const Eigen::Vector2d center = (low_ + high_) / 2, half = (high_ - low_) / 2;
+    const double up = (line - center.y()) / half.y();
+    if (std::abs(up) >= 1) return std::nullopt;
+    const double sign = begins ? 1 : -1;
+    Crossing result{line, center.x() - sign * half.x() * std::sqrt(1 - up * up), 0};
+    for (int round = 0; round < 3; ++round) {
+      result.per_column =
+          (depth_px(result.column + 1, line) - depth_px(result.column - 1, line)) / 2;
+      if (!(sign * result.per_column > flattest)) return std::nullopt;
+      result.column -= depth_px(result.column, line) / result.per_column;
+    }
+    return std::isfinite(result.column) ? std::optional(result) : std::nullopt;
+  }
+
+ private:
+  /// The distance from the centre, over the outline's.
+  double radii_at(double column, double line) const {
+    constexpr double far = 10;
+    const auto plane = shape_.plane_of(shape_.turned(Eigen::Vector2d(column, line)));
+    return plane ? (light_.unit_from_plane * (*plane - light_.plane_center)).norm() : far;
+  }
+
+  const Light& light_;
+  const LightShape& shape_;
+  Eigen::Vector2d low_, high_;
+};
+
+Piece piece_of(const Levels& levels, const std::vector<int>& lines, bool begins,
+               const CrossedOutline& outline, double reach_px) {
+  constexpr double straight = 0.7;
+  Piece piece;
+  const int middle_line = lines[lines.size() / 2];
+  for (const int line : lines) {
+    const auto crossing = outline.crossing(line, begins);
+    if (!crossing) continue;
+    piece.crossings.push_back(*crossing);
+    const int middle = static_cast<int>(std::lround(crossing->column));
+    const int reach = static_cast<int>(std::ceil(reach_px / std::abs(crossing->per_column)));
+    for (int column = std::max(0, middle - reach);
+         column <= std::min(levels.columns() - 1, middle + reach); ++column) {
+      const double depth_px = std::abs(crossing->per_column) > straight
+                                  ? crossing->per_column * (column - crossing->column)
+                                  : outline.depth_px(column, line);
+      if (std::abs(depth_px) > reach_px) continue;
+      piece.samples.push_back({depth_px, double(line - middle_line), levels.at(line, column)});
+    }
+  }
+  return piece;
+}
+
+struct Step {
+  double at_px, sd_px;
+  double log_blur, log_blur_sd;
+};
+
+std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& picture,
+                            bool blur_known) {
+  constexpr std::size_t least = 30;
+  constexpr int rounds = 12;
+  constexpr double clear_px = 2, farthest_px = 3;
+  // What is known of the slopes, of the change along a line and of the blur, give or take, in
+  // grey levels of noise.
+  constexpr double noise = 1.5, slope_sd = 0.3, along_sd = 0.05, log_blur_sd = 0.4;
+  if (piece.samples.size() < least) return std::nullopt;
+  std::array<double, 2> sums{}, counts{};
+  for (const StepSample& sample : piece.samples) {
+    if (std::abs(sample.depth_px) < clear_px) continue;
+    const std::size_t side = sample.depth_px > 0 ? 1 : 0;
+    sums[side] += sample.level;
+    ++counts[side];
+  }
+  if (counts[0] == 0 || counts[1] == 0) return std::nullopt;
+  const double out = std::max(1.0, sums[0] / counts[0]), in = std::max(1.0, sums[1] / counts[1]);
+  StepModel model{{}, picture.gamma, std::max(0.5, dark)};
+  model.x << 0, picture.gamma * std::log(out), 0, picture.gamma * std::log(in), 0, 0,
+      std::log(picture.blur_px);
+  const double known_blur = model.x[kLogBlur];
+  struct Prior {
+    StepUnknown unknown;
+    double value, sd;
+  };
+  const std::array priors{Prior{kOutSlope, 0, slope_sd}, Prior{kInSlope, 0, slope_sd},
+                          Prior{kAlong, 0, along_sd},
+                          Prior{kLogBlur, known_blur, blur_known ? 1e-3 : log_blur_sd}};
+  const double tolerance = std::max({4.0, 0.2 * std::abs(in - out), 0.1 * in});
+  std::optional<MEstimateStep<kStepUnknowns>> last;
+  for (int round = 0; round < rounds; ++round) {
+    // A clipped pixel says nothing to a model in which it is clipped (Tobin 1958).
+    std::vector<CurveDistance<kStepUnknowns>> residuals;
+    for (const StepSample& sample : piece.samples) {
+      residuals.push_back(model.residual(sample));
+      if (sample.clipped() && residuals.back().error >= 0) residuals.pop_back();
+    }
+    if (residuals.size() < least) return std::nullopt;
+    const std::vector<double> weights(residuals.size() + priors.size(), 1);
+    last = m_estimate_step<kStepUnknowns>(weights, tolerance, [&](std::size_t i) {
+      if (i < residuals.size()) return residuals[i];
+      const auto& [unknown, value, sd] = priors[i - residuals.size()];
+      CurveDistance<kStepUnknowns> prior{noise / sd * (model.x[unknown] - value),
+                                         StepVector::Zero()};
+      prior.slope[unknown] = noise / sd;
+      return prior;
+    });
+    if (!last) return std::nullopt;
+    const StepVector most{0.7, 0.5, 0.1, 0.5, 0.1, 0.05, 0.3};
+    model.x -= last->step.cwiseMin(most).cwiseMax(-most);
+    if (!(std::abs(model.x[kAt]) < farthest_px)) return std::nullopt;
+  }
+  return Step{model.x[kAt], std::sqrt(last->covariance(kAt, kAt)), model.x[kLogBlur],
+              std::sqrt(last->covariance(kLogBlur, kLogBlur))};
+}
+
+}  // namespace
+
+RimSteps fit_rim_steps(const cv::Mat& image, const Light& light, const std::vector<int>& lit_lines,
+                       const Background& background, const StepPicture& picture, bool blur_known,
+                       const LightShape& shape) {
+  constexpr double piece_of_radius = 0.2, least_lines = 6, most_sd_px = 0.5;
+  constexpr double least_reach_px = 7, reach_of_blur = 4;
+  constexpr double of_blur = 0.05;  // what sharpening and compression do
+  constexpr std::size_t least_crossings = 3;
+  const double reach_px = std::max(least_reach_px, reach_of_blur * picture.blur_px);
+  const CrossedOutline outline(light, shape);
+  const Levels levels(image, shape.turned(light.low), shape.turned(light.high));
+  const int most = static_cast<int>(std::max(least_lines, piece_of_radius * light.radius_px));
+  RimSteps result{{}, 0, {}, picture.blur_px};
+  double log_blur = 0, weight = 0;
+  for (const std::vector<int>& lines : pieces_of(lit_lines, most)) {
+    for (const bool begins : {true, false}) {
+      const Piece piece = piece_of(levels, lines, begins, outline, reach_px);
+      if (piece.crossings.size() < least_crossings) continue;
+      ++result.looked_at;
+      const auto step = step_of(piece, levels.of(background.level), picture, blur_known);
+      if (!step || !(step->sd_px < most_sd_px)) continue;
+      log_blur += step->log_blur / std::pow(step->log_blur_sd, 2);
+      weight += 1 / std::pow(step->log_blur_sd, 2);
+      const double sd_px = std::hypot(step->sd_px, of_blur * picture.blur_px);
+      const Crossing& middle = piece.crossings[piece.crossings.size() / 2];
+      result.pieces.push_back({outline.inwards(middle), step->at_px, sd_px});
+      for (const Crossing& crossing : piece.crossings) {
+        result.points.push_back(
+            {{crossing.column + step->at_px / crossing.per_column, crossing.line},
+             1 / sd_px,
+             light.rise_px,
+             begins});
+      }
+    }
+  }
+  if (!blur_known && weight > 0) result.blur_px = std::exp(log_blur / weight);
+  return result;
+}
+
+namespace {
+
+template <int N>
+std::optional<OutlineShift> shift_by(const std::vector<RimPiece>& pieces) {
+  constexpr int rounds = 8;
+  constexpr double tukey = 4.685, sigma_from_median = 1.4826;
+  if (pieces.size() < N + 2) return std::nullopt;
+  using Vector = Eigen::Matrix<double, N, 1>;
+  const auto slope_of = [](const RimPiece& piece) {
+    const double c = piece.inwards.x(), s = piece.inwards.y();
+    Vector slope;
+    slope[0] = c, slope[1] = s, slope[2] = -1;
+    if constexpr (N > 3) slope[3] = c * c - s * s, slope[4] = 2 * c * s;
+    return Vector(slope / piece.sd_px);
+  };
+  Vector x = Vector::Zero();
+  OutlineShift shift{};
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<double> errors, sizes;
+    for (const RimPiece& piece : pieces) {
+      errors.push_back(piece.behind_px / piece.sd_px - slope_of(piece).dot(x));
+      sizes.push_back(std::abs(errors.back()));
+    }
+    const double scale = std::max(1.0, sigma_from_median * upper_median(std::move(sizes)));
+    Normal<std::size_t(N)> normal;
+    double squares = 0, all = 0;
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      const double share = errors[i] / (tukey * scale);
+      if (std::abs(share) >= 1) continue;
+      const double weight = std::pow(1 - share * share, 2);
+      normal.add_row(slope_of(pieces[i]), errors[i], weight);
+      squares += weight * errors[i] * errors[i];
+      all += weight;
+    }
+    const Cholesky<std::size_t(N)> factor(normal);
+    if (!factor.determines(1e-9) || !(all > N + 1)) return std::nullopt;
+    const auto step = factor.solve(normal.gradient);
+    for (int i = 0; i < N; ++i) x[i] += step[std::size_t(i)];
+    const double beyond = std::max(1.0, squares / (all - N));
+    for (int i = 0; i < 2; ++i) {
+      const auto column = factor.inverse_column(std::size_t(i));
+      shift.covariance(0, i) = beyond * column[0];
+      shift.covariance(1, i) = beyond * column[1];
+    }
+    shift.px = x.template head<2>();
+    shift.agreeing = all;
+  }
+  return shift;
+}
+
+}  // namespace
+
+std::optional<OutlineShift> shift_of(const std::vector<RimPiece>& pieces, bool round) {
+  return round ? shift_by<3>(pieces) : shift_by<5>(pieces);
+}
+
+}  // namespace vlp

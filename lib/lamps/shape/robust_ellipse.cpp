@@ -1,0 +1,114 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/robust_ellipse.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "lamps/shape/m_estimate.h"
+#include "lamps/shape/robust_circle.h"
+#include "geometry/symmetric.h"
+
+namespace vlp {
+namespace {
+
+/// The ellipse (x - center)^T conic (x - center) = 1.
+struct Conic {
+  Eigen::Vector2d center;
+  Matrix2 conic;
+
+  CurveDistance<5> distance(const Eigen::Vector2d& point) const {
+    const Eigen::Vector2d away = point - center, gradient = conic * away;
+    const double s = std::sqrt(std::max(0.0, away.dot(gradient)));
+    const double steepness = std::max(gradient.norm(), std::numeric_limits<double>::min());
+    CurveDistance<5> result;
+    result.error = (s - 1) * s / steepness;
+    result.slope << -gradient / steepness, away.x() * away.x() / (2 * steepness),
+        away.x() * away.y() / steepness, away.y() * away.y() / (2 * steepness);
+    return result;
+  }
+};
+
+}  // namespace
+
+std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d> points,
+                                                std::span<const double> weights, double tolerance) {
+  constexpr double most_oval = 1.0 / 8, most_axis_ratio = 3;
+  constexpr int rounds = 10;
+  if (points.empty()) return std::nullopt;
+  Eigen::Vector2d low = points[0], high = points[0];
+  for (const Eigen::Vector2d& point : points) {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  const double oval = std::max(tolerance, most_oval * (high - low).norm() / 2);
+  const auto circle = fit_robust_circle(points, weights, oval);
+  if (!circle) return std::nullopt;
+  // In units of the circle, so that centre and conic weigh alike.
+  const double unit = circle->circle.radius;
+  Conic ellipse{Eigen::Vector2d::Zero(), Matrix2::Identity()};
+  RobustEllipse fit{};
+  for (int round = 0; round < rounds; ++round) {
+    // The tolerance narrows as the ellipse gets better.
+    const double narrowed = std::max(tolerance, oval * std::pow(0.6, round));
+    auto better = m_estimate_step<5>(weights, narrowed / unit, [&](std::size_t i) {
+      return ellipse.distance((points[i] - circle->circle.center) / unit);
+    });
+    if (!better) return std::nullopt;
+    ellipse.center -= better->step.head<2>();
+    ellipse.conic(0, 0) -= better->step[2];
+    ellipse.conic(0, 1) -= better->step[3];
+    ellipse.conic(1, 0) = ellipse.conic(0, 1);
+    ellipse.conic(1, 1) -= better->step[4];
+    fit.center_covariance = better->covariance.topLeftCorner<2, 2>() * (unit * unit);
+    fit.inliers = std::move(better->inliers);
+    fit.count = better->count;
+  }
+  const auto axes = symmetric_eigen(Eigen::Matrix2d(ellipse.conic));
+  const double least = axes.values[0], most = axes.values[1];
+  if (!(least * most_axis_ratio * most_axis_ratio > most)) return std::nullopt;
+  fit.center = circle->circle.center + unit * ellipse.center;
+  const Eigen::Vector2d semi_axes = axes.values.cwiseInverse().cwiseSqrt();
+  fit.rim_from_circle =
+      unit * Matrix2(axes.vectors * semi_axes.asDiagonal() * axes.vectors.transpose());
+  return fit;
+}
+
+std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d> points,
+                                                 std::span<const double> weights,
+                                                 double tolerance) {
+  if (points.empty()) return std::nullopt;
+  const auto count = static_cast<double>(points.size());
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& point : points) middle += point / count;
+  Matrix2 scatter = Matrix2::Zero();
+  for (const Eigen::Vector2d& point : points) {
+    scatter += (point - middle) * (point - middle).transpose() / count;
+  }
+  const auto root_of = [](const Matrix2& square) -> Matrix2 {
+    const auto axes = symmetric_eigen(Eigen::Matrix2d(square));
+    return axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal() *
+           axes.vectors.transpose();
+  };
+  // Points all around an ellipse scatter by its semi-axes over the root of 2.
+  const Matrix2 to_points = std::numbers::sqrt2 * root_of(scatter);
+  const double mean_scale = std::sqrt(to_points.determinant());
+  if (!(mean_scale > 0)) return std::nullopt;
+  const Matrix2 from_points = to_points.inverse();
+  std::vector<Eigen::Vector2d> scaled;
+  scaled.reserve(points.size());
+  for (const Eigen::Vector2d& point : points) scaled.emplace_back(from_points * (point - middle));
+  auto fit = fit_robust_ellipse(scaled, weights, tolerance / mean_scale);
+  if (!fit) return std::nullopt;
+  const Matrix2 rim = to_points * fit->rim_from_circle;
+  fit->center = middle + to_points * fit->center;
+  fit->rim_from_circle = root_of(rim * rim.transpose());
+  fit->center_covariance = to_points * fit->center_covariance * to_points.transpose();
+  return fit;
+}
+
+}  // namespace vlp

@@ -1,0 +1,146 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/shear.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace vlp {
+namespace {
+
+/// Of an oval that the motion explains, what it may differ by: of its size.
+constexpr double kUnlike = 0.15;
+
+/// The oval by the motion (v, w) / 2.
+Eigen::Matrix<double, 2, 3> oval_from_motion(const OutlineSums& light) {
+  const Eigen::Vector2d &slope = light.line_slope(), &at = light.circle().center;
+  const Eigen::Matrix2d times_slope{{slope.x(), -slope.y()}, {slope.y(), slope.x()}};
+  Eigen::Matrix<double, 2, 3> result;
+  result << times_slope, times_slope * Eigen::Vector2d(-at.y(), at.x());
+  return result;
+}
+
+Matrix2 unlike(const Eigen::Vector2d& oval) {
+  return kUnlike * kUnlike * oval.squaredNorm() * Matrix2::Identity();
+}
+
+struct Shown {
+  Eigen::Matrix<double, 2, 3> from_motion;
+  Eigen::Vector2d oval;
+  Matrix2 information;
+
+  double chi_square(const Eigen::Vector3d& motion) const {
+    const Eigen::Vector2d left = oval - from_motion * motion;
+    return left.dot(information * left);
+  }
+};
+
+struct Motion {
+  Eigen::Vector3d value;
+  Eigen::Matrix3d information;
+};
+
+Motion motion_of(const std::vector<Shown>& lights) {
+  // A camera that turns by more than a radian or two in 10,000 lines is none that sees lamps.
+  constexpr double most_turn = 1e-4;
+  Motion motion{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+  motion.information(2, 2) = 1 / (most_turn * most_turn);
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const Shown& light : lights) {
+    const Eigen::Matrix<double, 3, 2> weighed = light.from_motion.transpose() * light.information;
+    motion.information += weighed * light.from_motion;
+    right += weighed * light.oval;
+  }
+  motion.value = motion.information.ldlt().solve(right);
+  return motion;
+}
+
+}  // namespace
+
+OutlineSums::OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
+                         const std::vector<bool>& counted, const Circle& circle,
+                         const Eigen::Vector2d& line_slope, double together)
+    : circle_(circle), line_slope_(line_slope), together_(together) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!counted[i]) continue;
+    const Eigen::Vector2d away = (points[i] - circle_.center) / circle_.radius;
+    const double norm = away.norm(), c = away.x() / norm, s = away.y() / norm;
+    const Vector5 slope{{c, s, 1, c * c - s * s, 2 * c * s}};
+    const double weight = weights[i], out = norm - 1;
+    normal_ += weight * slope * slope.transpose();
+    gradient_ += weight * out * slope;
+    squares_ += weight * out * out;
+    weight_ += weight;
+    ++count_;
+  }
+}
+
+std::optional<OutlineSums::Estimate> OutlineSums::solved(const std::optional<Oval>& known) const {
+  constexpr int unknowns = 5, least = 2 * unknowns;
+  if (count_ < least) return std::nullopt;
+  const auto solve = [&](double variance) -> std::optional<Estimate> {
+    Matrix5 information = normal_ / variance;
+    Vector5 right = gradient_ / variance;
+    if (known) {
+      const Matrix2 prior = known->covariance.inverse();
+      information.bottomRightCorner<2, 2>() += prior;
+      right.tail<2>() += prior * known->oval;
+    }
+    const Eigen::LDLT<Matrix5> solver(information);
+    if (!(solver.vectorD().minCoeff() > 1e-9 * solver.vectorD().maxCoeff())) return std::nullopt;
+    return Estimate{solver.solve(right), solver.solve(Matrix5::Identity())};
+  };
+  const auto variance_left = [&](const Vector5& p) {
+    const double left = squares_ - 2 * gradient_.dot(p) + p.dot(normal_ * p);
+    return together_ * std::max(left, 1e-12 * weight_) / (count_ - unknowns);
+  };
+  constexpr double first = 1e-4;  // of the radius, squared
+  auto estimate = solve(first);
+  if (estimate) estimate = solve(variance_left(estimate->p));
+  return estimate;
+}
+
+std::optional<Shear> Shear::common(std::span<const OutlineSums> lights) {
+  constexpr double most_sd = 0.01;     // of the radius, of a light that is to tell
+  constexpr double beyond_doubt = 30;  // a chi-square of 2
+  constexpr double contradicts = 14;   // a chi-square of 2
+  std::vector<Shown> shown;
+  for (const OutlineSums& light : lights) {
+    const auto estimate = light.solved(std::nullopt);
+    if (!estimate) continue;
+    const Matrix2 covariance = estimate->covariance.bottomRightCorner<2, 2>();
+    if (covariance.trace() > 2 * most_sd * most_sd) continue;
+    const Eigen::Vector2d oval = estimate->p.tail<2>();
+    shown.push_back({oval_from_motion(light), oval, (covariance + unlike(oval)).inverse()});
+  }
+  const std::size_t all = shown.size();
+  while (!shown.empty() && 2 * shown.size() >= all) {
+    const Motion motion = motion_of(shown);
+    const auto worst =
+        std::max_element(shown.begin(), shown.end(), [&](const Shown& a, const Shown& b) {
+          return a.chi_square(motion.value) < b.chi_square(motion.value);
+        });
+    if (worst->chi_square(motion.value) > contradicts) {
+      shown.erase(worst);
+      continue;
+    }
+    if (motion.value.dot(motion.information * motion.value) < beyond_doubt) break;
+    return Shear(motion.value, motion.information.inverse());
+  }
+  return std::nullopt;
+}
+
+Oval Shear::oval_of(const OutlineSums& light) const {
+  const auto from_motion = oval_from_motion(light);
+  const Eigen::Vector2d oval = from_motion * motion_;
+  return {oval, from_motion * covariance_ * from_motion.transpose() + unlike(oval)};
+}
+
+Eigen::Vector2d Shear::motion_at(const OutlineSums& light) const {
+  const Eigen::Vector2d& at = light.circle().center;
+  return 2 * (motion_.head<2>() + motion_[2] * Eigen::Vector2d(-at.y(), at.x()));
+}
+
+}  // namespace vlp

@@ -1,0 +1,346 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/straight_edge.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numbers>
+
+#include "lamps/shape/m_estimate.h"
+#include "geometry/normal_equations.h"
+
+namespace vlp {
+namespace {
+
+/// A pixel near the side.
+struct Sample {
+  int line;
+  LineLevel lit;
+  /// Over the brightest line's level.
+  double value;
+  /// Along the side, from 0 to 1.
+  double t;
+  /// From the side, in pixels, inside positive; and what it loses when the side moves in by a pixel
+  /// of the plane.
+  double depth_px, per_move;
+};
+
+/// The unknowns, in this order; without a lens the bow is the last.
+enum Unknown { kFrom, kTo, kBlur, kLevelFrom, kLevelTo, kLevelBend, kOutside, kBow };
+
+template <int N>
+struct Model {
+  Eigen::Matrix<double, N, 1> x;
+
+  /// The residual, its slope with the unknowns, and with the line's level.
+  CurveDistance<N> residual(const Sample& sample, double* with_level = nullptr) const {
+    const double t = sample.t, middle = 4 * t * (1 - t);
+    double move = (1 - t) * x[kFrom] + t * x[kTo];
+    if constexpr (N > kBow) move += middle * x[kBow];
+    const double depth = (sample.depth_px - sample.per_move * move) / x[kBlur];
+    const double inside = std::erfc(-depth / std::numbers::sqrt2) / 2;
+    const double density = std::exp(-depth * depth / 2) / std::sqrt(2 * std::numbers::pi);
+    const double level = (1 - t) * x[kLevelFrom] + t * x[kLevelTo] + middle * x[kLevelBend];
+    const double s = sample.lit.level, step = s * (level - x[kOutside]);
+    const double shown = x[kOutside] + (level - x[kOutside]) * inside;
+    CurveDistance<N> result;
+    result.error = sample.value - s * shown;
+    const double with_move = step * density / x[kBlur] * sample.per_move;
+    result.slope[kFrom] = with_move * (1 - t);
+    result.slope[kTo] = with_move * t;
+    result.slope[kBlur] = step * density * depth / x[kBlur];
+    result.slope[kLevelFrom] = -s * inside * (1 - t);
+    result.slope[kLevelTo] = -s * inside * t;
+    result.slope[kLevelBend] = -s * inside * middle;
+    result.slope[kOutside] = -s * (1 - inside);
+    if constexpr (N > kBow) result.slope[kBow] = with_move * middle;
+    if (with_level != nullptr) *with_level = -shown;
+    return result;
+  }
+};
+
+/// Collects the samples of a side.
+class Samples {
+ public:
+  Samples(const cv::Mat& lines, const Side& side, const LineLevels& levels, double dark,
+          double per_px, const EdgeSearch& search, const LightShape& shape)
+      : lines_(lines), side_(side), levels_(levels), dark_(dark), per_px_(per_px), shape_(shape) {
+    if (!trace()) return;
+    // A corner is blurred by both sides.
+    constexpr double corner_px = 4;
+    const Eigen::Vector2d way = trace_.back() - trace_.front();
+    const double length_px = way.norm();
+    if (length_px < 3 * corner_px) return;
+    const int along = std::abs(way.y()) >= std::abs(way.x()) ? 1 : 0;
+    const double margin = corner_px / length_px;
+    const double from = at(margin)[along], to = at(1 - margin)[along];
+    const int begin = static_cast<int>(std::ceil(std::min(from, to)));
+    const int end = static_cast<int>(std::floor(std::max(from, to)));
+    std::vector<int> stations;
+    for (int station = begin; station <= end; ++station) {
+      if (along == 0 || shows(station)) stations.push_back(station);
+    }
+    const std::size_t every = (stations.size() + search.stations - 1) / search.stations;
+    for (std::size_t i = 0; i < stations.size(); i += every) {
+      if (add_station(stations[i], along, search.reach_px)) continue;
+      samples.clear();
+      return;
+    }
+  }
+
+  /// Empty when the side is too short or not wholly in the image.
+  std::vector<Sample> samples;
+
+  /// The pixel, (column, row), on the side.
+  Eigen::Vector2d at(double t) const {
+    const double place = t * kPieces;
+    const auto i = static_cast<std::size_t>(std::clamp(std::floor(place), 0.0, kPieces - 1.0));
+    return trace_[i] + (place - double(i)) * (trace_[i + 1] - trace_[i]);
+  }
+
+ private:
+  static constexpr int kPieces = 16;
+
+  /// Whether a line is not quite dark.
+  bool shows(int line) const {
+    constexpr double least = 0.1;
+    const auto lit = levels_.at(line);
+    return lit && lit->level > least;
+  }
+
+  bool trace() {
+    for (int i = 0; i <= kPieces; ++i) {
+      const double t = double(i) / kPieces;
+      const auto pixel = shape_.pixel_of(side_.from + t * (side_.to - side_.from));
+      if (!pixel) return false;
+      const Eigen::Vector2d at = shape_.turned(*pixel);
+      if (!(at.minCoeff() > -1 && at.x() < lines_.cols && at.y() < lines_.rows)) return false;
+      trace_[static_cast<std::size_t>(i)] = at;
+    }
+    return true;
+  }
+
+  /// Where the side crosses that column (along 0) or row (1).
+  Eigen::Vector2d crossing(int station, int along) const {
+    for (std::size_t i = 0; i + 1 < trace_.size(); ++i) {
+      const double a = trace_[i][along] - station, b = trace_[i + 1][along] - station;
+      if (a * b <= 0 && a != b) return trace_[i] + a / (a - b) * (trace_[i + 1] - trace_[i]);
+    }
+    return trace_.front();
+  }
+
+  double value_of(int column, int row) const {
+    const double level = lines_.depth() == CV_8U ? lines_.at<std::uint8_t>(row, column)
+                                                 : lines_.at<std::uint16_t>(row, column);
+    return (level - dark_) / levels_.brightest();
+  }
+
+  /// The pixels across the side at one column or row.
+  bool add_station(int station, int along, double reach_px) {
+    constexpr double apart_px = 2;
+    const int across = 1 - along;
+    const Eigen::Vector2d edge = crossing(station, along);
+    const Eigen::Vector2d middle = edge.array().round();
+    const auto plane = [&](const Eigen::Vector2d& pixel) {
+      return shape_.plane_of(shape_.turned(pixel));
+    };
+    const auto here = plane(middle);
+    const auto right = plane(middle + Eigen::Vector2d(apart_px, 0));
+    const auto below = plane(middle + Eigen::Vector2d(0, apart_px));
+    if (!here || !right || !below) return false;
+    Matrix2 plane_from_pixel;
+    plane_from_pixel << (*right - *here) / apart_px, (*below - *here) / apart_px;
+    const Eigen::Vector2d inwards = side_.inwards();
+    const Eigen::Vector2d gradient = plane_from_pixel.transpose() * inwards;
+    const double px = gradient.norm();  // of the plane, across the side
+    const double length = (side_.to - side_.from).norm();
+    // So far along the row or column that the window reaches as far from the side.
+    const double slant = std::max(0.5, std::abs(gradient[across]) / px);
+    const int reach = static_cast<int>(std::lround(reach_px / slant));
+    for (int i = -reach; i <= reach; ++i) {
+      Eigen::Vector2d pixel = middle;
+      pixel[across] += i;
+      const int column = static_cast<int>(pixel.x()), row = static_cast<int>(pixel.y());
+      if (column < 0 || row < 0 || column >= lines_.cols || row >= lines_.rows) return false;
+      const auto lit = levels_.at(row);
+      if (!lit) continue;
+      const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
+      const double share = levels_.share_at(column);
+      samples.push_back({row,
+                         {share * lit->level, share * lit->sd},
+                         value_of(column, row),
+                         away.dot(side_.way()) / length,
+                         away.dot(inwards) / px,
+                         per_px_ / px});
+    }
+    return true;
+  }
+
+  const cv::Mat& lines_;
+  const Side& side_;
+  const LineLevels& levels_;
+  double dark_, per_px_;
+  const LightShape& shape_;
+  std::array<Eigen::Vector2d, kPieces + 1> trace_;
+};
+
+/// What is known of the level along a side that is so long beforehand: it changes by a tenth in 100
+/// px, and bends by half of that, give or take. Of short sides the pixels do not tell. So much a
+/// lens of that focal length bends it at most: one of 115 degrees from corner to corner.
+template <int N>
+constexpr std::size_t kExpected = N > kBow ? 3 : 2;
+
+template <int N>
+CurveDistance<N> expected(const Model<N>& model, std::size_t which, double length_px,
+                          double focal_px) {
+  constexpr double noise = 0.01, change = 0.1 / 100, bend = 0.05 / 100;
+  CurveDistance<N> result{0, Eigen::Matrix<double, N, 1>::Zero()};
+  if (which == 0) {
+    const double weight = noise / (change * length_px);
+    result.error = weight * (model.x[kLevelTo] - model.x[kLevelFrom]);
+    result.slope[kLevelTo] = weight;
+    result.slope[kLevelFrom] = -weight;
+  } else if (which == 1) {
+    const double weight = noise / (bend * length_px);
+    result.error = weight * model.x[kLevelBend];
+    result.slope[kLevelBend] = weight;
+  } else if constexpr (N > kBow) {
+    const double weight = noise / (length_px * length_px / (12 * focal_px));
+    result.error = weight * model.x[kBow];
+    result.slope[kBow] = weight;
+  }
+  return result;
+}
+
+/// Of the two ends: by the scatter of the pixels, each its own, because bright ones are noisier
+/// than dark ones (White 1980), and by the levels of lines, each wrong for all of its pixels.
+template <int N>
+std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vector<Sample>& samples,
+                                          const std::vector<bool>& inliers, double length_px,
+                                          double focal_px) {
+  Normal<std::size_t(N)> normal;
+  double count = 0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!inliers[i]) continue;
+    normal.add_row(model.residual(samples[i]).slope, 0);
+    ++count;
+  }
+  for (std::size_t which = 0; which < kExpected<N>; ++which) {
+    normal.add_row(expected(model, which, length_px, focal_px).slope, 0);
+  }
+  const Cholesky<std::size_t(N)> factor(normal);
+  if (!factor.determines(1e-12) || !(count > N)) return std::nullopt;
+  const auto from = factor.inverse_column(kFrom), to = factor.inverse_column(kTo);
+  const auto ends_moved_by = [&](const Eigen::Matrix<double, N, 1>& pull) {
+    Eigen::Vector2d moved(0, 0);
+    for (std::size_t i = 0; i < N; ++i) {
+      moved += pull[Eigen::Index(i)] * Eigen::Vector2d(from[i], to[i]);
+    }
+    return moved;
+  };
+  Matrix2 covariance = Matrix2::Zero();
+  std::map<int, std::pair<Eigen::Vector2d, double>> of_lines;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!inliers[i]) continue;
+    double with_level = 0;
+    const auto [error, slope] = model.residual(samples[i], &with_level);
+    const Eigen::Vector2d moved = ends_moved_by(slope);
+    covariance += error * error * moved * moved.transpose();
+    auto& [by_level, sd] =
+        of_lines.try_emplace(samples[i].line, Eigen::Vector2d(0, 0), 0).first->second;
+    by_level += with_level * moved;
+    sd = samples[i].lit.sd;
+  }
+  covariance *= count / (count - N);
+  for (const auto& [line, of_line] : of_lines) {
+    const Eigen::Vector2d moved = of_line.first * of_line.second;
+    covariance += moved * moved.transpose();
+  }
+  return covariance;
+}
+
+template <int N>
+std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per_px,
+                                double focal_px) {
+  constexpr std::array tolerances = {5.0, 5.0, 5.0, 5.0, 2.0, 1.0, 0.5, 0.3, 0.3, 0.3};
+  constexpr double first_blur_px = 1.5, sharpest_px = 0.3, softest_px = 6;
+  constexpr double most_move_px = 1.5, farthest_px = 8, least_step = 0.4, most_sd_px = 0.5;
+  constexpr double near = 3, least_lit = 0.3, explained = 0.15, least_share = 0.8;
+  const std::vector<Sample>& samples = all.samples;
+  const std::vector<double> weights(samples.size() + kExpected<N>, 1);
+  const double length_px = (all.at(1) - all.at(0)).norm();
+  Model<N> model{Eigen::Matrix<double, N, 1>::Zero()};
+  model.x[kBlur] = first_blur_px;
+  model.x[kLevelFrom] = model.x[kLevelTo] = 1;
+  std::optional<MEstimateStep<N>> last;
+  for (const double tolerance : tolerances) {
+    last = m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
+      return i < samples.size() ? model.residual(samples[i])
+                                : expected(model, i - samples.size(), length_px, focal_px);
+    });
+    if (!last) return std::nullopt;
+    auto step = last->step;
+    for (const int end : {kFrom, kTo}) {
+      step[end] = std::clamp(step[end], -most_move_px, most_move_px);
+    }
+    model.x -= step;
+    model.x[kBlur] = std::clamp(model.x[kBlur], sharpest_px, softest_px);
+    if (model.x.template head<2>().cwiseAbs().maxCoeff() > farthest_px) return std::nullopt;
+  }
+  const auto& x = model.x;
+  const double least_level = std::min(x[kLevelFrom], x[kLevelTo]);
+  if (!(least_level - x[kOutside] > least_step)) return std::nullopt;
+  const auto covariance = covariance_of_ends(model, samples, last->inliers, length_px, focal_px);
+  if (!covariance) return std::nullopt;
+
+  const Eigen::Vector2d inwards = side.inwards() * per_px;
+  StraightEdge edge;
+  edge.side = {side.from + x[kFrom] * inwards, side.to + x[kTo] * inwards};
+  edge.covariance_px = *covariance;
+  edge.blur_px = x[kBlur];
+  edge.bow_px = 0;
+  if constexpr (N > kBow) edge.bow_px = x[kBow];
+  if (!(edge.covariance_px.diagonal().maxCoeff() < most_sd_px * most_sd_px)) return std::nullopt;
+  int close = 0, like = 0;
+  for (const Sample& sample : samples) {
+    if (sample.lit.level < least_lit || std::abs(sample.depth_px) > near) continue;
+    ++close;
+    like += std::abs(model.residual(sample).error) < explained * sample.lit.level + 0.02;
+  }
+  edge.share = close > 0 ? double(like) / close : 0;
+  if (edge.share < least_share) return std::nullopt;
+  return edge;
+}
+
+}  // namespace
+
+std::optional<StraightEdge> straight_edge_at(const cv::Mat& lines, const Side& side,
+                                             const LineLevels& levels, double dark, double per_px,
+                                             const EdgeSearch& search, const LightShape& shape) {
+  constexpr double least_lit = 0.35, rise_of_blur = 1.349;
+  constexpr std::size_t least = 40;
+  const Samples all(lines, side, levels, dark, per_px, search, shape);
+  if (all.samples.size() < least) return std::nullopt;
+  const double focal_px = std::hypot(lines.cols, lines.rows) / 2;
+  auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, focal_px)
+                               : fit<kBow + 1>(all, side, per_px, focal_px);
+  if (!edge) return std::nullopt;
+  const Side& found = edge->side;
+  const auto points = static_cast<int>((all.at(1) - all.at(0)).norm());
+  for (int i = 0; i < points; ++i) {
+    const double t = (i + 0.5) / points;
+    const auto pixel = shape.pixel_of(found.from + t * (found.to - found.from));
+    if (!pixel) continue;
+    const Eigen::Vector2d at = shape.turned(*pixel);
+    const auto lit = levels.at(static_cast<int>(std::lround(at.y())));
+    if (!lit || lit->level < least_lit) continue;
+    edge->points.push_back(
+        {at, lit->level * levels.brightest(), rise_of_blur * edge->blur_px, false});
+  }
+  return edge;
+}
+
+}  // namespace vlp

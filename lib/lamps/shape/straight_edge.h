@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "lamps/image/background.h"
+#include "lamps/shape/light_shape.h"
+#include "lamps/shape/line_levels.h"
+#include "geometry/types.h"
+
+namespace vlp {
+
+/// One side of a rectangle in the plane of LightShape, from one corner to the next; the light is on
+/// its left.
+struct Side {
+  Eigen::Vector2d from, to;
+
+  Eigen::Vector2d way() const { return (to - from).normalized(); }
+  Eigen::Vector2d inwards() const {
+    const Eigen::Vector2d along = way();
+    return {-along.y(), along.x()};
+  }
+};
+
+struct StraightEdge {
+  /// With its ends where the edge was found.
+  Side side;
+  /// Of the two ends' distances from the edge, in pixels (LightShape plane's per_px).
+  Matrix2 covariance_px;
+  /// Sigma of the blur across it.
+  double blur_px;
+  /// How far its middle stands out of the line through its ends; 0 with a lens.
+  double bow_px;
+  /// The share of the pixels next to it that it explains.
+  double share;
+  /// On the edge, where it is lit.
+  std::vector<EdgePoint> points;
+};
+
+/// Which pixels are looked at: so far to both sides, at so many places along it at most.
+struct EdgeSearch {
+  double reach_px;
+  std::size_t stations;
+};
+
+/// The edge near a side, of a light whose lines are lit to levels s(line). With d, the distance
+/// from the edge in pixels, inside positive, and F, the normal distribution, pixels show
+///
+///     dark + s(line) (h + (L(t) - h) F(d / blur)),    t from 0 to 1 along the side,
+///
+/// with the level L(t), a parabola, inside and h outside, both shares of s: the edge is where half
+/// of the local step is passed, and a dark line says nothing of it. The place of both ends, blur,
+/// L (of which short sides tell little: it is taken to change by a tenth in 100 px, give or take)
+/// and h are those with the least residuals of all pixels near the side (Gauss-Newton,
+/// Tukey's biweight), d in rays behind the lens; without a lens a bow is one more unknown,
+/// known beforehand to what a lens of 115 degrees from corner to corner bends a side so long.
+/// The covariance is by the scatter of the pixels and by what the levels of lines are worth, see
+/// LineLevels. Nothing where that leaves an end uncertain by more than half a pixel, or where most
+/// pixels do not look like an edge.
+std::optional<StraightEdge> straight_edge_at(const cv::Mat& lines, const Side& side,
+                                             const LineLevels& levels, double dark, double per_px,
+                                             const EdgeSearch& search, const LightShape& shape);
+
+}  // namespace vlp

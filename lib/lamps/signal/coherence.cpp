@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/coherence.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "lamps/signal/stripes.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kPieces = 5;
+using PieceLevels = Eigen::Array<double, kPieces, 1>;
+
+/// The levels of each line's parts, above the dark.
+template <typename Level>
+std::vector<PieceLevels> piece_levels(const cv::Mat& lines, const std::vector<Run>& chords,
+                                      double dark) {
+  std::vector<PieceLevels> levels;
+  levels.reserve(chords.size());
+  for (const auto& [row, begin, end] : chords) {
+    const auto* pixels = lines.ptr<Level>(row);
+    PieceLevels& line = levels.emplace_back();
+    for (int piece = 0; piece < static_cast<int>(kPieces); ++piece) {
+      const int from = begin + (end - begin) * piece / static_cast<int>(kPieces);
+      const int to =
+          std::max(from + 1, begin + (end - begin) * (piece + 1) / static_cast<int>(kPieces));
+      double sum = 0;
+      for (int column = from; column < to; ++column) sum += pixels[column];
+      line[piece] = sum / (to - from) - dark;
+    }
+  }
+  return levels;
+}
+
+}  // namespace
+
+double coherence_of(const cv::Mat& lines, const std::vector<Run>& chords,
+                    const Background& background, double period_lines) {
+  constexpr double share = 0.05;
+  constexpr std::size_t least_values = 3;
+  const auto levels = lines.depth() == CV_8U
+                          ? piece_levels<std::uint8_t>(lines, chords, background.level)
+                          : piece_levels<std::uint16_t>(lines, chords, background.level);
+  const auto quarter = static_cast<std::size_t>(std::max(1L, std::lround(period_lines / 4)));
+  if (levels.size() + 1 < least_values + 2 * quarter) return 0;
+  double brightest = 0;
+  std::vector<PieceLevels> sums{PieceLevels::Zero()};  // of all lines before
+  sums.reserve(levels.size() + 1);
+  for (const PieceLevels& line : levels) {
+    sums.emplace_back(sums.back() + line);
+    brightest = std::max(brightest, line.mean());
+  }
+  const double soft = (background.threshold - background.level) / 2 + share * brightest;
+  PieceLevels both = PieceLevels::Zero(), own = both, others = both;
+  for (std::size_t line = quarter; line + quarter <= levels.size(); ++line) {
+    const PieceLevels before = (sums[line] - sums[line - quarter]) / double(quarter);
+    const PieceLevels after = (sums[line + quarter] - sums[line]) / double(quarter);
+    const PieceLevels step = ((after.max(0) + soft) / (before.max(0) + soft)).log();
+    const PieceLevels rest = step.sum() - step;
+    both += step * rest;
+    own += step.square();
+    others += rest.square();
+  }
+  std::array<double, kPieces> alike{};
+  for (std::size_t i = 0; i < kPieces; ++i) {
+    const auto piece = static_cast<Eigen::Index>(i);
+    const double scale = std::sqrt(own[piece] * others[piece]);
+    alike[i] = scale > 0 ? both[piece] / scale : 0;
+  }
+  std::sort(alike.begin(), alike.end());
+  return alike[1];
+}
+
+}  // namespace vlp

@@ -1,0 +1,62 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/confusion.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace vlp {
+namespace {
+
+/// With the lamps of `lights` and these.
+Confusion empty_confusion(std::span<const LabelledLight> lights, std::set<int> lamps = {}) {
+  for (const LabelledLight& light : lights) lamps.insert(light.lamp);
+  Confusion confusion{{lamps.begin(), lamps.end()}, {}};
+  const auto count = static_cast<Eigen::Index>(lamps.size());
+  confusion.counts = Eigen::MatrixXi::Zero(count, count + 1);
+  return confusion;
+}
+
+Eigen::Index place_of(const Confusion& confusion, int lamp) {
+  return std::lower_bound(confusion.lamps.begin(), confusion.lamps.end(), lamp) -
+         confusion.lamps.begin();
+}
+
+void judge(const LampClassifier& classifier, const LabelledLight& light, Confusion& confusion) {
+  const auto answer = lamp_of(classifier, light.stripes);
+  const auto unknown = static_cast<Eigen::Index>(confusion.lamps.size());
+  ++confusion.counts(place_of(confusion, light.lamp),
+                     answer ? place_of(confusion, *answer) : unknown);
+}
+
+}  // namespace
+
+int Confusion::right() const { return counts.diagonal().sum(); }
+
+int Confusion::unknown() const { return counts.rightCols<1>().sum(); }
+
+int Confusion::wrong() const { return counts.sum() - right() - unknown(); }
+
+Confusion confusion_of(const LampClassifier& classifier, std::span<const LabelledLight> lights) {
+  std::set<int> known;
+  for (const auto& lamp : classifier.lamps) known.insert(lamp.lamp);
+  Confusion confusion = empty_confusion(lights, std::move(known));
+  for (const LabelledLight& light : lights) judge(classifier, light, confusion);
+  return confusion;
+}
+
+Confusion cross_validated(std::span<const LabelledLight> lights, const TrainClassifier& train) {
+  Confusion confusion = empty_confusion(lights);
+  for (int fold = 0; fold < kFolds; ++fold) {
+    std::vector<LabelledLight> others, held_out;
+    for (const LabelledLight& light : lights) {
+      (light.image % kFolds == std::size_t(fold) ? held_out : others).push_back(light);
+    }
+    const LampClassifier classifier = train(others);
+    for (const LabelledLight& light : held_out) judge(classifier, light, confusion);
+  }
+  return confusion;
+}
+
+}  // namespace vlp

@@ -1,0 +1,231 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/lamp_classifier.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <string>
+
+#include <Eigen/Cholesky>
+
+#include "lamps/signal/lamp_rule.h"
+#include "geometry/symmetric.h"
+#include "rig/file.h"
+#include "rig/yaml_reader.h"
+#include "rig/yaml_writer.h"
+
+namespace vlp {
+
+namespace {
+
+double distance_squared(const Eigen::Matrix4d& covariance, const LampFeatures& difference) {
+  return difference.dot(covariance.llt().solve(difference));
+}
+
+LampFeatures standardized(const LampClassifier& classifier, const LampFeatures& features) {
+  return (features - classifier.mean).cwiseQuotient(classifier.scale);
+}
+
+void standardize(std::span<const LabelledLight> lights, LampClassifier& classifier) {
+  classifier.mean.setZero();
+  classifier.scale.setZero();
+  const auto n = static_cast<double>(lights.size());
+  for (const LabelledLight& light : lights) classifier.mean += features_of(light.stripes) / n;
+  for (const LabelledLight& light : lights) {
+    classifier.scale += (features_of(light.stripes) - classifier.mean).cwiseAbs2() / n;
+  }
+  constexpr double least = 1e-6;  // a feature that is the same everywhere
+  classifier.scale = classifier.scale.cwiseSqrt().cwiseMax(least);
+}
+
+/// Centers and covariance from the lights that are `used`.
+void fit(std::span<const LabelledLight> lights, const std::vector<bool>& used,
+         LampClassifier& classifier) {
+  std::map<int, LampClassifier::Class> lamps;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const LampClassifier::Class none{lights[i].lamp, 0, LampFeatures::Zero()};
+    auto& lamp = lamps.try_emplace(lights[i].lamp, none).first->second;
+    if (!used[i]) continue;
+    ++lamp.examples;
+    lamp.center += standardized(classifier, features_of(lights[i].stripes));
+  }
+  for (auto& [id, lamp] : lamps) lamp.center /= std::max(1, lamp.examples);
+  classifier.covariance.setZero();
+  double count = 0;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    if (!used[i]) continue;
+    const LampFeatures off =
+        standardized(classifier, features_of(lights[i].stripes)) - lamps.at(lights[i].lamp).center;
+    classifier.covariance += off * off.transpose();
+    ++count;
+  }
+  const double freedom = std::max(1.0, count - static_cast<double>(lamps.size()));
+  classifier.covariance /= freedom;
+  constexpr double shrinkage = 10;  // in lights
+  const Eigen::Vector4d diagonal = classifier.covariance.diagonal();
+  classifier.covariance *= freedom / (freedom + shrinkage);
+  const LampFeatures least(kLampDrift / 3, kDutyMargin / 2, 0.01, kDutyMargin / 2);
+  classifier.covariance.diagonal() = diagonal + least.cwiseQuotient(classifier.scale).cwiseAbs2();
+  classifier.lamps.clear();
+  for (const auto& [id, lamp] : lamps) classifier.lamps.push_back(lamp);
+}
+
+}  // namespace
+
+LampClassifier train_classifier(std::span<const LabelledLight> lights) {
+  LampClassifier classifier;
+  standardize(lights, classifier);
+  std::vector<bool> used(lights.size(), true);
+  constexpr int passes = 8;
+  for (int pass = 0; pass < passes; ++pass) {
+    fit(lights, used, classifier);
+    std::map<int, LampFeatures> centers;
+    for (const auto& lamp : classifier.lamps) centers[lamp.lamp] = lamp.center;
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      const LampFeatures off =
+          standardized(classifier, features_of(lights[i].stripes)) - centers.at(lights[i].lamp);
+      constexpr double trimmed = 9;  // sooner than in use: outliers widen the covariance
+      used[i] = distance_squared(classifier.covariance, off) < trimmed;
+    }
+  }
+  return classifier;
+}
+
+std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stripes) {
+  constexpr double least_probability = 0.99, farthest = 6, farthest_unclear = 3;
+  const LampFeatures z = standardized(classifier, features_of(stripes));
+  const Eigen::LLT<Eigen::Matrix4d> factor(classifier.covariance);
+  if (!readable(stripes)) return std::nullopt;
+  double nearest = std::pow(trustworthy(stripes) ? farthest : farthest_unclear, 2);
+  const LampClassifier::Class* lamp = nullptr;
+  std::vector<double> distances;
+  distances.reserve(classifier.lamps.size());
+  for (const auto& candidate : classifier.lamps) {
+    const LampFeatures off = z - candidate.center;
+    distances.push_back(off.dot(factor.solve(off)));
+    if (distances.back() < nearest) nearest = distances.back(), lamp = &candidate;
+  }
+  // Scores differ by half the difference of the squared distances.
+  double sum = 0;
+  for (const double distance : distances) sum += std::exp((nearest - distance) / 2);
+  if (lamp == nullptr || 1 / sum < least_probability) return std::nullopt;
+  return lamp->lamp;
+}
+
+std::vector<LampDistance> inseparable(const LampClassifier& classifier) {
+  constexpr double least = 6;
+  std::vector<LampDistance> pairs;
+  for (std::size_t i = 0; i < classifier.lamps.size(); ++i) {
+    for (std::size_t j = i + 1; j < classifier.lamps.size(); ++j) {
+      const auto &a = classifier.lamps[i], &b = classifier.lamps[j];
+      const double distance =
+          std::sqrt(distance_squared(classifier.covariance, a.center - b.center));
+      if (distance < least) pairs.push_back({a.lamp, b.lamp, distance});
+    }
+  }
+  return pairs;
+}
+
+namespace {
+
+constexpr const char* kFormat = "vlp-classifier/1";
+
+LampFeatures read_features(const YamlValue& value) {
+  return LampFeatures(value.numbers(kLampFeatures.size()).data());
+}
+
+void check_features(const YamlValue& value) {
+  const auto names = value.list();
+  std::string known;
+  for (const std::string_view name : kLampFeatures) {
+    known.append(known.empty() ? "" : ", ").append(name);
+  }
+  bool same = names.size() == kLampFeatures.size();
+  for (std::size_t i = 0; same && i < names.size(); ++i) same = names[i].text() == kLampFeatures[i];
+  if (!same) throw value.error("should be [" + known + "]: train the classifier again");
+}
+
+Eigen::Matrix4d read_covariance(const YamlValue& value) {
+  const auto rows = value.list();
+  if (rows.size() != kLampFeatures.size()) throw value.error("should be four rows of four numbers");
+  Eigen::Matrix4d covariance;
+  for (int row = 0; row < 4; ++row) {
+    covariance.row(row) = read_features(rows[static_cast<std::size_t>(row)]).transpose();
+  }
+  if (covariance != covariance.transpose() || !inverse_of_positive(covariance)) {
+    throw value.error("is not a covariance: it should be symmetric and positive");
+  }
+  return covariance;
+}
+
+LampClassifier::Class read_class(YamlMap map) {
+  constexpr int largest = std::numeric_limits<int>::max();
+  LampClassifier::Class lamp;
+  lamp.lamp = map.required("id").integer_within(0, largest);
+  lamp.examples = map.required("examples").integer_within(1, largest);
+  lamp.center = read_features(map.required("center"));
+  map.finish();
+  return lamp;
+}
+
+}  // namespace
+
+LampClassifier read_lamp_classifier(const std::filesystem::path& file) {
+  YamlMap document = read_yaml(file, kFormat);
+  LampClassifier classifier;
+  if (const auto value = document.optional("row_time_s")) {
+    classifier.row_time_s = value->number_within(1e-8, 1e-3, "s");
+  }
+  check_features(document.required("features"));
+  classifier.mean = read_features(document.required("mean"));
+  const YamlValue scale = document.required("scale");
+  classifier.scale = read_features(scale);
+  if (!(classifier.scale.minCoeff() > 0)) throw scale.error("should be positive");
+  const auto lamps = document.required("lamps");
+  classifier.covariance = read_covariance(document.required("covariance"));
+  document.finish();
+  for (const YamlValue& item : lamps.list()) {
+    const auto lamp = read_class(item.map());
+    for (const auto& other : classifier.lamps) {
+      if (other.lamp == lamp.lamp) {
+        throw item.error("id " + std::to_string(lamp.lamp) + " stands twice");
+      }
+    }
+    classifier.lamps.push_back(lamp);
+  }
+  if (classifier.lamps.empty()) throw lamps.error("holds no lamp");
+  return classifier;
+}
+
+void write_lamp_classifier(const std::filesystem::path& file, const LampClassifier& classifier) {
+  YAML::Emitter out;
+  out << YAML::BeginMap;
+  emit_word(out, "format", kFormat);
+  if (classifier.row_time_s) emit_number(out, "row_time_s", *classifier.row_time_s);
+  out << YAML::Key << "features" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (const std::string_view name : kLampFeatures) out << std::string(name);
+  out << YAML::EndSeq;
+  emit_numbers(out, "mean", classifier.mean);
+  emit_numbers(out, "scale", classifier.scale);
+  out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
+  for (const auto& lamp : classifier.lamps) {
+    out << YAML::Flow << YAML::BeginMap;
+    emit_integer(out, "id", lamp.lamp);
+    emit_integer(out, "examples", lamp.examples);
+    emit_numbers(out, "center", lamp.center);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
+  // Last: a file cut short lacks it.
+  out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
+  for (int row = 0; row < 4; ++row) {
+    const LampFeatures values = classifier.covariance.row(row).transpose();
+    emit_row(out, {values.data(), 4});
+  }
+  out << YAML::EndSeq << YAML::EndMap << YAML::Newline;
+  write_file(file, out.c_str());
+}
+
+}  // namespace vlp

@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/lamp_map_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/stripes.h"
+
+namespace vlp {
+namespace {
+
+double exposure_lines(const StripeConditions& conditions) {
+  return conditions.exposure_s.value_or(0) / conditions.row_time_s;
+}
+
+/// Relative; of a lamp without a diameter nothing is known.
+double period_sd_of(const Lamp& lamp, const StripeConditions& conditions) {
+  const auto lines = lines_on(lamp, conditions);
+  if (!lines) return 0;
+  const double period = 1 / (*lamp.frequency_hz * conditions.row_time_s);
+  return period_sd(period, *lines, exposure_lines(conditions));
+}
+
+}  // namespace
+
+std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions) {
+  const double above_m = lamp.position_m.z() - conditions.camera_height_m;
+  const auto size_m = lamp.rectangle ? lamp.rectangle->size_m.minCoeff() : lamp.diameter_m;
+  if (!size_m || !conditions.focal_px || !(above_m > 0)) return std::nullopt;
+  return *size_m * *conditions.focal_px / above_m;
+}
+
+double period_sd(double period_lines, double lines, double exposure_lines) {
+  const double periods = kUsedHeight * lines / period_lines;
+  if (periods < kLeastPeriods) return std::numeric_limits<double>::infinity();
+  constexpr double noise = 0.02, blunt_lines = 1.2;
+  const double sharp = std::max(0.0, 1 - exposure_lines / blunt_lines) / std::sqrt(12.0);
+  const double edge = std::hypot(sharp, noise * exposure_lines);
+  return edge / period_lines * std::sqrt(6 / (periods * (periods * periods - 1)));
+}
+
+std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions& conditions) {
+  std::vector<LampsAlike> pairs;
+  for (std::size_t i = 0; i < lamps.lamps.size(); ++i) {
+    for (std::size_t j = i + 1; j < lamps.lamps.size(); ++j) {
+      const Lamp &a = lamps.lamps[i], &b = lamps.lamps[j];
+      if (!a.frequency_hz || !b.frequency_hz) continue;
+      if (a.duty && b.duty && std::abs(*a.duty - *b.duty) >= 2 * kDutyMargin) continue;
+      const double gap = std::abs(std::log(*a.frequency_hz / *b.frequency_hz));
+      const double sd = std::max(period_sd_of(a, conditions), period_sd_of(b, conditions));
+      const double needed = kLampDrift + 4 * sd;
+      // Lamps that show no period at all are lamps_unreadable().
+      if (gap >= needed || !std::isfinite(needed)) continue;
+      pairs.push_back({a.id, b.id, std::expm1(gap), std::expm1(needed)});
+    }
+  }
+  return pairs;
+}
+
+std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
+                                             const StripeConditions& conditions) {
+  std::vector<LampUnreadable> unreadable;
+  for (const Lamp& lamp : lamps.lamps) {
+    if (!lamp.frequency_hz) continue;
+    const double phase = std::numbers::pi * *lamp.frequency_hz * conditions.exposure_s.value_or(0);
+    const double contrast = phase > 0 ? std::abs(std::sin(phase) / phase) : 1;
+    const auto lines = lines_on(lamp, conditions);
+    const double periods = lines ? kUsedHeight * *lines * *lamp.frequency_hz * conditions.row_time_s
+                                 : std::numeric_limits<double>::infinity();
+    const double period_lines = 1 / (*lamp.frequency_hz * conditions.row_time_s);
+    if (period_lines < kShortestPeriod_lines || periods < kLeastPeriods ||
+        contrast < kLeastContrast) {
+      unreadable.push_back({lamp.id, period_lines, periods, contrast});
+    }
+  }
+  return unreadable;
+}
+
+}  // namespace vlp

@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/lamp_rule.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace vlp {
+namespace {
+
+struct Candidate {
+  const Lamp* lamp;
+  /// From the light, in log frequency and in duty.
+  double off, duty_off;
+};
+
+bool nearer_in_frequency(const Candidate& a, const Candidate& b) {
+  return b.off >= std::max(2 * a.off, a.off + kLampDrift);
+}
+
+bool beats(const Candidate& a, const Candidate& b) {
+  if (nearer_in_frequency(a, b)) return true;
+  if (nearer_in_frequency(b, a)) return false;
+  return a.lamp->duty && b.lamp->duty && b.duty_off >= a.duty_off + kDutyMargin;
+}
+
+}  // namespace
+
+std::optional<int> lamp_by_frequency(const LampMap& lamps, double row_time_s,
+                                     const Stripes& stripes) {
+  // Lamps keep their frequency to a few per cent. Few stripes, and unclear ones, where something
+  // hides a part, have to fit better.
+  const double most_off = trustworthy(stripes) ? 0.06 : kMostOffUnclear;
+  if (!readable(stripes) || !(stripes.period_lines > 0)) return std::nullopt;
+  const double frequency_hz = 1 / (stripes.period_lines * row_time_s);
+  std::vector<Candidate> candidates;
+  candidates.reserve(lamps.lamps.size());
+  for (const Lamp& lamp : lamps.lamps) {
+    if (!lamp.frequency_hz) continue;
+    candidates.push_back({&lamp, std::abs(std::log(frequency_hz / *lamp.frequency_hz)),
+                          std::abs(stripes.duty - lamp.duty.value_or(0))});
+  }
+  for (const Candidate& candidate : candidates) {
+    const bool best = std::all_of(
+        candidates.begin(), candidates.end(),
+        [&](const Candidate& other) { return &other == &candidate || beats(candidate, other); });
+    if (best && candidate.off < most_off) return candidate.lamp->id;
+  }
+  return std::nullopt;
+}
+
+}  // namespace vlp

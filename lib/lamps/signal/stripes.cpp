@@ -1,0 +1,234 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/stripes.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <numeric>
+#include <optional>
+
+namespace vlp {
+
+namespace {
+
+constexpr double kClear = 0.7;
+
+/// Of four frequencies at a time, which processors multiply at once.
+using Lanes = Eigen::Array4d;
+
+/// The share of the variance that a sine of each frequency (per line) and a constant explain.
+Lanes explained(const std::vector<double>& signal, double mean, double variance,
+                const Lanes& frequencies) {
+  const Lanes step = 2 * std::numbers::pi * frequencies;
+  const Lanes turn_c = step.cos(), turn_s = step.sin();
+  Lanes c = Lanes::Ones(), s = Lanes::Zero();
+  const Lanes none = Lanes::Zero();
+  Lanes sum_c = none, sum_s = none, sum_cc = none, sum_cs = none, a = none, b = none;
+  for (const double value : signal) {
+    sum_c += c;
+    sum_s += s;
+    sum_cc += c * c - s * s;
+    sum_cs += 2 * c * s;
+    a += (value - mean) * c;
+    b += (value - mean) * s;
+    const Lanes next = c * turn_c - s * turn_s;
+    s = c * turn_s + s * turn_c;
+    c = next;
+  }
+  const auto n = static_cast<double>(signal.size());
+  // Normal equations of cosine and sine, with the constant taken off.
+  const Lanes cc = (n + sum_cc) / 2 - sum_c * sum_c / n;
+  const Lanes ss = (n - sum_cc) / 2 - sum_s * sum_s / n;
+  const Lanes cs = sum_cs / 2 - sum_c * sum_s / n;
+  const Lanes determinant = cc * ss - cs * cs;
+  const Lanes share = (ss * a * a - 2 * cs * a * b + cc * b * b) / determinant / (n * variance);
+  return (determinant > 1e-6 * n * n).select(share, 0);
+}
+
+/// Where stripes begin or end: the signal passes the middle between dark and bright.
+std::vector<double> passages(const std::vector<double>& signal, double middle, bool rising) {
+  std::vector<double> places;
+  for (std::size_t i = 1; i < signal.size(); ++i) {
+    const double before = signal[i - 1] - middle, after = signal[i] - middle;
+    if ((rising && before < 0 && after >= 0) || (!rising && before >= 0 && after < 0)) {
+      places.push_back(double(i) - after / (after - before));
+    }
+  }
+  return places;
+}
+
+/// The period that begins and ends of stripes show, by least squares: one offset for the begins,
+/// one for the ends. Exact for square waves, of which a few periods mislead a sine. Nothing when
+/// they are too few or do not keep time with `guess`.
+std::optional<double> period_of(const std::vector<double>& signal, double middle, double guess) {
+  double moment = 0, square = 0, misfit = 0;
+  int count = 0;
+  std::array<std::vector<double>, 2> places, numbers;
+  for (const bool rising : {true, false}) {
+    auto& at = places[rising];
+    at = passages(signal, middle, rising);
+    double number = 0;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      if (i > 0) number += std::max(1.0, std::round((at[i] - at[i - 1]) / guess));
+      numbers[rising].push_back(number);
+    }
+    if (at.size() < 2) continue;
+    const double mean_at = std::accumulate(at.begin(), at.end(), 0.0) / double(at.size());
+    const double mean_number =
+        std::accumulate(numbers[rising].begin(), numbers[rising].end(), 0.0) / double(at.size());
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      at[i] -= mean_at;
+      numbers[rising][i] -= mean_number;
+      moment += numbers[rising][i] * at[i];
+      square += numbers[rising][i] * numbers[rising][i];
+    }
+    count += static_cast<int>(at.size());
+  }
+  if (!(square > 0)) return std::nullopt;
+  const double period = moment / square;
+  for (const std::size_t type : {std::size_t(0), std::size_t(1)}) {
+    if (places[type].size() < 2) continue;
+    for (std::size_t i = 0; i < places[type].size(); ++i) {
+      misfit += std::pow(places[type][i] - period * numbers[type][i], 2);
+    }
+  }
+  constexpr double most_misfit = 0.12, most_off = 0.35;
+  const bool in_time = std::sqrt(misfit / count) < most_misfit * period;
+  if (!in_time || std::abs(period / guess - 1) > most_off) return std::nullopt;
+  return period;
+}
+
+/// Share of the disc's area on lines brighter than `middle`: of chords, in the middle of the disc.
+double lit_area(const std::vector<double>& signal, double middle) {
+  const auto n = static_cast<double>(signal.size());
+  double lit = 0, all = 0;
+  for (std::size_t i = 0; i < signal.size(); ++i) {
+    const double off = kUsedHeight * (2 * (double(i) + 0.5) / n - 1);
+    const double chord = std::sqrt(1 - off * off);
+    all += chord;
+    if (signal[i] > middle) lit += chord;
+  }
+  return lit / all;
+}
+
+}  // namespace
+
+bool trustworthy(const Stripes& stripes) {
+  return stripes.clarity > kClear && stripes.periods > kEnoughPeriods;
+}
+
+bool readable(const Stripes& stripes) { return stripes.regular || stripes.clarity > kClear; }
+
+Stripes stripes_of(const std::vector<double>& signal) {
+  constexpr std::size_t least_lines = 8;
+  if (signal.size() < least_lines) return {};
+  const auto n = static_cast<double>(signal.size());
+  std::vector<double> sorted = signal;
+  std::sort(sorted.begin(), sorted.end());
+  const double low = std::max(0.0, sorted[sorted.size() / 20]);
+  const double high = sorted[sorted.size() - 1 - sorted.size() / 20];
+  if (!(high > 0)) return {};
+  Stripes stripes{};
+  stripes.contrast = (high - low) / high;
+  double mean = 0, variance = 0;
+  for (const double value : signal) mean += value / n;
+  for (const double value : signal) variance += (value - mean) * (value - mean) / n;
+  constexpr double rounding = 1e-18;
+  if (!(high > low) || !(variance > rounding * high * high)) return stripes;
+
+  // Steps are fine enough for a parabola through the best three.
+  const double step = 0.2 / n, lowest = 0.9 / n, highest = 1 / kShortestPeriod_lines;
+  const Lanes steps(0, step, 2 * step, 3 * step);
+  double best = lowest;
+  for (double first = lowest; first <= highest; first += 4 * step) {
+    const Lanes shares = explained(signal, mean, variance, first + steps);
+    for (Eigen::Index i = 0; i < 4 && first + steps[i] <= highest; ++i) {
+      if (shares[i] > stripes.clarity) stripes.clarity = shares[i], best = first + steps[i];
+    }
+  }
+  const Lanes beside = explained(signal, mean, variance, best - step + steps);
+  const double before = beside[0], after = beside[2];
+  const double bend = before - 2 * stripes.clarity + after;
+  if (bend < 0) best += std::clamp((before - after) / bend / 2, -1.0, 1.0) * step;
+  const double middle = (low + high) / 2;
+  const auto in_time = period_of(signal, middle, 1 / best);
+  stripes.regular = in_time.has_value();
+  stripes.period_lines = in_time.value_or(1 / best);
+  stripes.periods = n / stripes.period_lines;
+  // Over whole periods alone.
+  const double used = std::max(1.0, std::floor(stripes.periods)) * stripes.period_lines;
+  double lit = 0;
+  for (std::size_t i = 0; i < signal.size(); ++i) {
+    lit += std::clamp(used - double(i), 0.0, 1.0) * signal[i];
+  }
+  stripes.duty = std::clamp((lit / std::min(used, n) - low) / (high - low), 0.0, 1.0);
+  const std::size_t edges =
+      passages(signal, middle, true).size() + passages(signal, middle, false).size();
+  stripes.count_per_line = static_cast<double>(edges) / (2 * n);
+  stripes.lit_area = lit_area(signal, middle);
+  return stripes;
+}
+
+namespace {
+
+/// The level of a line between two columns: of five parts the second brightest, because something
+/// may hide some, and a speck may brighten one.
+template <typename Level>
+double level_of(const Level* pixels, int begin, int end) {
+  constexpr int parts = 5;
+  double most = 0, second = 0;
+  int counted = 0;
+  for (int part = 0; part < parts; ++part) {
+    const int from = begin + (end - begin) * part / parts;
+    const int to = begin + (end - begin) * (part + 1) / parts;
+    if (from == to) continue;
+    double sum = 0;
+    for (int column = from; column < to; ++column) sum += pixels[column];
+    const double mean = sum / (to - from);
+    second = std::max(second, std::min(most, mean));
+    most = std::max(most, mean);
+    ++counted;
+  }
+  return counted > 1 ? second : most;
+}
+
+template <typename Level>
+std::vector<double> signal_of(const cv::Mat& image, const std::vector<Run>& chords, double dark) {
+  std::vector<double> signal;
+  signal.reserve(chords.size());
+  for (const auto& [row, begin, end] : chords) {
+    signal.push_back(level_of(image.ptr<Level>(row), begin, end) - dark);
+  }
+  return signal;
+}
+
+}  // namespace
+
+std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                           const cv::Size& size) {
+  constexpr double used_width = 0.8;
+  const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
+  const int first = std::max(0, static_cast<int>(std::ceil(center.y() - kUsedHeight * half.y())));
+  const int last =
+      std::min(size.height - 1, static_cast<int>(std::floor(center.y() + kUsedHeight * half.y())));
+  std::vector<Run> chords;
+  for (int row = first; row <= last; ++row) {
+    const double off = (row - center.y()) / half.y();
+    const double used = used_width * half.x() * std::sqrt(std::max(0.0, 1 - off * off));
+    const int begin = std::max(0, static_cast<int>(std::lround(center.x() - used)));
+    const int end = std::min(size.width, static_cast<int>(std::lround(center.x() + used)) + 1);
+    if (begin < end) chords.push_back({row, begin, end});
+  }
+  return chords;
+}
+
+std::vector<double> line_signal(const cv::Mat& image, const std::vector<Run>& chords, double dark) {
+  return image.depth() == CV_8U ? signal_of<std::uint8_t>(image, chords, dark)
+                                : signal_of<std::uint16_t>(image, chords, dark);
+}
+
+}  // namespace vlp

@@ -1,0 +1,82 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "detection/labelled_lights.h"
+
+#include <gtest/gtest.h>
+
+#include "detection/image_file.h"
+
+namespace vlp {
+namespace {
+
+const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample";
+
+std::vector<ImageLights> sample_lights() {
+  const LampDetector detector({}, {Readout::rows, {}, {}});
+  return detect_lights(detector, images_in(kSample), {}, 1, [](std::size_t) {});
+}
+
+TEST(LabelledLights, AreThoseThatTheTableNames) {
+  const auto images = sample_lights();
+  ASSERT_EQ(images.size(), 2);
+  Labelled labelled;
+  const auto labels = read_detections(kSample + "/true_detections.csv");
+  add_labelled(images, labels, labelled);
+  EXPECT_EQ(labelled.labels, 12);
+  EXPECT_EQ(labelled.without_light, 0);
+  ASSERT_EQ(labelled.lights.size(), 12);
+  for (const LabelledLight& light : labelled.lights) {
+    const double frequency_hz =
+        std::array{1600, 2000, 2500, 3100, 3800, 4700}.at(static_cast<std::size_t>(light.lamp - 1));
+    EXPECT_NEAR(light.stripes.period_lines * frequency_hz * 3e-5, 1, 0.05) << light.lamp;
+    EXPECT_LT(light.image, 2);
+  }
+  // A second folder's images have numbers of their own.
+  add_labelled(images, labels, labelled);
+  EXPECT_EQ(labelled.lights.back().image, 3);
+}
+
+TEST(LabelledLights, AreNoneWhereTheLabelIsElsewhere) {
+  auto labels = read_detections(kSample + "/true_detections.csv");
+  labels[0].detections[0].pixel.x() += 30;
+  Labelled labelled;
+  add_labelled(sample_lights(), labels, labelled);
+  EXPECT_EQ(labelled.without_light, 1);
+  EXPECT_EQ(labelled.lights.size(), 11);
+}
+
+TEST(LabelledLights, LeaveOutLightsThatTheEdgeCuts) {
+  auto images = sample_lights();
+  const auto labels = read_detections(kSample + "/true_detections.csv");
+  images[0].size = cv::Size(int(labels[0].detections[0].pixel.x()), 600);
+  Labelled labelled;
+  add_labelled(images, labels, labelled);
+  EXPECT_GT(labelled.without_light, 0);
+}
+
+TEST(MeasuredPeriods, AreOfAllLightsOrOfThoseWithALabel) {
+  const auto images = sample_lights();
+  const auto all = measured_periods(images, {});
+  EXPECT_GE(all.size(), 8);
+  EXPECT_FALSE(all[0].lamp);
+  auto labels = read_detections(kSample + "/true_detections.csv");
+  labels.pop_back();
+  const auto some = measured_periods(images, labels);
+  EXPECT_LE(some.size(), 6);
+  EXPECT_GE(some.size(), 4);
+  for (const MeasuredPeriod& period : some) EXPECT_TRUE(period.lamp);
+}
+
+TEST(DetectLights, SaysWhyAnImageCannotBeUsed) {
+  const LampDetector detector({}, {Readout::rows, {}, {}});
+  std::size_t last = 0;
+  const std::vector<std::filesystem::path> files{"none.png", kSample + "/0000.png"};
+  const auto images = detect_lights(detector, files, {}, 2, [&](std::size_t done) { last = done; });
+  EXPECT_EQ(last, 2);
+  EXPECT_EQ(images[0].refused, "none.png: cannot be read as an image");
+  EXPECT_EQ(images[1].refused, "");
+  EXPECT_EQ(images[1].size, cv::Size(800, 600));
+}
+
+}  // namespace
+}  // namespace vlp

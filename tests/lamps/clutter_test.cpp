@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Captures with other lights, glare, poor light and things in the way: a lamp may be missed when
+/// something hides it, but what is said to be a lamp is right.
+#include "lamps/rendered_captures.h"
+
+namespace vlp {
+namespace {
+
+class Clutter : public testing::TestWithParam<const char*> {};
+
+TEST_P(Clutter, MisleadsNoDetection) {
+  const Score score = Captures("clutter", GetParam()).score(6);
+  EXPECT_GE(score.lamps, 20);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_EQ(score.missed, 0);
+  EXPECT_LT(score.chi_square / score.lamps, 2.5);
+  EXPECT_GE(score.hidden, 15);
+  EXPECT_LT(score.hidden_chi_square / score.hidden,
+            5);  // moving, too: 1 m/s and 90 degrees a second
+}
+
+INSTANTIATE_TEST_SUITE_P(Folders, Clutter,
+                         testing::Values("check", "low-light", "saturated", "fast"),
+                         [](const auto& folder) {
+                           std::string name = folder.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace vlp

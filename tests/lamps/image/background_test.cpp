@@ -1,0 +1,152 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/image/background.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+/// Flat and noisy; every `bright_every`th pixel at random is lit, none for 0.
+template <typename Level>
+cv::Mat noisy(cv::Size size, double level, double noise, std::size_t bright_every, double bright) {
+  Random random(7);
+  cv::Mat_<Level> image(size);
+  for (Level& pixel : image) {
+    const bool lit = bright_every > 0 && random.index(bright_every) == 0;
+    pixel = cv::saturate_cast<Level>(lit ? bright : level + noise * random.normal());
+  }
+  return image;
+}
+
+void expect_dark(const cv::Mat& image, double level, double noise) {
+  const Background background = background_of(image);
+  EXPECT_NEAR(background.level, level, 0.15 * noise + 0.5);
+  EXPECT_NEAR(background.noise, noise, 0.1 * noise);
+  EXPECT_DOUBLE_EQ(background.threshold, background.level + 4.5 * background.noise);
+}
+
+void expect_flat(const cv::Mat& image, double level) {
+  const Background background = background_of(image);
+  EXPECT_EQ(background.level, level);
+  EXPECT_LT(background.noise, 0.5);
+  EXPECT_EQ(background.threshold, level + 1.6);
+}
+
+TEST(Background, IsTheLevelAndNoiseOfFlatImagesOf8Bits) {
+  for (const cv::Size size : {cv::Size(97, 80), cv::Size(800, 600), cv::Size(1920, 1200)}) {
+    for (const double noise : {2.0, 5.0, 10.0}) {
+      SCOPED_TRACE(testing::Message() << size << ", " << noise);
+      expect_dark(noisy<std::uint8_t>(size, 60, noise, 0, 0), 60, noise);
+    }
+  }
+}
+
+TEST(Background, IsTheLevelAndNoiseOfFlatImagesOf16Bits) {
+  for (const double noise : {3.0, 50.0, 400.0}) {
+    SCOPED_TRACE(noise);
+    expect_dark(noisy<std::uint16_t>({800, 600}, 4000, noise, 0, 0), 4000, noise);
+  }
+}
+
+TEST(Background, IsNotMovedByLightsOnATwentiethOfThePixels) {
+  expect_dark(noisy<std::uint8_t>({800, 600}, 20, 4, 20, 250), 20, 4);
+  expect_dark(noisy<std::uint16_t>({800, 600}, 900, 80, 20, 65535), 900, 80);
+}
+
+TEST(Background, LeavesAllButAFewPixelsOfFlatImagesBelowItsThreshold) {
+  for (const double noise : {0.5, 2.0, 8.0}) {
+    const cv::Mat image = noisy<std::uint8_t>({800, 600}, 60, noise, 0, 0);
+    EXPECT_LT(cv::countNonZero(image > background_of(image).threshold), 20) << noise;
+  }
+}
+
+TEST(Background, OfTinyImagesIsTheirMedian) {
+  expect_flat(cv::Mat(1, 1, CV_8U, cv::Scalar(40)), 40);
+  expect_flat(cv::Mat(1, 1, CV_16U, cv::Scalar(4000)), 4000);
+  expect_flat((cv::Mat_<std::uint8_t>(3, 2) << 9, 9, 200, 9, 9, 9), 9);
+  expect_flat((cv::Mat_<std::uint16_t>(2, 3) << 700, 700, 700, 60000, 700, 700), 700);
+}
+
+TEST(Background, OfBlackAndWhiteImagesIsBlackAndWhite) {
+  expect_flat(cv::Mat::zeros(600, 800, CV_8U), 0);
+  expect_flat(cv::Mat::zeros(600, 800, CV_16U), 0);
+  expect_flat(cv::Mat(600, 800, CV_8U, cv::Scalar(255)), 255);
+  expect_flat(cv::Mat(600, 800, CV_16U, cv::Scalar(65535)), 65535);
+}
+
+TEST(Background, IsThatAboveALevelThatNothingIsBelow) {
+  // As many times as bright as it was, an image that was black in most places.
+  const cv::Mat image = cv::max(noisy<std::uint8_t>({800, 600}, 1, 1.2, 0, 0), 1);
+  const Background background = background_of(image);
+  EXPECT_NEAR(background.noise, 1.2, 0.3);
+  EXPECT_LT(cv::countNonZero(image > background.threshold), 20);
+}
+
+TEST(Background, WithoutNoiseIsNotTakenForClippedWhenMuchIsLit) {
+  for (const int type : {CV_8U, CV_16U}) {
+    for (const double dark : {0.0, 9.0}) {
+      for (const int lit_rows : {60, 150, 240}) {  // of 600: a tenth to two fifths
+        cv::Mat image(600, 800, type, cv::Scalar(dark));
+        image.rowRange(100, 100 + lit_rows) = 200;
+        image.row(100) = 60;  // an edge that is not sharp
+        SCOPED_TRACE(testing::Message() << type << ", " << dark << ", " << lit_rows);
+        expect_flat(image, dark);
+      }
+    }
+  }
+}
+
+TEST(Background, OfPartOfAnImageLeavesTheRestOut) {
+  cv::Mat image(600, 800, CV_8U, cv::Scalar(200));
+  cv::Mat part = image(cv::Rect(100, 50, 33, 41));
+  part = 30;
+  expect_flat(part, 30);
+}
+
+TEST(Background, OfFewerBitsInSixteenIsTheSame) {
+  Random random(3);
+  cv::Mat eight(600, 800, CV_8U), sixteen;
+  for (const double dark : {0.2, 3.0, 40.0}) {
+    for (int row = 0; row < eight.rows; ++row) {
+      for (int column = 0; column < eight.cols; ++column) {
+        const double lamp = row < 60 && column < 60 ? 3 * row : 0;
+        eight.at<std::uint8_t>(row, column) =
+            cv::saturate_cast<std::uint8_t>(dark + lamp + 0.8 * random.normal());
+      }
+    }
+    const Background expected = background_of(eight);
+    for (const int step : {16, 257}) {
+      eight.convertTo(sixteen, CV_16U, step);
+      const Background found = background_of(sixteen);
+      EXPECT_NEAR(found.level / step, expected.level, 1e-9);
+      EXPECT_NEAR(found.noise / step, expected.noise, 1e-9);
+      EXPECT_NEAR(found.threshold / step, expected.threshold, 1e-9);
+    }
+  }
+}
+
+TEST(Background, OfFewLevelsSaysNothingOfTheirStep) {
+  cv::Mat image = cv::Mat::zeros(600, 800, CV_16U);
+  image(cv::Rect(100, 50, 200, 200)) = 400;
+  EXPECT_LT(background_of(image).threshold, 2);
+}
+
+TEST(Background, MeetsEveryKindOfColumn) {
+  // Of four columns one is darker, as behind a mosaic of colours.
+  for (const cv::Size size : {cv::Size(800, 600), cv::Size(1280, 960), cv::Size(1920, 1200)}) {
+    for (int darker = 0; darker < 4; ++darker) {
+      cv::Mat image(size, CV_8U, cv::Scalar(30));
+      for (int column = darker; column < size.width; column += 4) image.col(column) = 20;
+      EXPECT_NEAR(background_of(image).level, 27.5, 0.1) << size << ", " << darker;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vlp

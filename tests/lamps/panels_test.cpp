@@ -1,0 +1,198 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Panels and tubes among discs, by a camera that leans.
+#include <algorithm>
+#include <utility>
+
+#include "lamps/rendered_captures.h"
+#include "positioning/positioner.h"
+#include "rig/find_lamp.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kStep = 11;  // of 144 captures, through all yaws
+
+bool is_panel_or_tube(int lamp) { return lamp <= 4; }
+
+TEST(Panels, AreFoundByTheirFourEdges) {
+  const Score score = Captures("panels", "check").score(kStep, is_panel_or_tube);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_GE(score.lamps, 34);
+  EXPECT_LE(score.missed, score.lamps / 3) << "a dark stripe hides an edge along the lines";
+  EXPECT_LT(score.rms_px(), 0.1);
+  EXPECT_GT(score.chi_square / score.lamps, 0.7);
+  EXPECT_LT(score.chi_square / score.lamps, 1.5);
+}
+
+TEST(Panels, LeaveDiscsAsTheyAre) {
+  const Captures captures("panels", "check");
+  LampMap discs = captures.lamps();
+  for (Lamp& lamp : discs.lamps) lamp.rectangle.reset();
+  const LampDetector without(discs, detector_camera(captures.calibration()));
+  int compared = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
+    const cv::Mat image = captures.image(captures.shot(i));
+    const auto lights = captures.detector().detect(image), others = without.detect(image);
+    for (const Light& light : lights) {
+      if (!light.lamp || is_panel_or_tube(*light.lamp)) continue;
+      const auto same = std::find_if(others.begin(), others.end(), [&](const Light& other) {
+        return other.lamp == light.lamp && other.pixel == light.pixel &&
+               other.sigma_px == light.sigma_px;
+      });
+      EXPECT_NE(same, others.end()) << "lamp " << *light.lamp << " in image " << i;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 8);
+}
+
+TEST(Panels, AreNoLampsOfAnotherShape) {
+  const Captures captures("panels", "check");
+  LampMap swapped = captures.lamps();
+  for (Lamp& lamp : swapped.lamps) {
+    if (lamp.rectangle) lamp.rectangle->size_m = Eigen::Vector2d(0.6, 0.2);
+  }
+  const LampDetector detector(swapped, detector_camera(captures.calibration()));
+  int refused = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
+    for (const Light& light : detector.detect(captures.image(captures.shot(i)))) {
+      if (!is_rectangle(light)) continue;
+      EXPECT_FALSE(light.lamp);
+      EXPECT_EQ(light.kind, LightKind::unknown);
+      refused += light.reason == LightReason::other_shape;
+    }
+  }
+  EXPECT_GT(refused, 6);
+}
+
+TEST(Panels, AreFoundWithoutALensByWhatTheirBowsTellOfIt) {
+  const Captures captures("panels", "check");
+  const LampDetector detector(captures.lamps(), {Readout::rows, 3e-5, std::nullopt});
+  double squares = 0;
+  int found = 0, tubes = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 3 * kStep) {
+    const LampShot shot = captures.shot(i);
+    const auto truth = captures.truth(shot);
+    for (const Light& light : detector.detect(captures.image(shot))) {
+      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      const auto lamp = std::find_if(truth.begin(), truth.end(),
+                                     [&](const TrueLamp& one) { return one.id == light.lamp; });
+      ASSERT_NE(lamp, truth.end());
+      const double error_px = (light.pixel - lamp->pixel).norm();
+      EXPECT_LT(error_px, 4 * light.sigma_px) << "lamp " << lamp->id;
+      squares += error_px * error_px;
+      tubes += lamp->id >= 3;
+      ++found;
+    }
+  }
+  EXPECT_GT(found, 9);
+  EXPECT_GT(tubes, 4);
+  EXPECT_LT(std::sqrt(squares / found), 0.4);
+}
+
+Scene panels_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/panels/scene.yaml"); }
+
+TEST(Panels, LeaveSmallDiscsBesideThemDiscs) {
+  Scene scene = panels_scene();
+  for (SceneLamp& lamp : scene.lamps) {
+    if (lamp.glow.rectangle) continue;
+    lamp.glow.diameter_m = 0.095;  // 10 to 12 px
+    lamp.frequency_hz = 6100 + 1200 * (lamp.id - 5);
+  }
+  const Captures captures(std::move(scene), "check");
+  const Score score = captures.score(kStep, [](int lamp) { return !is_panel_or_tube(lamp); });
+  EXPECT_GT(score.lamps, 35);
+  EXPECT_EQ(score.missed, 0);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_LT(score.rms_px(), 0.04);
+  EXPECT_LT(score.chi_square / score.lamps, 1.5);
+}
+
+/// A bar along y, at 2.2 m, between camera and ceiling.
+Panel bar(double x_m, double width_m) {
+  return {{x_m, -1.5, 2.2}, {width_m, 0, 0}, {0, 3, 0}, 1e6};
+}
+
+TEST(Panels, HiddenInPartAreAsSureAsTheyState) {
+  Scene scene = panels_scene();
+  // Along edges of panels and across a tube's end: what is left of them is a rectangle, too.
+  scene.clutter.occluders = {bar(-1.2, 0.08), bar(0.6, 0.3)};
+  const Captures captures(std::move(scene), "check");
+  int found = 0, far = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 5) {
+    const LampShot shot = captures.shot(i);
+    const auto truth = captures.truth(shot);
+    for (const Light& light : captures.detector().detect(captures.image(shot))) {
+      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      const auto lamp = std::find_if(truth.begin(), truth.end(),
+                                     [&](const TrueLamp& one) { return one.id == light.lamp; });
+      ASSERT_NE(lamp, truth.end());
+      const double off_px = (light.pixel - lamp->pixel).norm();
+      // A tube of 20 px width does not show that less than 3 px of its end are hidden.
+      if (off_px > 3) {
+        EXPECT_LT(off_px, 3 * light.sigma_px) << "lamp " << lamp->id << " in image " << i;
+        ++far;
+      }
+      ++found;
+    }
+  }
+  EXPECT_GT(found, 10);
+  EXPECT_GT(far, 5) << "there is something to state";
+}
+
+TEST(Panels, CutByTheImagesEdgeAreNoLamps) {
+  const Captures captures("panels", "check");
+  int cut = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 5) {
+    const LampShot shot = captures.shot(i);
+    const auto lights = captures.detector().detect(captures.image(shot));
+    for (const TrueLamp& lamp : captures.truth(shot)) {
+      if (!is_panel_or_tube(lamp.id) || lamp.in_view >= 1) continue;
+      ++cut;
+      for (const Light& light : lights) {
+        EXPECT_FALSE(light.lamp == lamp.id && light.kind == LightKind::lamp)
+            << "lamp " << lamp.id << " in image " << i;
+      }
+    }
+  }
+  EXPECT_GT(cut, 10);
+}
+
+TEST(Panels, AreNotTheirReflections) {
+  Scene scene = panels_scene();
+  for (const std::size_t lamp : {1U, 2U}) {
+    scene.clutter.reflections.push_back({scene.lamps[lamp].glow, lamp});
+    Glow& reflection = scene.clutter.reflections.back().glow;
+    reflection.position_m.head<2>() += Eigen::Vector2d(0.1, lamp == 1 ? -0.75 : 0.75);
+    reflection.radiance_e_per_s /= 4;
+    reflection.edge_share = 0;
+  }
+  const Score score = Captures(std::move(scene), "check").score(2 * kStep, is_panel_or_tube);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_GE(score.lamps, 12);
+  EXPECT_LT(score.rms_px(), 0.1);
+}
+
+TEST(Panels, GiveFixes) {
+  const Captures captures("panels", "check");
+  const Positioner positioner(captures.lamps(), captures.calibration());
+  int fixes = 0;
+  for (std::size_t i = 0; i < captures.size(); i += 2 * kStep) {
+    const LampShot shot = captures.shot(i);
+    std::vector<Detection> detections;
+    for (const Light& light : captures.detector().detect(captures.image(shot))) {
+      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      detections.push_back({*light.lamp, light.pixel, light.sigma_px});
+    }
+    if (detections.size() < 3) continue;
+    const Fix fix = positioner.locate(detections);
+    ASSERT_EQ(fix.status, FixStatus::ok) << i;
+    EXPECT_LT((fix.estimate.pose.position_m - shot.motion.pose(0).position_m).norm(), 0.002) << i;
+    ++fixes;
+  }
+  EXPECT_GE(fixes, 3);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/readout.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "detection/image_file.h"
+
+namespace vlp {
+namespace {
+
+cv::Mat sample(const std::string& scene) {
+  return read_image(VLP_SOURCE_DIR "/datasets/" + scene + "/rendered/sample/0000.png");
+}
+
+std::optional<Readout> found_in(const cv::Mat& image) {
+  return find_readout(1, [&](std::size_t) { return image; });
+}
+
+TEST(Readout, IsFoundInRenderedImages) {
+  for (const char* scene : {"paper-rig", "paper-rig-faulty", "clutter"}) {
+    EXPECT_EQ(found_in(sample(scene)), Readout::rows) << scene;
+    EXPECT_EQ(found_in(sample(scene).t()), Readout::columns) << scene;
+  }
+  EXPECT_EQ(found_in(sample("wide")), Readout::columns);
+  EXPECT_EQ(found_in(sample("wide").t()), Readout::rows);
+}
+
+TEST(Readout, IsNotFoundWhereThereAreNoLamps) {
+  EXPECT_FALSE(found_in(cv::Mat(120, 160, CV_8U, cv::Scalar(30))));
+  EXPECT_FALSE(found_in({}));
+  EXPECT_FALSE(find_readout(0, [](std::size_t) { return cv::Mat(); }));
+}
+
+TEST(Readout, IsFoundInTheFirstImagesThatShowIt) {
+  const cv::Mat lamps = sample("paper-rig"), dark(600, 800, CV_8U, cv::Scalar(2));
+  const std::array images{cv::Mat(), dark, lamps, lamps, cv::Mat()};
+  std::size_t asked = 0;
+  EXPECT_EQ(find_readout(images.size(), [&](std::size_t i) { return ++asked, images[i]; }),
+            Readout::rows);
+  EXPECT_LE(asked, 4);
+}
+
+TEST(Readout, IsNotDecidedByOneDoubtfulLight) {
+  EXPECT_FALSE((ReadoutEvidence{0.9, 0}).readout());
+  EXPECT_FALSE((ReadoutEvidence{3, 2}).readout());
+  EXPECT_EQ((ReadoutEvidence{3, 0.5}).readout(), Readout::rows);
+  EXPECT_EQ((ReadoutEvidence{0.5, 3}).readout(), Readout::columns);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,157 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The detector on photographs of real lamps, when they are there.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "captures/csv_reader.h"
+#include "detection/detect_lights.h"
+#include "lamps/signal/row_time.h"
+#include "detection/image_file.h"
+#include "lamps/lamp_detector.h"
+#include "support/real_data.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::map<int, Light> lamps_in(const LampDetector& detector, const cv::Mat& image) {
+  std::map<int, Light> lamps;
+  for (Light& light : detector.detect(image)) {
+    if (light.kind == LightKind::lamp) lamps.emplace(*light.lamp, std::move(light));
+  }
+  return lamps;
+}
+
+cv::Mat encoded(const cv::Mat& image, const char* ending, int quality = -1) {
+  std::vector<unsigned char> bytes;
+  const std::vector<int> options =
+      quality < 0 ? std::vector<int>() : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, quality};
+  cv::imencode(ending, image, bytes, options);
+  return cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+}
+
+/// Five recessed downlights in five photographs.
+class RealDownlights : public testing::Test {
+ protected:
+  const fs::path data = real_data("downlights");
+
+  void SetUp() override {
+    if (data.empty()) GTEST_SKIP() << "no real captures here";
+  }
+  LampMap map() const { return read_lamp_map(data / "lamps.yaml"); }
+  fs::path image(int number) const { return data / ("a0" + std::to_string(number) + ".jpg"); }
+};
+
+/// Lamps found, and of those that are not where they are expected, in all photographs.
+struct Identified {
+  int lamps = 0, wrong = 0;
+};
+
+template <typename Picture>
+Identified identified(const fs::path& data, const Picture& picture) {
+  const LampDetector detector(read_lamp_map(data / "lamps.yaml"), {Readout::columns, 15.1e-6, {}});
+  const CsvTable table(data / "expected.csv");
+  const auto image_column = table.required("image"), lamp_column = table.required("lamp");
+  const auto u_column = table.required("u_px"), v_column = table.required("v_px");
+  const auto size_column = table.required("size_px");
+  std::map<std::string, std::map<int, Light>> found;
+  Identified result;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string image(table.text(row, image_column));
+    if (!found.contains(image)) found[image] = lamps_in(detector, picture(data / image));
+    const auto lamp = found[image].find(table.integer(row, lamp_column));
+    if (lamp == found[image].end()) continue;
+    // What is expected is good to 20 px or so, and of what is lit; its middle is not the rim's.
+    const Eigen::Vector2d expected(table.number(row, u_column), table.number(row, v_column));
+    const double apart_px = (lamp->second.pixel - expected).norm();
+    ++result.lamps;
+    result.wrong += apart_px > table.number(row, size_column) / 2;
+  }
+  return result;
+}
+
+TEST_F(RealDownlights, AreIdentified) {
+  const Identified found = identified(data, [](const fs::path& file) { return read_image(file); });
+  EXPECT_EQ(found.wrong, 0);
+  EXPECT_GE(found.lamps, 24);  // measured: 25, all of them
+}
+
+TEST_F(RealDownlights, AreIdentifiedInEachFormat) {
+  for (const auto& [ending, quality] :
+       {std::pair(".png", -1), {".jpg", 100}, {".jpg", 90}, {".jpg", 80}}) {
+    const Identified found = identified(data, [&, &e = ending, &q = quality](const fs::path& file) {
+      return encoded(cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION), e,
+                     q);
+    });
+    EXPECT_EQ(found.wrong, 0) << ending << quality;
+    EXPECT_GE(found.lamps, 22) << ending << quality;  // measured: 23 or 24
+  }
+}
+
+TEST_F(RealDownlights, AreIdentifiedAtTwiceTheBrightness) {
+  const Identified found = identified(data, [](const fs::path& file) {
+    cv::Mat brighter;
+    cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION)
+        .convertTo(brighter, -1, 2);
+    return encoded(brighter, ".png");
+  });
+  EXPECT_EQ(found.wrong, 0);
+  EXPECT_GE(found.lamps, 22);  // measured: 23
+}
+
+TEST_F(RealDownlights, TellTheRowTime) {
+  const LampDetector detector(map(), {Readout::columns, {}, {}});
+  std::vector<MeasuredPeriod> periods;
+  for (int number = 1; number <= 5; ++number) {
+    for (const Light& light : detector.detect(read_image(image(number)))) {
+      if (trustworthy(light.stripes)) periods.push_back({light.stripes.period_lines, {}});
+    }
+  }
+  const RowTimeResult result = estimate_row_time(periods, map());
+  ASSERT_TRUE(result.found) << result.problem;
+  EXPECT_NEAR(result.found->row_time_s / 15.10e-6, 1, 0.002);
+}
+
+/// Glowing bulbs, from a phone's own JPEG files and the same pictures in other formats.
+TEST(RealGlows, AreTheSameInEachFormat) {
+  const fs::path data = real_data("luxapose");
+  if (data.empty()) GTEST_SKIP() << "no real captures here";
+  const LampMap map = read_lamp_map(data / "lamps.yaml");
+  for (const auto& [name, readout, count] :
+       {std::tuple("x_0_y_1.27.jpg", Readout::rows, 5U),
+        std::tuple("2014-02-27--18-15-03-62.jpg", Readout::columns, 3U)}) {
+    const LampDetector detector(map, {readout, 1 / 47540.0, {}});
+    const auto original = lamps_in(detector, read_image(data / name));
+    EXPECT_EQ(original.size(), count);
+    const cv::Mat picture =
+        cv::imread((data / name).string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+    cv::Mat dimmed;
+    picture.convertTo(dimmed, -1, 0.5);
+    for (const cv::Mat& image :
+         {encoded(picture, ".png"), encoded(picture, ".bmp"), encoded(picture, ".jpg", 100),
+          encoded(picture, ".jpg", 95), encoded(picture, ".jpg", 90), encoded(picture, ".jpg", 80),
+          encoded(dimmed, ".png")}) {
+      const auto lamps = lamps_in(detector, image);
+      EXPECT_EQ(lamps.size(), count);
+      for (const auto& [id, lamp] : lamps) {
+        ASSERT_TRUE(original.contains(id));
+        const double apart_px = (lamp.pixel - original.at(id).pixel).norm();
+        EXPECT_LT(apart_px, 2 * std::max(lamp.sigma_px, original.at(id).sigma_px)) << name << id;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vlp

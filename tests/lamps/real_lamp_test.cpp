@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// A real lamp, dim and with a hole, as a rolling-shutter camera saw it.
+#include <gtest/gtest.h>
+
+#include "detection/image_file.h"
+#include "lamps/lamp_detector.h"
+#include "support/real_data.h"
+
+namespace vlp {
+namespace {
+
+TEST(RealLamp, HasItsOutlineAndItsStripes) {
+  const auto folder = real_data("striped-lamp");
+  if (folder.empty()) GTEST_SKIP() << "no real captures here";
+  const LampDetector detector({}, {Readout::rows, {}, {}});
+  const auto lights = detector.detect(read_image(folder / "single_LED.bmp"));
+  ASSERT_EQ(lights.size(), 1);
+  EXPECT_NEAR(lights[0].stripes.period_lines, 10.1, 0.2);
+  EXPECT_NEAR(lights[0].radius_px, 34.5, 1);
+  EXPECT_EQ(lights[0].kind, LightKind::unknown) << "the map is empty";
+}
+
+}  // namespace
+}  // namespace vlp

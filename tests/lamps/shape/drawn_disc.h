@@ -1,0 +1,107 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "lamps/shape/outline.h"
+
+namespace vlp {
+
+constexpr double kDark = 0.04;  // of white
+/// Cosine between the row and the normal, from which on the first outline is good.
+constexpr double kSteep = 0.75;
+
+/// A disc on a dark image of 200 x 160 pixels, blurred, seen by pixels that are lit all over. The
+/// blur is with theirs: 0.3 px or more.
+struct DrawnDisc {
+  Eigen::Vector2d center{101.3, 79.6};
+  double radius_px = 38.4, blur_px = 0.8;
+  double level = 0.7;                  // of white, above the dark
+  double change = 0;                   // of the level, from the centre to the right rim
+  double fall = 0;                     // of the level, with the square of the radius, at the rim
+  std::vector<int> dark_columns = {};  // of a bar before it
+  /// More of the level above chips, of which so many pixels are from one to the next.
+  double chips = 0, pitch_px = 6;
+
+  Eigen::Vector2d low() const { return center - Eigen::Vector2d(radius_px, radius_px); }
+  Eigen::Vector2d high() const { return center + Eigen::Vector2d(radius_px, radius_px); }
+  double off(const Eigen::Vector2d& pixel) const { return (pixel - center).norm() - radius_px; }
+  /// Of the angle between the row and the outline's normal.
+  double cosine(const Eigen::Vector2d& pixel) const {
+    return std::abs(pixel.x() - center.x()) / radius_px;
+  }
+  cv::Mat image(int depth) const {
+    constexpr int finer = 8;
+    constexpr double pixels_own = 1 / 12.0;  // of their area, squared
+    cv::Mat1d sharp(160 * finer, 200 * finer);
+    for (int row = 0; row < sharp.rows; ++row) {
+      for (int column = 0; column < sharp.cols; ++column) {
+        const Eigen::Vector2d place(column, row);
+        const double inside_px = -off((place.array() + 0.5) / finer - 0.5);
+        const double lost = fall * std::pow(1 - inside_px / radius_px, 2);
+        const double wave = 2 * std::numbers::pi / (finer * pitch_px);
+        const double above = std::cos(wave * column) * std::cos(wave * row);
+        const double chip = 1 + chips * std::max(0.0, above);
+        sharp(row, column) = std::clamp(0.5 + finer * inside_px, 0.0, 1.0) * (1 - lost) * chip;
+      }
+    }
+    const double sigma = finer * std::sqrt(blur_px * blur_px - pixels_own);
+    cv::GaussianBlur(sharp, sharp, {}, sigma);
+    cv::Mat1d light;
+    cv::resize(sharp, light, {200, 160}, 0, 0, cv::INTER_AREA);
+    const double white = depth == CV_8U ? 255 : 65535;
+    for (int row = 0; row < light.rows; ++row) {
+      for (int column = 0; column < light.cols; ++column) {
+        const double here = level * (1 + change * (column - center.x()) / radius_px);
+        light(row, column) = white * (kDark + here * light(row, column));
+      }
+    }
+    for (const int column : dark_columns) light.col(column) = white * kDark;
+    cv::Mat image;
+    light.convertTo(image, depth);
+    return image;
+  }
+};
+
+inline std::vector<EdgePoint> outline_in(const cv::Mat& image) {
+  const Background background = background_of(image);
+  std::vector<EdgePoint> all;
+  for (const Blob& blob : group_runs(find_runs(image, background.threshold), 3)) {
+    const auto points = outline_of(image, blob, background);
+    all.insert(all.end(), points.begin(), points.end());
+  }
+  return all;
+}
+
+inline RefinedOutline refined_outline_in(const cv::Mat& image, const DrawnDisc& disc) {
+  return refined(image, outline_in(image), {disc.low(), disc.high(), disc.center},
+                 background_of(image));
+}
+
+inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {
+  return refined_outline_in(image, disc).points;
+}
+
+/// Where rows cut the outline more steeply than that.
+inline double worst_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points,
+                        double least_cosine) {
+  double worst = 0;
+  for (const EdgePoint& point : points) {
+    if (disc.cosine(point.pixel) < least_cosine) continue;
+    worst = std::max(worst, std::abs(disc.off(point.pixel)));
+  }
+  return worst;
+}
+
+inline double rms_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points) {
+  double squares = 0;
+  for (const EdgePoint& point : points) squares += std::pow(disc.off(point.pixel), 2);
+  return std::sqrt(squares / double(points.size()));
+}
+
+}  // namespace vlp

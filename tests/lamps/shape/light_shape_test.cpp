@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/light_shape.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "geometry/plane.h"
+#include "support/near.h"
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector2d;
+
+/// Behind a lens that bends lines, off the image's middle.
+class MovingDisc : public testing::Test {
+ protected:
+  MovingDisc() : shape(camera), center_px(*shape.pixel_of(circle.center)) {}
+
+  /// The rim, each point where it is while its line is read: at d + m (l - l_c).
+  std::vector<EdgePoint> outline(const Vector2d& motion_per_line) const {
+    constexpr int count = 120;
+    std::vector<EdgePoint> points;
+    for (int i = 0; i < count; ++i) {
+      const double angle = 2 * std::numbers::pi * i / count;
+      const Vector2d rim =
+          circle.center + circle.radius * Vector2d(std::cos(angle), std::sin(angle));
+      Vector2d pixel = *shape.pixel_of(rim);
+      for (int round = 0; round < 20; ++round) {
+        pixel = *shape.pixel_of(rim + (pixel.y() - center_px.y()) * motion_per_line);
+      }
+      points.push_back({pixel, 100, 1, pixel.x() < center_px.x()});
+    }
+    return points;
+  }
+
+  static constexpr std::array kIntrinsics{600.0, 600.0, 399.5, 299.5, -0.3, 0.1, 0.0, 0.0};
+  DetectorCamera camera{Readout::rows, 3e-5, Lens(LensModel::opencv4, kIntrinsics)};
+  LightShape shape;
+  Circle circle{{0.35, 0.3}, 0.12};
+  Vector2d center_px;
+  Background dark{0, 1, 5};
+};
+
+TEST_F(MovingDisc, HasItsCentreWhereItIsWhileThatIsRead) {
+  // Of a lamp 2.5 m above a camera that drives at 2 m/s, rows of 30 us.
+  for (const Vector2d& motion :
+       {Vector2d(2.4e-5, 0), Vector2d(0, 2.4e-5), Vector2d(-1.5e-5, 2e-5)}) {
+    auto light = shape.light_of(outline(motion), dark);
+    ASSERT_TRUE(light);
+    const Vector2d oval = complex_product(light->sums.line_slope(), motion) / 2;
+    Light unshifted = *light;
+    shape.shift({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
+    shape.shift({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), unshifted);
+    EXPECT_THAT(light->pixel, IsNear(center_px, 2e-3));
+    EXPECT_GT((unshifted.pixel - center_px).norm(), 8e-3) << "read sooner than its centre";
+  }
+}
+
+TEST_F(MovingDisc, OfACameraThatStandsStays) {
+  auto light = shape.light_of(outline(Vector2d::Zero()), dark);
+  ASSERT_TRUE(light);
+  shape.shift({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), *light);
+  EXPECT_THAT(light->pixel, IsNear(center_px, 1e-6));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/outline.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "lamps/shape/drawn_disc.h"
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector2d;
+
+TEST(Outline, LiesOnTheCircleOfADisc) {
+  for (const int depth : {CV_8U, CV_16U}) {
+    for (const double blur_px : {0.6, 0.8}) {
+      const DrawnDisc disc{.blur_px = blur_px};
+      const auto points = outline_in(disc.image(depth));
+      EXPECT_GT(points.size(), 140U);
+      EXPECT_LT(worst_off(disc, points, kSteep), 0.05) << blur_px;
+    }
+  }
+}
+
+TEST(Outline, TellsBeginsFromEndsAndTheirLevelAndRise) {
+  const DrawnDisc disc;
+  const double rise_px = 2 * 0.6745 * disc.blur_px;  // between the quartiles of a normal curve
+  for (const EdgePoint& point : outline_in(disc.image(CV_16U))) {
+    EXPECT_EQ(point.begins, point.pixel.x() < disc.center.x());
+    EXPECT_EQ(point.pixel.y(), std::round(point.pixel.y()));
+    if (disc.cosine(point.pixel) < 0.9) continue;
+    EXPECT_NEAR(point.level, disc.level * 65535, 0.01 * 65535);
+    EXPECT_NEAR(point.rise_px, rise_px / disc.cosine(point.pixel), 0.25);
+  }
+}
+
+TEST(Outline, LeavesOutTheImagesEdge) {
+  for (const double column : {25.0, 175.0}) {
+    const DrawnDisc disc{.center = {column, 79.6}};
+    const auto points = outline_in(disc.image(CV_16U));
+    const bool left = column < 100;
+    EXPECT_GT(points.size(), 60U);
+    EXPECT_LT(worst_off(disc, points, kSteep), 0.05);
+    for (const EdgePoint& point : points) {
+      EXPECT_GT(point.pixel.x(), 2);
+      EXPECT_LT(point.pixel.x(), 197);
+    }
+    EXPECT_TRUE(
+        std::ranges::any_of(points, [&](const EdgePoint& point) { return point.begins != left; }));
+  }
+  EXPECT_TRUE(outline_in(cv::Mat(160, 200, CV_8U, cv::Scalar(9))).empty());
+}
+
+TEST(Outermost, LeavesOutTheEdgesOfABar) {
+  const DrawnDisc disc{.dark_columns = {95, 96, 97, 98, 99, 100}};
+  const auto all = outline_in(disc.image(CV_16U));
+  EXPECT_GT(worst_off(disc, all, 0), 10);
+  const auto points = outermost(all);
+  EXPECT_GT(points.size(), 120U);
+  EXPECT_LT(worst_off(disc, points, kSteep), 0.05);
+}
+
+TEST(Outermost, IsTheFirstBeginAndTheLastEndOfEachRow) {
+  const auto points = outermost({{{30, 5}, 1, 1, false},
+                                 {{20, 4}, 1, 1, true},
+                                 {{12, 5}, 1, 1, true},
+                                 {{40, 5}, 1, 1, false},
+                                 {{32, 5}, 1, 1, true},
+                                 {{60, 6}, 1, 1, false}});
+  const auto is = [](double column, double row, bool begins) {
+    return testing::AllOf(testing::Field(&EdgePoint::pixel, Vector2d(column, row)),
+                          testing::Field(&EdgePoint::begins, begins));
+  };
+  EXPECT_THAT(points, testing::ElementsAre(is(20, 4, true), is(12, 5, true), is(40, 5, false),
+                                           is(60, 6, false)));
+  EXPECT_TRUE(outermost({}).empty());
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,224 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/rim.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "lamps/drawn_lamp.h"
+#include "lamps/lamp_detector.h"
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector2d;
+
+const cv::Size kSize(300, 280);
+
+Blob largest_blob(const cv::Mat& image, const Background& background) {
+  const auto blobs = group_runs(find_runs(image, background.threshold), 24);
+  return *std::max_element(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) {
+    return a.box().area() < b.box().area();
+  });
+}
+
+std::optional<Rim> rim_in(const cv::Mat& image) {
+  const Background background = background_of(image);
+  return rim_of(image, largest_blob(image, background), background,
+                LightShape(drawn_camera(kSize)));
+}
+
+/// A downlight whose core lies off the middle in that direction.
+DrawnLamp downlight(double angle_rad, double period_lines) {
+  DrawnRecess recess;
+  recess.core_off_px = 16 * Vector2d(std::cos(angle_rad), std::sin(angle_rad));
+  return {.center = {151.3, 139.6},
+          .radius_px = 50.7,
+          .blur_px = 1.2,
+          .level = 0.8,
+          .stripes = {.period_lines = period_lines},
+          .recess = recess};
+}
+
+template <typename Test>
+void for_each_downlight(const Test& test) {
+  std::uint64_t seed = 0;
+  for (const double period : {12.0, 17.0, 26.0, 33.0}) {
+    for (const double noise : {0.5, 1.0, 2.0}) {
+      for (int i = 0; i < 8; ++i) {
+        SCOPED_TRACE(testing::Message() << period << " lines, noise " << noise << ", " << i);
+        const DrawnLamp lamp = downlight(i * std::numbers::pi / 4 + 0.2, period);
+        for (const int depth : {CV_8U, CV_16U}) test(lamp, depth, noise, ++seed);
+      }
+    }
+  }
+}
+
+TEST(Rim, IsThatOfADownlightWhereverItsCoreIs) {
+  double chi_square = 0, worst_px = 0, count = 0;
+  for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
+    const auto rim = rim_in(drawn({lamp}, kSize, depth, noise, seed));
+    ASSERT_TRUE(rim);
+    EXPECT_TRUE(rim->clear);
+    EXPECT_TRUE(rim->light.uneven);
+    EXPECT_NEAR(rim->light.radius_px, lamp.radius_px, 1);
+    const double error_px = (rim->light.pixel - lamp.center).norm();
+    worst_px = std::max(worst_px, error_px);
+    chi_square += std::pow(error_px / rim->light.sigma_px, 2) / 2;
+    ++count;
+  });
+  EXPECT_LT(worst_px, 0.5) << "the core is 16 px off";
+  EXPECT_LT(chi_square / count, 1.5);
+  EXPECT_GT(chi_square / count, 0.1);
+}
+
+/// As a camera for people codes light.
+cv::Mat coded(const cv::Mat& image) {
+  cv::Mat1b curve(1, 256);
+  for (int i = 0; i < 256; ++i) {
+    curve(i) = cv::saturate_cast<std::uint8_t>(255 * std::pow(i / 255.0, 1 / 2.2));
+  }
+  cv::Mat result;
+  cv::LUT(image, curve, result);
+  return result;
+}
+
+TEST(Rim, IsNotDrawnTowardsTheCoreByAToneCurve) {
+  double towards_px = 0, squares = 0, chi_square = 0, worst = 0;
+  int count = 0;
+  for (const double period : {12.0, 17.0, 26.0, 33.0}) {
+    for (int i = 0; i < 12; ++i) {
+      const double angle = i * std::numbers::pi / 6 + 0.2;
+      const DrawnLamp lamp = downlight(angle, period);
+      const auto rim = rim_in(coded(drawn({lamp}, kSize, CV_8U, 1, std::uint64_t(++count))));
+      ASSERT_TRUE(rim);
+      const Vector2d error = rim->light.pixel - lamp.center;
+      towards_px += error.dot(Vector2d(std::cos(angle), std::sin(angle)));
+      squares += error.squaredNorm();
+      chi_square += error.squaredNorm() / 2 / std::pow(rim->light.sigma_px, 2);
+      worst = std::max(worst, error.norm() / rim->light.sigma_px);
+    }
+  }
+  EXPECT_NEAR(towards_px / count, 0, 0.03);
+  EXPECT_LT(std::sqrt(squares / count), 0.1);
+  EXPECT_LT(chi_square / count, 1.5);
+  EXPECT_LT(worst, 6);
+}
+
+/// As such a camera shows what is brighter than white as well.
+cv::Mat1b coded_and_clipped(const DrawnLamp& lamp, double noise, Random& random) {
+  cv::Mat1b image(kSize);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      const double light = 0.002 + lamp.light(Vector2d(column, row));
+      image(row, column) =
+          cv::saturate_cast<std::uint8_t>(255 * std::pow(light, 1 / 2.2) + noise * random.normal());
+    }
+  }
+  return image;
+}
+
+TEST(Rim, IsNotDrawnTowardsWallsThatAreBrighterThanWhite) {
+  Random random(1);
+  for (const double white : {0.8, 1.5, 2.0, 4.0}) {
+    double towards_px = 0, chi_square = 0, worst = 0;
+    int count = 0;
+    for (const double period : {17.0, 26.0}) {
+      for (int i = 0; i < 8; ++i) {
+        const double angle = i * std::numbers::pi / 4 + 0.2;
+        const Vector2d towards(std::cos(angle), std::sin(angle));
+        DrawnLamp lamp = downlight(angle, period);
+        lamp.level = white;
+        lamp.recess->core_off_px = 36 * towards;
+        lamp.recess->core_px = 24;
+        const auto rim = rim_in(coded_and_clipped(lamp, 1, random));
+        ASSERT_TRUE(rim);
+        const Vector2d error = rim->light.pixel - lamp.center;
+        towards_px += error.dot(towards);
+        chi_square += error.squaredNorm() / 2 / std::pow(rim->light.sigma_px, 2);
+        worst = std::max(worst, error.norm() / rim->light.sigma_px);
+        ++count;
+      }
+    }
+    EXPECT_NEAR(towards_px / count, 0, 0.06) << white;
+    EXPECT_LT(chi_square / count, 1.5) << white;
+    EXPECT_LT(worst, 6) << white;
+  }
+}
+
+TEST(Rim, IsSeenOfLargeDownlightsToo) {
+  for (const double scale : {3.0, 7.0}) {
+    DrawnLamp lamp = downlight(0.7, 40);
+    lamp.center *= scale, lamp.radius_px *= scale;
+    lamp.recess->core_off_px *= scale, lamp.recess->core_px *= scale, lamp.recess->halo_px *= scale;
+    const cv::Size size(int(scale * kSize.width), int(scale * kSize.height));
+    const cv::Mat image = drawn({lamp}, size, CV_8U, 1);
+    const Background background = background_of(image);
+    const auto rim =
+        rim_of(image, largest_blob(image, background), background, LightShape(drawn_camera(size)));
+    ASSERT_TRUE(rim) << scale;
+    EXPECT_TRUE(rim->clear) << scale;
+    EXPECT_LT((rim->light.pixel - lamp.center).norm(), 0.5) << scale;
+  }
+}
+
+TEST(Rim, OfADownlightLeadsToItsLamp) {
+  for_each_downlight([](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
+    const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
+    const auto lights =
+        LampDetector(map, drawn_camera(kSize)).detect(drawn({lamp}, kSize, depth, noise, seed));
+    ASSERT_EQ(lights.size(), 1U);
+    if (lights[0].stripes.periods < kEnoughPeriods) {
+      EXPECT_EQ(lights[0].reason, LightReason::alone);
+    } else {
+      EXPECT_EQ(lights[0].kind, LightKind::lamp);
+      EXPECT_EQ(lights[0].lamp, 7);
+    }
+    EXPECT_NEAR(lights[0].stripes.period_lines / lamp.stripes.period_lines, 1, 0.01);
+    EXPECT_LT((lights[0].pixel - lamp.center).norm(), 1);
+  });
+}
+
+TEST(Rim, OfAGlowIsNotClear) {
+  for (const double period : {9.0, 14.5, 22.0}) {
+    for (const double noise : {0.0, 0.5, 1.5}) {
+      const DrawnLamp glow{
+          .center = {151.3, 139.6}, .stripes = {.period_lines = period}, .glow = DrawnGlow()};
+      const auto rim = rim_in(drawn({glow}, kSize, CV_8U, noise));
+      EXPECT_FALSE(rim && rim->clear) << period << " lines, noise " << noise;
+    }
+  }
+}
+
+TEST(Rim, OfADiscIsItsEdge) {
+  const DrawnLamp disc{.center = {151.3, 139.6}, .radius_px = 50.7};
+  const auto rim = rim_in(drawn({disc}, kSize, CV_8U, 1));
+  ASSERT_TRUE(rim);
+  EXPECT_TRUE(rim->clear);
+  EXPECT_LT((rim->light.pixel - disc.center).norm(), 0.2);
+}
+
+TEST(Rim, IsNotLookedForInSpecks) {
+  const DrawnLamp speck{.center = {151.3, 139.6}, .radius_px = 8};
+  EXPECT_FALSE(rim_in(drawn({speck}, kSize, CV_8U)));
+}
+
+TEST(UnevenlyLit, IsADownlightAndNotADisc) {
+  const auto uneven = [](const DrawnLamp& lamp, int depth) {
+    const cv::Mat image = drawn({lamp}, kSize, depth, 1);
+    const Background background = background_of(image);
+    const Blob blob = largest_blob(image, background);
+    return unevenly_lit(image, blob, outline_of(image, blob, background), background);
+  };
+  for (const int depth : {CV_8U, CV_16U}) {
+    EXPECT_TRUE(uneven(downlight(0.2, 17), depth));
+    EXPECT_FALSE(uneven({.center = {151.3, 139.6}, .radius_px = 50.7}, depth));
+  }
+  EXPECT_FALSE(unevenly_lit(cv::Mat1b(20, 20), Blob{{{3, 2, 9}}}, {}, Background{0, 1, 5}));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,135 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/shape/shear.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "lamps/shape/robust_circle.h"
+#include "geometry/arc.h"
+#include "support/near.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+using Eigen::Vector2d;
+using std::numbers::pi;
+
+/// Of a level camera with a focal length of 600 px: lines per unit of the level plane.
+const Vector2d kLineSlope(0, 600);
+constexpr double kRadius = 0.08;
+
+/// As a shutter sees the rim of a disc whose centre moves by `motion` while a line is read.
+Points read_line_by_line(Points points, const Vector2d& center, const Vector2d& motion) {
+  for (Vector2d& point : points) point += motion * kLineSlope.dot(point - center);
+  return points;
+}
+
+/// A camera that drives and turns, and so many radians of the rim of the light there.
+class Room {
+ public:
+  Vector2d motion_at(const Vector2d& center) const {
+    return v + w * Vector2d(-center.y(), center.x());
+  }
+  OutlineSums seen(const Vector2d& center, double angle_rad, Random& random) const {
+    Points points = read_line_by_line(arc({center, kRadius}, 0.4, 0.4 + angle_rad, 90), center,
+                                      motion_at(center));
+    for (Vector2d& point : points) point += noise * Vector2d(random.normal(), random.normal());
+    const std::vector<double> weights(points.size(), 1);
+    const auto circle = fit_robust_circle(points, weights, 1e-3);
+    EXPECT_TRUE(circle);
+    return {points, weights, circle->inliers, circle->circle, kLineSlope};
+  }
+
+  Vector2d v{2.0e-5, -1.5e-5};
+  double w = 3e-5;
+  double noise = 1e-4;
+};
+
+std::vector<OutlineSums> three_whole(const Room& room, Random& random) {
+  return {room.seen({0.4, 0.3}, 2 * pi, random), room.seen({-0.4, 0.2}, 2 * pi, random),
+          room.seen({0.1, -0.4}, 2 * pi, random)};
+}
+
+TEST(Shear, OfACameraThatDrivesAndTurnsIsThatOfItsMotion) {
+  Random random(1);
+  const Room room;
+  const auto lights = three_whole(room, random);
+  const auto shear = Shear::common(lights);
+  ASSERT_TRUE(shear);
+  const Vector2d at(-0.3, -0.3);
+  const Oval oval = shear->oval_of(room.seen(at, 2 * pi, random));
+  // With s along y alone, s (v_x + i v_y) / 2 is |s| (-v_y + i v_x) / 2.
+  const Vector2d motion = room.motion_at(at), expected = 300 * Vector2d(-motion.y(), motion.x());
+  EXPECT_GT(expected.norm(), 0.005);
+  EXPECT_THAT(oval.oval, IsNear(expected, 3e-4));
+  EXPECT_THAT(shear->motion_at(room.seen(at, 2 * pi, random)), IsNear(motion, 1e-6));
+}
+
+TEST(Shear, PutsTheCentreOfAPartWhereThatOfTheWholeIs) {
+  Random random(2);
+  const Room room;
+  const Vector2d center(-0.3, -0.3);
+  double squared = 0, circle_squared = 0, chi_square = 0;
+  constexpr int trials = 100;
+  for (int trial = 0; trial < trials; ++trial) {
+    auto lights = three_whole(room, random);
+    lights.push_back(room.seen(center, 1.1 * pi, random));
+    const OutlineSums& part = lights.back();
+    const auto shear = Shear::common(lights);
+    ASSERT_TRUE(shear);
+    const auto found = part.solved(shear->oval_of(part));
+    ASSERT_TRUE(found);
+    const Vector2d by_circle = part.circle().center - center;
+    const Vector2d error = (by_circle + kRadius * found->p.head<2>()) / kRadius;
+    squared += error.squaredNorm() / trials;
+    circle_squared += by_circle.squaredNorm() / (kRadius * kRadius) / trials;
+    chi_square +=
+        error.dot(found->covariance.topLeftCorner<2, 2>().inverse() * error) / (2 * trials);
+  }
+  EXPECT_LT(std::sqrt(squared), 0.15 * std::sqrt(circle_squared));
+  // The part that lamps at other heights might have, and these have not, counts as an error, too.
+  EXPECT_GT(chi_square, 0.1);
+  EXPECT_LT(chi_square, 1.3);
+}
+
+TEST(Shear, IsNoneOfACameraThatStands) {
+  Random random(3);
+  Room room;
+  room.v.setZero();
+  room.w = 0;
+  int found = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    found += Shear::common(three_whole(room, random)).has_value();
+  }
+  EXPECT_EQ(found, 0);
+}
+
+TEST(Shear, IsNotTakenFromALightThatContradictsTheOthers) {
+  Random random(4);
+  const Room room;
+  auto lights = three_whole(room, random);
+  Room other;
+  other.v = -3 * room.v;
+  lights.push_back(other.seen({0.4, -0.3}, 2 * pi, random));
+  const auto shear = Shear::common(lights);
+  ASSERT_TRUE(shear);
+  const Vector2d motion = room.motion_at({-0.4, 0.2});
+  EXPECT_THAT(shear->oval_of(lights[1]).oval,
+              IsNear(300 * Vector2d(-motion.y(), motion.x()), 5e-4));
+}
+
+TEST(Shear, IsNoneWithoutLights) {
+  EXPECT_FALSE(Shear::common({}));
+  // Three points of an outline tell nothing.
+  const Points points{{1, 0}, {0, 1}, {-1, 0}};
+  const OutlineSums few(points, std::vector<double>{1, 1, 1}, {true, true, true}, {{0, 0}, 1},
+                        kLineSlope);
+  EXPECT_FALSE(few.solved(std::nullopt));
+  EXPECT_FALSE(Shear::common(std::vector{few}));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,132 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Centres of ellipses in the image against the images of discs' centres.
+#include "lamps/shape/unknown_lens.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <numbers>
+
+#include "camera/lens.h"
+#include "lamps/shape/robust_ellipse.h"
+#include "lamps/rendered_captures.h"
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+const cv::Size kUnknownLensImage(800, 600);
+constexpr double kHalf_px = 500;  // of its diagonal
+
+/// A disc on a ceiling, seen by a camera that leans by that towards x, with a lens that has its
+/// axis in the middle of the image. Places and radii on the ceiling are slopes.
+struct SeenDisc {
+  Eigen::Vector2d shift_px, pixel;
+  double radius_px;
+};
+
+std::optional<SeenDisc> seen(const Lens& lens, double lean_rad, const Eigen::Vector2d& place,
+                             double radius) {
+  const Eigen::Matrix3d camera_from_level =
+      Eigen::AngleAxisd(lean_rad, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const auto pixel_of = [&](const Eigen::Vector2d& on_ceiling) {
+    return lens.project(camera_from_level * on_ceiling.homogeneous());
+  };
+  std::vector<Eigen::Vector2d> rim;
+  for (int i = 0; i < 200; ++i) {
+    const double angle = 2 * std::numbers::pi * i / 200;
+    const auto pixel = pixel_of(place + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+    if (!pixel) return std::nullopt;
+    rim.push_back(*pixel);
+  }
+  const std::vector<double> weights(rim.size(), 1);
+  const auto fit = fit_robust_ellipse(rim, weights, 0.35);
+  const auto center = pixel_of(place);
+  if (!fit || !center) return std::nullopt;
+  return SeenDisc{fit->center - *center, fit->center,
+                  std::sqrt(fit->rim_from_circle.determinant())};
+}
+
+/// The bound on the shift: the standard deviation is per axis.
+double bound_px(const SeenDisc& disc) {
+  Light light{};
+  light.pixel = disc.pixel;
+  light.radius_px = disc.radius_px;
+  return std::numbers::sqrt2 * unknown_lens_sd_px(light, kUnknownLensImage);
+}
+
+Lens lens_of(LensModel model, double focal_px, std::vector<double> coefficients) {
+  std::vector<double> parameters = {focal_px, focal_px, (kUnknownLensImage.width - 1) / 2.0,
+                                    (kUnknownLensImage.height - 1) / 2.0};
+  parameters.insert(parameters.end(), coefficients.begin(), coefficients.end());
+  return Lens(model, parameters);
+}
+
+TEST(UnknownLens, HoldsForTheEquidistantLensOfItsBound) {
+  const Lens equidistant = lens_of(LensModel::fisheye, kHalf_px, {0, 0, 0, 0});
+  int discs = 0;
+  for (const double off_axis : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+    for (const double radius : {0.02, 0.05, 0.08}) {
+      const auto disc = seen(equidistant, 0, {std::tan(off_axis), 0}, radius);
+      ASSERT_TRUE(disc) << off_axis;
+      EXPECT_LT(disc->shift_px.norm(), bound_px(*disc)) << off_axis << ", " << radius;
+      if (off_axis > 0.3) {
+        EXPECT_GT(disc->shift_px.norm(), bound_px(*disc) / 1.5) << off_axis << ", " << radius;
+      }
+      EXPECT_LT(disc->shift_px.x(), 0) << "towards the axis";
+      ++discs;
+    }
+  }
+  EXPECT_EQ(discs, 15);
+}
+
+TEST(UnknownLens, HoldsForACameraThatLeans) {
+  const Lens pinhole = lens_of(LensModel::pinhole, kHalf_px, {});
+  for (const double lean_deg : {2.0, 5.0, 10.0}) {
+    const double lean_rad = rad_from_deg(lean_deg);
+    // In the middle of the image.
+    const auto disc = seen(pinhole, lean_rad, {-std::tan(lean_rad), 0}, 0.06);
+    ASSERT_TRUE(disc);
+    EXPECT_LT(disc->shift_px.norm(), 1.03 * bound_px(*disc));
+    const double expected_px = std::pow(disc->radius_px, 2) * std::tan(lean_rad) / kHalf_px;
+    EXPECT_NEAR(disc->shift_px.norm() / expected_px, 1, 0.03);
+  }
+}
+
+TEST(UnknownLens, GrowsWithTheDiscAndWithItsDistanceFromTheMiddle) {
+  Light light{};
+  light.pixel = {399.5, 299.5};
+  light.radius_px = 30;
+  const double in_the_middle = unknown_lens_sd_px(light, kUnknownLensImage);
+  light.pixel.x() += 300;
+  const double off_axis = unknown_lens_sd_px(light, kUnknownLensImage);
+  EXPECT_GT(off_axis, 3 * in_the_middle);
+  light.radius_px = 60;
+  EXPECT_DOUBLE_EQ(unknown_lens_sd_px(light, kUnknownLensImage), 4 * off_axis);
+  light.face = {{0, 0}, {9, 0}, {9, 9}, {0, 9}};
+  EXPECT_EQ(unknown_lens_sd_px(light, kUnknownLensImage), 0) << "a rectangle's edges say it";
+}
+
+/// Discs of a scene without its lens: their errors over what is stated of them.
+Score without_lens(const std::string& scene, std::size_t step) {
+  const Captures captures(scene, "check");
+  DetectorCamera camera = detector_camera(captures.calibration());
+  camera.lens.reset();
+  return captures.score(step, LampDetector(captures.lamps(), camera));
+}
+
+TEST(UnknownLens, IsInWhatCentresWithoutOneState) {
+  for (const auto& [scene, step] :
+       {std::pair("paper-rig", 12), {"paper-rig-faulty", 24}, {"wide", 16}}) {
+    const Score score = without_lens(scene, std::size_t(step));
+    EXPECT_GT(score.lamps, 80) << scene;
+    EXPECT_EQ(score.wrong, 0) << scene;
+    EXPECT_GT(score.rms_px(), 0.3) << scene << ": there is something to state";
+    EXPECT_GT(score.chi_square / score.lamps, 0.3) << scene;
+    EXPECT_LT(score.chi_square / score.lamps, 1.5) << scene;
+  }
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/coherence.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "lamps/drawn_lamp.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+const cv::Size kPictureSize(200, 160);
+
+double coherence_in(const cv::Mat& image, const DrawnLamp& lamp) {
+  const Eigen::Vector2d half(lamp.radius_px, lamp.radius_px);
+  return coherence_of(image, chords_of(lamp.center - half, lamp.center + half, image.size()),
+                      background_of(image), lamp.stripes.period_lines);
+}
+
+double coherence_of_drawn(const DrawnLamp& lamp) {
+  return coherence_in(drawn({lamp}, kPictureSize, CV_16U, 0.5), lamp);
+}
+
+TEST(Coherence, IsNearOneOfALampHoweverItIsLit) {
+  for (const double period : {3.7, 11.0, 40.0}) {
+    EXPECT_GT(coherence_of_drawn(DrawnLamp{.stripes = {.period_lines = period}}), 0.99) << period;
+  }
+  EXPECT_GT(coherence_of_drawn(DrawnLamp{.glow = DrawnGlow{}}), 0.97);
+  EXPECT_GT(coherence_of_drawn(DrawnLamp{.recess = DrawnRecess{}}), 0.97);
+}
+
+TEST(Coherence, LeavesOneHiddenPartOut) {
+  const DrawnBar bar{std::numbers::pi / 2, 20, 14};
+  EXPECT_GT(coherence_of_drawn(DrawnLamp{.bar = bar}), 0.9);
+}
+
+TEST(Coherence, IsLostWhenBarsLean) {
+  const auto of_leaning = [](double degrees) {
+    DrawnLamp lamp;
+    lamp.stripes.period_lines = 0.9 * lamp.radius_px;  // two periods
+    const double slope = std::tan(degrees * std::numbers::pi / 180);
+    cv::Mat1d image(kPictureSize);
+    for (int row = 0; row < image.rows; ++row) {
+      for (int column = 0; column < image.cols; ++column) {
+        const Eigen::Vector2d away = Eigen::Vector2d(column, row) - lamp.center;
+        image(row, column) = 1000 + 40000 * blurred_step(lamp.radius_px - away.norm(), 1) *
+                                        lamp.stripes.lit(row - slope * away.x());
+      }
+    }
+    cv::Mat levels;
+    image.convertTo(levels, CV_16U);
+    return coherence_in(levels, lamp);
+  };
+  EXPECT_GT(of_leaning(2), kLeastCoherence);
+  EXPECT_LT(of_leaning(12), kLeastCoherence);
+}
+
+TEST(Coherence, IsSeldomReachedByPartsThatVaryEachInItsWay) {
+  // Patches a quarter of a period high, and as wide as a part.
+  constexpr int trials = 2000, patch = 6;
+  Random random(5);
+  int coherent = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    cv::Mat image(120, 120, CV_8U, cv::Scalar(10));
+    for (int row = 40; row < 80; row += patch) {
+      for (int column = 40; column < 80; column += 7) {
+        image(cv::Rect(column, row, 7, patch)) = random.uniform(10, 200);
+      }
+    }
+    coherent += coherence_of(image, chords_of({40, 40}, {80, 80}, image.size()), {10, 1, 14.5},
+                             4 * patch) > kLeastCoherence;
+  }
+  EXPECT_LE(coherent, 10);
+}
+
+TEST(Coherence, OfTooFewLinesIsNone) {
+  const DrawnLamp lamp{.stripes = {.period_lines = 170}};
+  EXPECT_EQ(coherence_of_drawn(lamp), 0);
+  const cv::Mat image(120, 120, CV_8U, cv::Scalar(10));
+  EXPECT_EQ(coherence_of(image, chords_of({200, 20}, {240, 60}, image.size()), {10, 1, 14.5}, 8),
+            0);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,142 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/lamp_classifier.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "lamps/signal/confusion.h"
+#include "lamps/signal/square_wave.h"
+
+namespace vlp {
+namespace {
+
+struct Made {
+  int lamp;
+  double period_lines, duty;
+};
+
+/// Lights of lamps in the sizes and phases that a room shows, a lamp of each in every image.
+std::vector<LabelledLight> lights_of(const std::vector<Made>& lamps, std::size_t images,
+                                     std::uint64_t seed) {
+  Random random(seed);
+  std::vector<LabelledLight> lights;
+  for (std::size_t image = 0; image < images; ++image) {
+    for (const Made& lamp : lamps) {
+      const auto lines = static_cast<int>(random.uniform(45, 75));
+      lights.push_back(
+          {lamp.lamp,
+           stripes_of(noisy_square_wave(lines, lamp.period_lines, lamp.duty, 1.67, 0.02, random)),
+           image});
+    }
+  }
+  return lights;
+}
+
+const std::vector<Made> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5}};
+/// Two of one period, told apart by their duty alone.
+const std::vector<Made> kTwins{{1, 12, 0.35}, {2, 12, 0.7}};
+
+TEST(LampClassifier, KnowsTheLampsThatItWasTrainedOn) {
+  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
+  ASSERT_EQ(classifier.lamps.size(), 3);
+  EXPECT_EQ(classifier.lamps[0].lamp, 4);
+  const Confusion confusion = confusion_of(classifier, lights_of(kLamps, 100, 2));
+  EXPECT_EQ(confusion.lamps, (std::vector<int>{4, 7, 9}));
+  EXPECT_EQ(confusion.wrong(), 0);
+  EXPECT_GE(confusion.right(), 297);
+  EXPECT_EQ(confusion.right() + confusion.unknown(), 300);
+  EXPECT_TRUE(inseparable(classifier).empty());
+}
+
+TEST(LampClassifier, TellsLampsOfOnePeriodApartByTheirDuty) {
+  const LampClassifier classifier = train_classifier(lights_of(kTwins, 40, 1));
+  const Confusion confusion = confusion_of(classifier, lights_of(kTwins, 100, 2));
+  EXPECT_EQ(confusion.wrong(), 0);
+  EXPECT_GE(confusion.right(), 150) << confusion.counts;
+}
+
+TEST(LampClassifier, CallsAnUnknownLampUnknown) {
+  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
+  const Confusion confusion =
+      confusion_of(classifier, lights_of({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
+  EXPECT_EQ(confusion.unknown(), 100);
+}
+
+TEST(LampClassifier, CallsLampsUnknownThatAreAlike) {
+  const std::vector<Made> alike{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 13.35, 0.5}};
+  const LampClassifier classifier = train_classifier(lights_of(alike, 30, 1));
+  const Confusion confusion = confusion_of(classifier, lights_of(alike, 100, 2));
+  EXPECT_EQ(confusion.counts(0, 0), 100);
+  EXPECT_GE(confusion.unknown(), 190);
+  const auto pairs = inseparable(classifier);
+  ASSERT_EQ(pairs.size(), 1);
+  EXPECT_EQ(pairs[0].first, 7);
+  EXPECT_EQ(pairs[0].second, 9);
+}
+
+TEST(LampClassifier, IsNotMisledByAFewWrongLabels) {
+  auto lights = lights_of(kLamps, 30, 1);
+  lights[0].lamp = 9, lights[4].lamp = 4, lights[8].lamp = 7;
+  const LampClassifier classifier = train_classifier(lights);
+  int used = 0;
+  for (const auto& lamp : classifier.lamps) used += lamp.examples;
+  EXPECT_LE(used, 87);
+  EXPECT_GE(used, 80);
+  const Confusion confusion = confusion_of(classifier, lights_of(kLamps, 100, 2));
+  EXPECT_EQ(confusion.wrong(), 0);
+  EXPECT_GE(confusion.right(), 297);
+}
+
+TEST(LampClassifier, TakesUnclearStripesOnlyVeryNearALamp) {
+  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
+  Stripes stripes = lights_of(kLamps, 1, 3)[1].stripes;
+  ASSERT_EQ(lamp_of(classifier, stripes), 7);
+  stripes.period_lines *= 1.025;
+  EXPECT_EQ(lamp_of(classifier, stripes), 7);
+  stripes.clarity = 0.6;
+  EXPECT_EQ(lamp_of(classifier, stripes), std::nullopt);
+}
+
+TEST(LampClassifier, DoesNotDependOnTheOrderOfTheLights) {
+  auto lights = lights_of(kLamps, 20, 1);
+  const LampClassifier a = train_classifier(lights);
+  std::reverse(lights.begin(), lights.end());
+  const LampClassifier b = train_classifier(lights);
+  EXPECT_TRUE(a.covariance.isApprox(b.covariance, 1e-9));
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(a.lamps[i].examples, b.lamps[i].examples);
+    EXPECT_TRUE(a.lamps[i].center.isApprox(b.lamps[i].center, 1e-9));
+  }
+}
+
+TEST(CrossValidation, JudgesEachLightOnce) {
+  const Confusion confusion = cross_validated(lights_of(kLamps, 40, 1), train_classifier);
+  EXPECT_EQ(confusion.counts.sum(), 120);
+  EXPECT_EQ(confusion.wrong(), 0);
+  EXPECT_GE(confusion.right(), 117);
+}
+
+TEST(CrossValidation, HoldsOutWhatItJudges) {
+  // All of lamp 9 in one fifth of the images: whoever judges them has never seen it.
+  auto lights = lights_of(kLamps, 40, 1);
+  std::erase_if(lights,
+                [](const LabelledLight& light) { return light.lamp == 9 && light.image % 5 != 0; });
+  const Confusion confusion = cross_validated(lights, train_classifier);
+  EXPECT_EQ(confusion.counts(2, 2), 0);
+  EXPECT_EQ(confusion.counts(2, 3), 8);
+}
+
+TEST(CrossValidation, IsOfTheClassifierThatIsGiven) {
+  const auto mistaken = [](std::span<const LabelledLight> lights) {
+    LampClassifier classifier = train_classifier(lights);
+    std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);
+    return classifier;
+  };
+  const Confusion confusion = cross_validated(lights_of(kLamps, 40, 1), mistaken);
+  EXPECT_GE(confusion.wrong(), 78);
+}
+
+}  // namespace
+}  // namespace vlp

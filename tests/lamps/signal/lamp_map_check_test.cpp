@@ -1,0 +1,127 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/lamp_map_check.h"
+
+#include <gtest/gtest.h>
+
+#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/square_wave.h"
+#include "lamps/signal/stripes.h"
+
+namespace vlp {
+namespace {
+
+constexpr StripeConditions kConditions{3e-5, 520, 0, 5e-5};
+
+Lamp lamp(int id, double frequency_hz, std::optional<double> duty = 0.5) {
+  return {id, {double(id), 0, 1.6}, 0.18, frequency_hz, duty};
+}
+
+/// Of many measurements, over what period_sd() says.
+double measured_over_stated(double period, double lines, double exposure_lines) {
+  Random random(5);
+  constexpr int draws = 300;
+  double squares = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    const auto used = static_cast<int>(kUsedHeight * lines);
+    const Stripes stripes =
+        stripes_of(noisy_square_wave(used, period, 0.5, exposure_lines, 0.02, random));
+    squares += std::pow(stripes.period_lines / period - 1, 2);
+  }
+  return std::sqrt(squares / draws) / period_sd(period, lines, exposure_lines);
+}
+
+TEST(PeriodSd, IsWhatIsMeasured) {
+  for (const double lines : {40.0, 60.0, 100.0}) {
+    for (const double period : {9.3, 20.8}) {
+      for (const double exposure_lines : {0.02, 0.5, 1.0, 1.67, 4.0}) {
+        SCOPED_TRACE(testing::Message()
+                     << lines << " lines, period " << period << ", exposure " << exposure_lines);
+        const double ratio = measured_over_stated(period, lines, exposure_lines);
+        EXPECT_LT(ratio, 1.2);
+        EXPECT_GT(ratio, 0.25);
+      }
+    }
+  }
+}
+
+TEST(PeriodSd, IsABoundForPeriodsOfWholeLines) {
+  for (const double period : {5.0, 14.0}) {
+    EXPECT_LT(measured_over_stated(period, 60, 0.02), 1.1);
+    EXPECT_LT(measured_over_stated(period, 60, 1.67), 1.1);
+  }
+}
+
+TEST(PeriodSd, IsInfiniteWithoutAPeriod) {
+  EXPECT_EQ(period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
+}
+
+TEST(LampMapCheck, CountsTheLinesOnALamp) {
+  EXPECT_NEAR(lines_on(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
+  Lamp unknown = lamp(1, 2000);
+  unknown.diameter_m.reset();
+  EXPECT_FALSE(lines_on(unknown, kConditions));
+  StripeConditions above = kConditions;
+  above.camera_height_m = 2;
+  EXPECT_FALSE(lines_on(lamp(1, 2000), above));
+}
+
+TEST(LampMapCheck, NamesLampsOfNearlyOneFrequency) {
+  const LampMap map{{lamp(1, 2000), lamp(2, 2500), lamp(3, 2530), lamp(4, 3100)}};
+  const auto pairs = lamps_alike(map, kConditions);
+  ASSERT_EQ(pairs.size(), 1);
+  EXPECT_EQ(pairs[0].first, 2);
+  EXPECT_EQ(pairs[0].second, 3);
+  EXPECT_NEAR(pairs[0].gap, 0.012, 1e-9);
+  EXPECT_GT(pairs[0].needed, kLampDrift);
+}
+
+TEST(LampMapCheck, AcceptsADifferenceInDuty) {
+  EXPECT_TRUE(lamps_alike({{lamp(2, 2500, 0.3), lamp(3, 2500, 0.7)}}, kConditions).empty());
+  EXPECT_EQ(lamps_alike({{lamp(2, 2500, 0.4), lamp(3, 2500, 0.6)}}, kConditions).size(), 1);
+  EXPECT_EQ(lamps_alike({{lamp(2, 2500, 0.3), lamp(3, 2500, {})}}, kConditions).size(), 1);
+}
+
+TEST(LampMapCheck, AsksForMoreWhereLessIsSeen) {
+  const LampMap map{{lamp(1, 2500), lamp(2, 2560)}};
+  EXPECT_TRUE(lamps_alike(map, kConditions).empty());
+  StripeConditions sharp = kConditions, far = kConditions;
+  sharp.exposure_s.reset();
+  EXPECT_EQ(lamps_alike(map, sharp).size(), 1);
+  far.camera_height_m = -1.5;
+  EXPECT_EQ(lamps_alike(map, far).size(), 1);
+}
+
+/// What it says is what happens: of lamps that are just far enough apart nearly all are identified.
+TEST(LampMapCheck, HoldsForTheRule) {
+  StripeConditions conditions = kConditions;
+  conditions.exposure_s.reset();
+  const auto needed = lamps_alike({{lamp(1, 2500), lamp(2, 2501)}}, conditions)[0].needed;
+  const LampMap map{{lamp(1, 2500), lamp(2, 2500 * (1 + needed))}};
+  Random random(6);
+  int right = 0, wrong = 0;
+  for (int draw = 0; draw < 400; ++draw) {
+    const double period = 1 / (2500 * conditions.row_time_s);
+    const auto lines = static_cast<int>(kUsedHeight * *lines_on(map.lamps[0], conditions));
+    const auto id =
+        lamp_by_frequency(map, conditions.row_time_s,
+                          stripes_of(noisy_square_wave(lines, period, 0.5, 0.02, 0.02, random)));
+    right += id == 1;
+    wrong += id == 2;
+  }
+  EXPECT_GE(right, 380);
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(LampMapCheck, NamesLampsWithoutReadableStripes) {
+  const LampMap map{{lamp(1, 600), lamp(2, 2500), lamp(3, 19000)}};
+  const auto unreadable = lamps_unreadable(map, kConditions);
+  ASSERT_EQ(unreadable.size(), 2);
+  EXPECT_EQ(unreadable[0].lamp, 1);
+  EXPECT_LT(unreadable[0].periods, kLeastPeriods);
+  EXPECT_EQ(unreadable[1].lamp, 3);
+  EXPECT_LT(unreadable[1].contrast, 0.2);
+}
+
+}  // namespace
+}  // namespace vlp
