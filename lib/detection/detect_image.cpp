@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <exception>
 
+#include "detection/mat_view.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -16,7 +17,7 @@ ImageLights detect_image(const LampDetector& detector, const SourceImage& source
     result.image = source.read(max_mpx);
     check_imager(source.file, result.image.size(), imager_px);
     result.size = result.image.size();
-    result.lights = detector.detect(result.image);
+    result.lights = detector.detect(image_view(result.image));
   } catch (const InputError& error) {
     result.refused = error.what();
   } catch (const std::exception& error) {

@@ -14,7 +14,7 @@ std::unordered_map<std::string, const Frame*> frames_by_image(const std::vector<
 }
 
 bool may_be_lamp(const Light& light, const cv::Size& size) {
-  return flickers(light) && wholly_in_view(light, size);
+  return flickers(light) && wholly_in_view(light, {size.width, size.height});
 }
 
 }  // namespace

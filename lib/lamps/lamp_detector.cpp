@@ -9,17 +9,17 @@
 #include <utility>
 #include <vector>
 
-#include "lamps/signal/coherence.h"
-#include "lamps/signal/lamp_rule.h"
+#include "geometry/frames.h"
 #include "lamps/image/background.h"
+#include "lamps/image/lines.h"
+#include "lamps/image/runs.h"
 #include "lamps/shape/glow.h"
 #include "lamps/shape/glow_envelope.h"
-#include "lamps/image/lines.h"
 #include "lamps/shape/rectangle.h"
 #include "lamps/shape/rim.h"
-#include "lamps/image/runs.h"
 #include "lamps/shape/unknown_lens.h"
-#include "geometry/frames.h"
+#include "lamps/signal/coherence.h"
+#include "lamps/signal/lamp_rule.h"
 #include "rig/detection.h"
 #include "rig/find_lamp.h"
 
@@ -40,9 +40,9 @@ int most_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_tim
 }
 
 /// Whether no pixel can be brighter: full scale of 8 bits, or of a converter of 10 to 16.
-bool is_full_scale(double level, int depth) {
+bool is_full_scale(double level, int bits_per_pixel) {
   constexpr double nearly = 0.98;
-  const int least_bits = depth == CV_16U ? 10 : 8, most_bits = depth == CV_16U ? 16 : 8;
+  const int least_bits = bits_per_pixel == 16 ? 10 : 8, most_bits = bits_per_pixel;
   for (int bits = least_bits; bits <= most_bits; bits += 2) {
     const double full = std::exp2(bits) - 1;
     if (level <= full && level >= nearly * full) return true;
@@ -51,24 +51,22 @@ bool is_full_scale(double level, int depth) {
 }
 
 /// Of a steady light, see Light::clipped.
-double clipped_share(const cv::Mat& lines, const Eigen::Vector2d& low,
+double clipped_share(const ImageView& lines, const Eigen::Vector2d& low,
                      const Eigen::Vector2d& high) {
   const Eigen::Vector2d middle = (low + high) / 2, size = (high - low) / 2;
-  const cv::Rect box(
-      cv::Point(static_cast<int>(std::lround(middle.x() - size.x() / 2)),
-                static_cast<int>(std::lround(middle.y() - size.y() / 2))),
-      cv::Size(static_cast<int>(std::lround(size.x())), static_cast<int>(std::lround(size.y()))));
-  const cv::Mat pixels = lines(box & cv::Rect({0, 0}, lines.size()));
+  const ImageView pixels = lines.part({static_cast<int>(std::lround(middle.x() - size.x() / 2)),
+                                       static_cast<int>(std::lround(middle.y() - size.y() / 2)),
+                                       static_cast<int>(std::lround(size.x())),
+                                       static_cast<int>(std::lround(size.y()))});
   if (pixels.empty()) return 0;
-  double brightest = 0;
-  cv::minMaxLoc(pixels, nullptr, &brightest);
-  if (!is_full_scale(brightest, pixels.depth())) return 0;
-  return double(cv::countNonZero(pixels >= brightest)) / double(pixels.total());
+  const int brightest = brightest_level(pixels);
+  if (!is_full_scale(brightest, pixels.bits)) return 0;
+  return double(count_pixels_at(pixels, brightest)) / (double(pixels.width) * pixels.height);
 }
 
 /// To what the outlines say. Which of two lights has the surer centre is not for it to say: it is
 /// the smaller one's.
-void add_unknown_lens(const cv::Size& size, std::vector<Light>& lights) {
+void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
     const double sigma_px = std::hypot(light.sigma_px, unknown_lens_sd_px(light, size));
@@ -114,11 +112,11 @@ LampDetector LampDetector::leaning(const std::optional<Eigen::Matrix3d>& level_f
   return {lamps_, camera, classifier_};
 }
 
-std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& blob,
+std::vector<LightPart> LampDetector::parts_of(const ImageView& lines, const Blob& blob,
                                               const Background& background) const {
   constexpr double least_roundness = 0.5, softest_edge = 0.3;
   constexpr std::size_t most_lights = 4;
-  const cv::Rect box = blob.box();
+  const PixelBox box = blob.box();
   std::vector<LightPart> parts;
   auto rest = outline_of(lines, blob, background);
   if (has_rectangles_) {
@@ -160,7 +158,8 @@ std::vector<LightPart> LampDetector::parts_of(const cv::Mat& lines, const Blob& 
   return parts;
 }
 
-void LampDetector::measure(const cv::Mat& lines, const Background& background, Light& light) const {
+void LampDetector::measure(const ImageView& lines, const Background& background,
+                           Light& light) const {
   const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
   const auto judge = [&](const std::vector<double>& signal) {
     const Eigen::Vector2d from = shape_.turned(light.low), to = shape_.turned(light.high);
@@ -212,7 +211,7 @@ void LampDetector::correct_shear(std::vector<Light>& lights) const {
   }
 }
 
-std::vector<Light> LampDetector::detect(const cv::Mat& image) const {
+std::vector<Light> LampDetector::detect(const ImageView& image) const {
   const Background background = background_of(image);
   const auto [lines, lit, memory] = lines_of(image, camera_.readout, background);
   const auto blobs = group_runs(find_runs(lines, background.threshold, lit), most_dark_rows_);
@@ -271,7 +270,7 @@ void refuse(Light& light, LightReason reason) {
 
 }  // namespace
 
-bool wholly_in_view(const Light& light, const cv::Size& size) {
+bool wholly_in_view(const Light& light, const ImageSize& size) {
   return light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
          light.high.y() < size.height - 0.5;
 }
@@ -294,7 +293,7 @@ std::optional<double> LampDetector::shape_off(const Light& light, int lamp) cons
   return off < most_off ? std::optional(off) : std::nullopt;
 }
 
-void LampDetector::identify(std::vector<Light>& lights, const cv::Size& size) const {
+void LampDetector::identify(std::vector<Light>& lights, const ImageSize& size) const {
   constexpr double much_softer = 5, least_roundness = 0.45, most_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity();
   for (Light& light : lights) {

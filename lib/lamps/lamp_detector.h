@@ -3,21 +3,22 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
-#include "lamps/signal/lamp_classifier.h"
+#include "lamps/image/image_view.h"
+#include "lamps/image/pixel_box.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_parts.h"
 #include "lamps/shape/light_shape.h"
+#include "lamps/signal/lamp_classifier.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 
 namespace vlp {
 
 /// Whether the image's edge cuts no part of the light.
-bool wholly_in_view(const Light& light, const cv::Size& size);
+bool wholly_in_view(const Light& light, const ImageSize& size);
 
 /// Of a calibration; rows are taken for the read-out when it is not stated.
 DetectorCamera detector_camera(const Calibration& calibration);
@@ -37,8 +38,8 @@ class LampDetector {
   LampDetector(const LampMap& lamps, const DetectorCamera& camera,
                std::optional<LampClassifier> classifier = {});
 
-  /// The lights of an image, from the top. It has one channel of 8 or 16 bits and is not empty.
-  std::vector<Light> detect(const cv::Mat& image) const;
+  /// The lights of an image that is not empty, from the top.
+  std::vector<Light> detect(const ImageView& image) const;
 
   /// The same detector for a camera that leans otherwise, with its level_from_camera; nothing: as
   /// nobody knows. Then ellipses are fitted in the image, as without a lens.
@@ -49,13 +50,13 @@ class LampDetector {
  private:
   /// What may be lights: a blob by its edge, several when it is of several lights that touch, or by
   /// its glow when it has no edge.
-  std::vector<LightPart> parts_of(const cv::Mat& lines, const Blob& blob,
+  std::vector<LightPart> parts_of(const ImageView& lines, const Blob& blob,
                                   const Background& background) const;
   /// The outline once more, exactly, and the stripes.
-  void measure(const cv::Mat& lines, const Background& background, Light& light) const;
+  void measure(const ImageView& lines, const Background& background, Light& light) const;
   /// The centres of lights that a moving camera sees in part, see Shear.
   void correct_shear(std::vector<Light>& lights) const;
-  void identify(std::vector<Light>& lights, const cv::Size& size) const;
+  void identify(std::vector<Light>& lights, const ImageSize& size) const;
   /// How far a light is from that lamp's shape, round, or a rectangle with its sides' ratio: the
   /// logarithm of what the ratio is off by, 0 of discs; nothing when it has another shape.
   std::optional<double> shape_off(const Light& light, int lamp) const;

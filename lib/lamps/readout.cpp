@@ -7,7 +7,7 @@
 namespace vlp {
 namespace {
 
-double clear_stripes(const cv::Mat& image, Readout readout) {
+double clear_stripes(const ImageView& image, Readout readout) {
   const LampDetector detector({}, {readout, {}, {}});
   double sum = 0;
   for (const Light& light : detector.detect(image)) {
@@ -26,19 +26,19 @@ std::optional<Readout> ReadoutEvidence::readout() const {
   return std::nullopt;
 }
 
-void add_evidence(const cv::Mat& image, ReadoutEvidence& evidence) {
+void add_evidence(const ImageView& image, ReadoutEvidence& evidence) {
   evidence.rows += clear_stripes(image, Readout::rows);
   evidence.columns += clear_stripes(image, Readout::columns);
 }
 
 std::optional<Readout> find_readout(std::size_t images,
-                                    const std::function<cv::Mat(std::size_t)>& image) {
+                                    const std::function<ImageView(std::size_t)>& image) {
   constexpr double enough = 6;
   constexpr int most_used = 8;
   ReadoutEvidence evidence;
   int used = 0;
   for (std::size_t i = 0; i < images && used < most_used; ++i) {
-    const cv::Mat frame = image(i);
+    const ImageView frame = image(i);
     if (frame.empty()) continue;
     const double before = evidence.rows + evidence.columns;
     add_evidence(frame, evidence);

@@ -4,9 +4,9 @@
 
 #include <cstddef>
 #include <functional>
-#include <opencv2/core.hpp>
 #include <optional>
 
+#include "lamps/image/image_view.h"
 #include "rig/calibration.h"
 
 namespace vlp {
@@ -24,11 +24,11 @@ struct ReadoutEvidence {
 
 /// Adds what an image shows: with the right read-out a lamp is a disc with stripes across, with the
 /// other one it falls to pieces or has none.
-void add_evidence(const cv::Mat& image, ReadoutEvidence& evidence);
+void add_evidence(const ImageView& image, ReadoutEvidence& evidence);
 
 /// The read-out from the first images that show it, at most eight with lights. `image` gives an
-/// image by number, an empty one when it cannot be used.
+/// image by number, which is used until the next call of it, or an empty one if it cannot be used.
 std::optional<Readout> find_readout(std::size_t images,
-                                    const std::function<cv::Mat(std::size_t)>& image);
+                                    const std::function<ImageView(std::size_t)>& image);
 
 }  // namespace vlp

@@ -25,8 +25,8 @@
 #include "captures/detections_table.h"
 #include "captures/fixes_table.h"
 #include "captures/truth_table.h"
-#include "lamps/signal/lamp_classifier.h"
 #include "lamps/lamp_detector.h"
+#include "lamps/signal/lamp_classifier.h"
 #include "positioning/positioner.h"
 #include "rig/input_error.h"
 
@@ -278,15 +278,15 @@ std::string shown(const Fix& fix) {
 
 // Lamps in images
 
-/// Of the array's own memory, where its rows follow each other: what is given has to outlive it.
-cv::Mat image_of(const py::array& array) {
+/// Returns a view of the array's own memory, where its rows follow each other.
+ImageView image_of(const py::array& array) {
   const bool bytes = py::isinstance<py::array_t<std::uint8_t>>(array);
   if (array.ndim() != 2 || array.size() == 0 ||
       !(bytes || py::isinstance<py::array_t<std::uint16_t>>(array))) {
     throw std::invalid_argument("an image should have the shape (rows, columns), uint8 or uint16");
   }
-  return {static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)),
-          bytes ? CV_8U : CV_16U, const_cast<void*>(array.data())};
+  return {array.data(), static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)),
+          array.strides(0), bytes ? 8 : 16};
 }
 
 py::tuple arrays_of(const std::vector<Detection>& detections) {
@@ -314,9 +314,9 @@ std::string in_px(int width, int height) {
 py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
   const auto& [detector, imager_px] = of_camera;
   const auto rows = py::array::ensure(array, py::array::c_style);
-  const cv::Mat image = image_of(rows);
-  if (image.cols != imager_px[0] || image.rows != imager_px[1]) {
-    throw std::invalid_argument("the image is " + in_px(image.cols, image.rows) +
+  const ImageView image = image_of(rows);
+  if (image.width != imager_px[0] || image.height != imager_px[1]) {
+    throw std::invalid_argument("the image is " + in_px(image.width, image.height) +
                                 ", the calibration's camera has " +
                                 in_px(imager_px[0], imager_px[1]) + " px");
   }

@@ -9,9 +9,10 @@
 #include <utility>
 
 #include "detection/detect_captures.h"
-#include "lamps/signal/lamp_map_check.h"
-#include "lamps/readout.h"
+#include "detection/mat_view.h"
 #include "detection/video.h"
+#include "lamps/readout.h"
+#include "lamps/signal/lamp_map_check.h"
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"
 #include "session/leaning_captures.h"
@@ -223,8 +224,11 @@ Readout readout_of(std::vector<fs::path> images, const std::optional<Readout>& s
                    StepResult& result, const FromVideos& from_videos) {
   if (stated) return *stated;
   ImageSource source(std::move(images), from_videos);
-  const auto found = find_readout(
-      source.expected(), [&](std::size_t) { return next_or_nothing(source, from_videos.max_mpx); });
+  cv::Mat image;
+  const auto found = find_readout(source.expected(), [&](std::size_t) {
+    image = next_or_nothing(source, from_videos.max_mpx);
+    return image_view(image);
+  });
   if (!found) {
     result.warnings.emplace_back(
         "the read-out is not stated and the images do not show it: rows are taken; --readout "

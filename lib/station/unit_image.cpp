@@ -12,6 +12,7 @@
 
 #include "captures/digest.h"
 #include "detection/image_file.h"
+#include "detection/mat_view.h"
 #include "rig/input_error.h"
 #include "station/image_blur.h"
 #include "station/image_signal.h"
@@ -126,7 +127,7 @@ UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& 
     // A lamp fills its box to a share of pi / 4, and is dark for half of the time.
     constexpr double least_white = 0.65;
     int overexposed = 0;
-    for (const Light& light : detector.detect(image)) {
+    for (const Light& light : detector.detect(image_view(image))) {
       result.lights_cut += light.kind == LightKind::cut ? 1 : 0;
       result.lights_unknown += light.kind == LightKind::unknown ? 1 : 0;
       const cv::Point low(static_cast<int>(light.low.x()), static_cast<int>(light.low.y()));

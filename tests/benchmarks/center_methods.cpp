@@ -14,8 +14,9 @@
 
 #include "captures/csv_reader.h"
 #include "detection/image_file.h"
-#include "lamps/lamp_detector.h"
+#include "detection/mat_view.h"
 #include "lamps/image/background.h"
+#include "lamps/lamp_detector.h"
 
 namespace vlp {
 namespace {
@@ -64,14 +65,14 @@ LitPixels lit_pixels_of(const cv::Mat& image, const Light& light) {
   const cv::Point high(int(std::ceil(light.high.x())) + around_px + 1,
                        int(std::ceil(light.high.y())) + around_px + 1);
   const cv::Rect box = cv::Rect(low, high) & cv::Rect({0, 0}, image.size());
-  const Background background = background_of(image);
+  const Background background = background_of(image_view(image));
   return image.depth() == CV_8U ? lit_pixels_of<std::uint8_t>(image, background, box)
                                 : lit_pixels_of<std::uint16_t>(image, background, box);
 }
 
 std::map<int, Light> lamps_in(const LampDetector& detector, const cv::Mat& image) {
   std::map<int, Light> lamps;
-  for (Light& light : detector.detect(image)) {
+  for (Light& light : detector.detect(image_view(image))) {
     if (light.kind == LightKind::lamp) lamps[*light.lamp] = std::move(light);
   }
   return lamps;

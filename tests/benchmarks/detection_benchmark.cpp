@@ -9,8 +9,9 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "lamps/lamp_detector.h"
+#include "detection/mat_view.h"
 #include "lamps/image/background.h"
+#include "lamps/lamp_detector.h"
 #include "simulation/exposure.h"
 #include "simulation/truth.h"
 
@@ -44,7 +45,7 @@ const Captures& captures() {
 void detect_in(benchmark::State& state, const cv::Mat& image, const DetectorCamera& camera) {
   const LampDetector detector(captures().lamps, camera);
   std::size_t lamps = 0;
-  for (auto _ : state) lamps = detector.detect(image).size();
+  for (auto _ : state) lamps = detector.detect(image_view(image)).size();
   state.counters["lamps"] = static_cast<double>(lamps);
 }
 
@@ -61,12 +62,12 @@ void detect_sample(benchmark::State& state) {
       detector_camera(read_calibration(rendered + "true_calibration.yaml")));
   cv::setNumThreads(1);
   std::size_t lamps = 0;
-  for (auto _ : state) lamps = detector.detect(image).size();
+  for (auto _ : state) lamps = detector.detect(image_view(image)).size();
   state.counters["lamps"] = static_cast<double>(lamps);
 }
 
 void opencv_components(benchmark::State& state) {
-  const double threshold = background_of(captures().frame).threshold;
+  const double threshold = background_of(image_view(captures().frame)).threshold;
   cv::Mat binary, labels, statistics, centroids;
   for (auto _ : state) {
     cv::threshold(captures().frame, binary, threshold, 255, cv::THRESH_BINARY);

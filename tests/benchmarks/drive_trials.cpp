@@ -24,8 +24,9 @@
 #include <string>
 #include <vector>
 
-#include "lamps/lamp_detector.h"
+#include "detection/mat_view.h"
 #include "geometry/angles.h"
+#include "lamps/lamp_detector.h"
 #include "positioning/body_limit.h"
 #include "positioning/positioner.h"
 #include "rig/find_lamp.h"
@@ -279,7 +280,7 @@ class Trials {
                                        const LampShot& shot) const {
     const cv::Mat image = expose(scene_.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
     std::vector<Detection> detections;
-    for (const Light& light : detector.detect(image)) {
+    for (const Light& light : detector.detect(image_view(image))) {
       if (light.kind == LightKind::lamp) {
         detections.push_back({*light.lamp, light.pixel, light.sigma_px});
       }

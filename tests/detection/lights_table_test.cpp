@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "captures/csv_reader.h"
+#include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "rig/input_error.h"
 #include "support/temporary_folder.h"
@@ -109,7 +110,7 @@ const cv::Size kReasonSize(300, 200);
 /// The lights that a drawing shows to a detector that knows its lamp.
 std::vector<Light> lights_in_drawing(const cv::Mat& image) {
   return LampDetector({{drawn_lamp(1, kReasonPeriod_lines)}}, drawn_camera(kReasonSize))
-      .detect(image);
+      .detect(image_view(image));
 }
 
 cv::Mat drawn_lamp_at(const Eigen::Vector2d& center, double radius_px, double level = 0.7,

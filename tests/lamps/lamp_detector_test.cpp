@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The detector on rendered captures, whose truth is known.
 #include "lamps/lamp_detector.h"
+#include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
 
 #include <gtest/gtest.h>
@@ -48,7 +49,8 @@ TEST(LampDetector, LeavesOutSteadyLightsAndReflections) {
   const Captures captures("clutter", "sample");
   const LampShot shot = captures.shot(0);
   std::map<LightKind, int> kinds;
-  for (const Light& light : captures.detector().detect(captures.image(shot))) ++kinds[light.kind];
+  for (const Light& light : captures.detector().detect(image_view(captures.image(shot))))
+    ++kinds[light.kind];
   EXPECT_GE(kinds[LightKind::lamp], 3);
   EXPECT_LE(kinds[LightKind::lamp], 6) << "and three of them partly hidden";
   EXPECT_GE(kinds[LightKind::unknown], 1) << "the reflection of lamp 5";
@@ -60,7 +62,7 @@ TEST(LampDetector, MarksALampThatTheImagesEdgeCuts) {
   int cut = 0;
   for (std::size_t i = 0; i < 432; i += 8) {
     const LampShot shot = captures.shot(i);
-    const auto lights = captures.detector().detect(captures.image(shot));
+    const auto lights = captures.detector().detect(image_view(captures.image(shot)));
     for (const auto& [id, pixel, in_view] : captures.truth(shot)) {
       if (in_view > 0.9) continue;
       for (const Light& light : lights) {
@@ -77,7 +79,7 @@ TEST(LampDetector, CallsALampUnknownThatTheMapDoesNotHave) {
   const Captures captures("paper-rig", "sample");
   const LampDetector detector(LampMap{{Lamp{7, {0, 0, 1.6}, {}, 6000, 0.5}}},
                               {Readout::rows, 3e-5, {}});
-  for (const Light& light : detector.detect(captures.image(captures.shot(0)))) {
+  for (const Light& light : detector.detect(image_view(captures.image(captures.shot(0))))) {
     EXPECT_EQ(light.kind, LightKind::unknown);
     EXPECT_FALSE(light.lamp);
   }
@@ -88,7 +90,7 @@ TEST(LampDetector, DoesNotChooseBetweenLampsOfNearlyOneFrequency) {
   LampMap map{{Lamp{3, {0, 0, 1.6}, {}, 2500, 0.5}, Lamp{7, {1, 0, 1.6}, {}, 2520, 0.5}}};
   const auto identified = [&] {
     const LampDetector detector(map, {Readout::rows, 3e-5, {}});
-    const auto lights = detector.detect(captures.image(captures.shot(0)));
+    const auto lights = detector.detect(image_view(captures.image(captures.shot(0))));
     return std::count_if(lights.begin(), lights.end(),
                          [](const Light& light) { return light.lamp.has_value(); });
   };
@@ -102,12 +104,12 @@ TEST(LampDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
   const LampDetector detector(LampMap{{drawn_lamp(1, 36), drawn_lamp(2, 11)}}, drawn_camera(size));
   const DrawnLamp few{.center = {81.3, 79.6}, .stripes = {.period_lines = 36}};
   const DrawnLamp more{.center = {210.3, 79.6}, .stripes = {.period_lines = 11}};
-  const auto alone = detector.detect(drawn({few}, size, CV_8U, 0.5));
+  const auto alone = detector.detect(image_view(drawn({few}, size, CV_8U, 0.5)));
   ASSERT_EQ(alone.size(), 1U);
   EXPECT_LT(alone[0].stripes.periods, kEnoughPeriods);
   EXPECT_EQ(alone[0].kind, LightKind::unknown);
   EXPECT_EQ(alone[0].reason, LightReason::alone);
-  const auto both = detector.detect(drawn({few, more}, size, CV_8U, 0.5));
+  const auto both = detector.detect(image_view(drawn({few, more}, size, CV_8U, 0.5)));
   ASSERT_EQ(both.size(), 2U);
   for (const Light& light : both) EXPECT_EQ(light.kind, LightKind::lamp);
 }
@@ -116,9 +118,9 @@ TEST(LampDetector, FindsNothingInImagesWithoutLamps) {
   const LampDetector detector = Captures("paper-rig", "sample").detector();
   for (const int type : {CV_8U, CV_16U}) {
     for (const double level : {0.0, 100.0, 255.0, 65535.0}) {
-      EXPECT_TRUE(detector.detect(cv::Mat(600, 800, type, cv::Scalar(level))).empty());
+      EXPECT_TRUE(detector.detect(image_view(cv::Mat(600, 800, type, cv::Scalar(level)))).empty());
     }
-    EXPECT_TRUE(detector.detect(cv::Mat(1, 1, type, cv::Scalar(9))).empty());
+    EXPECT_TRUE(detector.detect(image_view(cv::Mat(1, 1, type, cv::Scalar(9)))).empty());
   }
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "detection/mat_view.h"
 #include "lamps/rendered_captures.h"
 #include "positioning/positioner.h"
 #include "rig/find_lamp.h"
@@ -33,7 +34,8 @@ TEST(Panels, LeaveDiscsAsTheyAre) {
   int compared = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     const cv::Mat image = captures.image(captures.shot(i));
-    const auto lights = captures.detector().detect(image), others = without.detect(image);
+    const auto lights = captures.detector().detect(image_view(image)),
+               others = without.detect(image_view(image));
     for (const Light& light : lights) {
       if (!light.lamp || is_panel_or_tube(*light.lamp)) continue;
       const auto same = std::find_if(others.begin(), others.end(), [&](const Light& other) {
@@ -56,7 +58,7 @@ TEST(Panels, AreNoLampsOfAnotherShape) {
   const LampDetector detector(swapped, detector_camera(captures.calibration()));
   int refused = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
-    for (const Light& light : detector.detect(captures.image(captures.shot(i)))) {
+    for (const Light& light : detector.detect(image_view(captures.image(captures.shot(i))))) {
       if (!is_rectangle(light)) continue;
       EXPECT_FALSE(light.lamp);
       EXPECT_EQ(light.kind, LightKind::unknown);
@@ -74,7 +76,7 @@ TEST(Panels, AreFoundWithoutALensByWhatTheirBowsTellOfIt) {
   for (std::size_t i = 0; i < captures.size(); i += 3 * kStep) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
-    for (const Light& light : detector.detect(captures.image(shot))) {
+    for (const Light& light : detector.detect(image_view(captures.image(shot)))) {
       if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(),
                                      [&](const TrueLamp& one) { return one.id == light.lamp; });
@@ -123,7 +125,7 @@ TEST(Panels, HiddenInPartAreAsSureAsTheyState) {
   for (std::size_t i = 0; i < captures.size(); i += 5) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
-    for (const Light& light : captures.detector().detect(captures.image(shot))) {
+    for (const Light& light : captures.detector().detect(image_view(captures.image(shot)))) {
       if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(),
                                      [&](const TrueLamp& one) { return one.id == light.lamp; });
@@ -146,7 +148,7 @@ TEST(Panels, CutByTheImagesEdgeAreNoLamps) {
   int cut = 0;
   for (std::size_t i = 0; i < captures.size(); i += 5) {
     const LampShot shot = captures.shot(i);
-    const auto lights = captures.detector().detect(captures.image(shot));
+    const auto lights = captures.detector().detect(image_view(captures.image(shot)));
     for (const TrueLamp& lamp : captures.truth(shot)) {
       if (!is_panel_or_tube(lamp.id) || lamp.in_view >= 1) continue;
       ++cut;
@@ -181,7 +183,7 @@ TEST(Panels, GiveFixes) {
   for (std::size_t i = 0; i < captures.size(); i += 2 * kStep) {
     const LampShot shot = captures.shot(i);
     std::vector<Detection> detections;
-    for (const Light& light : captures.detector().detect(captures.image(shot))) {
+    for (const Light& light : captures.detector().detect(image_view(captures.image(shot)))) {
       if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
       detections.push_back({*light.lamp, light.pixel, light.sigma_px});
     }

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "detection/image_file.h"
+#include "detection/mat_view.h"
 
 namespace vlp {
 namespace {
@@ -16,7 +17,7 @@ cv::Mat sample(const std::string& scene) {
 }
 
 std::optional<Readout> found_in(const cv::Mat& image) {
-  return find_readout(1, [&](std::size_t) { return image; });
+  return find_readout(1, [&](std::size_t) { return image_view(image); });
 }
 
 TEST(Readout, IsFoundInRenderedImages) {
@@ -31,15 +32,16 @@ TEST(Readout, IsFoundInRenderedImages) {
 TEST(Readout, IsNotFoundWhereThereAreNoLamps) {
   EXPECT_FALSE(found_in(cv::Mat(120, 160, CV_8U, cv::Scalar(30))));
   EXPECT_FALSE(found_in({}));
-  EXPECT_FALSE(find_readout(0, [](std::size_t) { return cv::Mat(); }));
+  EXPECT_FALSE(find_readout(0, [](std::size_t) { return ImageView(); }));
 }
 
 TEST(Readout, IsFoundInTheFirstImagesThatShowIt) {
   const cv::Mat lamps = sample("paper-rig"), dark(600, 800, CV_8U, cv::Scalar(2));
   const std::array images{cv::Mat(), dark, lamps, lamps, cv::Mat()};
   std::size_t asked = 0;
-  EXPECT_EQ(find_readout(images.size(), [&](std::size_t i) { return ++asked, images[i]; }),
-            Readout::rows);
+  EXPECT_EQ(
+      find_readout(images.size(), [&](std::size_t i) { return ++asked, image_view(images[i]); }),
+      Readout::rows);
   EXPECT_LE(asked, 4);
 }
 

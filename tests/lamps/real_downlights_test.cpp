@@ -15,9 +15,10 @@
 
 #include "captures/csv_reader.h"
 #include "detection/detect_lights.h"
-#include "lamps/signal/row_time.h"
 #include "detection/image_file.h"
+#include "detection/mat_view.h"
 #include "lamps/lamp_detector.h"
+#include "lamps/signal/row_time.h"
 #include "support/real_data.h"
 
 namespace vlp {
@@ -27,7 +28,7 @@ namespace fs = std::filesystem;
 
 std::map<int, Light> lamps_in(const LampDetector& detector, const cv::Mat& image) {
   std::map<int, Light> lamps;
-  for (Light& light : detector.detect(image)) {
+  for (Light& light : detector.detect(image_view(image))) {
     if (light.kind == LightKind::lamp) lamps.emplace(*light.lamp, std::move(light));
   }
   return lamps;
@@ -114,7 +115,7 @@ TEST_F(RealDownlights, TellTheRowTime) {
   const LampDetector detector(map(), {Readout::columns, {}, {}});
   std::vector<MeasuredPeriod> periods;
   for (int number = 1; number <= 5; ++number) {
-    for (const Light& light : detector.detect(read_image(image(number)))) {
+    for (const Light& light : detector.detect(image_view(read_image(image(number))))) {
       if (trustworthy(light.stripes)) periods.push_back({light.stripes.period_lines, {}});
     }
   }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "detection/image_file.h"
+#include "detection/mat_view.h"
 #include "lamps/lamp_detector.h"
 #include "support/real_data.h"
 
@@ -24,7 +25,7 @@ LampMap map_of_five() {
 
 void expect_no_lamp(const std::filesystem::path& file, Readout readout, double row_time_s) {
   const LampDetector detector(map_of_five(), {readout, row_time_s, {}});
-  for (const Light& light : detector.detect(read_image(file))) {
+  for (const Light& light : detector.detect(image_view(read_image(file)))) {
     EXPECT_FALSE(light.lamp) << file << " at " << light.pixel.transpose() << ", " << row_time_s;
   }
 }

@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include "detection/mat_view.h"
 #include "lamps/lamp_detector.h"
 #include "simulation/exposure.h"
 #include "simulation/picture.h"
@@ -69,7 +70,7 @@ class Captures {
     for (std::size_t i = 0; i < shots_in(set_); i += step) {
       const LampShot shot = this->shot(i);
       std::map<int, Light> found;
-      for (Light& light : lamp_detector.detect(image(shot))) {
+      for (Light& light : lamp_detector.detect(image_view(image(shot)))) {
         if (light.kind != LightKind::lamp) continue;
         EXPECT_FALSE(found.contains(*light.lamp)) << "one lamp twice in image " << i;
         found[*light.lamp] = light;

@@ -4,6 +4,7 @@
 
 #include <numbers>
 
+#include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "lamps/lamp_detector.h"
 
@@ -32,7 +33,8 @@ void expect_both(const Touching& touching) {
                         .stripes = {.period_lines = kPeriods_lines[1], .phase = 0.8}};
   const LampMap map{{drawn_lamp(1, kPeriods_lines[0]), drawn_lamp(2, kPeriods_lines[1])}};
   const LampDetector detector(map, drawn_camera(kTouchingSize));
-  const auto lights = detector.detect(drawn({one, other}, kTouchingSize, touching.depth, 0.5));
+  const auto lights =
+      detector.detect(image_view(drawn({one, other}, kTouchingSize, touching.depth, 0.5)));
   int lamps = 0;
   for (const Light& light : lights) {
     if (light.kind != LightKind::lamp) continue;

@@ -48,19 +48,19 @@ class Histogram {
 };
 
 template <typename Level>
-Histogram sample_of(const cv::Mat& image) {
+Histogram sample_of(const ImageView& image) {
   constexpr double enough = 8000;
-  const double pixels = static_cast<double>(image.rows) * image.cols;
+  const double pixels = static_cast<double>(image.height) * image.width;
   // An odd step that shifts from row to row meets every kind of row and column.
   const int step = static_cast<int>(std::sqrt(pixels / enough)) | 1;
   Histogram sample(std::numeric_limits<Level>::max() + 1);
-  for (int row = std::min(step / 2, image.rows / 2); row < image.rows; row += step) {
-    const auto* line = image.ptr<Level>(row);
-    for (int column = row / step % step; column < image.cols; column += step) {
+  for (int row = std::min(step / 2, image.height / 2); row < image.height; row += step) {
+    const auto* line = image.row<Level>(row);
+    for (int column = row / step % step; column < image.width; column += step) {
       sample.add(line[column]);
     }
   }
-  if (sample.count() == 0) sample.add(*image.ptr<Level>(0));
+  if (sample.count() == 0) sample.add(*image.row<Level>(0));
   return sample;
 }
 
@@ -130,9 +130,9 @@ Background background(const Histogram& sample) {
 
 }  // namespace
 
-Background background_of(const cv::Mat& image) {
-  return background(image.depth() == CV_8U ? sample_of<std::uint8_t>(image)
-                                           : sample_of<std::uint16_t>(image));
+Background background_of(const ImageView& image) {
+  return background(
+      visit_levels(image, [&](auto level) { return sample_of<decltype(level)>(image); }));
 }
 
 }  // namespace vlp

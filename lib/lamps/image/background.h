@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
+#include "lamps/image/image_view.h"
 
 namespace vlp {
 
@@ -17,7 +17,7 @@ struct Background {
   double threshold;
 };
 
-/// `image` has one channel of 8 or 16 bits and is not empty.
-Background background_of(const cv::Mat& image);
+/// @pre The image is not empty.
+Background background_of(const ImageView& image);
 
 }  // namespace vlp

@@ -4,13 +4,16 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
+
+#include "lamps/image/pixel_box.h"
 
 namespace vlp {
 
 /// A grey image in memory that the caller owns and that stays valid as long as the view is used.
 struct ImageView {
-  /// First pixel of the first row. Pixels are std::uint8_t where bits is 8, and std::uint16_t in the
-  /// machine's byte order where it is 16, aligned as such.
+  /// First pixel of the first row. Pixels are std::uint8_t where bits is 8, and std::uint16_t in
+  /// the machine's byte order where it is 16, aligned as such.
   const void* data = nullptr;
   int width = 0, height = 0;  ///< pixels
   /// Bytes from the start of a row to the start of the next one.
@@ -18,12 +21,42 @@ struct ImageView {
   int bits = 8;  ///< 8 or 16
 
   bool empty() const { return data == nullptr || width <= 0 || height <= 0; }
+  ImageSize size() const { return {width, height}; }
+  /// Returns the level of white: 255 or 65535.
+  int max_level() const { return (1 << bits) - 1; }
 
   /// Returns the first pixel of row y. `Level` is std::uint8_t or std::uint16_t, as `bits` has it.
   template <typename Level>
   const Level* row(int y) const {
     return reinterpret_cast<const Level*>(static_cast<const std::byte*>(data) + y * stride);
   }
+
+  /// Returns the level of the pixel in column x of row y. @pre The pixel is in the image.
+  int level_at(int x, int y) const {
+    return bits == 8 ? row<std::uint8_t>(y)[x] : row<std::uint16_t>(y)[x];
+  }
+
+  /// Returns a view of the part of a box that is in the image; it is empty if there is none.
+  ImageView part(const PixelBox& box) const {
+    const PixelBox inside = intersection(box, {0, 0, width, height});
+    const auto* first = static_cast<const std::byte*>(data) + inside.y * stride;
+    return {first + std::ptrdiff_t(inside.x) * (bits / 8), inside.width, inside.height, stride,
+            bits};
+  }
 };
+
+/// Calls a function with a value of the type of an image's levels, std::uint8_t or std::uint16_t,
+/// and returns its result.
+template <typename Function>
+decltype(auto) visit_levels(const ImageView& image, Function&& function) {
+  return image.bits == 8 ? std::forward<Function>(function)(std::uint8_t{})
+                         : std::forward<Function>(function)(std::uint16_t{});
+}
+
+/// Returns the level of the brightest pixel; 0 of an empty image.
+int brightest_level(const ImageView& image);
+
+/// Returns how many pixels have that level.
+int count_pixels_at(const ImageView& image, int level);
 
 }  // namespace vlp

@@ -3,18 +3,19 @@
 #pragma once
 
 #include <memory>
-#include <opencv2/core.hpp>
 
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
+#include "lamps/image/runs.h"
 #include "rig/calibration.h"
 
 namespace vlp {
 
 /// An image with the lines that the shutter reads as its rows.
 struct Lines {
-  cv::Mat pixels;
+  ImageView pixels;
   /// Tiles that may have runs, see lit_tiles(); empty when the image is read along rows.
-  cv::Mat1b lit;
+  TileMask lit;
   /// Of `pixels`, which last as long, when they are not the image's.
   std::shared_ptr<void> memory;
 };
@@ -24,6 +25,6 @@ struct Lines {
 /// because turning all of a large image takes longer than finding its lamps. The rest, in which
 /// nothing is to be seen, is at the background's level as far from what is lit as that reaches, and
 /// black beyond, where memory need not even be touched.
-Lines lines_of(const cv::Mat& image, Readout readout, const Background& background);
+Lines lines_of(const ImageView& image, Readout readout, const Background& background);
 
 }  // namespace vlp

@@ -24,18 +24,18 @@ bool any_above(const Level* pixels, int count, Level threshold) {
 int tiles_in(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
 
 /// No level is above the threshold.
-bool is_above_all(const cv::Mat& image, double threshold) {
-  return threshold >= (image.depth() == CV_8U ? 255 : 65535);
+bool is_above_all(const ImageView& image, double threshold) {
+  return threshold >= image.max_level();
 }
 
 template <typename Level>
-void mark_lit(const cv::Mat& image, Level threshold, cv::Mat1b& lit) {
-  for (int row = 0; row < image.rows; ++row) {
-    const auto* pixels = image.ptr<Level>(row);
-    auto* of_row = lit.ptr(row / kTile_px);
-    for (int tile = 0; tile < lit.cols; ++tile) {
+void mark_lit(const ImageView& image, Level threshold, TileMask& lit) {
+  for (int row = 0; row < image.height; ++row) {
+    const auto* pixels = image.row<Level>(row);
+    auto* of_row = lit.row(row / kTile_px);
+    for (int tile = 0; tile < lit.columns; ++tile) {
       const auto* first = pixels + tile * kTile_px;
-      const int count = std::min(kTile_px, image.cols - tile * kTile_px);
+      const int count = std::min(kTile_px, image.width - tile * kTile_px);
       if (of_row[tile] > 1 || !any_above(first, count, threshold)) continue;
       const auto lit_pixels =
           std::count_if(first, first + count, [&](Level level) { return level > threshold; });
@@ -67,16 +67,16 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
 }
 
 template <typename Level>
-std::vector<Run> runs_of(const cv::Mat& image, Level threshold, const cv::Mat1b& lit) {
+std::vector<Run> runs_of(const ImageView& image, Level threshold, const TileMask& lit) {
   std::vector<Run> runs;
   std::vector<int> tiles;
-  for (int top = 0; top < image.rows; top += kTile_px) {
+  for (int top = 0; top < image.height; top += kTile_px) {
     tiles.clear();
-    for (int tile = 0; tile < tiles_in(image.cols); ++tile) {
-      if (lit.empty() || lit(top / kTile_px, tile) != 0) tiles.push_back(tile);
+    for (int tile = 0; tile < tiles_in(image.width); ++tile) {
+      if (lit.empty() || lit.row(top / kTile_px)[tile] != 0) tiles.push_back(tile);
     }
-    for (int row = top; row < std::min(top + kTile_px, image.rows); ++row) {
-      add_runs_of_row(image.ptr<Level>(row), image.cols, row, threshold, tiles, runs);
+    for (int row = top; row < std::min(top + kTile_px, image.height); ++row) {
+      add_runs_of_row(image.row<Level>(row), image.width, row, threshold, tiles, runs);
     }
   }
   return runs;
@@ -111,7 +111,7 @@ struct Growing {
 
 }  // namespace
 
-cv::Rect Blob::box() const {
+PixelBox Blob::box() const {
   int begin = runs[0].begin, end = runs[0].end;
   for (const Run& run : runs) {
     begin = std::min(begin, run.begin);
@@ -120,21 +120,19 @@ cv::Rect Blob::box() const {
   return {begin, top(), end - begin, bottom() + 1 - top()};
 }
 
-cv::Mat1b lit_tiles(const cv::Mat& image, double threshold) {
-  cv::Mat1b lit(tiles_in(image.rows), tiles_in(image.cols), std::uint8_t(0));
+TileMask lit_tiles(const ImageView& image, double threshold) {
+  TileMask lit(tiles_in(image.width), tiles_in(image.height));
   if (is_above_all(image, threshold)) return lit;
-  if (image.depth() == CV_8U) {
-    mark_lit(image, static_cast<std::uint8_t>(threshold), lit);
-  } else {
-    mark_lit(image, static_cast<std::uint16_t>(threshold), lit);
-  }
+  visit_levels(image,
+               [&](auto level) { mark_lit(image, static_cast<decltype(level)>(threshold), lit); });
   return lit;
 }
 
-std::vector<Run> find_runs(const cv::Mat& image, double threshold, const cv::Mat1b& lit) {
+std::vector<Run> find_runs(const ImageView& image, double threshold, const TileMask& lit) {
   if (is_above_all(image, threshold)) return {};
-  return image.depth() == CV_8U ? runs_of(image, static_cast<std::uint8_t>(threshold), lit)
-                                : runs_of(image, static_cast<std::uint16_t>(threshold), lit);
+  return visit_levels(image, [&](auto level) {
+    return runs_of(image, static_cast<decltype(level)>(threshold), lit);
+  });
 }
 
 std::vector<Blob> group_runs(const std::vector<Run>& runs, int most_dark_rows) {

@@ -25,18 +25,18 @@ double level_of(const Level* row, const Run& run) {
 
 /// Of each row of a blob from its top on, above the dark.
 template <typename Level>
-std::vector<double> levels_of(const cv::Mat& image, const Blob& blob, double dark) {
+std::vector<double> levels_of(const ImageView& image, const Blob& blob, double dark) {
   std::vector<double> levels(static_cast<std::size_t>(blob.bottom() - blob.top() + 1));
   for (const Run& run : blob.runs) {
     double& level = levels[static_cast<std::size_t>(run.row - blob.top())];
-    level = std::max(level, level_of(image.ptr<Level>(run.row), run) - dark);
+    level = std::max(level, level_of(image.row<Level>(run.row), run) - dark);
   }
   return levels;
 }
 
 template <typename Level>
-std::vector<EdgePoint> outline(const cv::Mat& image, const Blob& blob, const Background& background,
-                               double share) {
+std::vector<EdgePoint> outline(const ImageView& image, const Blob& blob,
+                               const Background& background, double share) {
   constexpr double least_lit = 0.6, steep = 1.3;
   constexpr int outside = -3;
   const auto levels = levels_of<Level>(image, blob, background.level);
@@ -49,9 +49,9 @@ std::vector<EdgePoint> outline(const cv::Mat& image, const Blob& blob, const Bac
     const double own = levels[index], lit = own / envelope[index];
     if (!(lit >= least_lit) || envelope[index] < steep * level) continue;
     const double at = background.level + lit * level;
-    const auto* row = image.ptr<Level>(run.row);
+    const auto* row = image.row<Level>(run.row);
     for (const int direction : {1, -1}) {
-      const Profile<Level> profile{row, image.cols, direction > 0 ? run.begin : run.end - 1,
+      const Profile<Level> profile{row, image.width, direction > 0 ? run.begin : run.end - 1,
                                    direction};
       const auto edge = profile.crossing(at, outside, run.width());
       if (!edge) continue;
@@ -65,15 +65,15 @@ std::vector<EdgePoint> outline(const cv::Mat& image, const Blob& blob, const Bac
   return outermost(std::move(points));
 }
 
-std::vector<EdgePoint> outline_at(const cv::Mat& image, const Blob& blob,
+std::vector<EdgePoint> outline_at(const ImageView& image, const Blob& blob,
                                   const Background& background, double share) {
-  return image.depth() == CV_8U ? outline<std::uint8_t>(image, blob, background, share)
-                                : outline<std::uint16_t>(image, blob, background, share);
+  return visit_levels(
+      image, [&](auto level) { return outline<decltype(level)>(image, blob, background, share); });
 }
 
 }  // namespace
 
-std::optional<Light> glow_of(const cv::Mat& image, const Blob& blob, const Background& background,
+std::optional<Light> glow_of(const ImageView& image, const Blob& blob, const Background& background,
                              const LightShape& shape) {
   constexpr std::array shares = {0.1, 0.15, 0.2, 0.125, 0.175};  // the last two for want of others
   constexpr std::size_t enough = 3;

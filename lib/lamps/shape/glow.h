@@ -2,14 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
+#include "lamps/image/runs.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_shape.h"
-#include "lamps/image/runs.h"
 
 namespace vlp {
 
@@ -18,7 +18,7 @@ namespace vlp {
 /// the row is dimmer than the stripe that it belongs to. No glow is quite round: the centre is the
 /// mean of those at three shares from a tenth to a fifth of the level, and their scatter is in its
 /// sigma_px. Nothing when there is no glow, or one with an edge.
-std::optional<Light> glow_of(const cv::Mat& image, const Blob& blob, const Background& background,
+std::optional<Light> glow_of(const ImageView& image, const Blob& blob, const Background& background,
                              const LightShape& shape);
 
 }  // namespace vlp

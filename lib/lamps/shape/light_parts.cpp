@@ -16,7 +16,7 @@ bool covers(const Light& light, const Eigen::Vector2d& pixel) {
 }
 
 /// Whether two blobs may be parts of one light.
-bool near(const cv::Rect& a, const cv::Rect& b) {
+bool near(const PixelBox& a, const PixelBox& b) {
   const int gap_across = std::max(a.x, b.x) - std::min(a.x + a.width, b.x + b.width);
   const int gap_along = std::max(a.y, b.y) - std::min(a.y + a.height, b.y + b.height);
   const int size = std::max({a.width, a.height, b.width, b.height});
@@ -34,7 +34,7 @@ std::size_t points_of(const LightPart& part) { return part.light ? part.light->o
 /// circle each than on one together. `points` are there in all.
 bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std::size_t points) {
   constexpr double least_share = 0.6, least_gain = 1.25, least_of_both = 0.8, most_hidden = 1.5;
-  const cv::Rect box = a.box | b.box;
+  const PixelBox box = around(a.box, b.box);
   if (2 * whole.radius_px > most_hidden * std::max(box.width, box.height)) return false;
   const auto on_circle = double(whole.outline.size());
   const auto of_a = double(points_of(a)), of_b = double(points_of(b));
@@ -43,9 +43,10 @@ bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std:
 }
 
 /// Why a part has no form.
-LightReason reason_of(const LightPart& part, const cv::Size& size) {
-  const cv::Rect& box = part.box;
-  const bool inside = box.x > 0 && box.y > 0 && box.br().x < size.width && box.br().y < size.height;
+LightReason reason_of(const LightPart& part, const ImageSize& size) {
+  const PixelBox& box = part.box;
+  const bool inside =
+      box.x > 0 && box.y > 0 && box.right() < size.width && box.bottom() < size.height;
   if (!inside) return LightReason::at_edge;
   // What is not of the light itself takes up some of the points.
   const bool small = part.outline.size() < 2 * kLeastOutlinePoints;
@@ -89,7 +90,7 @@ std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
       both = outermost(std::move(both));
       auto one = shape.light_of(both, background);
       if (!one || !is_of_both(*one, parts[i], parts[j], both.size())) continue;
-      parts[i] = {std::move(one), std::move(both), parts[i].box | parts[j].box};
+      parts[i] = {std::move(one), std::move(both), around(parts[i].box, parts[j].box)};
       parts.erase(parts.begin() + std::ptrdiff_t(j));
       j = i;  // the whole may have more parts
     }
@@ -103,17 +104,17 @@ std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
 }
 
 std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vector<Light>& lights,
-                                   const LightShape& shape, const cv::Size& size) {
+                                   const LightShape& shape, const ImageSize& size) {
   constexpr int least_px = 5;
   std::vector<Light> formless;
   for (LightPart& part : parts) {
-    const cv::Rect& box = part.box;
+    const PixelBox& box = part.box;
     if (std::min(box.width, box.height) < least_px) continue;
     Light light{};
     light.kind = LightKind::formless;
     light.reason = reason_of(part, size);
     light.low = shape.turned({box.x - 0.5, box.y - 0.5});
-    light.high = shape.turned({box.br().x - 0.5, box.br().y - 0.5});
+    light.high = shape.turned({box.right() - 0.5, box.bottom() - 0.5});
     light.pixel = (light.low + light.high) / 2;
     light.radius_px = (light.high - light.low).mean() / 2;
     const bool inside = std::any_of(lights.begin(), lights.end(),

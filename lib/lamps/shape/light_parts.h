@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "lamps/image/background.h"
+#include "lamps/image/pixel_box.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_shape.h"
 
@@ -16,7 +16,7 @@ namespace vlp {
 struct LightPart {
   std::optional<Light> light;
   std::vector<EdgePoint> outline;
-  cv::Rect box;
+  PixelBox box;
 };
 
 /// The lights that the parts are of: what stands in the way splits a lamp, but its parts lie on one
@@ -28,6 +28,6 @@ std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
 /// Parts without a form, but those inside one of `lights`, as lights, with the reason. What is less
 /// than five pixels wide or high is a speck, and no light. `size` is that of the lines.
 std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vector<Light>& lights,
-                                   const LightShape& shape, const cv::Size& size);
+                                   const LightShape& shape, const ImageSize& size);
 
 }  // namespace vlp

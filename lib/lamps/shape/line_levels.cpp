@@ -31,7 +31,7 @@ ChordSums sums_of(const Level* pixels, const Run& chord, double dark) {
 
 }  // namespace
 
-LineLevels::LineLevels(const cv::Mat& lines, const std::vector<Run>& chords,
+LineLevels::LineLevels(const ImageView& lines, const std::vector<Run>& chords,
                        const Background& background)
     : first_(chords.front().row) {
   constexpr double unevenness = 0.005, steepest = 0.01;
@@ -39,9 +39,9 @@ LineLevels::LineLevels(const cv::Mat& lines, const std::vector<Run>& chords,
   sums.reserve(chords.size());
   double moment = 0, spread = 0;
   for (const Run& chord : chords) {
-    sums.push_back(lines.depth() == CV_8U
-                       ? sums_of(lines.ptr<std::uint8_t>(chord.row), chord, background.level)
-                       : sums_of(lines.ptr<std::uint16_t>(chord.row), chord, background.level));
+    sums.push_back(visit_levels(lines, [&](auto level) {
+      return sums_of(lines.row<decltype(level)>(chord.row), chord, background.level);
+    }));
     middle_ += sums.back().middle / double(chords.size());
     moment += sums.back().moment;
     spread += std::max(0.0, sums.back().mean) * sums.back().spread;

@@ -3,11 +3,11 @@
 #pragma once
 
 #include <algorithm>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
 #include "lamps/image/runs.h"
 
 namespace vlp {
@@ -27,7 +27,7 @@ struct LineLevel {
 class LineLevels {
  public:
   /// `chords` are of lines that follow one another, of which there are eight at least.
-  LineLevels(const cv::Mat& lines, const std::vector<Run>& chords, const Background& background);
+  LineLevels(const ImageView& lines, const std::vector<Run>& chords, const Background& background);
 
   /// Above the dark, in grey levels.
   double brightest() const { return brightest_; }

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <numbers>
 
-#include "lamps/shape/profile.h"
 #include "geometry/median.h"
 #include "geometry/normal_equations.h"
+#include "lamps/shape/profile.h"
 
 namespace vlp {
 namespace {
@@ -41,15 +41,15 @@ void add_edge(const Profile<Level>& profile, int width, int row, double dark,
 }
 
 template <typename Level>
-std::vector<EdgePoint> outline(const cv::Mat& image, const Blob& blob, double dark) {
+std::vector<EdgePoint> outline(const ImageView& image, const Blob& blob, double dark) {
   constexpr int least_width = 8;
   std::vector<EdgePoint> points;
   points.reserve(2 * blob.runs.size());
   for (const Run& run : blob.runs) {
     if (run.width() < least_width) continue;
-    const auto* row = image.ptr<Level>(run.row);
-    add_edge(Profile<Level>{row, image.cols, run.begin, 1}, run.width(), run.row, dark, points);
-    add_edge(Profile<Level>{row, image.cols, run.end - 1, -1}, run.width(), run.row, dark, points);
+    const auto* row = image.row<Level>(run.row);
+    add_edge(Profile<Level>{row, image.width, run.begin, 1}, run.width(), run.row, dark, points);
+    add_edge(Profile<Level>{row, image.width, run.end - 1, -1}, run.width(), run.row, dark, points);
   }
   // Between the stripes of a saturated lamp its charge spills over: no outline of its own.
   constexpr double least_share = 0.35;
@@ -127,13 +127,13 @@ constexpr int kBefore = 8, kSamples = 8;
 constexpr double kVariance = (kSamples * kSamples - 1) / 12.0;
 
 template <typename Level>
-Profile<Level> profile_of(const cv::Mat& image, const InnerLevel& inner) {
-  return {image.ptr<Level>(static_cast<int>(inner.point.pixel.y())), image.cols, inner.origin,
+Profile<Level> profile_of(const ImageView& image, const InnerLevel& inner) {
+  return {image.row<Level>(static_cast<int>(inner.point.pixel.y())), image.width, inner.origin,
           inner.direction()};
 }
 
 template <typename Level>
-std::vector<InnerLevel> inner_levels(const cv::Mat& image, const std::vector<EdgePoint>& points,
+std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<EdgePoint>& points,
                                      const RimEllipse& rim, double dark) {
   constexpr double flattest = 0.35, depth_px = 3, most_bent = 0.35;
   constexpr double square = kSamples * (kSamples * kSamples - 1) / 12.0;
@@ -227,7 +227,7 @@ double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
 /// -1/4 of the mean square, because a line was taken off, and of the n = 6 that 8 pixels have left
 /// per line its standard deviation is 1 / sqrt(n).
 template <typename Level>
-bool mottled(const cv::Mat& image, const std::vector<InnerLevel>& levels, const RimEllipse& rim,
+bool mottled(const ImageView& image, const std::vector<InnerLevel>& levels, const RimEllipse& rim,
              double bend, double dark) {
   constexpr double by_chance = -0.25, beyond_chance = 3.5, least_share = 0.003;
   constexpr int left = kSamples - 2;
@@ -253,7 +253,7 @@ bool mottled(const cv::Mat& image, const std::vector<InnerLevel>& levels, const 
 }
 
 template <typename Level>
-RefinedOutline refine(const cv::Mat& image, const std::vector<EdgePoint>& points,
+RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& points,
                       const DiscImage& disc, double dark) {
   // Of more blur the tail reaches the samples, and would pass for a bend.
   constexpr double most_blur_to_bend_px = 1.3;
@@ -303,10 +303,11 @@ RefinedOutline refine(const cv::Mat& image, const std::vector<EdgePoint>& points
 
 }  // namespace
 
-RefinedOutline refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
+RefinedOutline refined(const ImageView& image, const std::vector<EdgePoint>& points,
                        const DiscImage& disc, const Background& background) {
-  return image.depth() == CV_8U ? refine<std::uint8_t>(image, points, disc, background.level)
-                                : refine<std::uint16_t>(image, points, disc, background.level);
+  return visit_levels(image, [&](auto level) {
+    return refine<decltype(level)>(image, points, disc, background.level);
+  });
 }
 
 std::vector<EdgePoint> outermost(std::vector<EdgePoint> points) {
@@ -323,10 +324,10 @@ std::vector<EdgePoint> outermost(std::vector<EdgePoint> points) {
   return points;
 }
 
-std::vector<EdgePoint> outline_of(const cv::Mat& image, const Blob& blob,
+std::vector<EdgePoint> outline_of(const ImageView& image, const Blob& blob,
                                   const Background& background) {
-  return image.depth() == CV_8U ? outline<std::uint8_t>(image, blob, background.level)
-                                : outline<std::uint16_t>(image, blob, background.level);
+  return visit_levels(
+      image, [&](auto level) { return outline<decltype(level)>(image, blob, background.level); });
 }
 
 }  // namespace vlp

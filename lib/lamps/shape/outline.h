@@ -3,10 +3,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <opencv2/core.hpp>
 #include <vector>
 
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
 #include "lamps/image/runs.h"
 
 namespace vlp {
@@ -51,7 +51,7 @@ struct RefinedOutline {
 ///     level(i) = o (1 - F(t / s)) + a F(t / s) + b (t F(t / s) + s f(t / s)),
 ///
 /// a blurred step to a level that rises evenly; F, f: the normal distribution and its density.
-RefinedOutline refined(const cv::Mat& image, const std::vector<EdgePoint>& points,
+RefinedOutline refined(const ImageView& image, const std::vector<EdgePoint>& points,
                        const DiscImage& disc, const Background& background);
 
 /// Of each row the first begin and the last end: the outline of a light that something in the way
@@ -59,7 +59,7 @@ RefinedOutline refined(const cv::Mat& image, const std::vector<EdgePoint>& point
 std::vector<EdgePoint> outermost(std::vector<EdgePoint> points);
 
 /// The two ends of each run, but those at the image's edge and those too short to tell.
-std::vector<EdgePoint> outline_of(const cv::Mat& image, const Blob& blob,
+std::vector<EdgePoint> outline_of(const ImageView& image, const Blob& blob,
                                   const Background& background);
 
 }  // namespace vlp

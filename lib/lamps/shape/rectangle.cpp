@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "lamps/shape/straight_edge.h"
 #include "geometry/angles.h"
 #include "geometry/symmetric.h"
+#include "lamps/shape/straight_edge.h"
 #include "rig/detection.h"
 
 namespace vlp {
@@ -90,25 +90,53 @@ double aspect_sd_of(const std::array<StraightEdge, 4>& edges, double per_px) {
   return std::sqrt(variance);
 }
 
-/// The rectangle of the least area around the points, the light on the left of its sides.
-Corners rectangle_around(const std::vector<Eigen::Vector2d>& points, double per_px) {
-  const Eigen::Vector2d& origin = points.front();
-  std::vector<cv::Point2f> scaled;
-  scaled.reserve(points.size());
-  for (const Eigen::Vector2d& point : points) {
-    const Eigen::Vector2f at = ((point - origin) / per_px).cast<float>();
-    scaled.emplace_back(at.x(), at.y());
+/// Returns the convex hull, counter-clockwise as x and y are seen with x to the right and y up
+/// (Andrew's monotone chain).
+std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
+  std::sort(points.begin(), points.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+  });
+  std::vector<Eigen::Vector2d> hull;
+  const auto add_chain = [&](auto begin, auto end) {
+    const std::size_t first = hull.size();
+    for (auto point = begin; point != end; ++point) {
+      while (hull.size() >= first + 2 &&
+             !(cross_of(hull.back() - hull[hull.size() - 2], *point - hull.back()) > 0)) {
+        hull.pop_back();
+      }
+      hull.push_back(*point);
+    }
+    hull.pop_back();  // it begins the other chain
+  };
+  add_chain(points.begin(), points.end());
+  add_chain(points.rbegin(), points.rend());
+  return hull;
+}
+
+/// Computes the rectangle of the least area around the points, the light on the left of its sides.
+/// One of its sides lies on a side of their convex hull (Freeman and Shapira 1975).
+Corners rectangle_around(const std::vector<Eigen::Vector2d>& points) {
+  const auto hull = convex_hull(points);
+  Corners best{points.front(), points.front(), points.front(), points.front()};
+  double least_area = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < hull.size(); ++i) {
+    const Eigen::Vector2d& from = hull[i];
+    const Eigen::Vector2d way = (hull[(i + 1) % hull.size()] - from).normalized();
+    Eigen::AlignedBox2d box;
+    for (const Eigen::Vector2d& point : hull) {
+      const Eigen::Vector2d away = point - from;
+      box.extend(Eigen::Vector2d(way.dot(away), cross_of(way, away)));
+    }
+    if (!(box.volume() < least_area)) continue;
+    least_area = box.volume();
+    const Eigen::Vector2d left(-way.y(), way.x());
+    const auto corner = [&](double along, double across) -> Eigen::Vector2d {
+      return from + along * way + across * left;
+    };
+    best = {corner(box.min().x(), box.min().y()), corner(box.max().x(), box.min().y()),
+            corner(box.max().x(), box.max().y()), corner(box.min().x(), box.max().y())};
   }
-  std::array<cv::Point2f, 4> around;
-  cv::minAreaRect(scaled).points(around.data());
-  Corners corners;
-  for (std::size_t i = 0; i < 4; ++i) {
-    corners[i] = origin + per_px * Eigen::Vector2d(around[i].x, around[i].y);
-  }
-  if (cross_of(corners[1] - corners[0], corners[2] - corners[1]) < 0) {
-    std::reverse(corners.begin(), corners.end());
-  }
-  return corners;
+  return best;
 }
 
 double off(const Side& side, const Eigen::Vector2d& point) {
@@ -160,7 +188,7 @@ std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& po
                                           double per_px) {
   constexpr double near_px = 2, least_share = 0.7;
   constexpr double coarse_share = 0.08;
-  Corners corners = rectangle_around(points, per_px);
+  Corners corners = rectangle_around(points);
   const double size = std::min((corners[1] - corners[0]).norm(), (corners[2] - corners[1]).norm());
   double within = std::max(4 * per_px, coarse_share * size);
   for (int round = 0; round < 3; ++round) {
@@ -182,7 +210,7 @@ std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& po
 /// best of many that are bent back, which leaves its ends where they are.
 std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& points) {
   constexpr double most_px = 6, step_px = 0.5, least_aspect = 3;
-  const Sides around = sides_of(rectangle_around(points, 1));
+  const Sides around = sides_of(rectangle_around(points));
   if (aspect_of(around) < least_aspect) return std::nullopt;
   const bool first =
       (around[0].to - around[0].from).norm() > (around[1].to - around[1].from).norm();
@@ -356,7 +384,7 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& s
 
 }  // namespace
 
-std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const cv::Size& size) {
+std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const ImageSize& size) {
   constexpr int least_px = 4;
   double top = size.height, bottom = -1;
   for (const Eigen::Vector2d& point : polygon) {
@@ -393,12 +421,12 @@ bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d
   return !(left && right);
 }
 
-std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
+std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
                                   const std::vector<EdgePoint>& outline,
                                   const Background& background, const LightShape& shape) {
   constexpr double least_px = 10, most_slender = 40;
   constexpr std::size_t least_lines = 8;
-  const cv::Rect box = blob.box();
+  const PixelBox box = blob.box();
   if (outline.size() < kLeastOutlinePoints || std::min(box.width, box.height) < least_px) return {};
   std::vector<Eigen::Vector2d> points;
   points.reserve(outline.size());
@@ -451,7 +479,7 @@ std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
     corners = rectangular(found) ? corners_of(found) : std::nullopt;
     if (!corners) return std::nullopt;
   }
-  const Eigen::Vector2d middle((lines.cols - 1) / 2.0, (lines.rows - 1) / 2.0);
+  const Eigen::Vector2d middle((lines.width - 1) / 2.0, (lines.height - 1) / 2.0);
   return light_of(edges, sides_of(*corners), per_px, points, middle, shape);
 }
 

@@ -3,14 +3,15 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
+#include "lamps/image/pixel_box.h"
+#include "lamps/image/runs.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_shape.h"
-#include "lamps/image/runs.h"
 
 namespace vlp {
 
@@ -27,12 +28,12 @@ namespace vlp {
 /// wide, has less than some 18 lines, is more than 40 times as long as wide, or when an edge is not
 /// seen: wholly in the image, and lit where a side lies along the lines and a dark stripe may hide
 /// it.
-std::optional<Light> rectangle_of(const cv::Mat& lines, const Blob& blob,
+std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
                                   const std::vector<EdgePoint>& outline,
                                   const Background& background, const LightShape& shape);
 
 /// The pixels inside a convex polygon, (column, row), on each line of an image of that size.
-std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const cv::Size& size);
+std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const ImageSize& size);
 
 /// Whether a point is in a convex polygon.
 bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point);

@@ -7,12 +7,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
 
-#include "lamps/shape/rim_fit.h"
 #include "geometry/median.h"
+#include "lamps/shape/rim_fit.h"
 
 namespace vlp {
 namespace {
@@ -28,20 +27,23 @@ struct Ring {
 class Face {
  public:
   /// Means are of so many pixels.
-  Face(const cv::Mat& image, const cv::Rect& box, const Background& background, int window)
+  Face(const ImageView& image, const PixelBox& box, const Background& background, int window)
       : box_(box), window_(window) {
     constexpr double share = 0.02;
-    image(box).convertTo(levels_, CV_32F, 1, -background.level);
-    double brightest = 0;
-    cv::minMaxLoc(levels_, nullptr, &brightest);
+    const auto dark = static_cast<float>(background.level);
+    levels_.reserve(std::size_t(box.area()));
+    for (int row = box.y; row < box.bottom(); ++row) {
+      for (int column = box.x; column < box.right(); ++column) {
+        levels_.push_back(static_cast<float>(image.level_at(column, row)) - dark);
+      }
+    }
+    const double brightest = *std::max_element(levels_.begin(), levels_.end());
     soft_ = std::max(share * brightest, (background.threshold - background.level) / 2);
-    // The mean over a window that ends with each pixel.
-    cv::boxFilter(levels_, means_, CV_32F, {window_, 1}, {window_ - 1, 0}, true,
-                  cv::BORDER_REPLICATE);
+    find_means();
     find_lit_lines(background.threshold - background.level);
   }
 
-  const cv::Rect& box() const { return box_; }
+  const PixelBox& box() const { return box_; }
   /// Lines of bright stripes.
   const std::vector<int>& lit_lines() const { return lit_; }
   std::vector<int> lit_lines_of_image() const {
@@ -53,8 +55,8 @@ class Face {
 
   /// Mean level before the border between a column and the one before it, and after it.
   std::pair<double, double> around(int line, int column) const {
-    const auto* means = means_.ptr<float>(line);
-    return {std::max(0.F, means[column - 1]), std::max(0.F, means[column + window_ - 1])};
+    const float* line_means = means(line);
+    return {std::max(0.F, line_means[column - 1]), std::max(0.F, line_means[column + window_ - 1])};
   }
 
   /// e, unbounded, of a light that begins at that border, or ends there; 0 at the box's edge.
@@ -63,7 +65,7 @@ class Face {
     const auto [before, after] = around(line, column);
     const double outside = begins ? before : after, inside = begins ? after : before;
     const int further = std::clamp(column - 1 + (begins ? 2 : -1) * window_, 0, box_.width - 1);
-    const double beyond = std::max(0.F, means_.ptr<float>(line)[further]);
+    const double beyond = std::max(0.F, means(line)[further]);
     const double ratio = (inside + soft_) / (outside + soft_);
     const double slope = std::max(1.0, (beyond + soft_) / (inside + soft_));
     return std::log(ratio / slope);
@@ -75,7 +77,7 @@ class Face {
     const auto [before, after] = around(line, column);
     const auto [dark, bright] = std::minmax(before, after);
     const double middle = dark + share * (bright - dark), sign = after > before ? 1 : -1;
-    const auto* levels = levels_.ptr<float>(line);
+    const float* levels = this->levels(line);
     const double border = column - 0.5;
     std::optional<double> nearest;
     for (int i = column - window_; i + 1 < column + window_; ++i) {
@@ -88,12 +90,29 @@ class Face {
   }
 
  private:
+  const float* levels(int line) const { return levels_.data() + std::ptrdiff_t(line) * box_.width; }
+  const float* means(int line) const { return means_.data() + std::ptrdiff_t(line) * box_.width; }
+
+  /// Computes the mean over a window that ends with each pixel; before the first pixel the line has
+  /// its level.
+  void find_means() {
+    means_.reserve(levels_.size());
+    for (int row = 0; row < box_.height; ++row) {
+      const float* line = levels(row);
+      double sum = double(line[0]) * window_;
+      for (int column = 0; column < box_.width; ++column) {
+        sum += double(line[column]) - line[std::max(0, column - window_)];
+        means_.push_back(static_cast<float>(sum * (1.0 / window_)));
+      }
+    }
+  }
+
   void find_lit_lines(double least_level) {
     constexpr double least_lit = 0.55;
     std::vector<double> brightest(static_cast<std::size_t>(box_.height));
     std::vector<float> line;
     for (int row = 0; row < box_.height; ++row) {
-      line.assign(levels_.ptr<float>(row), levels_.ptr<float>(row) + box_.width);
+      line.assign(levels(row), levels(row) + box_.width);
       const auto tenth = line.end() - 1 - std::ptrdiff_t(line.size() / 10);
       std::nth_element(line.begin(), tenth, line.end());
       brightest[static_cast<std::size_t>(row)] = *tenth;
@@ -109,10 +128,10 @@ class Face {
     }
   }
 
-  cv::Rect box_;
+  PixelBox box_;
   int window_;
   double soft_;
-  cv::Mat levels_, means_;
+  std::vector<float> levels_, means_;  // row by row
   std::vector<int> lit_;
 };
 
@@ -161,7 +180,7 @@ class Steps {
 };
 
 /// The rings of the largest sum: the best, and the best of those that are far from it.
-std::array<Ring, 2> best_rings(const Face& face, const cv::Rect& blob) {
+std::array<Ring, 2> best_rings(const Face& face, const PixelBox& blob) {
   constexpr double fine = 20, far = 0.15;
   const Steps steps(face);
   const double size = std::max(blob.width, blob.height), step = std::max(1.0, size / 2 / fine);
@@ -232,11 +251,11 @@ std::vector<EdgePoint> steps_near(const Face& face, const Eigen::Vector2d& low,
 /// What one line of ten reaches in the middle of its runs or half way to their ends, above the
 /// dark.
 template <typename Level>
-double bright_level(const cv::Mat& image, const Blob& blob, double dark) {
+double bright_level(const ImageView& image, const Blob& blob, double dark) {
   std::vector<Level> levels;
   levels.reserve(blob.runs.size());
   for (const Run& run : blob.runs) {
-    const auto* row = image.ptr<Level>(run.row) + run.begin;
+    const auto* row = image.row<Level>(run.row) + run.begin;
     const std::ptrdiff_t quarter = run.width() / 4;
     levels.push_back(std::max({row[quarter], row[2 * quarter], row[3 * quarter]}));
   }
@@ -260,7 +279,7 @@ double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
 
 /// The light by the steps next to its outline, in which sides of another contrast are as far out as
 /// others, and the sigma of its centre; whether most of them show one.
-bool fit_to_steps(const cv::Mat& image, const std::vector<int>& lit_lines,
+bool fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
                   const Background& background, const LightShape& shape, Light& light,
                   double& sigma_px) {
   constexpr int rounds = 3;
@@ -291,7 +310,7 @@ bool fit_to_steps(const cv::Mat& image, const std::vector<int>& lit_lines,
 
 }  // namespace
 
-bool unevenly_lit(const cv::Mat& image, const Blob& blob, const std::vector<EdgePoint>& outline,
+bool unevenly_lit(const ImageView& image, const Blob& blob, const std::vector<EdgePoint>& outline,
                   const Background& background) {
   constexpr double much = 3, least_ends = 0.2;
   constexpr int least_width = 8;
@@ -302,23 +321,23 @@ bool unevenly_lit(const cv::Mat& image, const Blob& blob, const std::vector<Edge
   std::vector<double> levels;
   levels.reserve(outline.size());
   for (const EdgePoint& point : outline) levels.push_back(point.level);
-  const double inside = image.depth() == CV_8U
-                            ? bright_level<std::uint8_t>(image, blob, background.level)
-                            : bright_level<std::uint16_t>(image, blob, background.level);
+  const double inside = visit_levels(image, [&](auto level) {
+    return bright_level<decltype(level)>(image, blob, background.level);
+  });
   return inside > much * upper_median(std::move(levels));
 }
 
-std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Background& background,
+std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Background& background,
                           const LightShape& shape) {
   constexpr int least_size = 20, least_lines = 10;
   constexpr double margin = 0.2, least_step = 0.28, clear_step = 0.33, least_shown = 0.5;
   constexpr double one_point = 2;
-  const cv::Rect box = blob.box();
+  const PixelBox box = blob.box();
   if (std::min(box.width, box.height) < least_size) return std::nullopt;
   const int more = static_cast<int>(margin * std::max(box.width, box.height));
-  const cv::Rect wide =
-      cv::Rect(box.x - more, box.y - more, box.width + 2 * more, box.height + 2 * more) &
-      cv::Rect(0, 0, image.cols, image.rows);
+  const PixelBox wide =
+      intersection({box.x - more, box.y - more, box.width + 2 * more, box.height + 2 * more},
+                   {0, 0, image.width, image.height});
   // As coarse as the search for the ring; fine enough for the rim.
   const int size = std::max(wide.width, wide.height);
   const int fine = std::clamp(size / 30, 2, 6), coarse = std::max(fine, size / 50);

@@ -2,19 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
+#include "lamps/image/runs.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_shape.h"
-#include "lamps/image/runs.h"
 
 namespace vlp {
 
 /// Whether a blob is much brighter inside than next to its outline: three times in one line of ten.
-bool unevenly_lit(const cv::Mat& image, const Blob& blob, const std::vector<EdgePoint>& outline,
+bool unevenly_lit(const ImageView& image, const Blob& blob, const std::vector<EdgePoint>& outline,
                   const Background& background);
 
 /// A light by its rim, and whether the rim is clear: a glow without one has slopes that may pass
@@ -40,7 +40,7 @@ struct Rim {
 /// most of it has one. The sigma of its centre is theirs, with what another tone curve would make
 /// of it; of a rim that is not clear by them and where another circle has nearly that sum, the
 /// distance to it by the odds that it is the rim, too.
-std::optional<Rim> rim_of(const cv::Mat& image, const Blob& blob, const Background& background,
+std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Background& background,
                           const LightShape& shape);
 
 }  // namespace vlp

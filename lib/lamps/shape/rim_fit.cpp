@@ -9,9 +9,9 @@
 #include <numbers>
 #include <utility>
 
-#include "lamps/shape/m_estimate.h"
 #include "geometry/median.h"
 #include "geometry/normal_equations.h"
+#include "lamps/shape/m_estimate.h"
 
 namespace vlp {
 namespace {
@@ -23,26 +23,22 @@ constexpr double kClipped = 0.98 * 255;
 /// Levels of an image as those of 8 bits: of more bits the brightest of a light is 255.
 class Levels {
  public:
-  Levels(const cv::Mat& image, const Eigen::Vector2d& low, const Eigen::Vector2d& high)
+  Levels(const ImageView& image, const Eigen::Vector2d& low, const Eigen::Vector2d& high)
       : image_(image) {
-    if (image.depth() == CV_8U) return;
-    const cv::Rect box(cv::Point(static_cast<int>(low.x()), static_cast<int>(low.y())),
-                       cv::Point(static_cast<int>(high.x()) + 1, static_cast<int>(high.y()) + 1));
-    const cv::Mat pixels = image(box & cv::Rect({0, 0}, image.size()));
-    double brightest = 0;
-    if (!pixels.empty()) cv::minMaxLoc(pixels, nullptr, &brightest);
-    if (brightest > 0) scale_ = 255 / brightest;
+    if (image.bits == 8) return;
+    const int x = static_cast<int>(low.x()), y = static_cast<int>(low.y());
+    const PixelBox box{x, y, static_cast<int>(high.x()) + 1 - x,
+                       static_cast<int>(high.y()) + 1 - y};
+    const int brightest = brightest_level(image.part(box));
+    if (brightest > 0) scale_ = 255.0 / brightest;
   }
 
-  int columns() const { return image_.cols; }
+  int columns() const { return image_.width; }
   double of(double level) const { return scale_ * level; }
-  double at(int row, int column) const {
-    return image_.depth() == CV_8U ? double(image_.at<std::uint8_t>(row, column))
-                                   : of(image_.at<std::uint16_t>(row, column));
-  }
+  double at(int row, int column) const { return of(image_.level_at(column, row)); }
 
  private:
-  const cv::Mat& image_;
+  ImageView image_;
   double scale_ = 1;
 };
 
@@ -260,9 +256,9 @@ std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& 
 
 }  // namespace
 
-RimSteps fit_rim_steps(const cv::Mat& image, const Light& light, const std::vector<int>& lit_lines,
-                       const Background& background, const StepPicture& picture, bool blur_known,
-                       const LightShape& shape) {
+RimSteps fit_rim_steps(const ImageView& image, const Light& light,
+                       const std::vector<int>& lit_lines, const Background& background,
+                       const StepPicture& picture, bool blur_known, const LightShape& shape) {
   constexpr double piece_of_radius = 0.2, least_lines = 6, most_sd_px = 0.5;
   constexpr double least_reach_px = 7, reach_of_blur = 4;
   constexpr double of_blur = 0.05;  // what sharpening and compression do

@@ -2,14 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
+#include "geometry/types.h"
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_shape.h"
-#include "geometry/types.h"
 
 namespace vlp {
 
@@ -48,9 +48,9 @@ struct RimSteps {
 /// coded level is not half of the light: the larger the step, the further out it seems
 /// (lib/THEORY.md). A clipped pixel tells only that its light is no less. The blur is fitted, too,
 /// unless `blur_known`.
-RimSteps fit_rim_steps(const cv::Mat& image, const Light& light, const std::vector<int>& lit_lines,
-                       const Background& background, const StepPicture& picture, bool blur_known,
-                       const LightShape& shape);
+RimSteps fit_rim_steps(const ImageView& image, const Light& light,
+                       const std::vector<int>& lit_lines, const Background& background,
+                       const StepPicture& picture, bool blur_known, const LightShape& shape);
 
 /// How far an outline is off, (column, row), by pieces of it, and its covariance.
 struct OutlineShift {

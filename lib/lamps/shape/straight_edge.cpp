@@ -9,8 +9,8 @@
 #include <map>
 #include <numbers>
 
-#include "lamps/shape/m_estimate.h"
 #include "geometry/normal_equations.h"
+#include "lamps/shape/m_estimate.h"
 
 namespace vlp {
 namespace {
@@ -65,7 +65,7 @@ struct Model {
 /// Collects the samples of a side.
 class Samples {
  public:
-  Samples(const cv::Mat& lines, const Side& side, const LineLevels& levels, double dark,
+  Samples(const ImageView& lines, const Side& side, const LineLevels& levels, double dark,
           double per_px, const EdgeSearch& search, const LightShape& shape)
       : lines_(lines), side_(side), levels_(levels), dark_(dark), per_px_(per_px), shape_(shape) {
     if (!trace()) return;
@@ -117,7 +117,7 @@ class Samples {
       const auto pixel = shape_.pixel_of(side_.from + t * (side_.to - side_.from));
       if (!pixel) return false;
       const Eigen::Vector2d at = shape_.turned(*pixel);
-      if (!(at.minCoeff() > -1 && at.x() < lines_.cols && at.y() < lines_.rows)) return false;
+      if (!(at.minCoeff() > -1 && at.x() < lines_.width && at.y() < lines_.height)) return false;
       trace_[static_cast<std::size_t>(i)] = at;
     }
     return true;
@@ -133,9 +133,7 @@ class Samples {
   }
 
   double value_of(int column, int row) const {
-    const double level = lines_.depth() == CV_8U ? lines_.at<std::uint8_t>(row, column)
-                                                 : lines_.at<std::uint16_t>(row, column);
-    return (level - dark_) / levels_.brightest();
+    return (lines_.level_at(column, row) - dark_) / levels_.brightest();
   }
 
   /// The pixels across the side at one column or row.
@@ -164,7 +162,7 @@ class Samples {
       Eigen::Vector2d pixel = middle;
       pixel[across] += i;
       const int column = static_cast<int>(pixel.x()), row = static_cast<int>(pixel.y());
-      if (column < 0 || row < 0 || column >= lines_.cols || row >= lines_.rows) return false;
+      if (column < 0 || row < 0 || column >= lines_.width || row >= lines_.height) return false;
       const auto lit = levels_.at(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
@@ -179,7 +177,7 @@ class Samples {
     return true;
   }
 
-  const cv::Mat& lines_;
+  ImageView lines_;
   const Side& side_;
   const LineLevels& levels_;
   double dark_, per_px_;
@@ -317,14 +315,14 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
 
 }  // namespace
 
-std::optional<StraightEdge> straight_edge_at(const cv::Mat& lines, const Side& side,
+std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side& side,
                                              const LineLevels& levels, double dark, double per_px,
                                              const EdgeSearch& search, const LightShape& shape) {
   constexpr double least_lit = 0.35, rise_of_blur = 1.349;
   constexpr std::size_t least = 40;
   const Samples all(lines, side, levels, dark, per_px, search, shape);
   if (all.samples.size() < least) return std::nullopt;
-  const double focal_px = std::hypot(lines.cols, lines.rows) / 2;
+  const double focal_px = std::hypot(lines.width, lines.height) / 2;
   auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, focal_px)
                                : fit<kBow + 1>(all, side, per_px, focal_px);
   if (!edge) return std::nullopt;

@@ -3,14 +3,14 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
+#include "geometry/types.h"
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
 #include "lamps/shape/light_shape.h"
 #include "lamps/shape/line_levels.h"
-#include "geometry/types.h"
 
 namespace vlp {
 
@@ -61,7 +61,7 @@ struct EdgeSearch {
 /// The covariance is by the scatter of the pixels and by what the levels of lines are worth, see
 /// LineLevels. Nothing where that leaves an end uncertain by more than half a pixel, or where most
 /// pixels do not look like an edge.
-std::optional<StraightEdge> straight_edge_at(const cv::Mat& lines, const Side& side,
+std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side& side,
                                              const LineLevels& levels, double dark, double per_px,
                                              const EdgeSearch& search, const LightShape& shape);
 

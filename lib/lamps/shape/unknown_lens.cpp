@@ -9,7 +9,7 @@
 
 namespace vlp {
 
-double unknown_lens_sd_px(const Light& light, const cv::Size& image) {
+double unknown_lens_sd_px(const Light& light, const ImageSize& image) {
   constexpr double most_lean_rad = rad_from_deg(10);
   if (is_rectangle(light)) return 0;
   const double focal_px = std::hypot(image.width, image.height) / 2;

@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
-
+#include "lamps/image/pixel_box.h"
 #include "lamps/shape/light.h"
 
 namespace vlp {
@@ -26,6 +25,6 @@ namespace vlp {
 /// image's diagonal, on a camera that leans by 10 degrees, and it is taken for one standard
 /// deviation of the shift: a lens for people's pictures bends less, a fisheye of 180 degrees up to
 /// 2.5 times as much. 0 for rectangles, whose edges show what bends them.
-double unknown_lens_sd_px(const Light& light, const cv::Size& image);
+double unknown_lens_sd_px(const Light& light, const ImageSize& image);
 
 }  // namespace vlp

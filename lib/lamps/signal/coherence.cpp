@@ -19,12 +19,12 @@ using PieceLevels = Eigen::Array<double, kPieces, 1>;
 
 /// The levels of each line's parts, above the dark.
 template <typename Level>
-std::vector<PieceLevels> piece_levels(const cv::Mat& lines, const std::vector<Run>& chords,
+std::vector<PieceLevels> piece_levels(const ImageView& lines, const std::vector<Run>& chords,
                                       double dark) {
   std::vector<PieceLevels> levels;
   levels.reserve(chords.size());
   for (const auto& [row, begin, end] : chords) {
-    const auto* pixels = lines.ptr<Level>(row);
+    const auto* pixels = lines.row<Level>(row);
     PieceLevels& line = levels.emplace_back();
     for (int piece = 0; piece < static_cast<int>(kPieces); ++piece) {
       const int from = begin + (end - begin) * piece / static_cast<int>(kPieces);
@@ -40,13 +40,13 @@ std::vector<PieceLevels> piece_levels(const cv::Mat& lines, const std::vector<Ru
 
 }  // namespace
 
-double coherence_of(const cv::Mat& lines, const std::vector<Run>& chords,
+double coherence_of(const ImageView& lines, const std::vector<Run>& chords,
                     const Background& background, double period_lines) {
   constexpr double share = 0.05;
   constexpr std::size_t least_values = 3;
-  const auto levels = lines.depth() == CV_8U
-                          ? piece_levels<std::uint8_t>(lines, chords, background.level)
-                          : piece_levels<std::uint16_t>(lines, chords, background.level);
+  const auto levels = visit_levels(lines, [&](auto level) {
+    return piece_levels<decltype(level)>(lines, chords, background.level);
+  });
   const auto quarter = static_cast<std::size_t>(std::max(1L, std::lround(period_lines / 4)));
   if (levels.size() + 1 < least_values + 2 * quarter) return 0;
   double brightest = 0;

@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <vector>
 
 #include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
 #include "lamps/image/runs.h"
 
 namespace vlp {
@@ -30,7 +30,7 @@ inline constexpr double kLeastCoherence = 0.85;
 ///
 /// `chords` are the light's pixels on each of its `lines`, see lines_of() and chords_of(). 0 when
 /// it has too few lines to tell.
-double coherence_of(const cv::Mat& lines, const std::vector<Run>& chords,
+double coherence_of(const ImageView& lines, const std::vector<Run>& chords,
                     const Background& background, double period_lines);
 
 }  // namespace vlp

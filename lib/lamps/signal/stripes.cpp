@@ -197,11 +197,11 @@ double level_of(const Level* pixels, int begin, int end) {
 }
 
 template <typename Level>
-std::vector<double> signal_of(const cv::Mat& image, const std::vector<Run>& chords, double dark) {
+std::vector<double> signal_of(const ImageView& image, const std::vector<Run>& chords, double dark) {
   std::vector<double> signal;
   signal.reserve(chords.size());
   for (const auto& [row, begin, end] : chords) {
-    signal.push_back(level_of(image.ptr<Level>(row), begin, end) - dark);
+    signal.push_back(level_of(image.row<Level>(row), begin, end) - dark);
   }
   return signal;
 }
@@ -209,7 +209,7 @@ std::vector<double> signal_of(const cv::Mat& image, const std::vector<Run>& chor
 }  // namespace
 
 std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
-                           const cv::Size& size) {
+                           const ImageSize& size) {
   constexpr double used_width = 0.8;
   const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
   const int first = std::max(0, static_cast<int>(std::ceil(center.y() - kUsedHeight * half.y())));
@@ -226,9 +226,10 @@ std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& hi
   return chords;
 }
 
-std::vector<double> line_signal(const cv::Mat& image, const std::vector<Run>& chords, double dark) {
-  return image.depth() == CV_8U ? signal_of<std::uint8_t>(image, chords, dark)
-                                : signal_of<std::uint16_t>(image, chords, dark);
+std::vector<double> line_signal(const ImageView& image, const std::vector<Run>& chords,
+                                double dark) {
+  return visit_levels(image,
+                      [&](auto level) { return signal_of<decltype(level)>(image, chords, dark); });
 }
 
 }  // namespace vlp

@@ -3,9 +3,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <opencv2/core.hpp>
 #include <vector>
 
+#include "lamps/image/image_view.h"
+#include "lamps/image/pixel_box.h"
 #include "lamps/image/runs.h"
 
 namespace vlp {
@@ -27,10 +28,11 @@ inline constexpr double kUsedHeight = 0.9;
 /// The pixels that a light has on each line, without those at its rim. The light is an ellipse in
 /// the box from `low` to `high` (column, row) of an image of that size.
 std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
-                           const cv::Size& size);
+                           const ImageSize& size);
 
 /// How bright each chord of a light is, above the dark, where nothing hides it.
-std::vector<double> line_signal(const cv::Mat& image, const std::vector<Run>& chords, double dark);
+std::vector<double> line_signal(const ImageView& image, const std::vector<Run>& chords,
+                                double dark);
 
 struct Stripes {
   /// (bright - dark) / bright of the lines: 0 for steady light, 1 for full stripes.

@@ -9,8 +9,9 @@
 
 #include "calibration/adjustment/adjustment.h"
 #include "calibration/levelling/levelling.h"
-#include "lamps/lamp_detector.h"
+#include "detection/mat_view.h"
 #include "geometry/angles.h"
+#include "lamps/lamp_detector.h"
 #include "simulation/exposure.h"
 #include "simulation/truth.h"
 #include "support/random.h"
@@ -56,7 +57,7 @@ class RenderedDrive : public testing::Test {
       motion.turn_rate_rad_per_s = speed_m_per_s > 0 ? rate_rad_per_s : 0;
       const cv::Mat image = expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
       Frame frame{std::to_string(i), {}};
-      for (const Light& light : detector.detect(image)) {
+      for (const Light& light : detector.detect(image_view(image))) {
         if (light.kind != LightKind::lamp) continue;
         frame.detections.push_back({*light.lamp, light.pixel, light.sigma_px});
       }

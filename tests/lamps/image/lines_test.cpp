@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "detection/mat_view.h"
 #include "lamps/image/runs.h"
 #include "lamps/rendered_captures.h"
 #include "support/random.h"
@@ -14,6 +15,12 @@ namespace vlp {
 namespace {
 
 constexpr int kAround_px = 64;
+
+/// The pixels of a view as an image of OpenCV.
+cv::Mat mat_of(const ImageView& view) {
+  return {view.height, view.width, view.bits == 8 ? CV_8U : CV_16U, const_cast<void*>(view.data),
+          std::size_t(view.stride)};
+}
 
 /// Dark, with noise, and some spots of light.
 cv::Mat spots_on_dark(const cv::Size& size, int depth, int spots) {
@@ -31,8 +38,8 @@ cv::Mat spots_on_dark(const cv::Size& size, int depth, int spots) {
 }
 
 void expect_turned(const cv::Mat& image, double threshold) {
-  const auto [lines, lit, memory] = lines_of(image, Readout::columns, {0, 1, threshold});
-  const cv::Mat all = image.t();
+  const Lines found = lines_of(image_view(image), Readout::columns, {0, 1, threshold});
+  const cv::Mat lines = mat_of(found.pixels), all = image.t();
   ASSERT_EQ(lines.size(), all.size());
   ASSERT_EQ(lines.type(), all.type());
   const cv::Mat bright = all > threshold;
@@ -50,7 +57,8 @@ void expect_turned(const cv::Mat& image, double threshold) {
   EXPECT_EQ(cv::countNonZero(differs & (lines != 0)), 0);
   EXPECT_EQ(cv::countNonZero(differs & bright), 0);
   // Where nothing is lit nothing is looked for, and nothing is missed.
-  const auto some = find_runs(lines, threshold, lit), every = find_runs(all, threshold);
+  const auto some = find_runs(found.pixels, threshold, found.lit);
+  const auto every = find_runs(image_view(all), threshold);
   EXPECT_TRUE(std::equal(some.begin(), some.end(), every.begin(), every.end(),
                          [](const Run& a, const Run& b) {
                            return a.row == b.row && a.begin == b.begin && a.end == b.end;
@@ -59,7 +67,7 @@ void expect_turned(const cv::Mat& image, double threshold) {
 
 TEST(Lines, AreTheImageWhenRowsAreRead) {
   const cv::Mat image = spots_on_dark({100, 70}, CV_8U, 3);
-  EXPECT_EQ(lines_of(image, Readout::rows, {0, 1, 100}).pixels.data, image.data);
+  EXPECT_EQ(lines_of(image_view(image), Readout::rows, {0, 1, 100}).pixels.data, image.data);
 }
 
 TEST(Lines, AreTheImageTurnedAroundAllThatIsBright) {
@@ -79,7 +87,8 @@ TEST(Lines, AreAsDarkAsTheBackgroundAroundWhatIsBright) {
     cv::Mat image = spots_on_dark({2000, 1500}, depth, 0);
     const cv::Rect light(900, 700, 200, 150);
     image(light).setTo(white);
-    const auto [lines, lit, memory] = lines_of(image, Readout::columns, {7.4, 1, white - 1});
+    const Lines found = lines_of(image_view(image), Readout::columns, {7.4, 1, white - 1});
+    const cv::Mat lines = mat_of(found.pixels);
     EXPECT_EQ(lines.size(), cv::Size(1500, 2000));
     EXPECT_EQ(lines.type(), image.type());
     // As far as it is large: 200 px, and more.
@@ -95,17 +104,17 @@ TEST(Lines, AreAsDarkAsTheBackgroundAroundWhatIsBright) {
 TEST(Lines, OfADarkImageAreBlackAlsoWithNoise) {
   cv::Mat dark = spots_on_dark({601, 333}, CV_8U, 0);
   dark.at<std::uint8_t>(100, 200) = dark.at<std::uint8_t>(300, 500) = 200;  // no run of three
-  const Lines lines = lines_of(dark, Readout::columns, {7.4, 1, 100});
-  EXPECT_EQ(lines.pixels.size(), cv::Size(333, 601));
-  EXPECT_EQ(cv::countNonZero(lines.pixels), 0);
+  const Lines lines = lines_of(image_view(dark), Readout::columns, {7.4, 1, 100});
+  EXPECT_EQ(lines.pixels.size(), (ImageSize{333, 601}));
+  EXPECT_EQ(cv::countNonZero(mat_of(lines.pixels)), 0);
   EXPECT_TRUE(find_runs(lines.pixels, 100, lines.lit).empty());
 }
 
 TEST(Lines, HaveTheRunThatTilesShare) {
   cv::Mat image(200, 200, CV_8U, cv::Scalar(0));
   image.at<std::uint8_t>(63, 10) = image.at<std::uint8_t>(65, 10) = 200;
-  const auto [lines, lit, memory] = lines_of(image, Readout::columns, {0, 1, 100});
-  const auto runs = find_runs(lines, 100, lit);
+  const Lines lines = lines_of(image_view(image), Readout::columns, {0, 1, 100});
+  const auto runs = find_runs(lines.pixels, 100, lines.lit);
   ASSERT_EQ(runs.size(), 1U);
   EXPECT_EQ(runs[0].row, 10);
   EXPECT_EQ(runs[0].begin, 63);
@@ -134,8 +143,8 @@ TEST(Lines, OfAFrameAndOfTheTurnedFrameShowTheSameLights) {
   for (std::size_t i = 0; i < 3; ++i) {
     const LampShot shot = lamp_shot(scene, set, i * 7);
     const cv::Mat image = expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
-    const auto upright = by_rows.detect(image);
-    auto turned = by_columns.detect(image.t());
+    const auto upright = by_rows.detect(image_view(image));
+    auto turned = by_columns.detect(image_view(image.t()));
     std::sort(turned.begin(), turned.end(), before);
     EXPECT_GE(upright.size(), 4U);
     ASSERT_EQ(upright.size(), turned.size());

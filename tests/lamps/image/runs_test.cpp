@@ -8,6 +8,8 @@
 #include <string>
 #include <utility>
 
+#include "detection/mat_view.h"
+
 namespace vlp {
 
 bool operator==(const Run& a, const Run& b) {
@@ -33,20 +35,24 @@ cv::Mat row_with(const std::vector<std::pair<int, int>>& lit, int depth = CV_8U,
 TEST(FindRuns, FindsTheLitPixelsOfEveryRowInOrder) {
   cv::Mat image;
   cv::vconcat(std::vector{row_with({{20, 30}, {50, 53}}), row_with({}), row_with({{5, 8}})}, image);
-  EXPECT_THAT(find_runs(image, 100),
+  EXPECT_THAT(find_runs(image_view(image), 100),
               ElementsAre(vlp::Run{0, 20, 30}, vlp::Run{0, 50, 53}, vlp::Run{2, 5, 8}));
 }
 
 TEST(FindRuns, PassesOverGapsOfUpToTwoPixels) {
-  EXPECT_THAT(find_runs(row_with({{20, 25}, {26, 30}}), 100), ElementsAre(vlp::Run{0, 20, 30}));
-  EXPECT_THAT(find_runs(row_with({{20, 25}, {27, 30}}), 100), ElementsAre(vlp::Run{0, 20, 30}));
-  EXPECT_THAT(find_runs(row_with({{20, 25}, {28, 31}}), 100),
+  EXPECT_THAT(find_runs(image_view(row_with({{20, 25}, {26, 30}})), 100),
+              ElementsAre(vlp::Run{0, 20, 30}));
+  EXPECT_THAT(find_runs(image_view(row_with({{20, 25}, {27, 30}})), 100),
+              ElementsAre(vlp::Run{0, 20, 30}));
+  EXPECT_THAT(find_runs(image_view(row_with({{20, 25}, {28, 31}})), 100),
               ElementsAre(vlp::Run{0, 20, 25}, vlp::Run{0, 28, 31}));
 }
 
 TEST(FindRuns, TakesOneOrTwoPixelsForNoise) {
-  EXPECT_THAT(find_runs(row_with({{0, 1}, {20, 21}, {40, 42}, {198, 200}}), 100), IsEmpty());
-  EXPECT_THAT(find_runs(row_with({{20, 23}, {40, 42}}), 100), ElementsAre(vlp::Run{0, 20, 23}));
+  EXPECT_THAT(find_runs(image_view(row_with({{0, 1}, {20, 21}, {40, 42}, {198, 200}})), 100),
+              IsEmpty());
+  EXPECT_THAT(find_runs(image_view(row_with({{20, 23}, {40, 42}})), 100),
+              ElementsAre(vlp::Run{0, 20, 23}));
 }
 
 TEST(FindRuns, FindsRunsWhereverTheyBeginAndEnd) {
@@ -54,47 +60,49 @@ TEST(FindRuns, FindsRunsWhereverTheyBeginAndEnd) {
   for (int begin = 0; begin < 197; ++begin) {
     for (const int width : {3, 64, 65, 130}) {
       const int end = std::min(begin + width, 200);
-      EXPECT_THAT(find_runs(row_with({{begin, end}}), 100), ElementsAre(vlp::Run{0, begin, end}));
+      EXPECT_THAT(find_runs(image_view(row_with({{begin, end}})), 100),
+                  ElementsAre(vlp::Run{0, begin, end}));
     }
   }
 }
 
 TEST(FindRuns, PassesOverGapsBetweenBlocks) {
   for (int gap = 60; gap < 68; ++gap) {
-    EXPECT_THAT(find_runs(row_with({{50, gap}, {gap + 2, 90}}), 100),
+    EXPECT_THAT(find_runs(image_view(row_with({{50, gap}, {gap + 2, 90}})), 100),
                 ElementsAre(vlp::Run{0, 50, 90}));
-    EXPECT_THAT(find_runs(row_with({{50, gap}, {gap + 3, 90}}), 100),
+    EXPECT_THAT(find_runs(image_view(row_with({{50, gap}, {gap + 3, 90}})), 100),
                 ElementsAre(vlp::Run{0, 50, gap}, vlp::Run{0, gap + 3, 90}));
   }
 }
 
 TEST(FindRuns, DoesNotJoinRunsAcrossADarkBlock) {
-  EXPECT_THAT(find_runs(row_with({{60, 64}, {128, 131}}), 100),
+  EXPECT_THAT(find_runs(image_view(row_with({{60, 64}, {128, 131}})), 100),
               ElementsAre(vlp::Run{0, 60, 64}, vlp::Run{0, 128, 131}));
 }
 
 TEST(FindRuns, TakesPixelsAboveTheThresholdOnly) {
   const cv::Mat row = row_with({{20, 30}}, CV_8U, 10, 100);
-  EXPECT_THAT(find_runs(row, 99.9), ElementsAre(vlp::Run{0, 20, 30}));
-  EXPECT_THAT(find_runs(row, 100), IsEmpty());
-  EXPECT_THAT(find_runs(row, 100.1), IsEmpty());
+  EXPECT_THAT(find_runs(image_view(row), 99.9), ElementsAre(vlp::Run{0, 20, 30}));
+  EXPECT_THAT(find_runs(image_view(row), 100), IsEmpty());
+  EXPECT_THAT(find_runs(image_view(row), 100.1), IsEmpty());
 }
 
 TEST(FindRuns, FindsRunsOf16Bits) {
   const cv::Mat row = row_with({{20, 30}}, CV_16U, 3000, 40000);
-  EXPECT_THAT(find_runs(row, 39999.5), ElementsAre(vlp::Run{0, 20, 30}));
-  EXPECT_THAT(find_runs(row, 40000), IsEmpty());
-  EXPECT_THAT(find_runs(row, 300), ElementsAre(vlp::Run{0, 0, 200}));
+  EXPECT_THAT(find_runs(image_view(row), 39999.5), ElementsAre(vlp::Run{0, 20, 30}));
+  EXPECT_THAT(find_runs(image_view(row), 40000), IsEmpty());
+  EXPECT_THAT(find_runs(image_view(row), 300), ElementsAre(vlp::Run{0, 0, 200}));
 }
 
 TEST(FindRuns, FindsNothingAboveWhite) {
   for (const double threshold : {255.0, 257.5, 1e9}) {
-    EXPECT_THAT(find_runs(row_with({{20, 30}}, CV_8U, 10, 255), threshold), IsEmpty());
+    EXPECT_THAT(find_runs(image_view(row_with({{20, 30}}, CV_8U, 10, 255)), threshold), IsEmpty());
   }
-  EXPECT_THAT(find_runs(row_with({{20, 30}}, CV_8U, 10, 255), 254.9),
+  EXPECT_THAT(find_runs(image_view(row_with({{20, 30}}, CV_8U, 10, 255)), 254.9),
               ElementsAre(vlp::Run{0, 20, 30}));
   for (const double threshold : {65535.0, 65540.0, 1e9}) {
-    EXPECT_THAT(find_runs(row_with({{20, 30}}, CV_16U, 10, 65535), threshold), IsEmpty());
+    EXPECT_THAT(find_runs(image_view(row_with({{20, 30}}, CV_16U, 10, 65535)), threshold),
+                IsEmpty());
   }
 }
 

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "detection/mat_view.h"
 #include "lamps/shape/outline.h"
 
 namespace vlp {
@@ -68,7 +69,8 @@ struct DrawnDisc {
   }
 };
 
-inline std::vector<EdgePoint> outline_in(const cv::Mat& image) {
+inline std::vector<EdgePoint> outline_in(const cv::Mat& pixels) {
+  const ImageView image = image_view(pixels);
   const Background background = background_of(image);
   std::vector<EdgePoint> all;
   for (const Blob& blob : group_runs(find_runs(image, background.threshold), 3)) {
@@ -79,8 +81,8 @@ inline std::vector<EdgePoint> outline_in(const cv::Mat& image) {
 }
 
 inline RefinedOutline refined_outline_in(const cv::Mat& image, const DrawnDisc& disc) {
-  return refined(image, outline_in(image), {disc.low(), disc.high(), disc.center},
-                 background_of(image));
+  return refined(image_view(image), outline_in(image), {disc.low(), disc.high(), disc.center},
+                 background_of(image_view(image)));
 }
 
 inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "lamps/lamp_detector.h"
 #include "lamps/shape/glow_envelope.h"
@@ -23,7 +24,7 @@ DrawnLamp glow(double level, const DrawnStripes& stripes = {}) {
   return {.center = {198.7, 181.2}, .level = level, .stripes = stripes, .glow = DrawnGlow()};
 }
 
-std::optional<Light> glow_in(const cv::Mat& image) {
+std::optional<Light> glow_in(const ImageView& image) {
   const Background background = background_of(image);
   const auto blobs = group_runs(find_runs(image, background.threshold), 20);
   const auto size = [](const Blob& blob) { return blob.bottom() - blob.top(); };
@@ -53,7 +54,8 @@ TEST(Glow, IsFoundWithItsCentreAndItsStripes) {
   double chi_square = 0, worst_px = 0, count = 0;
   for (const int depth : {CV_8U, CV_16U}) {
     for_each_case({0, 0.5, 1.5}, [&](const DrawnLamp& lamp, double noise) {
-      const cv::Mat image = drawn({lamp}, kGlowSize, depth, noise);
+      const cv::Mat pixels = drawn({lamp}, kGlowSize, depth, noise);
+      const ImageView image = image_view(pixels);
       const auto light = glow_in(image);
       ASSERT_TRUE(light);
       EXPECT_TRUE(light->glows);
@@ -77,8 +79,8 @@ TEST(Glow, IsFoundWithItsCentreAndItsStripes) {
 TEST(Glow, IsIdentified) {
   for_each_case({0, 0.5}, [](const DrawnLamp& lamp, double noise) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 17.5)}};
-    const auto lights =
-        LampDetector(map, drawn_camera(kGlowSize)).detect(drawn({lamp}, kGlowSize, CV_8U, noise));
+    const auto lights = LampDetector(map, drawn_camera(kGlowSize))
+                            .detect(image_view(drawn({lamp}, kGlowSize, CV_8U, noise)));
     ASSERT_EQ(lights.size(), 1U);
     EXPECT_TRUE(lights[0].glows);
     EXPECT_NEAR(lights[0].stripes.period_lines / lamp.stripes.period_lines, 1, 0.02);
@@ -91,9 +93,9 @@ TEST(Glow, HasNoEdge) {
   for (const int depth : {CV_8U, CV_16U}) {
     for (const double blur_px : {0.6, 1.0}) {
       const DrawnLamp disc{.center = {198.7, 181.2}, .blur_px = blur_px};
-      EXPECT_FALSE(glow_in(drawn({disc}, kGlowSize, depth)));
-      for (const Light& light :
-           LampDetector({}, drawn_camera(kGlowSize)).detect(drawn({disc}, kGlowSize, depth))) {
+      EXPECT_FALSE(glow_in(image_view(drawn({disc}, kGlowSize, depth))));
+      for (const Light& light : LampDetector({}, drawn_camera(kGlowSize))
+                                    .detect(image_view(drawn({disc}, kGlowSize, depth)))) {
         EXPECT_FALSE(light.glows);
       }
     }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "lamps/lamp_detector.h"
 
@@ -18,14 +19,15 @@ using Eigen::Vector2d;
 
 const cv::Size kSize(300, 280);
 
-Blob largest_blob(const cv::Mat& image, const Background& background) {
+Blob largest_blob(const ImageView& image, const Background& background) {
   const auto blobs = group_runs(find_runs(image, background.threshold), 24);
   return *std::max_element(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) {
     return a.box().area() < b.box().area();
   });
 }
 
-std::optional<Rim> rim_in(const cv::Mat& image) {
+std::optional<Rim> rim_in(const cv::Mat& pixels) {
+  const ImageView image = image_view(pixels);
   const Background background = background_of(image);
   return rim_of(image, largest_blob(image, background), background,
                 LightShape(drawn_camera(kSize)));
@@ -155,7 +157,8 @@ TEST(Rim, IsSeenOfLargeDownlightsToo) {
     lamp.center *= scale, lamp.radius_px *= scale;
     lamp.recess->core_off_px *= scale, lamp.recess->core_px *= scale, lamp.recess->halo_px *= scale;
     const cv::Size size(int(scale * kSize.width), int(scale * kSize.height));
-    const cv::Mat image = drawn({lamp}, size, CV_8U, 1);
+    const cv::Mat pixels = drawn({lamp}, size, CV_8U, 1);
+    const ImageView image = image_view(pixels);
     const Background background = background_of(image);
     const auto rim =
         rim_of(image, largest_blob(image, background), background, LightShape(drawn_camera(size)));
@@ -168,8 +171,8 @@ TEST(Rim, IsSeenOfLargeDownlightsToo) {
 TEST(Rim, OfADownlightLeadsToItsLamp) {
   for_each_downlight([](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
-    const auto lights =
-        LampDetector(map, drawn_camera(kSize)).detect(drawn({lamp}, kSize, depth, noise, seed));
+    const auto lights = LampDetector(map, drawn_camera(kSize))
+                            .detect(image_view(drawn({lamp}, kSize, depth, noise, seed)));
     ASSERT_EQ(lights.size(), 1U);
     if (lights[0].stripes.periods < kEnoughPeriods) {
       EXPECT_EQ(lights[0].reason, LightReason::alone);
@@ -208,7 +211,8 @@ TEST(Rim, IsNotLookedForInSpecks) {
 
 TEST(UnevenlyLit, IsADownlightAndNotADisc) {
   const auto uneven = [](const DrawnLamp& lamp, int depth) {
-    const cv::Mat image = drawn({lamp}, kSize, depth, 1);
+    const cv::Mat pixels = drawn({lamp}, kSize, depth, 1);
+    const ImageView image = image_view(pixels);
     const Background background = background_of(image);
     const Blob blob = largest_blob(image, background);
     return unevenly_lit(image, blob, outline_of(image, blob, background), background);
@@ -217,7 +221,8 @@ TEST(UnevenlyLit, IsADownlightAndNotADisc) {
     EXPECT_TRUE(uneven(downlight(0.2, 17), depth));
     EXPECT_FALSE(uneven({.center = {151.3, 139.6}, .radius_px = 50.7}, depth));
   }
-  EXPECT_FALSE(unevenly_lit(cv::Mat1b(20, 20), Blob{{{3, 2, 9}}}, {}, Background{0, 1, 5}));
+  EXPECT_FALSE(
+      unevenly_lit(image_view(cv::Mat1b(20, 20)), Blob{{{3, 2, 9}}}, {}, Background{0, 1, 5}));
 }
 
 }  // namespace

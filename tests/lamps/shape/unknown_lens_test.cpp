@@ -9,14 +9,14 @@
 #include <numbers>
 
 #include "camera/lens.h"
-#include "lamps/shape/robust_ellipse.h"
-#include "lamps/rendered_captures.h"
 #include "geometry/angles.h"
+#include "lamps/rendered_captures.h"
+#include "lamps/shape/robust_ellipse.h"
 
 namespace vlp {
 namespace {
 
-const cv::Size kUnknownLensImage(800, 600);
+constexpr ImageSize kUnknownLensImage{800, 600};
 constexpr double kHalf_px = 500;  // of its diagonal
 
 /// A disc on a ceiling, seen by a camera that leans by that towards x, with a lens that has its

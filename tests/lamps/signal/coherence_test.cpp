@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "support/random.h"
 
@@ -15,7 +16,8 @@ namespace {
 
 const cv::Size kPictureSize(200, 160);
 
-double coherence_in(const cv::Mat& image, const DrawnLamp& lamp) {
+double coherence_in(const cv::Mat& pixels, const DrawnLamp& lamp) {
+  const ImageView image = image_view(pixels);
   const Eigen::Vector2d half(lamp.radius_px, lamp.radius_px);
   return coherence_of(image, chords_of(lamp.center - half, lamp.center + half, image.size()),
                       background_of(image), lamp.stripes.period_lines);
@@ -65,12 +67,13 @@ TEST(Coherence, IsSeldomReachedByPartsThatVaryEachInItsWay) {
   Random random(5);
   int coherent = 0;
   for (int trial = 0; trial < trials; ++trial) {
-    cv::Mat image(120, 120, CV_8U, cv::Scalar(10));
+    cv::Mat pixels(120, 120, CV_8U, cv::Scalar(10));
     for (int row = 40; row < 80; row += patch) {
       for (int column = 40; column < 80; column += 7) {
-        image(cv::Rect(column, row, 7, patch)) = random.uniform(10, 200);
+        pixels(cv::Rect(column, row, 7, patch)) = random.uniform(10, 200);
       }
     }
+    const ImageView image = image_view(pixels);
     coherent += coherence_of(image, chords_of({40, 40}, {80, 80}, image.size()), {10, 1, 14.5},
                              4 * patch) > kLeastCoherence;
   }
@@ -80,7 +83,8 @@ TEST(Coherence, IsSeldomReachedByPartsThatVaryEachInItsWay) {
 TEST(Coherence, OfTooFewLinesIsNone) {
   const DrawnLamp lamp{.stripes = {.period_lines = 170}};
   EXPECT_EQ(coherence_of_drawn(lamp), 0);
-  const cv::Mat image(120, 120, CV_8U, cv::Scalar(10));
+  const cv::Mat pixels(120, 120, CV_8U, cv::Scalar(10));
+  const ImageView image = image_view(pixels);
   EXPECT_EQ(coherence_of(image, chords_of({200, 20}, {240, 60}, image.size()), {10, 1, 14.5}, 8),
             0);
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "detection/mat_view.h"
 #include "lamps/signal/stripes.h"
 
 namespace vlp {
@@ -9,8 +10,9 @@ namespace {
 
 TEST(LineSignal, IsTheMeanOfEachLineAboveTheDark) {
   for (const int depth : {CV_8U, CV_16U}) {
-    cv::Mat image(100, 120, depth, cv::Scalar(10));
-    for (int row = 31; row <= 69; ++row) image(cv::Rect(40, row, 41, 1)) = 2 * row;
+    cv::Mat pixels(100, 120, depth, cv::Scalar(10));
+    for (int row = 31; row <= 69; ++row) pixels(cv::Rect(40, row, 41, 1)) = 2 * row;
+    const ImageView image = image_view(pixels);
     const auto signal = line_signal(image, chords_of({40, 30}, {80, 70}, image.size()), 10);
     ASSERT_EQ(signal.size(), 37U);  // nine tenths of the height: lines 32 to 68
     for (std::size_t i = 0; i < signal.size(); ++i) {
@@ -20,7 +22,8 @@ TEST(LineSignal, IsTheMeanOfEachLineAboveTheDark) {
 }
 
 TEST(LineSignal, OfLightsPastTheImagesEdgeIsThatOfTheirLinesInside) {
-  const cv::Mat image(100, 120, CV_8U, cv::Scalar(50));
+  const cv::Mat pixels(100, 120, CV_8U, cv::Scalar(50));
+  const ImageView image = image_view(pixels);
   EXPECT_EQ(line_signal(image, chords_of({40, -20}, {80, 20}, image.size()), 10).size(), 19U);
   EXPECT_EQ(line_signal(image, chords_of({-10, 80}, {30, 120}, image.size()), 10).size(), 18U);
   EXPECT_TRUE(line_signal(image, chords_of({40, 200}, {80, 240}, image.size()), 10).empty());
