@@ -14,7 +14,7 @@ namespace vlp {
 /// An image with the lines that the shutter reads as its rows.
 struct Lines {
   ImageView pixels;
-  /// Tiles that may have runs, see lit_tiles(); empty when the image is read along rows.
+  /// Tiles that may have runs, see lit_tiles().
   TileMask lit;
   /// Of `pixels`, which last as long, when they are not the image's.
   std::shared_ptr<void> memory;

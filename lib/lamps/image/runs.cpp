@@ -21,29 +21,6 @@ bool any_above(const Level* pixels, int count, Level threshold) {
   return brightest > threshold;
 }
 
-int tiles_in(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
-
-/// No level is above the threshold.
-bool is_above_all(const ImageView& image, double threshold) {
-  return threshold >= image.max_level();
-}
-
-template <typename Level>
-void mark_lit(const ImageView& image, Level threshold, TileMask& lit) {
-  for (int row = 0; row < image.height; ++row) {
-    const auto* pixels = image.row<Level>(row);
-    auto* of_row = lit.row(row / kTile_px);
-    for (int tile = 0; tile < lit.columns; ++tile) {
-      const auto* first = pixels + tile * kTile_px;
-      const int count = std::min(kTile_px, image.width - tile * kTile_px);
-      if (of_row[tile] > 1 || !any_above(first, count, threshold)) continue;
-      const auto lit_pixels =
-          std::count_if(first, first + count, [&](Level level) { return level > threshold; });
-      of_row[tile] = of_row[tile] + lit_pixels > 1 ? 2 : 1;
-    }
-  }
-}
-
 template <typename Level>
 void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
                      const std::vector<int>& tiles, std::vector<Run>& runs) {
@@ -72,9 +49,10 @@ std::vector<Run> runs_of(const ImageView& image, Level threshold, const TileMask
   std::vector<int> tiles;
   for (int top = 0; top < image.height; top += kTile_px) {
     tiles.clear();
-    for (int tile = 0; tile < tiles_in(image.width); ++tile) {
+    for (int tile = 0; tile * kTile_px < image.width; ++tile) {
       if (lit.empty() || lit.row(top / kTile_px)[tile] != 0) tiles.push_back(tile);
     }
+    if (tiles.empty()) continue;
     for (int row = top; row < std::min(top + kTile_px, image.height); ++row) {
       add_runs_of_row(image.row<Level>(row), image.width, row, threshold, tiles, runs);
     }
@@ -120,16 +98,8 @@ PixelBox Blob::box() const {
   return {begin, top(), end - begin, bottom() + 1 - top()};
 }
 
-TileMask lit_tiles(const ImageView& image, double threshold) {
-  TileMask lit(tiles_in(image.width), tiles_in(image.height));
-  if (is_above_all(image, threshold)) return lit;
-  visit_levels(image,
-               [&](auto level) { mark_lit(image, static_cast<decltype(level)>(threshold), lit); });
-  return lit;
-}
-
 std::vector<Run> find_runs(const ImageView& image, double threshold, const TileMask& lit) {
-  if (is_above_all(image, threshold)) return {};
+  if (threshold >= image.max_level()) return {};
   return visit_levels(image, [&](auto level) {
     return runs_of(image, static_cast<decltype(level)>(threshold), lit);
   });

@@ -1,0 +1,163 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/image/lit_tiles.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace vlp {
+namespace {
+
+/// Rows that are searched together: every second one of 17.
+constexpr int kRowsAtOnce = 9;
+
+template <typename Level>
+using Rows = std::array<const Level*, kRowsAtOnce>;
+
+/// Returns every row, or every second one, from `first` on; rows below the image are its last one.
+template <typename Level, int step>
+Rows<Level> rows_from(const ImageView& image, int first) {
+  Rows<Level> rows;
+  for (int i = 0; i < kRowsAtOnce; ++i) {
+    rows[std::size_t(i)] = image.row<Level>(std::min(first + step * i, image.height - 1));
+  }
+  return rows;
+}
+
+/// Returns the brightest level in some columns. There is no branch in it, so that it is compiled to
+/// vectors.
+template <typename Level>
+Level brightest_in(const Rows<Level>& rows, int begin, int count) {
+  const auto [a, b, c, d, e, f, g, h, l] = rows;
+  Level brightest = 0;
+  for (int i = begin; i < begin + count; ++i) {
+    const Level upper = std::max(std::max(a[i], b[i]), std::max(c[i], d[i]));
+    const Level lower = std::max(std::max(e[i], f[i]), std::max(g[i], h[i]));
+    brightest = std::max(std::max(brightest, l[i]), std::max(upper, lower));
+  }
+  return brightest;
+}
+
+/// Marks the tiles that are lit in one of the rows that are searched.
+template <typename Level>
+void search(const ImageView& image, Level threshold, TileMask& found) {
+  constexpr int span = 2 * (kRowsAtOnce - 1);  // rows from 0 to 16, from 15 to 31, and so on
+  const int whole = image.width / kTile_px;
+  for (int top = 0; top < image.height; top += span) {
+    const Rows<Level> rows = rows_from<Level, 2>(image, top - top / span % 2);
+    auto* marks = found.row(top / kTile_px);
+    for (int tile = 0; tile < whole; ++tile) {
+      if (brightest_in(rows, tile * kTile_px, kTile_px) > threshold) marks[tile] = 1;
+    }
+    const int begin = whole * kTile_px, rest = image.width - begin;
+    if (rest > 0 && brightest_in(rows, begin, rest) > threshold) marks[whole] = 1;
+  }
+}
+
+/// Counts the pixels of a box above the threshold: 0, 1, or 2 if there are more.
+template <typename Level>
+std::uint8_t count_above(const ImageView& image, const PixelBox& box, Level threshold) {
+  std::ptrdiff_t count = 0;
+  for (int top = box.y; top < box.bottom() && count < 2; top += kRowsAtOnce) {
+    const auto rows = rows_from<Level, 1>(image, top);
+    if (brightest_in(rows, box.x, box.width) <= threshold) continue;
+    for (int y = top; y < std::min(top + kRowsAtOnce, box.bottom()); ++y) {
+      const Level* row = image.row<Level>(y);
+      count += std::count_if(row + box.x, row + box.right(),
+                             [&](Level level) { return level > threshold; });
+    }
+  }
+  return static_cast<std::uint8_t>(std::min<std::ptrdiff_t>(count, 2));
+}
+
+/// Calls a function with the column and row of each tile around one, and of that one itself.
+template <typename Function>
+void for_each_around(const TileMask& mask, int column, int row, Function&& function) {
+  const PixelBox box = intersection({column - 1, row - 1, 3, 3}, {0, 0, mask.columns, mask.rows});
+  for (int y = box.y; y < box.bottom(); ++y) {
+    for (int x = box.x; x < box.right(); ++x) function(x, y);
+  }
+}
+
+/// Calls a function with the column and row of each tile that is not 0.
+template <typename Function>
+void for_each_set(const TileMask& mask, Function&& function) {
+  for (int row = 0; row < mask.rows; ++row) {
+    for (int column = 0; column < mask.columns; ++column) {
+      if (mask.row(row)[column] != 0) function(column, row);
+    }
+  }
+}
+
+int tiles_in(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
+
+}  // namespace
+
+PixelBox pixels_of_tiles(const PixelBox& tiles, const ImageSize& size) {
+  return intersection({tiles.x * kTile_px, tiles.y * kTile_px, tiles.width * kTile_px,
+                       tiles.height * kTile_px},
+                      {0, 0, size.width, size.height});
+}
+
+TileMask lit_tiles(const ImageView& image, double threshold) {
+  TileMask found(tiles_in(image.width), tiles_in(image.height));
+  if (threshold >= image.max_level()) return found;
+  TileMask counts = found, lit = found;
+  visit_levels(image, [&](auto type) {
+    const auto level = static_cast<decltype(type)>(threshold);
+    search(image, level, found);
+    for_each_set(dilated(found), [&](int column, int row) {
+      const PixelBox box = pixels_of_tiles({column, row, 1, 1}, image.size());
+      counts.row(row)[column] = count_above(image, box, level);
+    });
+  });
+  for_each_set(counts, [&](int column, int row) {
+    int around = 0;
+    for_each_around(counts, column, row, [&](int x, int y) { around += counts.row(y)[x]; });
+    lit.row(row)[column] = around > 1 ? 1 : 0;
+  });
+  return lit;
+}
+
+TileMask dilated(const TileMask& mask) {
+  TileMask result(mask.columns, mask.rows);
+  for_each_set(mask, [&](int column, int row) {
+    for_each_around(mask, column, row, [&](int x, int y) { result.row(y)[x] = 1; });
+  });
+  return result;
+}
+
+TileMask transposed(const TileMask& mask) {
+  TileMask result(mask.rows, mask.columns);
+  for_each_set(mask,
+               [&](int column, int row) { result.row(column)[row] = mask.row(row)[column]; });
+  return result;
+}
+
+std::vector<PixelBox> group_boxes(TileMask mask) {
+  std::vector<PixelBox> boxes;
+  std::vector<std::pair<int, int>> open;
+  const auto take = [&](int x, int y) {
+    if (mask.row(y)[x] == 0) return;
+    open.emplace_back(x, y);
+    mask.row(y)[x] = 0;
+  };
+  for (int row = 0; row < mask.rows; ++row) {
+    for (int column = 0; column < mask.columns; ++column) {
+      if (mask.row(row)[column] == 0) continue;
+      PixelBox box{column, row, 1, 1};
+      take(column, row);
+      while (!open.empty()) {
+        const auto [x, y] = open.back();
+        open.pop_back();
+        box = around(box, {x, y, 1, 1});
+        for_each_around(mask, x, y, take);
+      }
+      boxes.push_back(box);
+    }
+  }
+  return boxes;
+}
+
+}  // namespace vlp
