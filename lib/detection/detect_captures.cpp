@@ -19,7 +19,7 @@ struct CaptureOutcome {
   std::string refused;
 };
 
-CaptureOutcome outcome_of(const LampDetector& detector, const SourceImage& source,
+CaptureOutcome outcome_of(const LightDetector& detector, const SourceImage& source,
                           const DetectRun& run) {
   const auto leaning = leaning_detector(detector, run.levels, source.file.filename().string());
   ImageLights found =
@@ -44,15 +44,15 @@ CaptureOutcome outcome_of(const LampDetector& detector, const SourceImage& sourc
 
 }  // namespace
 
-std::optional<LampDetector> leaning_detector(const LampDetector& detector,
-                                             const LevelsOfImages& levels,
-                                             const std::string& image) {
+std::optional<LightDetector> leaning_detector(const LightDetector& detector,
+                                              const LevelsOfImages& levels,
+                                              const std::string& image) {
   const auto level = levels.find(image);
   if (level == levels.end()) return std::nullopt;
   return detector.leaning(level->second);
 }
 
-CaptureDetections detect_captures(const LampDetector& detector, ImageSource& images,
+CaptureDetections detect_captures(const LightDetector& detector, ImageSource& images,
                                   const DetectRun& run,
                                   const std::function<void(std::size_t done)>& progress) {
   std::vector<CaptureOutcome> outcomes;

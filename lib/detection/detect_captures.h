@@ -13,8 +13,8 @@
 
 #include "captures/detections_table.h"
 #include "detection/image_source.h"
-#include "lamps/lamp_detector.h"
 #include "detection/lights_table.h"
+#include "lamps/light_detector.h"
 
 namespace vlp {
 
@@ -32,13 +32,13 @@ struct CaptureDetections {
   std::map<std::string, double> times_s;
 };
 
-/// level_from_camera of images, by name; nothing: nobody knows (LampDetector::leaning).
+/// level_from_camera of images, by name; nothing: nobody knows (LightDetector::leaning).
 using LevelsOfImages = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
 /// The detector for the image of that name, unless it is the one that all have.
-std::optional<LampDetector> leaning_detector(const LampDetector& detector,
-                                             const LevelsOfImages& levels,
-                                             const std::string& image);
+std::optional<LightDetector> leaning_detector(const LightDetector& detector,
+                                              const LevelsOfImages& levels,
+                                              const std::string& image);
 
 struct DetectRun {
   /// Images at a time.
@@ -56,7 +56,7 @@ struct DetectRun {
 /// Detects in each image. An image that cannot be used is refused and does not end it; a picture
 /// that cannot be written does (InputError). The result does not depend on the threads. `progress`
 /// gets the images done so far; its calls do not overlap.
-CaptureDetections detect_captures(const LampDetector& detector, ImageSource& images,
+CaptureDetections detect_captures(const LightDetector& detector, ImageSource& images,
                                   const DetectRun& run,
                                   const std::function<void(std::size_t done)>& progress);
 

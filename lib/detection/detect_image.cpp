@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-ImageLights detect_image(const LampDetector& detector, const SourceImage& source,
+ImageLights detect_image(const LightDetector& detector, const SourceImage& source,
                          const std::optional<std::array<int, 2>>& imager_px, double max_mpx) {
   ImageLights result{source.file, {}, {}, {}, {}};
   try {

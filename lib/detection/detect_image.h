@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "detection/image_source.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 
 namespace vlp {
 
@@ -26,7 +26,7 @@ struct ImageLights {
 
 /// One bad image does not end a run, whatever is bad about it: it cannot be read, or has another
 /// size than `imager_px`, or more than so many million pixels.
-ImageLights detect_image(const LampDetector& detector, const SourceImage& source,
+ImageLights detect_image(const LightDetector& detector, const SourceImage& source,
                          const std::optional<std::array<int, 2>>& imager_px = std::nullopt,
                          double max_mpx = kUsualMaxMpx);
 

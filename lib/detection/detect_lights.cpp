@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-std::vector<ImageLights> detect_lights(const LampDetector& detector,
+std::vector<ImageLights> detect_lights(const LightDetector& detector,
                                        std::span<const std::filesystem::path> images,
                                        const std::optional<std::array<int, 2>>& imager_px,
                                        int threads,

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/readout.h"
 
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 
 namespace vlp {
 namespace {
 
 double clear_stripes(const ImageView& image, Readout readout) {
-  const LampDetector detector({}, {readout, {}, {}});
+  const LightDetector detector({}, {readout, {}, {}});
   double sum = 0;
   for (const Light& light : detector.detect(image)) {
     if (!flickers(light)) continue;

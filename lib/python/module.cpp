@@ -25,7 +25,7 @@
 #include "captures/detections_table.h"
 #include "captures/fixes_table.h"
 #include "captures/truth_table.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "lamps/signal/lamp_classifier.h"
 #include "positioning/positioner.h"
 #include "rig/input_error.h"
@@ -303,7 +303,7 @@ py::tuple arrays_of(const std::vector<Detection>& detections) {
 
 /// And the size of the images that it is for.
 struct ImageDetector {
-  LampDetector detector;
+  LightDetector detector;
   std::array<int, 2> imager_px;
 };
 

@@ -150,8 +150,8 @@ struct LampSearch {
   CaptureDetections run_over(const std::vector<fs::path>& some, const StepProgress& progress,
                              StepResult& result) const {
     ImageSource source(some, from_videos);
-    CaptureDetections found = detect_captures(LampDetector(input.lamps, camera, classifier), source,
-                                              run, [&](std::size_t done) {
+    CaptureDetections found = detect_captures(LightDetector(input.lamps, camera, classifier),
+                                              source, run, [&](std::size_t done) {
                                                 if (progress)
                                                   progress(done, std::max(done, source.expected()));
                                               });

@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "lamps/lamp_detector.h"
 #include "geometry/angles.h"
+#include "lamps/light_detector.h"
 #include "positioning/correction.h"
 #include "positioning/inclination_rotation.h"
 

@@ -36,7 +36,7 @@ SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps
     all.insert(all.end(), images.back().begin(), images.back().end());
   }
   seen.camera.readout = readout_of(all, stated, seen);
-  const LampDetector detector(lamps, seen.camera);
+  const LightDetector detector(lamps, seen.camera);
   std::size_t before = 0;
   for (const auto& folder : images) {
     seen.folders.push_back(

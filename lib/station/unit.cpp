@@ -155,7 +155,7 @@ LevelsOfImages Unit::levels_of(StationStep step) const {
 
 void Unit::look(StationStep step, const std::vector<fs::path>& files) {
   std::vector<UnitImage> images(files.size());
-  std::optional<LampDetector> lamps;
+  std::optional<LightDetector> lamps;
   if (step != StationStep::boards) {
     lamps.emplace(config_.lamps, detector_camera(*calibration_before(step)));
   }

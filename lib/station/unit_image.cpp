@@ -120,7 +120,7 @@ UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& 
 }
 
 UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& config,
-                        const LampDetector& detector) {
+                        const LightDetector& detector) {
   return looked_at(file, config.type, [&](const cv::Mat& image, UnitImage& result) {
     result.refused = exposure_refusal(image);
     if (!result.refused.empty()) return;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "detection/boards/detect_boards.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "rig/detection.h"
 #include "station/station_config.h"
 
@@ -53,7 +53,7 @@ UnitImage look_at_board(const std::filesystem::path& file, const StationConfig& 
 /// too dark or all white (image_signal.h), or it shows fewer than two of them; said is whether they
 /// are at full scale all over, where no stripes can be seen.
 UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& config,
-                        const LampDetector& detector);
+                        const LightDetector& detector);
 
 /// Whether two views show the board at the same place: the corners of the tags that both have are
 /// closer than `distance_px` on average.

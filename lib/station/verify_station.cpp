@@ -53,7 +53,7 @@ class Verification {
   }
 
   void lamps(StationStep each) {
-    const LampDetector detector(config_.lamps, detector_camera(golden_.calibration));
+    const LightDetector detector(config_.lamps, detector_camera(golden_.calibration));
     const fs::path folder = folder_ / name_of(each);
     const auto levels = levels_told(captures_table(folder), golden_.calibration, 0);
     UnitStep step = step_of(folder, threads_, [&](const fs::path& file) {

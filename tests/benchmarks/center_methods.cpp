@@ -16,7 +16,7 @@
 #include "detection/image_file.h"
 #include "detection/mat_view.h"
 #include "lamps/image/background.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 
 namespace vlp {
 namespace {
@@ -70,7 +70,7 @@ LitPixels lit_pixels_of(const cv::Mat& image, const Light& light) {
                                 : lit_pixels_of<std::uint16_t>(image, background, box);
 }
 
-std::map<int, Light> lamps_in(const LampDetector& detector, const cv::Mat& image) {
+std::map<int, Light> lamps_in(const LightDetector& detector, const cv::Mat& image) {
   std::map<int, Light> lamps;
   for (Light& light : detector.detect(image_view(image))) {
     if (light.kind == LightKind::lamp) lamps[*light.lamp] = std::move(light);
@@ -97,9 +97,9 @@ void run(const std::filesystem::path& folder) {
   const std::filesystem::path beside = folder / "..";
   const LampMap map = read_lamp_map(beside / "lamps.yaml");
   DetectorCamera camera = detector_camera(read_calibration(beside / "true_calibration.yaml"));
-  const LampDetector with_lens(map, camera);
+  const LightDetector with_lens(map, camera);
   camera.lens.reset();
-  const LampDetector without_lens(map, camera);
+  const LightDetector without_lens(map, camera);
 
   std::array<Errors, 4> methods = {
       Errors{"bounding box of the lit pixels"}, Errors{"centroid of the brightness"},

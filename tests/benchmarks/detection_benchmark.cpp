@@ -11,7 +11,7 @@
 
 #include "detection/mat_view.h"
 #include "lamps/image/background.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "simulation/exposure.h"
 #include "simulation/truth.h"
 
@@ -43,7 +43,7 @@ const Captures& captures() {
 }
 
 void detect_in(benchmark::State& state, const cv::Mat& image, const DetectorCamera& camera) {
-  const LampDetector detector(captures().lamps, camera);
+  const LightDetector detector(captures().lamps, camera);
   std::size_t lamps = 0;
   for (auto _ : state) lamps = detector.detect(image_view(image)).size();
   state.counters["lamps"] = static_cast<double>(lamps);
@@ -57,7 +57,7 @@ void detect(benchmark::State& state) {
 void detect_sample(benchmark::State& state) {
   const std::string rendered = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/";
   const cv::Mat image = cv::imread(rendered + "sample/0000.png", cv::IMREAD_UNCHANGED);
-  const LampDetector detector(
+  const LightDetector detector(
       read_lamp_map(rendered + "lamps.yaml"),
       detector_camera(read_calibration(rendered + "true_calibration.yaml")));
   cv::setNumThreads(1);

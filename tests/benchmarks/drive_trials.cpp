@@ -26,7 +26,7 @@
 
 #include "detection/mat_view.h"
 #include "geometry/angles.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "positioning/body_limit.h"
 #include "positioning/positioner.h"
 #include "rig/find_lamp.h"
@@ -117,7 +117,7 @@ class Trials {
     const FrameRenderer renderer(scene_);
     const Calibration calibration = true_calibration(scene_);
     const LampMap lamps = lamp_map_of(scene_, false);
-    const LampDetector detector(lamps, detector_camera(calibration));
+    const LightDetector detector(lamps, detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Sensors in_hand;
     in_hand.inclination_sigma_rad = rad_from_deg(90);
@@ -142,7 +142,7 @@ class Trials {
         DetectorCamera leaning = detector_camera(calibration);
         leaning.level_from_camera =
             level_from_inclination(fix.body->inclination) * leaning.level_from_camera;
-        const auto seen_again = detections_in(renderer, LampDetector(lamps, leaning), shot);
+        const auto seen_again = detections_in(renderer, LightDetector(lamps, leaning), shot);
         if (seen_again.size() >= 4) again.add(positioner.locate(seen_again, in_hand), motion);
       }
       const std::string lean = fmt::format("lean to {:2.0f} deg", most_deg);
@@ -155,7 +155,7 @@ class Trials {
     const FrameRenderer renderer(scene_);
     const Calibration calibration = true_calibration(scene_);
     const LampMap lamps = lamp_map_of(scene_, false);
-    const LampDetector detector(lamps, detector_camera(calibration));
+    const LightDetector detector(lamps, detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Errors standing;
     double noise_px = 0;
@@ -276,7 +276,7 @@ class Trials {
         1e3 * std::sqrt(moving.velocity / count));
   }
 
-  std::vector<Detection> detections_in(const FrameRenderer& renderer, const LampDetector& detector,
+  std::vector<Detection> detections_in(const FrameRenderer& renderer, const LightDetector& detector,
                                        const LampShot& shot) const {
     const cv::Mat image = expose(scene_.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
     std::vector<Detection> detections;

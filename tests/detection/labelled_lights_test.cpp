@@ -12,7 +12,7 @@ namespace {
 const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample";
 
 std::vector<ImageLights> sample_lights() {
-  const LampDetector detector({}, {Readout::rows, {}, {}});
+  const LightDetector detector({}, {Readout::rows, {}, {}});
   return detect_lights(detector, images_in(kSample), {}, 1, [](std::size_t) {});
 }
 
@@ -68,7 +68,7 @@ TEST(MeasuredPeriods, AreOfAllLightsOrOfThoseWithALabel) {
 }
 
 TEST(DetectLights, SaysWhyAnImageCannotBeUsed) {
-  const LampDetector detector({}, {Readout::rows, {}, {}});
+  const LightDetector detector({}, {Readout::rows, {}, {}});
   std::size_t last = 0;
   const std::vector<std::filesystem::path> files{"none.png", kSample + "/0000.png"};
   const auto images = detect_lights(detector, files, {}, 2, [&](std::size_t done) { last = done; });

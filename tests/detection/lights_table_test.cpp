@@ -109,7 +109,7 @@ const cv::Size kReasonSize(300, 200);
 
 /// The lights that a drawing shows to a detector that knows its lamp.
 std::vector<Light> lights_in_drawing(const cv::Mat& image) {
-  return LampDetector({{drawn_lamp(1, kReasonPeriod_lines)}}, drawn_camera(kReasonSize))
+  return LightDetector({{drawn_lamp(1, kReasonPeriod_lines)}}, drawn_camera(kReasonSize))
       .detect(image_view(image));
 }
 

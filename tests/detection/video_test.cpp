@@ -153,8 +153,8 @@ TEST_F(Videos, ShowTheLampsOfTheSameImages) {
   std::vector<cv::Mat> images;
   for (const auto& file : files) images.push_back(read_image(file));
   ASSERT_TRUE(write_video(film, images));
-  const LampDetector detector(read_lamp_map(kRig + "/lamps.yaml"),
-                              detector_camera(read_calibration(kRig + "/true_calibration.yaml")));
+  const LightDetector detector(read_lamp_map(kRig + "/lamps.yaml"),
+                               detector_camera(read_calibration(kRig + "/true_calibration.yaml")));
   const auto seen = [&](const std::vector<fs::path>& sources, int threads) {
     ImageSource source(sources);
     return detect_captures(detector, source, {threads}, [](std::size_t) {});

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "camera/lens.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "lamps/shape/drawn_disc.h"
 #include "lamps/shape/light_shape.h"
 #include "rig/lamp_map.h"

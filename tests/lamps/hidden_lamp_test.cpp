@@ -6,14 +6,14 @@
 
 #include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 
 namespace vlp {
 namespace {
 
 const cv::Size kHiddenSize(200, 160);
 
-LampDetector detector() {
+LightDetector detector() {
   const LampMap map{{drawn_lamp(1, 8), drawn_lamp(2, 9.6), drawn_lamp(3, 11.5), drawn_lamp(4, 13.8),
                      drawn_lamp(5, 16.5)}};
   return {map, drawn_camera(kHiddenSize)};
@@ -25,7 +25,7 @@ struct Tally {
 
 /// A bar of that width at many angles and offsets.
 Tally tally(double width_of_diameter) {
-  const LampDetector lamp_detector = detector();
+  const LightDetector lamp_detector = detector();
   Tally tally;
   for (int degrees = 0; degrees < 180; degrees += 15) {
     for (const double offset : {-0.6, -0.3, 0.0, 0.3, 0.6}) {

@@ -30,7 +30,7 @@ TEST(Panels, LeaveDiscsAsTheyAre) {
   const Captures captures("panels", "check");
   LampMap discs = captures.lamps();
   for (Lamp& lamp : discs.lamps) lamp.rectangle.reset();
-  const LampDetector without(discs, detector_camera(captures.calibration()));
+  const LightDetector without(discs, detector_camera(captures.calibration()));
   int compared = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     const cv::Mat image = captures.image(captures.shot(i));
@@ -55,7 +55,7 @@ TEST(Panels, AreNoLampsOfAnotherShape) {
   for (Lamp& lamp : swapped.lamps) {
     if (lamp.rectangle) lamp.rectangle->size_m = Eigen::Vector2d(0.6, 0.2);
   }
-  const LampDetector detector(swapped, detector_camera(captures.calibration()));
+  const LightDetector detector(swapped, detector_camera(captures.calibration()));
   int refused = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     for (const Light& light : detector.detect(image_view(captures.image(captures.shot(i))))) {
@@ -70,7 +70,7 @@ TEST(Panels, AreNoLampsOfAnotherShape) {
 
 TEST(Panels, AreFoundWithoutALensByWhatTheirBowsTellOfIt) {
   const Captures captures("panels", "check");
-  const LampDetector detector(captures.lamps(), {Readout::rows, 3e-5, std::nullopt});
+  const LightDetector detector(captures.lamps(), {Readout::rows, 3e-5, std::nullopt});
   double squares = 0;
   int found = 0, tubes = 0;
   for (std::size_t i = 0; i < captures.size(); i += 3 * kStep) {

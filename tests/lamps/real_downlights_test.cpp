@@ -17,7 +17,7 @@
 #include "detection/detect_lights.h"
 #include "detection/image_file.h"
 #include "detection/mat_view.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "lamps/signal/row_time.h"
 #include "support/real_data.h"
 
@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::map<int, Light> lamps_in(const LampDetector& detector, const cv::Mat& image) {
+std::map<int, Light> lamps_in(const LightDetector& detector, const cv::Mat& image) {
   std::map<int, Light> lamps;
   for (Light& light : detector.detect(image_view(image))) {
     if (light.kind == LightKind::lamp) lamps.emplace(*light.lamp, std::move(light));
@@ -61,7 +61,7 @@ struct Identified {
 
 template <typename Picture>
 Identified identified(const fs::path& data, const Picture& picture) {
-  const LampDetector detector(read_lamp_map(data / "lamps.yaml"), {Readout::columns, 15.1e-6, {}});
+  const LightDetector detector(read_lamp_map(data / "lamps.yaml"), {Readout::columns, 15.1e-6, {}});
   const CsvTable table(data / "expected.csv");
   const auto image_column = table.required("image"), lamp_column = table.required("lamp");
   const auto u_column = table.required("u_px"), v_column = table.required("v_px");
@@ -112,7 +112,7 @@ TEST_F(RealDownlights, AreIdentifiedAtTwiceTheBrightness) {
 }
 
 TEST_F(RealDownlights, TellTheRowTime) {
-  const LampDetector detector(map(), {Readout::columns, {}, {}});
+  const LightDetector detector(map(), {Readout::columns, {}, {}});
   std::vector<MeasuredPeriod> periods;
   for (int number = 1; number <= 5; ++number) {
     for (const Light& light : detector.detect(image_view(read_image(image(number))))) {
@@ -132,7 +132,7 @@ TEST(RealGlows, AreTheSameInEachFormat) {
   for (const auto& [name, readout, count] :
        {std::tuple("x_0_y_1.27.jpg", Readout::rows, 5U),
         std::tuple("2014-02-27--18-15-03-62.jpg", Readout::columns, 3U)}) {
-    const LampDetector detector(map, {readout, 1 / 47540.0, {}});
+    const LightDetector detector(map, {readout, 1 / 47540.0, {}});
     const auto original = lamps_in(detector, read_image(data / name));
     EXPECT_EQ(original.size(), count);
     const cv::Mat picture =

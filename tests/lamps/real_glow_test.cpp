@@ -9,7 +9,7 @@
 
 #include "detection/image_file.h"
 #include "detection/mat_view.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "positioning/positioner.h"
 #include "support/real_data.h"
 
@@ -40,7 +40,7 @@ Seen seen_in(const std::filesystem::path& folder, const char* name, Readout read
   Seen seen;
   seen.map = read_lamp_map(folder / "lamps.yaml");
   seen.calibration.camera = camera_of(image, readout);
-  const LampDetector detector(seen.map, detector_camera(seen.calibration));
+  const LightDetector detector(seen.map, detector_camera(seen.calibration));
   for (const Light& light : detector.detect(image_view(image))) {
     if (light.kind != LightKind::lamp) continue;
     EXPECT_FALSE(seen.lamps.contains(*light.lamp)) << "one lamp twice";

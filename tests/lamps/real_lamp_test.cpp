@@ -5,7 +5,7 @@
 
 #include "detection/image_file.h"
 #include "detection/mat_view.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "support/real_data.h"
 
 namespace vlp {
@@ -14,7 +14,7 @@ namespace {
 TEST(RealLamp, HasItsOutlineAndItsStripes) {
   const auto folder = real_data("striped-lamp");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
-  const LampDetector detector({}, {Readout::rows, {}, {}});
+  const LightDetector detector({}, {Readout::rows, {}, {}});
   const auto lights = detector.detect(image_view(read_image(folder / "single_LED.bmp")));
   ASSERT_EQ(lights.size(), 1);
   EXPECT_NEAR(lights[0].stripes.period_lines, 10.1, 0.2);

@@ -8,7 +8,7 @@
 
 #include "detection/image_file.h"
 #include "detection/mat_view.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "support/real_data.h"
 
 namespace vlp {
@@ -24,7 +24,7 @@ LampMap map_of_five() {
 }
 
 void expect_no_lamp(const std::filesystem::path& file, Readout readout, double row_time_s) {
-  const LampDetector detector(map_of_five(), {readout, row_time_s, {}});
+  const LightDetector detector(map_of_five(), {readout, row_time_s, {}});
   for (const Light& light : detector.detect(image_view(read_image(file)))) {
     EXPECT_FALSE(light.lamp) << file << " at " << light.pixel.transpose() << ", " << row_time_s;
   }

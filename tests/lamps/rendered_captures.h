@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "detection/mat_view.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "simulation/exposure.h"
 #include "simulation/picture.h"
 #include "simulation/truth.h"
@@ -55,7 +55,7 @@ class Captures {
   }
   LampMap lamps() const { return lamp_map_of(scene_, false); }
   Calibration calibration() const { return true_calibration(scene_); }
-  LampDetector detector() const { return {lamps(), detector_camera(calibration())}; }
+  LightDetector detector() const { return {lamps(), detector_camera(calibration())}; }
   std::size_t size() const { return shots_in(set_); }
 
   /// Of the lamps that count; what is wrong of others counts, too.
@@ -64,7 +64,7 @@ class Captures {
     return score(step, detector(), counts);
   }
   Score score(
-      std::size_t step, const LampDetector& lamp_detector,
+      std::size_t step, const LightDetector& lamp_detector,
       const std::function<bool(int)>& counts = [](int) { return true; }) const {
     Score score;
     for (std::size_t i = 0; i < shots_in(set_); i += step) {

@@ -6,7 +6,7 @@
 
 #include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 
 namespace vlp {
 namespace {
@@ -32,7 +32,7 @@ void expect_both(const Touching& touching) {
                         .radius_px = small_px,
                         .stripes = {.period_lines = kPeriods_lines[1], .phase = 0.8}};
   const LampMap map{{drawn_lamp(1, kPeriods_lines[0]), drawn_lamp(2, kPeriods_lines[1])}};
-  const LampDetector detector(map, drawn_camera(kTouchingSize));
+  const LightDetector detector(map, drawn_camera(kTouchingSize));
   const auto lights =
       detector.detect(image_view(drawn({one, other}, kTouchingSize, touching.depth, 0.5)));
   int lamps = 0;

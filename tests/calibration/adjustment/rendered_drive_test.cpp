@@ -11,7 +11,7 @@
 #include "calibration/levelling/levelling.h"
 #include "detection/mat_view.h"
 #include "geometry/angles.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "simulation/exposure.h"
 #include "simulation/truth.h"
 #include "support/random.h"
@@ -42,7 +42,7 @@ class RenderedDrive : public testing::Test {
 
   Drive drive(double speed_m_per_s) const {
     const FrameRenderer renderer(scene);
-    const LampDetector detector(lamps, detector_camera(truth));
+    const LightDetector detector(lamps, detector_camera(truth));
     Random random(5);
     Drive drive;
     for (int i = 0; i < kCaptures; ++i) {

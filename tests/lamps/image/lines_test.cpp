@@ -135,8 +135,8 @@ TEST(Lines, OfAFrameAndOfTheTurnedFrameShowTheSameLights) {
   const FrameRenderer renderer(scene);
   const LampMap map = lamp_map_of(scene, false);
   const double row_time_s = *scene.camera.row_time_s;
-  const LampDetector by_rows(map, {Readout::rows, row_time_s, std::nullopt});
-  const LampDetector by_columns(map, {Readout::columns, row_time_s, std::nullopt});
+  const LightDetector by_rows(map, {Readout::rows, row_time_s, std::nullopt});
+  const LightDetector by_columns(map, {Readout::columns, row_time_s, std::nullopt});
   const CaptureSet& set =
       *std::find_if(scene.sets.begin(), scene.sets.end(),
                     [](const CaptureSet& any) { return any.folder == "check"; });

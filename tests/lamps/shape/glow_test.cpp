@@ -9,7 +9,7 @@
 
 #include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "lamps/shape/glow_envelope.h"
 #include "support/near.h"
 
@@ -79,7 +79,7 @@ TEST(Glow, IsFoundWithItsCentreAndItsStripes) {
 TEST(Glow, IsIdentified) {
   for_each_case({0, 0.5}, [](const DrawnLamp& lamp, double noise) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 17.5)}};
-    const auto lights = LampDetector(map, drawn_camera(kGlowSize))
+    const auto lights = LightDetector(map, drawn_camera(kGlowSize))
                             .detect(image_view(drawn({lamp}, kGlowSize, CV_8U, noise)));
     ASSERT_EQ(lights.size(), 1U);
     EXPECT_TRUE(lights[0].glows);
@@ -94,7 +94,7 @@ TEST(Glow, HasNoEdge) {
     for (const double blur_px : {0.6, 1.0}) {
       const DrawnLamp disc{.center = {198.7, 181.2}, .blur_px = blur_px};
       EXPECT_FALSE(glow_in(image_view(drawn({disc}, kGlowSize, depth))));
-      for (const Light& light : LampDetector({}, drawn_camera(kGlowSize))
+      for (const Light& light : LightDetector({}, drawn_camera(kGlowSize))
                                     .detect(image_view(drawn({disc}, kGlowSize, depth)))) {
         EXPECT_FALSE(light.glows);
       }

@@ -10,7 +10,7 @@
 
 #include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 
 namespace vlp {
 namespace {
@@ -171,7 +171,7 @@ TEST(Rim, IsSeenOfLargeDownlightsToo) {
 TEST(Rim, OfADownlightLeadsToItsLamp) {
   for_each_downlight([](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
-    const auto lights = LampDetector(map, drawn_camera(kSize))
+    const auto lights = LightDetector(map, drawn_camera(kSize))
                             .detect(image_view(drawn({lamp}, kSize, depth, noise, seed)));
     ASSERT_EQ(lights.size(), 1U);
     if (lights[0].stripes.periods < kEnoughPeriods) {

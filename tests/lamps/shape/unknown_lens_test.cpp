@@ -113,7 +113,7 @@ Score without_lens(const std::string& scene, std::size_t step) {
   const Captures captures(scene, "check");
   DetectorCamera camera = detector_camera(captures.calibration());
   camera.lens.reset();
-  return captures.score(step, LampDetector(captures.lamps(), camera));
+  return captures.score(step, LightDetector(captures.lamps(), camera));
 }
 
 TEST(UnknownLens, IsInWhatCentresWithoutOneState) {

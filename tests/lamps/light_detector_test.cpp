@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// The detector on rendered captures, whose truth is known.
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 #include "detection/mat_view.h"
 #include "lamps/drawn_lamp.h"
 
@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-TEST(LampDetector, FindsAndIdentifiesEveryLampOfThePaperRig) {
+TEST(LightDetector, FindsAndIdentifiesEveryLampOfThePaperRig) {
   const Score score = Captures("paper-rig", "check").score(12);
   EXPECT_GT(score.lamps, 180);
   EXPECT_EQ(score.missed, 0);
@@ -24,20 +24,20 @@ TEST(LampDetector, FindsAndIdentifiesEveryLampOfThePaperRig) {
   EXPECT_LT(score.worst_px, 0.08);
 }
 
-TEST(LampDetector, StatesTheScatterOfItsCentres) {
+TEST(LightDetector, StatesTheScatterOfItsCentres) {
   const Score score = Captures("paper-rig", "check").score(12);
   EXPECT_GT(score.chi_square / score.lamps, 0.7);
   EXPECT_LT(score.chi_square / score.lamps, 2);
 }
 
-TEST(LampDetector, CopesWithTiltAndADecentredLens) {
+TEST(LightDetector, CopesWithTiltAndADecentredLens) {
   const Score score = Captures("paper-rig-faulty", "check").score(24);
   EXPECT_EQ(score.missed, 0);
   EXPECT_EQ(score.wrong, 0);
   EXPECT_LT(score.rms_px(), 0.02);
 }
 
-TEST(LampDetector, CopesWithAWideLensAndAReadOutAlongColumns) {
+TEST(LightDetector, CopesWithAWideLensAndAReadOutAlongColumns) {
   const Score score = Captures("wide", "check").score(8);
   EXPECT_GT(score.lamps, 150);
   EXPECT_LE(score.missed, 4);  // too few stripes to tell
@@ -45,7 +45,7 @@ TEST(LampDetector, CopesWithAWideLensAndAReadOutAlongColumns) {
   EXPECT_LT(score.rms_px(), 0.03);
 }
 
-TEST(LampDetector, LeavesOutSteadyLightsAndReflections) {
+TEST(LightDetector, LeavesOutSteadyLightsAndReflections) {
   const Captures captures("clutter", "sample");
   const LampShot shot = captures.shot(0);
   std::map<LightKind, int> kinds;
@@ -57,7 +57,7 @@ TEST(LampDetector, LeavesOutSteadyLightsAndReflections) {
   EXPECT_EQ(kinds[LightKind::steady], 2) << "the steady lamp and the window";
 }
 
-TEST(LampDetector, MarksALampThatTheImagesEdgeCuts) {
+TEST(LightDetector, MarksALampThatTheImagesEdgeCuts) {
   const Captures captures("paper-rig", "check");
   int cut = 0;
   for (std::size_t i = 0; i < 432; i += 8) {
@@ -75,21 +75,21 @@ TEST(LampDetector, MarksALampThatTheImagesEdgeCuts) {
   EXPECT_GT(cut, 5);
 }
 
-TEST(LampDetector, CallsALampUnknownThatTheMapDoesNotHave) {
+TEST(LightDetector, CallsALampUnknownThatTheMapDoesNotHave) {
   const Captures captures("paper-rig", "sample");
-  const LampDetector detector(LampMap{{Lamp{7, {0, 0, 1.6}, {}, 6000, 0.5}}},
-                              {Readout::rows, 3e-5, {}});
+  const LightDetector detector(LampMap{{Lamp{7, {0, 0, 1.6}, {}, 6000, 0.5}}},
+                               {Readout::rows, 3e-5, {}});
   for (const Light& light : detector.detect(image_view(captures.image(captures.shot(0))))) {
     EXPECT_EQ(light.kind, LightKind::unknown);
     EXPECT_FALSE(light.lamp);
   }
 }
 
-TEST(LampDetector, DoesNotChooseBetweenLampsOfNearlyOneFrequency) {
+TEST(LightDetector, DoesNotChooseBetweenLampsOfNearlyOneFrequency) {
   const Captures captures("paper-rig", "sample");
   LampMap map{{Lamp{3, {0, 0, 1.6}, {}, 2500, 0.5}, Lamp{7, {1, 0, 1.6}, {}, 2520, 0.5}}};
   const auto identified = [&] {
-    const LampDetector detector(map, {Readout::rows, 3e-5, {}});
+    const LightDetector detector(map, {Readout::rows, 3e-5, {}});
     const auto lights = detector.detect(image_view(captures.image(captures.shot(0))));
     return std::count_if(lights.begin(), lights.end(),
                          [](const Light& light) { return light.lamp.has_value(); });
@@ -99,9 +99,9 @@ TEST(LampDetector, DoesNotChooseBetweenLampsOfNearlyOneFrequency) {
   EXPECT_EQ(identified(), 1);
 }
 
-TEST(LampDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
+TEST(LightDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
   const cv::Size size(300, 160);
-  const LampDetector detector(LampMap{{drawn_lamp(1, 36), drawn_lamp(2, 11)}}, drawn_camera(size));
+  const LightDetector detector(LampMap{{drawn_lamp(1, 36), drawn_lamp(2, 11)}}, drawn_camera(size));
   const DrawnLamp few{.center = {81.3, 79.6}, .stripes = {.period_lines = 36}};
   const DrawnLamp more{.center = {210.3, 79.6}, .stripes = {.period_lines = 11}};
   const auto alone = detector.detect(image_view(drawn({few}, size, CV_8U, 0.5)));
@@ -114,8 +114,8 @@ TEST(LampDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
   for (const Light& light : both) EXPECT_EQ(light.kind, LightKind::lamp);
 }
 
-TEST(LampDetector, FindsNothingInImagesWithoutLamps) {
-  const LampDetector detector = Captures("paper-rig", "sample").detector();
+TEST(LightDetector, FindsNothingInImagesWithoutLamps) {
+  const LightDetector detector = Captures("paper-rig", "sample").detector();
   for (const int type : {CV_8U, CV_16U}) {
     for (const double level : {0.0, 100.0, 255.0, 65535.0}) {
       EXPECT_TRUE(detector.detect(image_view(cv::Mat(600, 800, type, cv::Scalar(level)))).empty());

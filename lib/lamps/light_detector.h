@@ -33,17 +33,17 @@ DetectorCamera detector_camera(const Calibration& calibration);
 /// then, and sigma_px may be too small. Identity: a lamp of
 /// frequency f has stripes of 1 / (f row_time) lines (Chen and Guan, section 2.1), or what a
 /// trained classifier says.
-class LampDetector {
+class LightDetector {
  public:
-  LampDetector(const LampMap& lamps, const DetectorCamera& camera,
-               std::optional<LampClassifier> classifier = {});
+  LightDetector(const LampMap& lamps, const DetectorCamera& camera,
+                std::optional<LampClassifier> classifier = {});
 
   /// The lights of an image that is not empty, from the top.
   std::vector<Light> detect(const ImageView& image) const;
 
   /// The same detector for a camera that leans otherwise, with its level_from_camera; nothing: as
   /// nobody knows. Then ellipses are fitted in the image, as without a lens.
-  LampDetector leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
+  LightDetector leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
   Readout readout() const { return camera_.readout; }
 

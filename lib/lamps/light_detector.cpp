@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "lamps/lamp_detector.h"
+#include "lamps/light_detector.h"
 
 #include <algorithm>
 #include <cmath>
@@ -91,8 +91,8 @@ DetectorCamera detector_camera(const Calibration& calibration) {
   return result;
 }
 
-LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera,
-                           std::optional<LampClassifier> classifier)
+LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
+                             std::optional<LampClassifier> classifier)
     : lamps_(lamps),
       camera_(camera),
       shape_(camera),
@@ -101,7 +101,8 @@ LampDetector::LampDetector(const LampMap& lamps, const DetectorCamera& camera,
       has_rectangles_(std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
                                   [](const Lamp& lamp) { return lamp.rectangle.has_value(); })) {}
 
-LampDetector LampDetector::leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const {
+LightDetector LightDetector::leaning(
+    const std::optional<Eigen::Matrix3d>& level_from_camera) const {
   DetectorCamera camera = camera_;
   if (level_from_camera) {
     camera.level_from_camera = *level_from_camera;
@@ -112,8 +113,8 @@ LampDetector LampDetector::leaning(const std::optional<Eigen::Matrix3d>& level_f
   return {lamps_, camera, classifier_};
 }
 
-std::vector<LightPart> LampDetector::parts_of(const ImageView& lines, const Blob& blob,
-                                              const Background& background) const {
+std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blob& blob,
+                                               const Background& background) const {
   constexpr double least_roundness = 0.5, softest_edge = 0.3;
   constexpr std::size_t most_lights = 4;
   const PixelBox box = blob.box();
@@ -158,8 +159,8 @@ std::vector<LightPart> LampDetector::parts_of(const ImageView& lines, const Blob
   return parts;
 }
 
-void LampDetector::measure(const ImageView& lines, const Background& background,
-                           Light& light) const {
+void LightDetector::measure(const ImageView& lines, const Background& background,
+                            Light& light) const {
   const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
   const auto judge = [&](const std::vector<double>& signal) {
     const Eigen::Vector2d from = shape_.turned(light.low), to = shape_.turned(light.high);
@@ -195,7 +196,7 @@ void LampDetector::measure(const ImageView& lines, const Background& background,
   judge(line_signal(lines, chords, background.level));
 }
 
-void LampDetector::correct_shear(std::vector<Light>& lights) const {
+void LightDetector::correct_shear(std::vector<Light>& lights) const {
   const auto has_sharp_circle = [](const Light& light) {
     return !light.sums.empty() && !light.glows && !light.uneven;
   };
@@ -211,7 +212,7 @@ void LampDetector::correct_shear(std::vector<Light>& lights) const {
   }
 }
 
-std::vector<Light> LampDetector::detect(const ImageView& image) const {
+std::vector<Light> LightDetector::detect(const ImageView& image) const {
   const Background background = background_of(image);
   const auto [lines, lit, memory] = lines_of(image, camera_.readout, background);
   const auto blobs = group_runs(find_runs(lines, background.threshold, lit), most_dark_rows_);
@@ -275,13 +276,13 @@ bool wholly_in_view(const Light& light, const ImageSize& size) {
          light.high.y() < size.height - 0.5;
 }
 
-std::optional<int> LampDetector::lamp_of(const Stripes& stripes) const {
+std::optional<int> LightDetector::lamp_of(const Stripes& stripes) const {
   if (classifier_) return vlp::lamp_of(*classifier_, stripes);
   if (!camera_.row_time_s) return std::nullopt;
   return lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
 }
 
-std::optional<double> LampDetector::shape_off(const Light& light, int lamp) const {
+std::optional<double> LightDetector::shape_off(const Light& light, int lamp) const {
   // A lens that nobody knows changes the ratio of the sides by more than a lean.
   const double most_off = shape_.has_lens() ? 2 * kLeanedOff : 0.3;
   const Lamp* mapped = find_lamp(lamps_.lamps, lamp);  // a classifier may know others
@@ -293,7 +294,7 @@ std::optional<double> LampDetector::shape_off(const Light& light, int lamp) cons
   return off < most_off ? std::optional(off) : std::nullopt;
 }
 
-void LampDetector::identify(std::vector<Light>& lights, const ImageSize& size) const {
+void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) const {
   constexpr double much_softer = 5, least_roundness = 0.45, most_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity();
   for (Light& light : lights) {
