@@ -97,10 +97,17 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$release" '
     done
   fi
   if has libvlp-positioning-dev; then
-    apt-get install -qq --no-install-recommends g++ pkg-config >>/packages/install.log 2>&1
+    apt-get install -qq --no-install-recommends g++ pkg-config python3-pil >>/packages/install.log 2>&1
     sed -n "/^\`\`\`c\$/,/^\`\`\`\$/{/^\`\`\`/!p}" ../../lib/README.md >/packages/robot.c
     cc -std=c99 /packages/robot.c -lvlp_positioning -o /packages/robot
-    grep -F "\`$(/packages/robot)\`" ../../lib/README.md  # as it says there
+    rendered=../paper-rig/rendered
+    mkdir /packages/rig
+    cp $rendered/lamps.yaml /packages/rig
+    cp $rendered/true_calibration.yaml /packages/rig/calibration.yaml
+    python3 -c "import sys, PIL.Image; sys.stdout.buffer.write(PIL.Image.open(sys.argv[1]).tobytes())" \
+      $rendered/sample/0000.png >/packages/rig/pixels
+    position=$(cd /packages/rig && /packages/robot <pixels)
+    grep -F "\`$position\`" ../../lib/README.md  # as it says there
     c++ -std=c++20 -x c++ ../../tests/consumer/same_fix/same_fix.cpp -o /packages/robot \
       $(pkg-config --cflags --libs vlp-positioning)
     fixes=$(/packages/robot)

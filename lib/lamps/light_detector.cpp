@@ -11,6 +11,7 @@
 
 #include "geometry/frames.h"
 #include "lamps/image/background.h"
+#include "lamps/image/levels.h"
 #include "lamps/image/lines.h"
 #include "lamps/image/runs.h"
 #include "lamps/shape/glow.h"

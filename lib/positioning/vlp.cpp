@@ -7,15 +7,21 @@
 #include <cmath>
 #include <exception>
 #include <new>
+#include <optional>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <string_view>
+#include <utility>
 
+#include "lamps/lamp_detector.h"
 #include "positioning/positioner.h"
 #include "rig/input_error.h"
 
 struct vlp_positioner {
   vlp::Positioner positioner;
+  /// Empty if the calibration has no row time.
+  std::optional<vlp::LampDetector> detector;
 };
 
 namespace vlp {
@@ -136,6 +142,29 @@ void fill(const Fix& from, const Sensors& sensors, vlp_fix& fix) {
   std::copy(from.rejected_ids.begin(), from.rejected_ids.end(), fix.rejected_ids);
 }
 
+/// Returns the code of the exception that is being handled, and keeps its message.
+std::int32_t failed_by_exception() {
+  try {
+    throw;
+  } catch (const InputError& error) {
+    return failed(VLP_BAD_FILE, error.what());
+  } catch (const std::invalid_argument& error) {
+    return failed(VLP_BAD_ARGUMENT, error.what());
+  } catch (const std::bad_alloc&) {
+    return failed(VLP_NO_MEMORY, "there is not enough memory");
+  } catch (const std::exception& error) {
+    return failed(VLP_FAILED, error.what());
+  } catch (...) {
+    return failed(VLP_FAILED, "an unknown exception");
+  }
+}
+
+ImageView view_of(const vlp_image& image) {
+  const std::ptrdiff_t row_bytes = std::ptrdiff_t{image.width} * (image.bits / 8);
+  return {image.data, image.width, image.height, image.stride != 0 ? image.stride : row_bytes,
+          image.bits};
+}
+
 /// The room of a frame's detections, not made before it is filled.
 union Room {
   Room() {}
@@ -160,22 +189,42 @@ int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp
     const Calibration calibration = read_calibration(calibration_yaml);
     const PositionerOptions chosen =
         options != nullptr ? options_of(*options) : PositionerOptions();
-    *positioner = new vlp_positioner{Positioner(map, calibration, chosen)};
+    std::optional<LampDetector> detector;
+    if (calibration.camera.row_time_s) detector.emplace(map, calibration);
+    *positioner = new vlp_positioner{Positioner(map, calibration, chosen), std::move(detector)};
     return VLP_OK;
-  } catch (const InputError& error) {
-    return failed(VLP_BAD_FILE, error.what());
-  } catch (const std::invalid_argument& error) {
-    return failed(VLP_BAD_ARGUMENT, error.what());
-  } catch (const std::bad_alloc&) {
-    return failed(VLP_NO_MEMORY, "there is not enough memory");
-  } catch (const std::exception& error) {
-    return failed(VLP_FAILED, error.what());
   } catch (...) {
-    return failed(VLP_FAILED, "an unknown exception");
+    return failed_by_exception();
   }
 }
 
 void vlp_close(vlp_positioner* positioner) { delete positioner; }
+
+int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
+                   vlp_detection* detections, size_t capacity, size_t* count) {
+  using namespace vlp;
+  if (count != nullptr) *count = 0;
+  if (positioner == nullptr || image == nullptr || count == nullptr ||
+      (detections == nullptr && capacity > 0)) {
+    return failed(VLP_BAD_ARGUMENT, "a pointer is null");
+  }
+  if (!positioner->detector) {
+    return failed(VLP_ROW_TIME_UNKNOWN,
+                  "the calibration has no row_time_s, by which lamps are told apart");
+  }
+  try {
+    const auto seen = positioner->detector->detect(view_of(*image));
+    for (std::size_t i = 0; i < std::min(seen.size(), capacity); ++i) {
+      detections[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(),
+                       seen[i].sigma_px.value_or(0)};
+    }
+    *count = seen.size();
+    if (seen.size() <= capacity) return VLP_OK;
+    return failed(VLP_TOO_SMALL, "the image shows " + std::to_string(seen.size()) + " lamps");
+  } catch (...) {
+    return failed_by_exception();
+  }
+}
 
 int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detections, size_t count,
                    const vlp_sensors* sensors, vlp_fix* fix) {
@@ -207,6 +256,8 @@ const char* vlp_explanation(int32_t code) {
       return "a pointer is null or a figure out of range";
     case VLP_NO_MEMORY:
       return "there is not enough memory";
+    case VLP_TOO_SMALL:
+      return "an array has no room for all; the count says how many there are";
     case VLP_FAILED:
       return "an error of the library; see vlp_last_error()";
     default:

@@ -1,10 +1,11 @@
 /* SPDX-FileCopyrightText: The VLP calibration toolbox authors
  * SPDX-License-Identifier: Apache-2.0
  *
- * Fixes from identified lamps in C (C99), for every language that can call it. What is behind it,
- * equations, frames and sources included, is in positioning/positioner.h; fixes are the same to the
- * last bit. Metres, radians, seconds, pixels; the world has z up, yaw is counter-clockwise seen
- * from above, and the centre of an image's top left pixel is (0, 0).
+ * Lamps in images and fixes from them in C (C99), for every language that can call it. What is
+ * behind it, equations, frames and sources included, is in lamps/lamp_detector.h and
+ * positioning/positioner.h; detections and fixes are the same to the last bit. Metres, radians,
+ * seconds, pixels; the world has z up, yaw is counter-clockwise seen from above, and the centre of
+ * an image's top left pixel is (0, 0).
  *
  * A field that is 0 is not stated: of structs that are zero ({0}) a caller fills in what it knows.
  */
@@ -33,11 +34,12 @@ enum {
   VLP_INCONSISTENT = 9,      /* three lamps or more that contradict each other */
   VLP_MIRRORED_MAP = 10,     /* they fit a mirror image of the map */
   VLP_UNDETERMINED = 11,     /* what is known does not tell lean or motion, and so not the place */
-  VLP_ROW_TIME_UNKNOWN = 12, /* motion wants to know when each row was read */
+  VLP_ROW_TIME_UNKNOWN = 12, /* motion, or lamps in an image, need the time when a row is read */
   VLP_BAD_FILE = -1,         /* a file cannot be read, or holds what it should not */
   VLP_BAD_ARGUMENT = -2,     /* a null pointer, or a figure out of range */
   VLP_NO_MEMORY = -3,
-  VLP_FAILED = -4 /* anything else; a mistake in the library */
+  VLP_FAILED = -4,   /* anything else; a mistake in the library */
+  VLP_TOO_SMALL = -5 /* an array has no room for all */
 };
 
 /* Detections in a frame. */
@@ -58,6 +60,19 @@ typedef struct vlp_options {
   /* Standard deviation of detections that state none, in the undistorted image; 1 when 0. */
   double unstated_sigma_px;
 } vlp_options;
+
+/* A grey image as the camera took it, in memory of the caller. */
+typedef struct vlp_image {
+  /* First pixel of the top row. Pixels of 16 bits are in the machine's byte order, at even
+   * addresses. */
+  const void* data;
+  /* Pixels; those of the calibration. */
+  int32_t width, height;
+  /* Bytes from the start of a row to the start of the next; 0: rows follow without a gap. */
+  ptrdiff_t stride;
+  /* Of a pixel in memory: 8 or 16. 10 or 12 bits of a converter are 16 here. */
+  int32_t bits;
+} vlp_image;
 
 typedef struct vlp_detection {
   /* Id in the lamp map. */
@@ -134,6 +149,15 @@ int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp
 /* Null is none. */
 void vlp_close(vlp_positioner* positioner);
 
+/* Detects the lamps of the map that are wholly in an image, from the top, for vlp_locate(). Writes
+ * the first `capacity` of them, of which vlp_locate() takes VLP_MAX_LAMPS, and their number to
+ * `*count`; if that is more than `capacity`, returns VLP_TOO_SMALL. After any other error `*count`
+ * is 0; what is wrong with the image is in vlp_last_error(). An image without lamps is no error.
+ * Lights that are no lamp of the map, and lamps that the image's edge cuts, are left out. Takes
+ * memory from the heap. Any number of threads may call it with one positioner. */
+int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
+                   vlp_detection* detections, size_t capacity, size_t* count);
+
 /* The fix of one frame, and its status; `sensors` may be null. It allocates nothing. */
 int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detections, size_t count,
                    const vlp_sensors* sensors, vlp_fix* fix);
@@ -141,8 +165,8 @@ int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detect
 /* What a status or an error means and what to do, in a line. Never null. */
 const char* vlp_explanation(int32_t code);
 
-/* What went wrong in the last vlp_open() of this thread that failed: file, line, key; "" before.
- * Valid until its next call. */
+/* What went wrong in the last vlp_open() or vlp_detect() of this thread that failed: file, line,
+ * key, or what the image is; "" before. Valid until its next call. */
 const char* vlp_last_error(void);
 
 #ifdef __cplusplus

@@ -4,9 +4,10 @@
 #
 # Installs the library, then builds the example of a robot's loop in lib/README.md against the installed
 # tree: with its CMake package, and with pkg-config for this very processor (-march=native), which
-# changes the layout of Eigen's own types. Both programs run. Then the same fixes through the C API, from C99
-# and C++17, and through the C++ API, by GCC and by Clang where there is one, without optimisation and with all
-# of it: they are the same to the last bit.
+# changes the layout of Eigen's own types. Both programs run, and the example in C: from the pixels of a
+# rendered image to its fix. Then the same fixes through the C API, from C99 and C++17, and through the C++ API,
+# by GCC and by Clang where there is one, without optimisation and with all of it: they are the same to the last
+# bit.
 set -euo pipefail
 source_dir=$1 build_dir=$2 scratch=$3 flags=${4:-}
 
@@ -32,25 +33,34 @@ mkdir "$scratch/with-pkg-config"
 c++ -std=c++20 -O2 -march=native $flags "$scratch"/robot/*.cpp -o "$scratch/with-pkg-config/robot" \
   $(pkg-config --cflags --libs vlp-positioning) -Wl,-rpath,"$lib"
 
-cd "$source_dir/datasets/example"
+rendered=$source_dir/datasets/paper-rig/rendered
+mkdir "$scratch/rig"
+cp "$rendered/lamps.yaml" "$scratch/rig"
+cp "$rendered/true_calibration.yaml" "$scratch/rig/calibration.yaml"
+pixels=$scratch/rig/pixels
+/usr/bin/python3 -c 'import sys, PIL.Image; sys.stdout.buffer.write(PIL.Image.open(sys.argv[1]).tobytes())' \
+  "$rendered/sample/0000.png" >"$pixels"
+
+cd "$scratch/rig"
 for how in with-cmake with-pkg-config; do
-  output=$("$scratch/$how/robot")
+  output=$("$scratch/$how/robot" <"$pixels")
   echo "$how: $output"
   [ "$(grep -c 'x ' <<<"$output")" = 1 ]
   [ "$(grep -c 'no fix: fewer than two lamps' <<<"$output")" = 1 ]
 done
-[ "$("$scratch/with-cmake/robot")" = "$("$scratch/with-pkg-config/robot")" ]
+[ "$("$scratch/with-cmake/robot" <"$pixels")" = "$("$scratch/with-pkg-config/robot" <"$pixels")" ]
 
 libs="-I$scratch/installed/include -L$lib -lvlp_positioning -Wl,-rpath,$lib"
 eigen=$(pkg-config --cflags eigen3)
 sed -n '/^```c$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/robot.c"
 # shellcheck disable=SC2086 # several words each
 cc -std=c99 -Wall -Wextra -Wpedantic -Werror $flags "$scratch/robot.c" $libs -o "$scratch/robot-in-c"
-grep -F "\`$("$scratch/robot-in-c")\`" "$source_dir/lib/README.md"  # as it says there
+grep -F "\`$("$scratch/robot-in-c" <"$pixels")\`" "$source_dir/lib/README.md"  # as it says there
 sed -n '/^```c++$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/ros_node.cpp"
 # shellcheck disable=SC2086 # several words each
 c++ -std=c++17 -Wall -Wextra -Werror -fsyntax-only $flags $eigen -I"$scratch/installed/include" \
   -I"$source_dir/tests/consumer/ros" "$scratch/ros_node.cpp"
+cd "$source_dir/datasets/example"
 same=$source_dir/tests/consumer/same_fix/same_fix
 first=''
 same_fix() {  # COMPILER OPTIONS...

@@ -243,11 +243,11 @@ TEST_F(CInterface, SaysWhatIsWrongWithAFileOrAnOption) {
 
 TEST(CInterfaceCodes, AreExplainedEach) {
   std::set<std::string> texts;
-  for (int code = VLP_FAILED; code <= VLP_ROW_TIME_UNKNOWN; ++code) {
+  for (int code = VLP_TOO_SMALL; code <= VLP_ROW_TIME_UNKNOWN; ++code) {
     texts.insert(vlp_explanation(code));
   }
-  EXPECT_EQ(texts.size(), static_cast<std::size_t>(VLP_ROW_TIME_UNKNOWN - VLP_FAILED + 1));
-  EXPECT_EQ(vlp_explanation(13), std::string(vlp_explanation(-5)));
+  EXPECT_EQ(texts.size(), static_cast<std::size_t>(VLP_ROW_TIME_UNKNOWN - VLP_TOO_SMALL + 1));
+  EXPECT_EQ(vlp_explanation(13), std::string(vlp_explanation(-6)));
   EXPECT_THAT(vlp_version(), HasSubstr("."));
 }
 

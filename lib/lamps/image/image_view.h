@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "lamps/image/pixel_box.h"
+#include "pixel_box.h"
 
 namespace vlp {
 
@@ -52,11 +52,5 @@ decltype(auto) visit_levels(const ImageView& image, Function&& function) {
   return image.bits == 8 ? std::forward<Function>(function)(std::uint8_t{})
                          : std::forward<Function>(function)(std::uint16_t{});
 }
-
-/// Returns the level of the brightest pixel; 0 of an empty image.
-int brightest_level(const ImageView& image);
-
-/// Returns how many pixels have that level.
-int count_pixels_at(const ImageView& image, int level);
 
 }  // namespace vlp

@@ -30,8 +30,7 @@ struct Pixels {
 std::shared_ptr<void> black_pixels(const ImageSize& size, int bits) {
   const std::size_t bytes =
       std::size_t(size.width) * std::size_t(size.height) * std::size_t(bits / 8);
-  void* memory =
-      mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  void* memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
   madvise(memory, bytes, MADV_HUGEPAGE);
   return {memory, [bytes](void* used) { munmap(used, bytes); }};

@@ -95,9 +95,9 @@ int tiles_in(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
 }  // namespace
 
 PixelBox pixels_of_tiles(const PixelBox& tiles, const ImageSize& size) {
-  return intersection({tiles.x * kTile_px, tiles.y * kTile_px, tiles.width * kTile_px,
-                       tiles.height * kTile_px},
-                      {0, 0, size.width, size.height});
+  return intersection(
+      {tiles.x * kTile_px, tiles.y * kTile_px, tiles.width * kTile_px, tiles.height * kTile_px},
+      {0, 0, size.width, size.height});
 }
 
 TileMask lit_tiles(const ImageView& image, double threshold) {
@@ -130,8 +130,7 @@ TileMask dilated(const TileMask& mask) {
 
 TileMask transposed(const TileMask& mask) {
   TileMask result(mask.rows, mask.columns);
-  for_each_set(mask,
-               [&](int column, int row) { result.row(column)[row] = mask.row(row)[column]; });
+  for_each_set(mask, [&](int column, int row) { result.row(column)[row] = mask.row(row)[column]; });
   return result;
 }
 

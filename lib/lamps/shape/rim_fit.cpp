@@ -11,6 +11,7 @@
 
 #include "geometry/median.h"
 #include "geometry/normal_equations.h"
+#include "lamps/image/levels.h"
 #include "lamps/shape/m_estimate.h"
 
 namespace vlp {

@@ -4,6 +4,7 @@
 /// the debug information of this one file tells its whole ABI; see abi_test.sh.
 #include <vlp/vlp.h>
 
+#include <vlp/lamps/lamp_detector.h>
 #include <vlp/positioning/positioner.h>
 #include <vlp/rig/input_error.h>
 #include <optional>
@@ -36,6 +37,10 @@ struct Types {
   PositionerOptions options;
   Correction correction;
   Positioner* positioner;
+  LampDetector* detector;
+  ImageView image;
+  ImageSize image_size;
+  PixelBox box;
   InputError* error;
   Fix fix;
   FixStatus status;
@@ -45,6 +50,7 @@ struct Types {
   Pose pose;
   Inclination inclination;
   vlp_options c_options;
+  vlp_image c_image;
   vlp_detection c_detection;
   vlp_sensors c_sensors;
   vlp_fix c_fix;
@@ -70,10 +76,12 @@ struct Functions {
   Fix (Positioner::*locate)(Seen, const Sensors&) const noexcept = &Positioner::locate;
   Fix (Positioner::*locate_together)(
       Seen, const Sensors&, std::span<const EarlierFrame>) const noexcept = &Positioner::locate;
+  std::vector<Detection> (LampDetector::*detect)(const ImageView&) const = &LampDetector::detect;
   int (Positioner::*elsewhere)() const noexcept = &Positioner::lamps_elsewhere;
   decltype(&vlp_version) c_version = &vlp_version;
   decltype(&vlp_open) c_open = &vlp_open;
   decltype(&vlp_close) c_close = &vlp_close;
+  decltype(&vlp_detect) c_detect = &vlp_detect;
   decltype(&vlp_locate) c_locate = &vlp_locate;
   decltype(&vlp_explanation) c_explanation = &vlp_explanation;
   decltype(&vlp_last_error) c_last_error = &vlp_last_error;

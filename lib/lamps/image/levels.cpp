@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "lamps/image/image_view.h"
+#include "lamps/image/levels.h"
 
 #include <algorithm>
 

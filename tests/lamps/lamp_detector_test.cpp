@@ -1,0 +1,245 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The public detector in C++ and in C, which finds what the toolbox finds, and takes any pixels.
+#include "lamps/lamp_detector.h"
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "detection/image_file.h"
+#include "detection/mat_view.h"
+#include "lamps/light_detector.h"
+#include "positioning/vlp.h"
+#include "support/random.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Handle = std::unique_ptr<vlp_positioner, void (*)(vlp_positioner*)>;
+using Detections = std::array<vlp_detection, VLP_MAX_LAMPS>;
+
+const std::string kRendered = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/";
+
+LampMap lamp_map() { return read_lamp_map(kRendered + "lamps.yaml"); }
+Calibration calibration() { return read_calibration(kRendered + "true_calibration.yaml"); }
+cv::Mat sample() { return read_image(kRendered + "sample/0000.png"); }
+
+vlp_image c_image(const ImageView& view) {
+  return {view.data, view.width, view.height, view.stride, view.bits};
+}
+
+Handle open(const Calibration& calibration) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "calibration.yaml";
+  write_calibration(file, calibration);
+  vlp_positioner* positioner = nullptr;
+  EXPECT_EQ(vlp_open((kRendered + "lamps.yaml").c_str(), file.c_str(), nullptr, &positioner),
+            VLP_OK)
+      << vlp_last_error();
+  return {positioner, &vlp_close};
+}
+
+TEST(LampDetector, DetectsTheLampsThatTheToolboxDetects) {
+  const cv::Mat image = sample();
+  const auto lamps = LampDetector(lamp_map(), calibration()).detect(image_view(image));
+  ASSERT_EQ(lamps.size(), 6U);
+  std::size_t i = 0;
+  const LightDetector lights(lamp_map(), detector_camera(calibration()));
+  for (const Light& light : lights.detect(image_view(image))) {
+    if (light.kind != LightKind::lamp) continue;
+    ASSERT_LT(i, lamps.size());
+    EXPECT_EQ(lamps[i].lamp, light.lamp);
+    EXPECT_EQ(lamps[i].pixel, light.pixel);
+    EXPECT_EQ(lamps[i++].sigma_px, light.sigma_px);
+  }
+  EXPECT_EQ(i, lamps.size());
+}
+
+TEST(LampDetector, RefusesWhatIsNoImageOfItsCamera) {
+  const cv::Mat image = sample();
+  const LampDetector detector(lamp_map(), calibration());
+  const auto message_of = [&](const auto& change) -> std::string {
+    ImageView view = image_view(image);
+    change(view);
+    try {
+      detector.detect(view);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_EQ(message_of([](ImageView&) {}), "none");
+  EXPECT_THAT(message_of([](ImageView& view) { view.data = nullptr; }), HasSubstr("no pixels"));
+  EXPECT_THAT(message_of([](ImageView& view) { view.width = 799; }), HasSubstr("799 x 600"));
+  EXPECT_THAT(message_of([](ImageView& view) { view.height = -1; }), HasSubstr("800 x -1"));
+  EXPECT_THAT(message_of([](ImageView& view) { view.stride = 799; }), HasSubstr("stride"));
+  EXPECT_THAT(message_of([](ImageView& view) { view.stride = -800; }), HasSubstr("stride"));
+  EXPECT_THAT(message_of([](ImageView& view) { view.bits = 16; }), HasSubstr("stride"));
+  EXPECT_THAT(message_of([](ImageView& view) { view.bits = 12; }), HasSubstr("12 bits"));
+  EXPECT_THAT(message_of([](ImageView& view) { view.bits = 16, view.stride = 1601; }),
+              HasSubstr("odd addresses"));
+  Calibration without = calibration();
+  without.camera.row_time_s.reset();
+  EXPECT_THROW(LampDetector(lamp_map(), without), std::invalid_argument);
+}
+
+TEST(VlpDetect, DetectsWhatTheDetectorInCppDetects) {
+  const cv::Mat image = sample();
+  const auto expected = LampDetector(lamp_map(), calibration()).detect(image_view(image));
+  ASSERT_EQ(expected.size(), 6U);
+  const Handle positioner = open(calibration());
+  // Rows without a gap, and rows with one.
+  cv::Mat wide(image.rows, image.cols + 13, CV_8U, cv::Scalar(255));
+  image.copyTo(wide(cv::Rect(0, 0, image.cols, image.rows)));
+  vlp_image without_gap = c_image(image_view(image));
+  without_gap.stride = 0;
+  for (const vlp_image& given :
+       {without_gap, c_image(image_view(wide(cv::Rect(0, 0, image.cols, image.rows))))}) {
+    Detections seen;
+    std::size_t count = 0;
+    ASSERT_EQ(vlp_detect(positioner.get(), &given, seen.data(), seen.size(), &count), VLP_OK);
+    ASSERT_EQ(count, expected.size());
+    for (std::size_t i = 0; i < count; ++i) {
+      EXPECT_EQ(seen[i].lamp, expected[i].lamp);
+      EXPECT_EQ(Eigen::Vector2d(seen[i].u_px, seen[i].v_px), expected[i].pixel);
+      EXPECT_EQ(seen[i].sigma_px, expected[i].sigma_px);
+    }
+  }
+}
+
+TEST(VlpDetect, TellsHowManyThereAreWhenTheArrayIsTooSmall) {
+  const cv::Mat image = sample();
+  const Handle positioner = open(calibration());
+  const vlp_image given = c_image(image_view(image));
+  for (const std::size_t capacity : {0U, 1U, 5U, 6U}) {
+    std::vector<vlp_detection> seen(capacity);  // of just that size, for the sanitizers
+    std::size_t count = 99;
+    EXPECT_EQ(vlp_detect(positioner.get(), &given, seen.data(), capacity, &count),
+              capacity < 6 ? VLP_TOO_SMALL : VLP_OK);
+    EXPECT_EQ(count, 6U);
+    for (const vlp_detection& one : seen) EXPECT_GT(one.sigma_px, 0);
+  }
+  EXPECT_NE(vlp_explanation(VLP_TOO_SMALL), std::string(vlp_explanation(-99)));
+}
+
+TEST(VlpDetect, RefusesArgumentsThatCannotBe) {
+  const cv::Mat image = sample();
+  const Handle positioner = open(calibration());
+  const vlp_image good = c_image(image_view(image));
+  Detections seen;
+  std::size_t count = 99;
+  const auto detect = [&](const vlp_positioner* with, const vlp_image* given, vlp_detection* to) {
+    count = 99;
+    return vlp_detect(with, given, to, seen.size(), &count);
+  };
+  EXPECT_EQ(detect(positioner.get(), &good, seen.data()), VLP_OK);
+  EXPECT_EQ(detect(nullptr, &good, seen.data()), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(count, 0U);
+  EXPECT_EQ(detect(positioner.get(), nullptr, seen.data()), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(detect(positioner.get(), &good, nullptr), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(vlp_detect(positioner.get(), &good, seen.data(), seen.size(), nullptr),
+            VLP_BAD_ARGUMENT);
+  const auto refused = [&](auto change) {
+    vlp_image bad = good;
+    change(bad);
+    const int code = detect(positioner.get(), &bad, seen.data());
+    return code == VLP_BAD_ARGUMENT && count == 0 && std::strlen(vlp_last_error()) > 0;
+  };
+  EXPECT_TRUE(refused([](vlp_image& bad) { bad = {}; }));
+  EXPECT_TRUE(refused([](vlp_image& bad) { bad.data = nullptr; }));
+  for (const int size : {0, -1, -800, 1, 801, 2147483647, -2147483647 - 1}) {
+    EXPECT_TRUE(refused([&](vlp_image& bad) { bad.width = size; })) << size;
+    EXPECT_TRUE(refused([&](vlp_image& bad) { bad.height = size; })) << size;
+    EXPECT_TRUE(refused([&](vlp_image& bad) { bad.width = bad.height = size; })) << size;
+  }
+  for (const int bits : {0, 1, 10, 12, 32, -8, -16, 2147483647}) {
+    EXPECT_TRUE(refused([&](vlp_image& bad) { bad.bits = bits; })) << bits;
+  }
+  for (const int stride : {1, 799, -1, -800}) {
+    EXPECT_TRUE(refused([&](vlp_image& bad) { bad.stride = stride; })) << stride;
+  }
+  EXPECT_TRUE(refused([](vlp_image& bad) {
+    bad.bits = 16, bad.stride = 1600, bad.data = static_cast<const char*>(bad.data) + 1;
+  }));
+}
+
+TEST(VlpDetect, NeedsTheRowTime) {
+  const cv::Mat image = sample();
+  const vlp_image given = c_image(image_view(image));
+  Calibration without = calibration();
+  without.camera.row_time_s.reset();
+  Detections seen;
+  std::size_t count = 99;
+  EXPECT_EQ(vlp_detect(open(without).get(), &given, seen.data(), seen.size(), &count),
+            VLP_ROW_TIME_UNKNOWN);
+  EXPECT_EQ(count, 0U);
+  EXPECT_THAT(vlp_last_error(), HasSubstr("row_time_s"));
+}
+
+/// Pixels of which every byte outside may be another's: rows have a gap, the last one has none.
+template <typename Level, typename Next>
+std::vector<Level> pixels(int width, int height, int row, Next&& next) {
+  std::vector<Level> pixels(std::size_t((height - 1) * row + width));
+  for (Level& level : pixels) level = static_cast<Level>(next());
+  return pixels;
+}
+
+TEST(VlpDetect, TakesImagesOfAnySizeAndContent) {
+  Random random(1);
+  for (const Readout readout : {Readout::rows, Readout::columns}) {
+    for (const auto& [width, height] : {std::array{1, 1},
+                                        {2, 100},
+                                        {100, 2},
+                                        {1, 700},
+                                        {65, 3},
+                                        {64, 64},
+                                        {127, 129},
+                                        {300, 200}}) {
+      Calibration small = calibration();
+      small.camera.imager_px = {width, height};
+      small.camera.readout = readout;
+      const Handle positioner = open(small);
+      ASSERT_NE(positioner, nullptr);
+      const auto expect_detected = [&, w = width, h = height]<typename Level>(
+                                       Level white, const char* content, bool is_even, auto next) {
+        SCOPED_TRACE(testing::Message()
+                     << w << " x " << h << ", white " << white << ": " << content);
+        const int row = w + 3;
+        const auto all = pixels<Level>(w, h, row, next);
+        const vlp_image given{all.data(), w, h, std::ptrdiff_t(sizeof(Level)) * row,
+                              8 * int(sizeof(Level))};
+        Detections seen;
+        std::size_t count = 99;
+        EXPECT_EQ(vlp_detect(positioner.get(), &given, seen.data(), seen.size(), &count), VLP_OK)
+            << vlp_last_error();
+        if (is_even) {
+          EXPECT_EQ(count, 0U);
+        }
+      };
+      const auto expect_all = [&]<typename Level>(Level white) {
+        expect_detected(white, "black", true, [] { return 0; });
+        expect_detected(white, "white", true, [&] { return white; });
+        expect_detected(white, "noise", false, [&] { return random.uniform(0, white); });
+        expect_detected(white, "spots", false,
+                        [&] { return random.uniform(0, 1) > 0.97 ? white : 9; });
+        int i = 0;
+        expect_detected(white, "bars", false, [&] { return ++i / 200 % 2 == 0 ? white : 9; });
+      };
+      expect_all(std::uint8_t{255});
+      expect_all(std::uint16_t{65535});
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vlp
