@@ -27,12 +27,19 @@ inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
+/// Returns a bit for each side of the bounds on whose outer side the point lies; 0 for NaN.
+inline unsigned sides_beyond(const Eigen::AlignedBox2d& bounds, const Eigen::Vector2d& point) {
+  return unsigned(point.x() < bounds.min().x()) | unsigned(point.x() > bounds.max().x()) << 1 |
+         unsigned(point.y() < bounds.min().y()) << 2 | unsigned(point.y() > bounds.max().y()) << 3;
+}
+
 /// Adds to each pixel of the window, which is all of `image`, weight times the mean of a flat
 /// pattern g over the pixel. The mean is exact for the pixel's image on the pattern, a
 /// quadrilateral Q: by Green's theorem the integral of g over Q is the sum over its edges of
 /// shape.edge_integral(p, q), which is the integral of G(x, y) along the edge for any G that
-/// Green's theorem turns into g. A shape has hit(origin, direction), in its frame, and
-/// edge_integral(p, q).
+/// Green's theorem turns into g. A shape has hit(origin, direction), in its frame,
+/// edge_integral(p, q) and bounds(): a quadrilateral whose corners all lie on the outer side of one
+/// side of these bounds is left out, as g is 0 there.
 template <typename Shape>
 void add_shape(const PixelRays& rays, const PixelWindow& window,
                const TargetFromCamera& target_from_camera, const Shape& shape, double weight,
@@ -44,7 +51,10 @@ void add_shape(const PixelRays& rays, const PixelWindow& window,
     return Edge{shape.edge_integral(p, q), cross(p, q) / 2};
   };
   const auto corners = static_cast<std::size_t>(window.place_end - window.place_begin) + 1;
+  const Eigen::AlignedBox2d bounds = shape.bounds();
   std::vector<Eigen::Vector2d> above(corners), below(corners);
+  /// Sides of the bounds beyond which both corners lie, above and below.
+  std::vector<unsigned> sides(corners);
   for (int line = window.line_begin; line < window.line_end; ++line) {
     const Eigen::Isometry3d pose = target_from_camera(line);
     const Eigen::Vector3d origin = pose.translation();
@@ -52,10 +62,18 @@ void add_shape(const PixelRays& rays, const PixelWindow& window,
       const int place = window.place_begin + static_cast<int>(i);
       above[i] = shape.hit(origin, pose.linear() * rays.corner(line, place));
       below[i] = shape.hit(origin, pose.linear() * rays.corner(line + 1, place));
+      sides[i] = sides_beyond(bounds, above[i]) & sides_beyond(bounds, below[i]);
     }
     float* pixel = image[line - window.line_begin];
     Edge left = edge(below[0], above[0]);
+    bool has_left = true;
     for (std::size_t i = 0; i + 1 < corners; ++i) {
+      if ((sides[i] & sides[i + 1]) != 0) {
+        has_left = false;
+        continue;
+      }
+      if (!has_left) left = edge(below[i], above[i]);
+      has_left = true;
       const Edge top = edge(above[i], above[i + 1]);
       const Edge right = edge(below[i + 1], above[i + 1]);
       const Edge bottom = edge(below[i], below[i + 1]);

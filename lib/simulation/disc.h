@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "simulation/coverage.h"
 
@@ -15,6 +15,10 @@ class Disc {
 
   Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
     return plane_hit(origin, direction) / radius_m_;
+  }
+
+  Eigen::AlignedBox2d bounds() const {
+    return {Eigen::Vector2d::Constant(-1), Eigen::Vector2d::Constant(1)};
   }
 
   /// The integral over the part of the triangle (0, p, q) in the disc, in units of the radius

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <optional>
 #include <vector>
@@ -24,6 +24,12 @@ class Mosaic {
 
   Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
     return plane_hit(origin, direction);
+  }
+
+  /// Box around all rectangles; empty without any.
+  Eigen::AlignedBox2d bounds() const {
+    if (x_m_.empty() || y_m_.empty()) return {};
+    return {Eigen::Vector2d(x_m_.front(), y_m_.front()), Eigen::Vector2d(x_m_.back(), y_m_.back())};
   }
 
   /// The integral along the edge of G dy, with G the integral of the pattern from the far left to
