@@ -32,7 +32,10 @@ void run(const Options& options) {
   check_output((std::filesystem::path(options.output) / "scene.yaml").string(), {options.scene});
   Scene scene = read_scene(options.scene);
   std::optional<std::uint64_t> seed;
-  if (options.seed) seed = scene.seed = static_cast<std::uint64_t>(*options.seed);
+  if (options.seed) {
+    seed = scene.seed = static_cast<std::uint64_t>(*options.seed);
+    draw_random_parts(scene);
+  }
   cv::setNumThreads(1);  // the captures themselves go in parallel
   const std::string what = options.archive ? "sessions" : "captures";
   const SimulationOptions how{options.folders, options.threads,

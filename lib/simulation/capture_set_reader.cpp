@@ -8,14 +8,6 @@
 namespace vlp {
 namespace {
 
-std::pair<double, double> read_range(const YamlValue& value, double min, double max,
-                                     std::string_view unit) {
-  const auto range = value.numbers(2);
-  for (const YamlValue& end : value.list()) end.number_within(min, max, unit);
-  if (range[0] > range[1]) throw value.error("should be [least, most]");
-  return {range[0], range[1]};
-}
-
 /// Refuses a height at which a light would not be above the camera.
 void check_height(const YamlValue& item, double height_m, const Scene& scene) {
   const auto check = [&](const Glow& glow, const std::string& name) {
@@ -25,6 +17,9 @@ void check_height(const YamlValue& item, double height_m, const Scene& scene) {
   for (const Glow& lamp : scene.clutter.steady_lamps) check(lamp, "a steady lamp");
   for (const Reflection& reflection : scene.clutter.reflections) {
     check(reflection.glow, "a reflection");
+  }
+  for (const ForeignLight& light : scene.clutter.foreign_lights) {
+    check(light.glow, "a foreign light");
   }
 }
 

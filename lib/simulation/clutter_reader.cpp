@@ -30,8 +30,9 @@ Reflection read_reflection(YamlMap map, const std::vector<SceneLamp>& lamps, con
   return reflection;
 }
 
-Panel read_panel(YamlMap map) {
-  Panel panel;
+/// Reads a panel's corner and edges.
+Panel read_place(YamlMap& map) {
+  Panel panel{};
   panel.corner_m = read_point(map.required("corner_m"));
   const YamlValue edges = map.required("edges_m");
   const auto list = edges.list();
@@ -43,9 +44,92 @@ Panel read_panel(YamlMap map) {
   if (!(lengths > 0) || std::abs(panel.edge_a_m.dot(panel.edge_b_m)) > right_angle * lengths) {
     throw edges.error("should be at right angles to each other and not of length zero");
   }
+  return panel;
+}
+
+/// Reads a panel with its radiance, and leaves the map open for more keys.
+Panel read_lit_panel(YamlMap& map) {
+  Panel panel = read_place(map);
   panel.radiance_e_per_s = read_radiance(map, "radiance_e_per_s");
+  return panel;
+}
+
+Panel read_panel(YamlMap map) {
+  const Panel panel = read_lit_panel(map);
   map.finish();
   return panel;
+}
+
+RectifiedSine read_mains(YamlMap map) {
+  const RectifiedSine mains{map.required("frequency_hz").number_within(10, 1000, "Hz"),
+                            map.required("depth").number_within(0, 1, "(of the light)"), 0};
+  map.finish();
+  return mains;
+}
+
+SquareWave read_pwm(YamlMap map) {
+  const SquareWave pwm{map.required("frequency_hz").number_within(1, 1e6, "Hz"),
+                       map.required("duty").number_within(1e-3, 1, "(of a period)"), 0};
+  map.finish();
+  return pwm;
+}
+
+ForeignLight read_foreign_light(YamlMap map, const Room& room) {
+  const auto rectangle = read_rectangle(map);
+  ForeignLight light{read_glow(map, room, rectangle), {}, {}};
+  if (!rectangle) read_profile(map, light.glow);
+  const auto pwm = map.optional("pwm"), mains = map.optional("mains");
+  if (pwm.has_value() == mains.has_value()) throw map.error("needs one of the keys pwm and mains");
+  if (pwm) {
+    light.wave = read_pwm(pwm->map());
+  } else {
+    light.wave = read_mains(mains->map());
+  }
+  if (const auto phase = map.optional("phase")) {
+    light.phase = phase->number_within(0, 1, "(of a period)");
+  }
+  map.finish();
+  return light;
+}
+
+Mirror read_mirror(YamlMap map) {
+  const Mirror mirror{read_place(map),
+                      map.required("reflectance").number_within(0, 1, "(of the light)")};
+  map.finish();
+  return mirror;
+}
+
+Blind read_blind(YamlMap map) {
+  const Blind blind{read_lit_panel(map), map.required("slats").integer_within(1, 1000),
+                    map.required("open_fraction").number_within(0, 1, "(of a slat's pitch)")};
+  map.finish();
+  return blind;
+}
+
+Sign read_sign(YamlMap map) {
+  const Sign sign{read_lit_panel(map),
+                  map.required("lines").integer_within(1, 100),
+                  map.required("letters").integer_within(1, 100),
+                  {}};
+  map.finish();
+  return sign;
+}
+
+/// Height of the lowest light but mirror images, in m.
+double lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutter) {
+  double lowest_m = std::numeric_limits<double>::infinity();
+  const auto see = [&](double height_m) { lowest_m = std::min(lowest_m, height_m); };
+  const auto see_panel = [&](const Panel& panel) {
+    see(panel.corner_m.z() + std::min(0.0, panel.edge_a_m.z()) + std::min(0.0, panel.edge_b_m.z()));
+  };
+  for (const SceneLamp& lamp : lamps) see(lamp.glow.position_m.z());
+  for (const Glow& lamp : clutter.steady_lamps) see(lamp.position_m.z());
+  for (const Reflection& reflection : clutter.reflections) see(reflection.glow.position_m.z());
+  for (const ForeignLight& light : clutter.foreign_lights) see(light.glow.position_m.z());
+  for (const Panel& window : clutter.windows) see_panel(window);
+  for (const Blind& blind : clutter.blinds) see_panel(blind.window);
+  for (const Sign& sign : clutter.signs) see_panel(sign.panel);
+  return lowest_m;
 }
 
 /// What is drawn as hiding every light has to be below every light.
@@ -53,7 +137,7 @@ void check_occluder(const YamlValue& item, const Panel& occluder, double lowest_
   const double highest_m = occluder.corner_m.z() + std::max(0.0, occluder.edge_a_m.z()) +
                            std::max(0.0, occluder.edge_b_m.z());
   if (highest_m < lowest_light_m) return;
-  throw item.error("is not below every lamp, steady lamp, window and reflection");
+  throw item.error("is not below every lamp and other light");
 }
 
 std::vector<YamlValue> items(YamlMap& map, const std::string& key) {
@@ -74,15 +158,22 @@ Clutter read_clutter(YamlMap map, const std::vector<SceneLamp>& lamps, const Roo
   for (const YamlValue& item : items(map, "reflections")) {
     clutter.reflections.push_back(read_reflection(item.map(), lamps, room));
   }
-  double lowest_m = std::numeric_limits<double>::infinity();
-  const auto see = [&](double height_m) { lowest_m = std::min(lowest_m, height_m); };
-  for (const SceneLamp& lamp : lamps) see(lamp.glow.position_m.z());
-  for (const Glow& lamp : clutter.steady_lamps) see(lamp.position_m.z());
-  for (const Reflection& reflection : clutter.reflections) see(reflection.glow.position_m.z());
-  for (const Panel& window : clutter.windows) {
-    see(window.corner_m.z() + std::min(0.0, window.edge_a_m.z()) +
-        std::min(0.0, window.edge_b_m.z()));
+  for (const YamlValue& item : items(map, "foreign_lights")) {
+    clutter.foreign_lights.push_back(read_foreign_light(item.map(), room));
   }
+  for (const YamlValue& item : items(map, "mirrors")) {
+    clutter.mirrors.push_back(read_mirror(item.map()));
+  }
+  for (const YamlValue& item : items(map, "blinds")) {
+    clutter.blinds.push_back(read_blind(item.map()));
+  }
+  for (const YamlValue& item : items(map, "signs")) {
+    clutter.signs.push_back(read_sign(item.map()));
+  }
+  if (const auto flicker = map.optional("ambient_flicker")) {
+    clutter.ambient_flicker = read_mains(flicker->map());
+  }
+  const double lowest_m = lowest_light_m(lamps, clutter);
   for (const YamlValue& item : items(map, "occluders")) {
     clutter.occluders.push_back(read_panel(item.map()));
     check_occluder(item, clutter.occluders.back(), lowest_m);

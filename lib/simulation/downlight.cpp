@@ -21,14 +21,23 @@ double wall_share(const Recess& recess, double radius_m, const Eigen::Vector2d& 
   return recess.reflector_share + way * (dark.reflector_share - recess.reflector_share);
 }
 
-/// Of the source's radiance, where a ray from the eye crosses the rim's plane.
+/// Returns the share of the source's radiance where a ray from the eye crosses the rim's plane; 0
+/// for an eye above that plane.
 double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d& eye_m,
                     const Eigen::Vector2d& at_m) {
+  if (eye_m.z() >= 0) return 0;
   const Eigen::Vector2d slope = (at_m - eye_m.head<2>()) / -eye_m.z();
-  const Eigen::Vector2d source_m = at_m + recess.depth_m * slope;
-  const double wall = wall_share(recess, radius_m, at_m);
-  const double ratio = 2 * source_m.norm() / recess.source_diameter_m;
-  return wall + (1 - wall) * std::exp2(-ratio * ratio);
+  double wall = wall_share(recess, radius_m, at_m);
+  if (recess.rim_power > 0) wall *= std::pow(at_m.norm() / radius_m, recess.rim_power);
+  if (recess.far_side_slope) {
+    const double halvings = (slope.norm() + at_m.dot(slope) / radius_m) / 2;
+    wall *= std::exp2(-halvings / *recess.far_side_slope);
+  }
+  const double ratio = 2 * (at_m + recess.depth_m * slope).norm() / recess.source_diameter_m;
+  const double cosine = 1 / std::sqrt(1 + slope.squaredNorm());
+  const double source =
+      std::pow(cosine, recess.beam_power) * std::exp2(-std::pow(ratio, recess.source_power));
+  return wall + (1 - wall) * source;
 }
 
 /// Of the chips around a place on the disc; those further away add less than 1e-3.
@@ -46,6 +55,15 @@ double share_of_chips(const Chips& chips, double radius_m, const Eigen::Vector2d
     }
   }
   return chips.share * sum;
+}
+
+double share_of_hot_spots(const std::vector<HotSpot>& hot_spots, const Eigen::Vector2d& at_m) {
+  double sum = 0;
+  for (const HotSpot& spot : hot_spots) {
+    const double ratio = (at_m - spot.center_m).norm() / spot.sigma_m;
+    sum += spot.excess * std::exp(-ratio * ratio / 2);
+  }
+  return sum;
 }
 
 double share_around(const Halo& halo, double radius_m, const Eigen::Vector2d& at_m) {
@@ -85,7 +103,9 @@ void add_downlight(const PixelRays& rays, const PixelWindow& window,
       double share = 0;
       if (glow.recess) share += part * share_inside(*glow.recess, radius_m, eye_m, at_m);
       if (glow.chips) share += part * share_of_chips(*glow.chips, radius_m, at_m);
-      if (glow.halo) share += (1 - part) * share_around(*glow.halo, radius_m, at_m);
+      share += part * share_of_hot_spots(glow.hot_spots, at_m);
+      if (glow.halo && eye_m.z() < 0)
+        share += (1 - part) * share_around(*glow.halo, radius_m, at_m);
       image(row, column) += static_cast<float>(glow.radiance_e_per_s * share);
     }
   }

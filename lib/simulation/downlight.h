@@ -11,8 +11,8 @@ namespace vlp {
 double reach_m(const Glow& glow);
 
 /// Adds to each pixel of the window, which is all of `image`, the radiance of a glow with a recess,
-/// chips or a halo. How much of a pixel is inside the rim is exact (add_shape); what recess, chips
-/// and halo give there is taken at the pixel's middle, so they should vary little within a pixel.
+/// chips, hot spots or a halo. How much of a pixel is inside the rim is exact (add_shape); what they
+/// give there is taken at the pixel's middle, so they should vary little within a pixel.
 void add_downlight(const PixelRays& rays, const PixelWindow& window,
                    const TargetFromCamera& glow_from_camera, const Glow& glow, cv::Mat1f& image);
 

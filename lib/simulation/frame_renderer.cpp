@@ -3,6 +3,7 @@
 #include "simulation/frame_renderer.h"
 
 #include <cmath>
+#include <variant>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -12,6 +13,7 @@
 #include "simulation/coverage.h"
 #include "simulation/disc.h"
 #include "simulation/downlight.h"
+#include "simulation/mirror.h"
 #include "simulation/mosaic.h"
 #include "simulation/pixel_window.h"
 #include "simulation/smear.h"
@@ -68,42 +70,83 @@ Eigen::Isometry3d panel_from_world(const Panel& panel) {
   return world_from_panel.inverse();
 }
 
-/// What the camera sees in one part of an exposure, in electrons per second, without vignetting.
+std::vector<Eigen::AlignedBox2d> bars_of(const Blind& blind) {
+  std::vector<Eigen::AlignedBox2d> bars;
+  for (int slat = 0; slat < blind.slats; ++slat) {
+    bars.emplace_back(Eigen::Vector2d(0, double(slat) / blind.slats),
+                      Eigen::Vector2d(1, (slat + blind.open_fraction) / blind.slats));
+  }
+  return bars;
+}
+
+/// A mosaic of 1 in boxes of a panel, which are given in fractions of its edges.
+Mosaic mosaic_on(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& boxes) {
+  const Eigen::Vector2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
+  std::vector<Rectangle> rectangles;
+  for (const Eigen::AlignedBox2d& box : boxes) {
+    const Eigen::Vector2d from_m = box.min().cwiseProduct(size_m);
+    const Eigen::Vector2d to_m = box.max().cwiseProduct(size_m);
+    rectangles.push_back({from_m.x(), from_m.y(), to_m.x(), to_m.y(), 1});
+  }
+  return Mosaic(rectangles);
+}
+
+Mosaic mosaic_of(const Panel& panel) {
+  return Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}});
+}
+
+/// What the camera sees in one part of an exposure, in electrons per second, without vignetting:
+/// directly, or by a mirror.
 class LampFrame {
  public:
-  LampFrame(const Scene& scene, const PixelRays& rays, const CarrierMotion& motion,
-            const Shutter& part)
-      : scene_(scene), rays_(rays), motion_(motion), part_(part) {
-    if (scene.clutter.occluders.empty()) return;
-    open_ = rays_.image(1);
-    for (const Panel& occluder : scene.clutter.occluders)
-      open_ = open_.mul(1 - hidden_by(occluder));
+  LampFrame(const Scene& scene, const PixelRays& rays, const LampShot& shot, const Shutter& part,
+            const Mirror* mirror = nullptr)
+      : scene_(scene), rays_(rays), shot_(shot), motion_(shot.motion), part_(part) {
+    if (!scene.clutter.occluders.empty() || mirror) open_ = rays_.image(1);
+    for (const Panel& occluder : scene.clutter.occluders) {
+      open_ = open_.mul(1 - covered_by(occluder));
+    }
+    if (!mirror) return;
+    open_ = open_.mul(mirror->reflectance * covered_by(mirror->pane));
+    pane_ = window_of(outline_of(mirror->pane), motion_, part_, rays_);
+    mirror_ = mirror;
+    reflection_ = reflection_about(mirror->pane);
   }
 
   /// What is always on.
   cv::Mat1f steady() const {
     const Clutter& clutter = scene_.clutter;
-    cv::Mat1f image = rays_.image(static_cast<float>(scene_.ambient_e_per_s));
-    if (clutter.windows.empty() && clutter.steady_lamps.empty() && clutter.occluders.empty()) {
+    cv::Mat1f image = ceiling();
+    if (clutter.windows.empty() && clutter.steady_lamps.empty() && clutter.occluders.empty() &&
+        clutter.blinds.empty() && clutter.signs.empty()) {
       return image;
     }
     for (const Panel& window : clutter.windows) {
-      draw(window, window.radiance_e_per_s - scene_.ambient_e_per_s, image);
+      replace_ceiling(window, mosaic_of(window), image);
+    }
+    for (const Blind& blind : clutter.blinds) {
+      replace_ceiling(blind.window, mosaic_on(blind.window, bars_of(blind)), image);
+    }
+    for (const Sign& sign : clutter.signs) {
+      replace_ceiling(sign.panel, mosaic_on(sign.panel, sign.strokes), image);
     }
     for (const Glow& lamp : clutter.steady_lamps) {
       const PixelWindow window = window_of_light(lamp);
       if (!window.empty()) draw(lamp, window, window.of(image, rays_.margin_px()));
     }
     for (const Panel& occluder : clutter.occluders) {
-      const cv::Mat1f hidden = hidden_by(occluder);
+      const cv::Mat1f hidden = covered_by(occluder);
       image = image.mul(1 - hidden) + occluder.radiance_e_per_s * hidden;
     }
     blur(image, scene_.optics.blur_px);
     return image;
   }
 
-  /// Adds a light that is switched.
-  void add(const Glow& glow, const SquareWave& wave, cv::Mat1f& image) const {
+  /// Adds a light that is switched; in a mirror, only one that is on the camera's side.
+  template <typename Wave>
+  void add(const Glow& glow, const Wave& wave, cv::Mat1f& image) const {
+    const Eigen::Vector3d eye_m = motion_.world_from_camera(0).translation();
+    if (mirror_ && !is_before(*mirror_, glow.position_m, eye_m)) return;
     const PixelWindow window = window_of_light(glow);
     if (window.empty()) return;
     cv::Mat1f patch = window.image(0);
@@ -118,18 +161,50 @@ class LampFrame {
   }
 
  private:
-  /// The share of each pixel that an occluder covers.
-  cv::Mat1f hidden_by(const Panel& occluder) const {
-    cv::Mat1f hidden = rays_.image(0);
-    draw(occluder, 1, hidden);
-    return hidden;
+  /// Returns the ceiling's radiance while a line is exposed.
+  double ceiling_of(int line) const {
+    if (!scene_.clutter.ambient_flicker) return scene_.ambient_e_per_s;
+    RectifiedSine wave = *scene_.clutter.ambient_flicker;
+    wave.phase = shot_.ambient_phase;
+    return scene_.ambient_e_per_s * wave.lit_share(part_.begin_s(line), part_.end_s(line));
+  }
+  cv::Mat1f ceiling() const {
+    cv::Mat1f image = rays_.image(static_cast<float>(scene_.ambient_e_per_s));
+    if (!scene_.clutter.ambient_flicker) return image;
+    for (int row = 0; row < image.rows; ++row) {
+      image.row(row) = static_cast<float>(ceiling_of(row - rays_.margin_px()));
+    }
+    return image;
+  }
+  /// Puts the radiance of a panel in place of the ceiling's where the pattern is 1.
+  void replace_ceiling(const Panel& panel, const Mosaic& pattern, cv::Mat1f& image) const {
+    const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
+    if (window.empty()) return;
+    cv::Mat1f cover = window.image(0);
+    add_shape(rays_, window, target_from_camera(panel_from_world(panel)), pattern, 1, cover);
+    cv::Mat1f target = window.of(image, rays_.margin_px());
+    for (int line = window.line_begin; line < window.line_end; ++line) {
+      const int row = line - window.line_begin;
+      target.row(row) += (panel.radiance_e_per_s - ceiling_of(line)) * cover.row(row);
+    }
+  }
+  /// The share of each pixel that a panel covers.
+  cv::Mat1f covered_by(const Panel& panel) const {
+    cv::Mat1f covered = rays_.image(0);
+    const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
+    if (!window.empty()) draw(panel, 1, window, window.of(covered, rays_.margin_px()));
+    return covered;
   }
   PixelWindow window_of_light(const Glow& glow) const {
-    return window_of(outline_of(glow), motion_, part_, rays_);
+    auto outline_m = outline_of(glow);
+    if (!mirror_) return window_of(outline_m, motion_, part_, rays_);
+    for (Eigen::Vector3d& point_m : outline_m) point_m = reflection_ * point_m;
+    return intersection(window_of(outline_m, motion_, part_, rays_), pane_);
   }
+  /// In a mirror, rays are those that are reflected.
   TargetFromCamera target_from_camera(const Eigen::Isometry3d& target_from_world) const {
-    return [this, target_from_world](int line) {
-      return target_from_world * motion_.world_from_camera(part_.middle_s(line));
+    return [this, target_from_rays = target_from_world * reflection_](int line) {
+      return target_from_rays * motion_.world_from_camera(part_.middle_s(line));
     };
   }
   /// `target` is the window's part of an image.
@@ -145,7 +220,7 @@ class LampFrame {
     }
     const Eigen::Isometry3d glow_from_world(Eigen::Translation3d(-glow.position_m));
     const TargetFromCamera glow_from_camera = target_from_camera(glow_from_world);
-    if (glow.recess || glow.chips || glow.halo) {
+    if (glow.recess || glow.chips || !glow.hot_spots.empty() || glow.halo) {
       add_downlight(rays_, window, glow_from_camera, glow, target);
       return;
     }
@@ -171,22 +246,43 @@ class LampFrame {
       }
     }
   }
-  void draw(const Panel& panel, double value, cv::Mat1f& image) const {
-    const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
-    if (!window.empty()) draw(panel, value, window, window.of(image, rays_.margin_px()));
-  }
   /// `target` is the window's part of an image.
   void draw(const Panel& panel, double value, const PixelWindow& window, cv::Mat1f target) const {
-    add_shape(rays_, window, target_from_camera(panel_from_world(panel)),
-              Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}}), value, target);
+    add_shape(rays_, window, target_from_camera(panel_from_world(panel)), mosaic_of(panel), value,
+              target);
   }
 
   const Scene& scene_;
   const PixelRays& rays_;
+  const LampShot& shot_;
   const CarrierMotion& motion_;
   const Shutter& part_;
-  cv::Mat1f open_;  // the share of each pixel that no occluder hides; empty without any
+  /// Share of each pixel's light that arrives: of what no occluder hides all, by a mirror what the
+  /// pane reflects. Empty when all of it does.
+  cv::Mat1f open_;
+  const Mirror* mirror_ = nullptr;
+  PixelWindow pane_{};
+  Eigen::Isometry3d reflection_ = Eigen::Isometry3d::Identity();
 };
+
+struct AlwaysOn {
+  static double lit_share(double, double) { return 1; }
+};
+
+/// Adds the mirror images of all lights.
+void add_mirror_images(const Scene& scene, const LampShot& shot, const LampFrame& mirrored,
+                       cv::Mat1f& image) {
+  for (std::size_t i = 0; i < scene.lamps.size(); ++i) {
+    mirrored.add(scene.lamps[i].glow, shot.waves[i], image);
+  }
+  for (const Glow& lamp : scene.clutter.steady_lamps) mirrored.add(lamp, AlwaysOn{}, image);
+  for (std::size_t i = 0; i < scene.clutter.foreign_lights.size(); ++i) {
+    const auto add = [&](const auto& wave) {
+      mirrored.add(scene.clutter.foreign_lights[i].glow, wave, image);
+    };
+    std::visit(add, shot.foreign_waves[i]);
+  }
+}
 
 /// Points all over what is in view, for the smear.
 std::vector<Eigen::Vector3d> outlines_of(const Scene& scene) {
@@ -200,6 +296,10 @@ std::vector<Eigen::Vector3d> outlines_of(const Scene& scene) {
   for (const Reflection& reflection : scene.clutter.reflections) add(reflection.glow);
   for (const Panel& window : scene.clutter.windows) add(window);
   for (const Panel& occluder : scene.clutter.occluders) add(occluder);
+  for (const ForeignLight& light : scene.clutter.foreign_lights) add(light.glow);
+  for (const Mirror& mirror : scene.clutter.mirrors) add(mirror.pane);
+  for (const Blind& blind : scene.clutter.blinds) add(blind.window);
+  for (const Sign& sign : scene.clutter.signs) add(sign.panel);
   return points_m;
 }
 
@@ -215,13 +315,20 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
   }
   cv::Mat1f sum = rays_.image(0);
   for (; part.index < part.count; ++part.index) {
-    LampFrame frame(scene_, rays_, shot.motion, part);
+    const LampFrame frame(scene_, rays_, shot, part);
     sum += frame.steady();
     for (std::size_t i = 0; i < scene_.lamps.size(); ++i) {
       frame.add(scene_.lamps[i].glow, shot.waves[i], sum);
     }
     for (const Reflection& reflection : scene_.clutter.reflections) {
       frame.add(reflection.glow, shot.waves[reflection.lamp], sum);
+    }
+    for (std::size_t i = 0; i < scene_.clutter.foreign_lights.size(); ++i) {
+      const Glow& glow = scene_.clutter.foreign_lights[i].glow;
+      std::visit([&](const auto& wave) { frame.add(glow, wave, sum); }, shot.foreign_waves[i]);
+    }
+    for (const Mirror& mirror : scene_.clutter.mirrors) {
+      add_mirror_images(scene_, shot, LampFrame(scene_, rays_, shot, part, &mirror), sum);
     }
   }
   return collected(sum, shot.exposure_s / part.count);

@@ -17,6 +17,7 @@ namespace vlp {
 ///     Shutter::center_s(i), from where the camera is then. An exposure during which something in
 ///     view moves by more than 0.1 px is the sum of several shorter ones.
 ///   - A board is blurred in halves of pixels, before those gather the light (add_shape_in_halves).
+///   - Mirrors (Clutter::mirrors) show lights by rays that are reflected in the pane's plane.
 ///   - A lamp's light is blurred by the lens first and switched by each line's own time after, as a
 ///     rolling shutter sees it.
 /// Const and safe to share between threads.

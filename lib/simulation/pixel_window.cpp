@@ -50,6 +50,11 @@ PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const Carri
           std::min(all.place_end, int(std::ceil(most[1])) + spare + 1)};
 }
 
+PixelWindow intersection(const PixelWindow& a, const PixelWindow& b) {
+  return {std::max(a.line_begin, b.line_begin), std::min(a.line_end, b.line_end),
+          std::max(a.place_begin, b.place_begin), std::min(a.place_end, b.place_end)};
+}
+
 Panel panel_of(const Glow& glow) {
   const auto corners_m = corners_of(*glow.rectangle, glow.position_m);
   return {corners_m[0], corners_m[1] - corners_m[0], corners_m[3] - corners_m[0],

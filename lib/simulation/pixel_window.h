@@ -35,6 +35,9 @@ PixelWindow whole_window(const PixelRays& rays);
 PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const CarrierMotion& motion,
                       const Shutter& shutter, const PixelRays& rays);
 
+/// Returns the pixels that are in both.
+PixelWindow intersection(const PixelWindow& a, const PixelWindow& b);
+
 /// Of a glow that is a rectangle.
 Panel panel_of(const Glow& glow);
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 #include "simulation/capture_set.h"
+#include "simulation/modulation.h"
 
 namespace vlp {
 
@@ -30,15 +32,25 @@ struct DarkSide {
 /// A source deep in a reflector, seen through its rim, a circle of the diameter D. A ray with the
 /// slope s (metres sideways for each metre up) that crosses the rim's plane at p from its centre
 /// crosses the source's plane at q = p + depth s. Its radiance is
-///   radiance (w + (1 - w) 2^-((2 |q| / source_diameter)^2)),
-/// so that the source, of which half is left at its diameter, shows at -depth s from the rim's
-/// centre. The walls give the share w = reflector_share; with a dark side w falls in proportion to
-/// p's way towards the azimuth, from reflector_share at p = -D / 2 to the dark side's at D / 2.
+///   radiance (w + (1 - w) cos(a)^beam_power 2^-((2 |q| / source_diameter)^source_power)),
+/// with the angle a of the ray off the vertical, so that the source, of which half is left at its
+/// diameter, shows at -depth s from the rim's centre, and is cut by the rim where that is near or
+/// beyond D / 2. The walls give the share
+///   w = w0 (2 |p| / D)^rim_power 2^-((1 + cos(b) 2 |p| / D) |s| / (2 far_side_slope)),
+/// with the angle b between p and s: walls are dark between source and rim, and, seen from aside,
+/// on the far side; the side next to the camera, where the source shows, keeps its light. w0 is
+/// reflector_share; with a dark side it falls in proportion to p's way towards the azimuth, from
+/// reflector_share at p = -D / 2 to the dark side's at D / 2.
 struct Recess {
   double depth_m;
   double source_diameter_m;
   double reflector_share;
   std::optional<DarkSide> dark_side;
+  /// Exponents of the equation: 2 is a Gaussian source; 0 are walls that are lit evenly, and a
+  /// source that is as bright from all sides.
+  double source_power = 2, rim_power = 0, beam_power = 0;
+  /// Slope at which half of the light of the far side is left; without it all is.
+  std::optional<double> far_side_slope = {};
 };
 
 /// The ceiling around a glow, lit by it: at r > D / 2 from the centre of the diameter D it adds
@@ -58,6 +70,24 @@ struct Chips {
   double pitch_m, width_m;
 };
 
+/// A bright spot of a disc: at p from the disc's centre its radiance is more by
+///   radiance excess exp(-|p - center|^2 / (2 sigma^2)).
+struct HotSpot {
+  Eigen::Vector2d center_m;  ///< from the disc's centre, along x and y of the world
+  double sigma_m;
+  double excess;
+};
+
+/// LED chips behind a diffuser at random places: `count` hot spots, sigma and the largest distance
+/// of their centres from the disc's centre as fractions of its radius, the excess of each drawn
+/// evenly between its bounds, places evenly over the area.
+struct RandomChips {
+  int count;
+  double sigma_fraction;
+  double within_fraction;
+  double min_excess, max_excess;
+};
+
 /// A horizontal disc of light. Its radiance at the distance r of its centre is
 ///   radiance (1 - (1 - edge_share) (2 r / diameter)^2),
 /// and its chips add to it; or that of its recess, of which the disc is the rim. Or a rectangle,
@@ -72,6 +102,9 @@ struct Glow {
   std::optional<Halo> halo = {};
   std::optional<LampRectangle> rectangle = {};
   std::optional<Chips> chips = {};
+  std::optional<RandomChips> random_chips = {};
+  /// Drawn from random_chips by draw_random_parts().
+  std::vector<HotSpot> hot_spots = {};
 };
 
 /// A lamp of the lamp map: a glow that a square wave switches.
@@ -101,6 +134,41 @@ struct Panel {
   double radiance_e_per_s;
 };
 
+/// A light of the building that is in no lamp map: dimmed by a square wave, or on the mains.
+struct ForeignLight {
+  Glow glow;
+  /// The wave's phase is replaced by the phase of each capture.
+  LightWave wave;
+  /// Phase in periods at time 0; without it, each capture has a random one.
+  std::optional<double> phase;
+};
+
+/// A pane that shows the mirror images of lamps, steady lamps and foreign lights on the camera's
+/// side of its plane, sharply: each ray that meets the pane adds `reflectance` times the radiance
+/// that the ray reflected there meets. Discs and rectangles are lit on both faces, recesses and
+/// halos below. The light behind the pane stays as it is, and panes do not show each other.
+struct Mirror {
+  Panel pane;  ///< its radiance is not used
+  double reflectance;
+};
+
+/// A window behind a blind: bars along edge_a, one per slat, side by side along edge_b. Each bar
+/// takes up `open_fraction` of its pitch, from the side of the corner; the ceiling is between.
+struct Blind {
+  Panel window;
+  int slats;
+  double open_fraction;
+};
+
+/// Bright writing: `lines` of `letters` along edge_a, the first line at the end of edge_b. Each
+/// letter is a random choice of the seven strokes of a digit on a calculator.
+struct Sign {
+  Panel panel;
+  int lines, letters;
+  /// In fractions of the edges, drawn by draw_random_parts().
+  std::vector<Eigen::AlignedBox2d> strokes;
+};
+
 /// What is in view besides the lamps.
 struct Clutter {
   std::vector<Glow> steady_lamps;
@@ -108,6 +176,12 @@ struct Clutter {
   std::vector<Reflection> reflections;
   /// Hide what is behind them.
   std::vector<Panel> occluders;
+  std::vector<ForeignLight> foreign_lights = {};
+  std::vector<Mirror> mirrors = {};
+  std::vector<Blind> blinds = {};
+  std::vector<Sign> signs = {};
+  /// Flicker of the ceiling's light, Scene::ambient_e_per_s, with a random phase in each capture.
+  std::optional<RectifiedSine> ambient_flicker = {};
 };
 
 struct Optics {
@@ -216,5 +290,10 @@ struct Scene {
 /// are in degrees there. Throws InputError, with line and key: unknown or missing keys, figures
 /// that cannot be, a lamp that is not above the camera, a spot outside the room.
 Scene read_scene(const std::filesystem::path& file);
+
+/// Draws what a scene leaves to chance in all of its captures, from its seed: the hot spots of
+/// random chips, for each lamp by its id, and the letters of signs. read_scene() does; to be done
+/// again when the seed or one of these has changed.
+void draw_random_parts(Scene& scene);
 
 }  // namespace vlp

@@ -1,5 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+#include <tuple>
+
 #include "geometry/angles.h"
 #include "rig/yaml_parts.h"
 #include "simulation/scene_parts.h"
@@ -27,6 +29,15 @@ Recess read_recess(YamlMap map, const Glow& rim) {
                  rad_from_deg(keys.required("azimuth_deg").number_within(-360, 360, "degrees"))};
     keys.finish();
   }
+  const auto read_power = [&](const std::string& key, double least, double& power) {
+    if (const auto value = map.optional(key)) power = value->number_within(least, 30, "");
+  };
+  read_power("source_power", 0.5, recess.source_power);
+  read_power("rim_power", 0, recess.rim_power);
+  read_power("beam_power", 0, recess.beam_power);
+  if (const auto slope = map.optional("far_side_slope")) {
+    recess.far_side_slope = slope->number_within(0.01, 100, "(metres sideways for each metre up)");
+  }
   map.finish();
   return recess;
 }
@@ -42,6 +53,19 @@ Chips read_chips(YamlMap map, const Glow& disc) {
   if (chips.width_m > 2 * chips.pitch_m) {
     throw width.error("is more than twice pitch_m: such chips are an even disc");
   }
+  map.finish();
+  return chips;
+}
+
+RandomChips read_random_chips(YamlMap map) {
+  RandomChips chips;
+  chips.count = map.required("count").integer_within(1, 1000);
+  chips.sigma_fraction =
+      map.required("sigma_fraction").number_within(0.01, 1, "(of the disc's radius)");
+  chips.within_fraction =
+      map.required("within_fraction").number_within(0, 1, "(of the disc's radius)");
+  std::tie(chips.min_excess, chips.max_excess) =
+      read_range(map.required("excess"), 0, 10, "(of the disc's radiance)");
   map.finish();
   return chips;
 }
@@ -68,6 +92,10 @@ void read_profile(YamlMap& map, Glow& glow) {
     glow.edge_share =
         map.required("edge_share").number_within(0, 2, "(of the radiance at the centre)");
     if (const auto chips = map.optional("chips")) glow.chips = read_chips(chips->map(), glow);
+    if (const auto chips = map.optional("random_chips")) {
+      if (glow.chips) throw chips->error("stands beside chips: a disc has one of them");
+      glow.random_chips = read_random_chips(chips->map());
+    }
   }
   if (const auto halo = map.optional("halo")) {
     YamlMap keys = halo->map();

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "rig/yaml_reader.h"
@@ -20,6 +22,9 @@ inline constexpr int kMostCaptures = 1'000'000;
 
 Eigen::Vector3d read_point(const YamlValue& value);
 double read_radiance(YamlMap& map, const std::string& key);
+/// Two numbers [least, most] within min and max.
+std::pair<double, double> read_range(const YamlValue& value, double min, double max,
+                                     std::string_view unit);
 /// Refuses more than kMostCaptures; `where` has error().
 template <typename Place>
 void check_count(double captures, const Place& where) {

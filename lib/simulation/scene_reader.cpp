@@ -99,6 +99,14 @@ double read_radiance(YamlMap& map, const std::string& key) {
   return map.required(key).number_within(0, kLargest, "electrons per second");
 }
 
+std::pair<double, double> read_range(const YamlValue& value, double min, double max,
+                                     std::string_view unit) {
+  const auto range = value.numbers(2);
+  for (const YamlValue& end : value.list()) end.number_within(min, max, unit);
+  if (range[0] > range[1]) throw value.error("should be [least, most]");
+  return {range[0], range[1]};
+}
+
 Scene read_scene(const std::filesystem::path& file) {
   YamlMap document = read_yaml(file, "vlp-scene/1");
   Scene scene;
@@ -133,6 +141,7 @@ Scene read_scene(const std::filesystem::path& file) {
     }
   }
   if (scene.sets.empty()) throw captures.error("holds no captures");
+  draw_random_parts(scene);
   return scene;
 }
 

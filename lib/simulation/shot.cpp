@@ -137,6 +137,15 @@ LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index)
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, periods - std::floor(periods)});
   }
   shot.noise_seed = next_seed(random);
+  // Drawn last, so that the other draws are those of a scene without such lights.
+  for (const ForeignLight& light : scene.clutter.foreign_lights) {
+    const double free_phase = random.uniform(0.0, 1.0);
+    const double frequency_hz =
+        std::visit([](const auto& wave) { return wave.frequency_hz; }, light.wave);
+    const double periods = light.phase ? *light.phase + frequency_hz * shot.time_s : free_phase;
+    shot.foreign_waves.push_back(with_phase(light.wave, periods - std::floor(periods)));
+  }
+  if (scene.clutter.ambient_flicker) shot.ambient_phase = random.uniform(0.0, 1.0);
   return shot;
 }
 

@@ -50,6 +50,10 @@ struct LampShot {
   /// Of each lamp of the scene; time 0 is time_s.
   std::vector<SquareWave> waves;
   std::uint64_t noise_seed;
+  /// Waves of Clutter::foreign_lights, in their order; time 0 is time_s.
+  std::vector<LightWave> foreign_waves = {};
+  /// Phase of Clutter::ambient_flicker at time_s, in periods.
+  double ambient_phase = 0;
 };
 
 /// A capture of the board.

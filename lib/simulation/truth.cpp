@@ -6,10 +6,12 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <variant>
 #include <vector>
 
 #include "rig/board_layout.h"
 #include "simulation/board_print.h"
+#include "simulation/mirror.h"
 
 namespace vlp {
 namespace {
@@ -88,13 +90,24 @@ GlowPoints points_of(const Glow& glow) {
   return points;
 }
 
+/// Where the centre of a glow is seen and how much of it, directly or by a mirror. Nothing if the
+/// lens does not describe its centre or nothing of it is in view.
+struct SeenGlow {
+  Eigen::Vector2d pixel;
+  double in_view;
+};
+
 template <typename Motion>
 double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Shutter& shutter,
-                     const Motion& camera_from_world, const Glow& glow) {
-  const auto visible = [&](const Eigen::Vector3d& point_m) {
+                     const Motion& camera_from_world, const Glow& glow, const Mirror* mirror) {
+  Eigen::Isometry3d reflection = Eigen::Isometry3d::Identity();
+  if (mirror) reflection = reflection_about(mirror->pane);
+  const auto visible = [&](const Eigen::Vector3d& glow_point_m) {
+    const Eigen::Vector3d point_m = reflection * glow_point_m;
     const auto at = seen(renderer, shutter, camera_from_world, point_m);
     if (!at || !in_image(scene.camera, at->pixel)) return false;
     const Eigen::Vector3d eye_m = camera_from_world(at->time_s).inverse().translation();
+    if (mirror && !hidden_by(mirror->pane, eye_m, point_m)) return false;
     const auto& occluders = scene.clutter.occluders;
     return std::none_of(occluders.begin(), occluders.end(),
                         [&](const Panel& occluder) { return hidden_by(occluder, eye_m, point_m); });
@@ -107,21 +120,68 @@ double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Sh
   return std::all_of(rim_m.begin(), rim_m.end(), visible) ? 1 : (points - 0.5) / points;
 }
 
+std::optional<SeenGlow> seen_glow(const Scene& scene, const FrameRenderer& renderer,
+                                  const LampShot& shot, const Glow& glow,
+                                  const Mirror* mirror = nullptr) {
+  const auto camera_from_world = [&](double time_s) {
+    return shot.motion.world_from_camera(time_s).inverse();
+  };
+  Eigen::Vector3d center_m = glow.position_m;
+  if (mirror) {
+    const Eigen::Vector3d eye_m = shot.motion.world_from_camera(0).translation();
+    if (!is_before(*mirror, center_m, eye_m)) return std::nullopt;
+    center_m = reflection_about(mirror->pane) * center_m;
+  }
+  const Shutter shutter = renderer.shutter(shot.exposure_s);
+  const auto center = seen(renderer, shutter, camera_from_world, center_m);
+  if (!center) return std::nullopt;
+  const double in_view = share_in_view(scene, renderer, shutter, camera_from_world, glow, mirror);
+  if (in_view == 0) return std::nullopt;
+  return SeenGlow{center->pixel, in_view};
+}
+
 }  // namespace
 
 std::vector<TrueLamp> true_lamps(const Scene& scene, const FrameRenderer& renderer,
                                  const LampShot& shot) {
-  const auto camera_from_world = [&](double time_s) {
-    return shot.motion.world_from_camera(time_s).inverse();
-  };
   std::vector<TrueLamp> lamps;
   for (const SceneLamp& lamp : scene.lamps) {
-    const Shutter shutter = renderer.shutter(shot.exposure_s);
-    const auto center = seen(renderer, shutter, camera_from_world, lamp.glow.position_m);
-    const double in_view = share_in_view(scene, renderer, shutter, camera_from_world, lamp.glow);
-    if (center && in_view > 0) lamps.push_back({lamp.id, center->pixel, in_view});
+    const auto seen_lamp = seen_glow(scene, renderer, shot, lamp.glow);
+    if (seen_lamp) lamps.push_back({lamp.id, seen_lamp->pixel, seen_lamp->in_view});
   }
   return lamps;
+}
+
+std::string_view name_of(OtherLightKind kind) {
+  switch (kind) {
+    case OtherLightKind::mirror_image:
+      return "mirror_image";
+    case OtherLightKind::pwm:
+      return "pwm";
+    case OtherLightKind::mains:
+      return "mains";
+  }
+  return "";
+}
+
+std::vector<TrueOtherLight> true_other_lights(const Scene& scene, const FrameRenderer& renderer,
+                                              const LampShot& shot) {
+  std::vector<TrueOtherLight> lights;
+  for (const Mirror& mirror : scene.clutter.mirrors) {
+    for (const SceneLamp& lamp : scene.lamps) {
+      const auto image = seen_glow(scene, renderer, shot, lamp.glow, &mirror);
+      if (!image) continue;
+      lights.push_back({OtherLightKind::mirror_image, lamp.id, image->pixel, image->in_view});
+    }
+  }
+  for (const ForeignLight& light : scene.clutter.foreign_lights) {
+    const auto image = seen_glow(scene, renderer, shot, light.glow);
+    if (!image) continue;
+    const bool is_pwm = std::holds_alternative<SquareWave>(light.wave);
+    lights.push_back(
+        {is_pwm ? OtherLightKind::pwm : OtherLightKind::mains, {}, image->pixel, image->in_view});
+  }
+  return lights;
 }
 
 std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& renderer,

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "rig/calibration.h"
@@ -25,6 +27,31 @@ struct TrueLamp {
 std::vector<TrueLamp> true_lamps(const Scene& scene, const FrameRenderer& renderer,
                                  const LampShot& shot);
 
+enum class OtherLightKind {
+  mirror_image,  ///< a lamp of the map, shown by a mirror
+  pwm,           ///< a foreign light that a square wave dims
+  mains          ///< a foreign light on the mains
+};
+
+/// Returns the kind as in true_other_lights.csv: "mirror_image", "pwm", "mains".
+std::string_view name_of(OtherLightKind kind);
+
+/// A light that flickers and is none of the lamps, as a capture shows it.
+struct TrueOtherLight {
+  OtherLightKind kind;
+  /// The lamp of a mirror image.
+  std::optional<int> lamp;
+  /// Image of its centre; see TrueLamp.
+  Eigen::Vector2d pixel;
+  /// Share of it that is in the image, not hidden and, of a mirror image, within the pane.
+  double in_view;
+};
+
+/// Mirror images and foreign lights that are at least partly in view and whose centre the lens
+/// describes.
+std::vector<TrueOtherLight> true_other_lights(const Scene& scene, const FrameRenderer& renderer,
+                                              const LampShot& shot);
+
 /// A corner of a tag's black border as a capture shows it, see BoardTag for the order; of a board
 /// of squares, without a tag, one in which they touch, counted as square_corners_m() does.
 struct TrueCorner {
@@ -43,10 +70,10 @@ Calibration true_calibration(const Scene& scene);
 /// The lamps as the lamp map has them, or (`surveyed` false) as they are.
 LampMap lamp_map_of(const Scene& scene, bool surveyed);
 
-/// Writes into `folder`: of lamps truth.csv, true_detections.csv (with the share in view) and
-/// captures.csv; of boards true_boards.csv (camera_from_board as a place in metres and a rotation
-/// vector in radians) and true_corners.csv. Returns how many captures show no lamp, or no corner.
-/// Throws InputError.
+/// Writes into `folder`: of lamps truth.csv, true_detections.csv (with the share in view),
+/// captures.csv and, of a scene with mirrors or foreign lights, true_other_lights.csv; of boards
+/// true_boards.csv (camera_from_board as a place in metres and a rotation vector in radians) and
+/// true_corners.csv. Returns how many captures show no lamp, or no corner. Throws InputError.
 std::size_t write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
                         const std::filesystem::path& folder);
 

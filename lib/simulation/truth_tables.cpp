@@ -72,6 +72,21 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
   return empty;
 }
 
+void write_other_lights(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
+                        const std::filesystem::path& folder) {
+  if (scene.clutter.mirrors.empty() && scene.clutter.foreign_lights.empty()) return;
+  CsvWriter table(folder / "true_other_lights.csv",
+                  {"image", "kind", "lamp", "u_px", "v_px", "in_view"});
+  for (std::size_t i = 0; i < shots_in(set); ++i) {
+    const LampShot shot = lamp_shot(scene, set, i);
+    for (const auto& [kind, lamp, at_px, in_view] : true_other_lights(scene, renderer, shot)) {
+      table.row({shot.image, std::string(name_of(kind)), lamp ? std::to_string(*lamp) : "",
+                 pixel(at_px.x()), pixel(at_px.y()), significant(in_view, 3)});
+    }
+  }
+  table.save();
+}
+
 std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
                               const CaptureSet& set, const std::filesystem::path& folder) {
   CsvWriter boards(folder / "true_boards.csv",
@@ -109,6 +124,7 @@ std::size_t write_truth(const Scene& scene, const FrameRenderer& renderer, const
   if (set.board) {
     return write_board_truth(scene, renderer, set, folder);
   }
+  write_other_lights(scene, renderer, set, folder);
   return write_lamp_truth(scene, renderer, set, folder);
 }
 

@@ -132,6 +132,93 @@ TEST_F(Downlight, ShowsTheChipsBehindItsDiffuser) {
   }
 }
 
+TEST_F(Downlight, HasTheBrightnessOfItsEquationFromAside) {
+  Recess recess{0.06, 0.03, 0.1, {}};
+  recess.source_power = 1.5;
+  recess.rim_power = 3;
+  recess.beam_power = 4;
+  recess.far_side_slope = 0.2;
+  glow().recess = recess;
+  const Eigen::Vector3d eye_m(0.9, 0.3, 0.1);
+  const cv::Mat1f image = rendered(eye_m);
+  int inside = 0;
+  for (double x_m = -0.06; x_m < 0.09; x_m += 0.03) {
+    for (const double y_m : {-0.04, 0.0, 0.05}) {
+      const Eigen::Vector2d pixel =
+          projected(glow().position_m + Eigen::Vector3d(x_m, y_m, 0), shot_at(scene_, eye_m, 0));
+      const cv::Point at(int(std::lround(pixel.x())), int(std::lround(pixel.y())));
+      // The place that the middle of that pixel shows, from the lamp.
+      const Eigen::Vector2d p = at_m(at.x, at.y) + eye_m.head<2>();
+      const Eigen::Vector2d s = at_m(at.x, at.y) / 1.5;
+      if (p.norm() > kRadiusM - 0.006) continue;
+      const double cos_b = p.dot(s) / (p.norm() * s.norm());
+      const double w = 0.1 * std::pow(p.norm() / kRadiusM, 3) *
+                       std::exp2(-(1 + cos_b * p.norm() / kRadiusM) * s.norm() / (2 * 0.2));
+      const double ratio = (p + 0.06 * s).norm() / 0.015;
+      const double source =
+          std::pow(std::cos(std::atan(s.norm())), 4) * std::exp2(-std::pow(ratio, 1.5));
+      EXPECT_NEAR(image(at) / kFull, w + (1 - w) * source, 2e-5) << at;
+      ++inside;
+    }
+  }
+  EXPECT_GE(inside, 8);
+}
+
+TEST_F(Downlight, ShowsACrescentWhereItsRimHidesTheSource) {
+  glow().recess = Recess{0.2, 0.05, 0, {}};
+  const Eigen::Vector3d eye_m(0.75, 0, 0.1);  // the source is 0.1 m beyond the rim's centre
+  const Eigen::Vector2d rim_px = projected(glow().position_m, shot_at(scene_, eye_m, 0));
+  const Brightness crescent = brightness_of(rendered(eye_m));
+  ASSERT_GT(crescent.sum, 0);
+  EXPECT_GT(crescent.centroid_px.x() - rim_px.x(), 0.75 * 30) << "at the near rim, 30 px away";
+  EXPECT_LT(crescent.centroid_px.x() - rim_px.x(), 30);
+  EXPECT_NEAR(crescent.centroid_px.y(), rim_px.y(), 0.01);
+  const FrameRenderer renderer(scene_);
+  const auto lamps = true_lamps(scene_, renderer, shot_at(scene_, eye_m, 0));
+  ASSERT_EQ(lamps.size(), 1U);
+  EXPECT_LT((lamps[0].pixel - rim_px).norm(), 1e-6) << "the truth is the rim's centre";
+}
+
+TEST_F(Downlight, ShowsHotSpotsOfTheirEquation) {
+  const Eigen::Vector3d eye_m(0.0015, 0.0015, 0.1);  // the lamp is at (399, 299)
+  const cv::Mat1f even = rendered(eye_m);
+  glow().hot_spots = {{{0.03, 0}, 0.012, 0.5}, {{-0.03, 0.03}, 0.009, 0.8}};
+  const cv::Mat1f image = rendered(eye_m);
+  const auto more = [&](int u, int v) { return (image(v, u) - even(v, u)) / kFull; };
+  EXPECT_NEAR(more(409, 299), 0.5, 1e-5);
+  EXPECT_NEAR(more(389, 309), 0.8, 1e-5);
+  EXPECT_NEAR(more(413, 299), 0.5 * std::exp(-0.5), 1e-5) << "sigma is 4 px";
+  EXPECT_NEAR(more(389, 315), 0.8 * std::exp(-2.0), 1e-5) << "twice 3 px";
+  EXPECT_EQ(more(435, 299), 0) << "beyond the rim";
+}
+
+TEST(DrawRandomParts, DrawsHotSpotsWithinTheirBoundsByTheSeed) {
+  Scene scene = plain_scene();
+  scene.lamps.push_back(scene.lamps[0]);
+  scene.lamps[1].id = 2;
+  for (SceneLamp& lamp : scene.lamps) lamp.glow.random_chips = RandomChips{7, 0.12, 0.75, 0.3, 0.8};
+  draw_random_parts(scene);
+  const auto spots = scene.lamps[0].glow.hot_spots;
+  ASSERT_EQ(spots.size(), 7U);
+  for (const HotSpot& spot : spots) {
+    EXPECT_LE(spot.center_m.norm(), 0.75 * 0.09);
+    EXPECT_NEAR(spot.sigma_m, 0.12 * 0.09, 1e-12);
+    EXPECT_GE(spot.excess, 0.3);
+    EXPECT_LE(spot.excess, 0.8);
+  }
+  EXPECT_NE(scene.lamps[1].glow.hot_spots.at(0).center_m, spots[0].center_m) << "another lamp";
+  Scene again = scene;
+  draw_random_parts(again);
+  EXPECT_EQ(again.lamps[0].glow.hot_spots.at(6).center_m, spots[6].center_m) << "the same seed";
+  std::swap(again.lamps[0], again.lamps[1]);
+  draw_random_parts(again);
+  EXPECT_EQ(again.lamps[1].glow.hot_spots.at(0).center_m, spots[0].center_m) << "by its id";
+  again.seed = 2;
+  draw_random_parts(again);
+  ASSERT_EQ(again.lamps[1].glow.hot_spots.size(), 7U);
+  EXPECT_NE(again.lamps[1].glow.hot_spots[0].center_m, spots[0].center_m) << "another seed";
+}
+
 TEST_F(Downlight, MayBeASteadyLampBehindSomething) {
   scene_.lamps[0].glow.radiance_e_per_s = 0;
   scene_.clutter.steady_lamps = {

@@ -150,6 +150,75 @@ TEST(SceneFigures, OfChipsAreChecked) {
             chips + "width_m: is more than twice pitch_m: such chips are an even disc");
 }
 
+TEST(SceneFigures, OfRandomChipsAreChecked) {
+  const auto with = [](const std::string& keys) {
+    return refusal_with("edge_share: 0.8}", "edge_share: 0.8, " + keys + "}");
+  };
+  const std::string random = "random_chips: {count: 7, sigma_fraction: 0.12, ";
+  const std::string chips = "scene.yaml:10: lamps[0].random_chips";
+  EXPECT_EQ(with(random + "within_fraction: 0.75, excess: [0.3, 0.8]}"), "");
+  EXPECT_EQ(
+      with(random + "within_fraction: 1.75, excess: [0.3, 0.8]}"),
+      chips +
+          ".within_fraction: 1.75 (of the disc's radius) is not within 0 and 1 (of the disc's "
+          "radius): is it in the right unit?");
+  EXPECT_EQ(with(random + "within_fraction: 0.75, excess: [0.8, 0.3]}"),
+            chips + ".excess: should be [least, most]");
+  EXPECT_EQ(with("chips: {share: 0.3, pitch_m: 0.03, width_m: 0.02}, " + random +
+                 "within_fraction: 0.75, excess: [0.3, 0.8]}"),
+            chips + ": stands beside chips: a disc has one of them");
+}
+
+TEST(SceneFigures, OfARecessFromAsideAreChecked) {
+  const auto with = [](const std::string& keys) {
+    return refusal_with("depth_m: 0.07,", "depth_m: 0.07, " + keys + ",");
+  };
+  EXPECT_EQ(with("source_power: 1.5, rim_power: 6, beam_power: 7, far_side_slope: 0.06"), "");
+  EXPECT_THAT(with("far_side_slope: 0"), testing::HasSubstr("recess.far_side_slope: 0 (metres"));
+  EXPECT_THAT(with("beam_power: -1"), testing::HasSubstr("recess.beam_power: -1"));
+}
+
+TEST(SceneFigures, OfForeignLightsAreChecked) {
+  const auto with = [](const std::string& keys) {
+    return refusal_with(
+        "clutter:\n", "clutter:\n  foreign_lights: [{position_m: [0, 0.2, 1.6], " + keys + "}]\n");
+  };
+  const std::string disc = "diameter_m: 0.2, radiance_e_per_s: 1.0e+8, edge_share: 1, ";
+  const std::string place = "scene.yaml:13: clutter.foreign_lights[0]";
+  EXPECT_EQ(with(disc + "pwm: {frequency_hz: 500, duty: 0.3}"), "");
+  EXPECT_EQ(with(disc + "mains: {frequency_hz: 100, depth: 0.3}, phase: 0.5"), "");
+  EXPECT_EQ(with("shape: rectangle, size_m: [0.6, 0.1], radiance_e_per_s: 1.0e+8, "
+                 "mains: {frequency_hz: 100, depth: 0.3}"),
+            "");
+  EXPECT_EQ(with(disc + "phase: 0.5"), place + ": needs one of the keys pwm and mains");
+  EXPECT_THAT(with(disc + "pwm: {frequency_hz: 500, duty: 0}"),
+              testing::StartsWith(place + ".pwm.duty: 0 (of a period)"));
+  EXPECT_THAT(with(disc + "mains: {frequency_hz: 50000, depth: 0.3}"),
+              testing::StartsWith(place + ".mains.frequency_hz: 50000 Hz"));
+  EXPECT_THAT(with(disc + "mains: {frequency_hz: 100, depth: 1.3}"),
+              testing::StartsWith(place + ".mains.depth: 1.3"));
+}
+
+TEST(SceneFigures, OfMirrorsBlindsAndSignsAreChecked) {
+  const auto with = [](const std::string& line) {
+    return refusal_with("clutter:\n", "clutter:\n  " + line + "\n");
+  };
+  const std::string panel = "corner_m: [0.9, 0, 1.5], edges_m: [[0, 0.3, 0], [0, 0, 0.2]], ";
+  EXPECT_EQ(with("mirrors: [{" + panel + "reflectance: 0.1}]"), "");
+  EXPECT_THAT(with("mirrors: [{" + panel + "reflectance: 10}]"),
+              testing::StartsWith("scene.yaml:13: clutter.mirrors[0].reflectance: 10"));
+  EXPECT_THAT(with("mirrors: [{" + panel + "reflectance: 0.1, radiance_e_per_s: 1}]"),
+              testing::HasSubstr("key 'radiance_e_per_s' is unknown here"));
+  const std::string lit = panel + "radiance_e_per_s: 1.0e+8, ";
+  EXPECT_EQ(with("blinds: [{" + lit + "slats: 9, open_fraction: 0.5}]"), "");
+  EXPECT_THAT(with("blinds: [{" + lit + "slats: 0, open_fraction: 0.5}]"),
+              testing::StartsWith("scene.yaml:13: clutter.blinds[0].slats: should be a whole"));
+  EXPECT_EQ(with("signs: [{" + lit + "lines: 2, letters: 8}]"), "");
+  EXPECT_THAT(with("signs: [{" + lit + "lines: 2}]"), testing::HasSubstr("letters"));
+  EXPECT_EQ(with("ambient_flicker: {frequency_hz: 120, depth: 0.3}"), "");
+  EXPECT_THAT(with("ambient_flicker: {depth: 0.3}"), testing::HasSubstr("frequency_hz"));
+}
+
 TEST(SceneFigures, OfARectangleAreThoseOfTheLampMap) {
   const std::string disc =
       "diameter_m: 0.18, frequency_hz: 1600, duty: 0.4, "
@@ -215,8 +284,7 @@ TEST(SceneFigures, OfAWindowOrOccluderMakeARectangle) {
 
 TEST(SceneFigures, OfAnOccluderKeepItBelowEveryLight) {
   const std::string problem =
-      "scene.yaml:16: clutter.occluders[0]: is not below every lamp, steady lamp, window and "
-      "reflection";
+      "scene.yaml:16: clutter.occluders[0]: is not below every lamp and other light";
   EXPECT_EQ(refusal_with("[-0.7, -0.2, 1.4]", "[-0.7, -0.2, 1.49]"), "");
   EXPECT_EQ(refusal_with("[-0.7, -0.2, 1.4]", "[-0.7, -0.2, 1.51]"), problem) << "lamp 5";
   EXPECT_EQ(refusal_with("[[0.1, 0.1, 0], [-0.2, 0.2, 0]]", "[[0.1, 0.1, 0], [0, 0, 0.2]]"),

@@ -177,7 +177,7 @@ TEST(Scene, HasViewsOfTheBoard) {
 
 TEST(ScenesOfTheDatasets, AreReadAndHaveASample) {
   for (const std::string name :
-       {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights"}) {
+       {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed"}) {
     SCOPED_TRACE(name);
     const Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
     EXPECT_EQ(scene.camera.id, name);

@@ -1,0 +1,85 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+
+#include "simulation/scene.h"
+#include "simulation/seeded_random.h"
+
+namespace vlp {
+namespace {
+
+void draw_hot_spots(cv::RNG random, Glow& glow) {
+  if (!glow.random_chips) return;
+  const RandomChips& chips = *glow.random_chips;
+  const double radius_m = glow.diameter_m / 2;
+  glow.hot_spots.clear();
+  for (int i = 0; i < chips.count; ++i) {
+    const double angle = random.uniform(0.0, 2 * std::numbers::pi);
+    const double distance_m =
+        radius_m * chips.within_fraction * std::sqrt(random.uniform(0.0, 1.0));
+    const double excess = random.uniform(chips.min_excess, chips.max_excess);
+    glow.hot_spots.push_back({distance_m * Eigen::Vector2d(std::cos(angle), std::sin(angle)),
+                              chips.sigma_fraction * radius_m, excess});
+  }
+}
+
+/// The strokes of a digit on a calculator, from the left, the bottom to the right, the top, as
+/// fractions of a letter's cell.
+const std::array<Eigen::AlignedBox2d, 7>& strokes_of_digit() {
+  constexpr double left = 0.15, right = 0.75, bottom = 0.15, top = 0.85, stroke = 0.14;
+  constexpr double middle = (bottom + top) / 2, half = stroke / 2;
+  using Box = Eigen::AlignedBox2d;
+  using Point = Eigen::Vector2d;
+  static const std::array<Box, 7> strokes = {
+      Box(Point(left, bottom), Point(right, bottom + stroke)),
+      Box(Point(left, middle - half), Point(right, middle + half)),
+      Box(Point(left, top - stroke), Point(right, top)),
+      Box(Point(left, bottom), Point(left + stroke, middle)),
+      Box(Point(left, middle), Point(left + stroke, top)),
+      Box(Point(right - stroke, bottom), Point(right, middle)),
+      Box(Point(right - stroke, middle), Point(right, top))};
+  return strokes;
+}
+
+void draw_letters(cv::RNG random, Sign& sign) {
+  const Eigen::Array2d cell(1.0 / sign.letters, 1.0 / sign.lines);
+  sign.strokes.clear();
+  for (int line = 0; line < sign.lines; ++line) {
+    for (int letter = 0; letter < sign.letters; ++letter) {
+      const int drawn = random.uniform(1, 1 << 7);
+      const Eigen::Array2d corner(letter, sign.lines - 1 - line);
+      for (std::size_t stroke = 0; stroke < strokes_of_digit().size(); ++stroke) {
+        if ((drawn >> stroke & 1) == 0) continue;
+        const Eigen::AlignedBox2d& box = strokes_of_digit()[stroke];
+        sign.strokes.emplace_back(((corner + box.min().array()) * cell).matrix(),
+                                  ((corner + box.max().array()) * cell).matrix());
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void draw_random_parts(Scene& scene) {
+  const auto random = [&](std::string_view name, std::size_t index) {
+    return random_of(scene.seed, name, index);
+  };
+  for (SceneLamp& lamp : scene.lamps) {
+    draw_hot_spots(random("chips of a lamp", static_cast<std::size_t>(lamp.id)), lamp.glow);
+  }
+  Clutter& clutter = scene.clutter;
+  for (std::size_t i = 0; i < clutter.steady_lamps.size(); ++i) {
+    draw_hot_spots(random("chips of a steady lamp", i), clutter.steady_lamps[i]);
+  }
+  for (std::size_t i = 0; i < clutter.foreign_lights.size(); ++i) {
+    draw_hot_spots(random("chips of a foreign light", i), clutter.foreign_lights[i].glow);
+  }
+  for (std::size_t i = 0; i < clutter.signs.size(); ++i) {
+    draw_letters(random("sign", i), clutter.signs[i]);
+  }
+}
+
+}  // namespace vlp
