@@ -1,0 +1,464 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// lamp_trials KIND [IMAGES [SEED]]: renders images of lamps in memory, detects the lamps in them,
+/// and compares with the truth. KIND is
+///   recessed   scene datasets/recessed: sources deep in reflectors, from aside;
+///   chips      scene datasets/paper-rig with seven random LED chips behind each lamp's diffuser,
+///              drawn again in each image, and a halo of 12 % on the ceiling;
+///   foreign    images of 400 x 300 with foreign lights, mirrors, blinds and signs, all drawn at
+///              random in each image;
+///   a scene    the path of a scene.yaml.
+/// Scenes are rendered by their folders of lamps (but `sample`), one image of each in turn; when
+/// all are used up, again with the next seed. IMAGES is 200, SEED 1, of a scene its own.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <numbers>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <string>
+
+#include "camera/lens.h"
+#include "detection/lights_table.h"
+#include "geometry/frames.h"
+#include "detection/mat_view.h"
+#include "lamps/light_detector.h"
+#include "simulation/exposure.h"
+#include "simulation/frame_renderer.h"
+#include "simulation/picture.h"
+#include "simulation/pixel_window.h"
+#include "simulation/seeded_random.h"
+#include "simulation/truth.h"
+
+namespace vlp {
+namespace {
+
+/// The only call of the detector.
+std::vector<Light> detect_lights(const LightDetector& detector, const cv::Mat& image) {
+  return detector.detect(image_view(image));
+}
+
+/// The image of a shot as a program reads it from a file: grey, rows from the top.
+cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot) {
+  cv::Mat image =
+      expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed, scene.picture);
+  if (scene.camera.readout == Readout::columns) image = image.t();
+  if (!scene.picture) return image;
+  return cv::imdecode(encoded(image, scene.picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+}
+
+/// A lamp's outline as a shot shows it.
+struct Extent {
+  double radius_px;  ///< largest distance of the outline from the centre
+  double periods;    ///< periods of its stripes across the outline
+};
+
+Extent extent_of(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
+                 const SceneLamp& lamp, const Eigen::Vector2d& center) {
+  const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
+  double radius_px = 0, first_line = INFINITY, last_line = -INFINITY;
+  Glow rim = lamp.glow;
+  rim.halo.reset();
+  for (const Eigen::Vector3d& point_m : outline_of(rim)) {
+    const auto pixel = renderer.rays().lens().project(camera_from_world * point_m);
+    if (!pixel) continue;
+    radius_px = std::max(radius_px, (*pixel - center).norm());
+    const double line = renderer.rays().line_and_place(*pixel)[0];
+    first_line = std::min(first_line, line);
+    last_line = std::max(last_line, line);
+  }
+  const double period_lines = 1 / (lamp.frequency_hz * *scene.camera.row_time_s);
+  return {radius_px, (last_line - first_line) / period_lines};
+}
+
+/// Lamps wholly in view that show a range of periods.
+struct Tally {
+  int lamps = 0, found = 0, missed = 0, wrong = 0;
+};
+
+/// Results of all images so far.
+class Score {
+ public:
+  void add(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
+           const std::vector<Light>& lights) {
+    ++images_;
+    const auto truth = true_lamps(scene, renderer, shot);
+    std::vector<Extent> extents;
+    for (const TrueLamp& lamp : truth) {
+      const auto in_scene = std::ranges::find(scene.lamps, lamp.id, &SceneLamp::id);
+      extents.push_back(extent_of(scene, renderer, shot, *in_scene, lamp.pixel));
+    }
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      if (truth[i].in_view == 1) add_lamp(truth[i], extents[i], lights);
+    }
+    for (const Light& light : lights) {
+      if (light.kind != LightKind::lamp) continue;
+      bool on_lamp = false;
+      for (std::size_t i = 0; i < truth.size(); ++i) {
+        on_lamp = on_lamp || (light.pixel - truth[i].pixel).norm() < extents[i].radius_px;
+      }
+      if (!on_lamp) ++false_lamps_[name_of_other(scene, renderer, shot, light.pixel)];
+    }
+  }
+
+  void print(double seconds) const {
+    const int lamps = tallies_[0].lamps + tallies_[1].lamps;
+    fmt::print("{} images in {:.1f} s, {:.1f} a second; {} lamps wholly in view\n", images_,
+               seconds, images_ / seconds, lamps);
+    for (const std::size_t many : {0, 1}) {
+      const auto& [count, found, missed, wrong] = tallies_[many];
+      fmt::print("  {} {} periods: {} lamps, {} found, {} missed, {} wrong identities\n",
+                 many ? "at least" : "below", kPeriods, count, found, missed, wrong);
+    }
+    fmt::print("  lamps where none is:");
+    if (false_lamps_.empty()) fmt::print(" none");
+    for (const auto& [name, count] : false_lamps_) fmt::print(" {} {};", count, name);
+    fmt::print("\n");
+    print_centers();
+    fmt::print("  reasons of the missed:");
+    for (const auto& [reason, count] : reasons_) fmt::print(" {} {};", count, reason);
+    fmt::print("\n");
+  }
+
+ private:
+  static constexpr double kPeriods = 2.5;
+
+  void add_lamp(const TrueLamp& lamp, const Extent& extent, const std::vector<Light>& lights) {
+    Tally& tally = tallies_[extent.periods >= kPeriods];
+    ++tally.lamps;
+    const Light* nearest = nullptr;
+    bool is_wrong = false;
+    for (const Light& light : lights) {
+      const double distance_px = (light.pixel - lamp.pixel).norm();
+      if (distance_px > extent.radius_px) continue;
+      if (light.kind == LightKind::lamp) {
+        if (*light.lamp == lamp.id) return add_found(distance_px, light.sigma_px, tally);
+        is_wrong = true;
+      }
+      if (!nearest || distance_px < (nearest->pixel - lamp.pixel).norm()) nearest = &light;
+    }
+    ++(is_wrong ? tally.wrong : tally.missed);
+    if (is_wrong) return;
+    ++reasons_[nearest ? std::string(name_of(nearest->kind)) + ": " +
+                             std::string(name_of(nearest->reason))
+                       : "no light there"];
+  }
+
+  void add_found(double error_px, double sigma_px, Tally& tally) {
+    ++tally.found;
+    errors_px_.push_back(error_px);
+    chi_square_ += std::pow(error_px / sigma_px, 2) / 2;
+  }
+
+  static std::string name_of_other(const Scene& scene, const FrameRenderer& renderer,
+                                   const LampShot& shot, const Eigen::Vector2d& pixel) {
+    const double near_px = 0.08 * scene.camera.imager_px[0];
+    std::string name = "elsewhere";
+    double least_px = near_px;
+    for (const TrueOtherLight& other : true_other_lights(scene, renderer, shot)) {
+      const double distance_px = (other.pixel - pixel).norm();
+      if (distance_px > least_px) continue;
+      least_px = distance_px;
+      name = "at " + std::string(vlp::name_of(other.kind));
+    }
+    return name;
+  }
+
+  void print_centers() const {
+    if (errors_px_.empty()) return;
+    auto sorted = errors_px_;
+    std::ranges::sort(sorted);
+    double squares = 0;
+    for (const double error_px : sorted) squares += error_px * error_px;
+    const auto count = static_cast<double>(sorted.size());
+    fmt::print("  centres: rms {:.3f}, median {:.3f}, worst {:.3f} px; chi-squared {:.2f}\n",
+               std::sqrt(squares / count), sorted[sorted.size() / 2], sorted.back(),
+               chi_square_ / count);
+  }
+
+  int images_ = 0;
+  std::array<Tally, 2> tallies_;  ///< below kPeriods, and others
+  std::map<std::string, int> false_lamps_, reasons_;
+  std::vector<double> errors_px_;
+  double chi_square_ = 0;
+};
+
+/// Detects the lamps of one image and adds them to the score.
+void try_shot(const Scene& scene, const FrameRenderer& renderer, const LightDetector& detector,
+              const LampShot& shot, Score& score) {
+  const cv::Mat image = render_image(scene, renderer, shot);
+  if (shot.motion.is_level()) {
+    return score.add(scene, renderer, shot, detect_lights(detector, image));
+  }
+  const Eigen::Matrix3d level_from_camera =
+      level_from_inclination(shot.motion.inclination(0)) * scene.mount.level_from_camera;
+  score.add(scene, renderer, shot, detect_lights(detector.leaning(level_from_camera), image));
+}
+
+LightDetector detector_for(const Scene& scene) {
+  return {lamp_map_of(scene, false), detector_camera(true_calibration(scene))};
+}
+
+/// Images of a scene's folders of lamps. Another seed in each round draws other chips, too.
+void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_each, Score& score) {
+  std::vector<CaptureSet> sets;
+  for (const CaptureSet& set : scene.sets) {
+    if (set.lamps && set.folder != "sample") sets.push_back(set);
+  }
+  if (sets.empty()) throw std::invalid_argument("the scene has no captures of lamps");
+  const FrameRenderer renderer(scene);
+  const LightDetector detector = detector_for(scene);
+  for (int i = 0; i < images; ++i) {
+    const auto index = static_cast<std::size_t>(i) / sets.size();
+    const CaptureSet& set = sets[static_cast<std::size_t>(i) % sets.size()];
+    const auto round = new_seed_in_each ? static_cast<std::size_t>(i) : index / shots_in(set);
+    scene.seed = seed + round;
+    draw_random_parts(scene);
+    // Spread over the whole of a folder, however few images there are.
+    const auto wanted = static_cast<std::size_t>(images) / sets.size() + 1;
+    const std::size_t step = std::max<std::size_t>(1, shots_in(set) / wanted);
+    try_shot(scene, renderer, detector, lamp_shot(scene, set, index * step % shots_in(set)), score);
+  }
+}
+
+Scene chips_scene() {
+  Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+  for (SceneLamp& lamp : scene.lamps) {
+    lamp.glow.edge_share = 1;
+    lamp.glow.random_chips = RandomChips{7, 0.12, 0.75, 0.3, 0.8};
+    lamp.glow.halo = Halo{0.12, 0.03};
+  }
+  return scene;
+}
+
+/// A rig like paper-rig with half as many pixels each way, eight lamps, and foreign lights drawn at
+/// random for each image.
+class ForeignScene {
+ public:
+  explicit ForeignScene(std::uint64_t seed) : seed_(seed) {
+    scene_ = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+    scene_.board.reset();
+    Camera& camera = scene_.camera;
+    camera.imager_px = {400, 300};
+    for (const std::size_t i : {0, 1, 2, 3}) camera.intrinsics[i] /= 2;
+    camera.row_time_s = 6e-5;
+    scene_.lamps.clear();
+    constexpr std::array frequencies_hz = {1100, 1400, 1800, 2300, 2900, 3500, 4100, 4700};
+    for (int i = 0; i < 8; ++i) {
+      Glow glow{{-0.75 + 0.5 * (i % 4), i < 4 ? -0.3 : 0.3, kCeilingM}, 0.18, 2e8, 0.9};
+      scene_.lamps.push_back(
+          {i + 1, glow, double(frequencies_hz[std::size_t(i)]), 0.5, {}, Eigen::Vector3d::Zero()});
+    }
+    set_ = scene_.sets.at(0);
+    set_.exposure_s = 5e-5;
+    set_.lamps = LampShots{};
+    set_.lamps->yaw_jitter_rad = set_.lamps->turn_rate_rad_per_s = 0;
+    set_.lamps->repeat = 1;
+    set_.lamps->interval_s = 1;
+  }
+
+  /// Another duty for each lamp; the lamp map has it, too.
+  void draw_duties(int index) {
+    cv::RNG random = random_of(seed_, "duties", static_cast<std::size_t>(index));
+    for (SceneLamp& lamp : scene_.lamps) lamp.duty = random.uniform(0.3, 0.7);
+  }
+
+  LampShot draw_shot(int index) {
+    random_ = random_of(seed_, "foreign lights", static_cast<std::size_t>(index));
+    set_.lamps->spots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
+    set_.lamps->heights_m = {random_.uniform(0.0, 0.7)};
+    set_.lamps->yaws_rad = {random_.uniform(0.0, 2 * std::numbers::pi)};
+    scene_.seed = next_seed(random_);
+    draw_clutter();
+    draw_random_parts(scene_);
+    return lamp_shot(scene_, set_, 0);
+  }
+
+  const Scene& scene() const { return scene_; }
+
+ private:
+  static constexpr double kCeilingM = 1.6;
+
+  struct Circle {
+    Eigen::Vector2d center_m;
+    double radius_m;
+  };
+
+  /// A free place on the ceiling.
+  std::optional<Eigen::Vector2d> draw_place(double radius_m) {
+    constexpr int tries = 40;
+    constexpr double gap_m = 0.02;
+    for (int i = 0; i < tries; ++i) {
+      const Eigen::Vector2d place_m(random_.uniform(-1.1, 1.1), random_.uniform(-0.8, 0.8));
+      const bool is_free = std::ranges::all_of(taken_, [&](const Circle& circle) {
+        return (circle.center_m - place_m).norm() > circle.radius_m + radius_m + gap_m;
+      });
+      if (!is_free) continue;
+      taken_.push_back({place_m, radius_m});
+      return place_m;
+    }
+    return std::nullopt;
+  }
+
+  bool draw_chance(double probability) { return random_.uniform(0.0, 1.0) < probability; }
+  double draw_log(double least, double most) {
+    return std::exp(random_.uniform(std::log(least), std::log(most)));
+  }
+
+  /// A frequency at least 4 % from those of the lamps.
+  double draw_pwm_frequency_hz() {
+    constexpr double apart = 0.04;
+    while (true) {
+      const double frequency_hz = draw_log(200, 6000);
+      const bool is_apart = std::ranges::all_of(scene_.lamps, [&](const SceneLamp& lamp) {
+        return std::abs(std::log(frequency_hz / lamp.frequency_hz)) > apart;
+      });
+      if (is_apart) return frequency_hz;
+    }
+  }
+
+  void draw_foreign_light() {
+    Glow glow{{0, 0, kCeilingM}, 0, draw_log(4e7, 4e8), random_.uniform(0.4, 1.0)};
+    const double length_m = random_.uniform(0.08, 0.35);
+    if (draw_chance(0.5)) {
+      glow.diameter_m = length_m;
+    } else {
+      glow.rectangle = LampRectangle{{length_m, length_m * random_.uniform(0.15, 1.0)},
+                                     random_.uniform(0.0, std::numbers::pi)};
+    }
+    const auto place_m = draw_place(0.7 * length_m);
+    if (!place_m) return;
+    glow.position_m.head<2>() = *place_m;
+    ForeignLight light{glow, {}, {}};
+    if (draw_chance(0.6)) {
+      light.wave = SquareWave{draw_pwm_frequency_hz(), random_.uniform(0.1, 0.9), 0};
+    } else {
+      light.wave = RectifiedSine{draw_chance(0.5) ? 100.0 : 120.0, random_.uniform(0.1, 1.0), 0};
+    }
+    scene_.clutter.foreign_lights.push_back(light);
+  }
+
+  std::optional<Panel> draw_panel() {
+    const double width_m = random_.uniform(0.15, 0.4),
+                 height_m = width_m * random_.uniform(0.4, 1.);
+    const auto place_m = draw_place(std::hypot(width_m, height_m) / 2);
+    if (!place_m) return std::nullopt;
+    const Eigen::Rotation2Dd turn(random_.uniform(0.0, 2 * std::numbers::pi));
+    const Eigen::Vector2d a_m = turn * Eigen::Vector2d(width_m, 0);
+    const Eigen::Vector2d b_m = turn * Eigen::Vector2d(0, height_m);
+    const Eigen::Vector2d corner_m = *place_m - (a_m + b_m) / 2;
+    return Panel{{corner_m.x(), corner_m.y(), kCeilingM},
+                 {a_m.x(), a_m.y(), 0},
+                 {b_m.x(), b_m.y(), 0},
+                 draw_log(3e7, 3e8)};
+  }
+
+  /// A wall of glass along one side of the room.
+  void draw_mirror() {
+    const double side = draw_chance(0.5) ? 1 : -1;
+    const double begin = random_.uniform(-1.0, 0.2), length = random_.uniform(0.4, 1.5);
+    Panel pane{};
+    if (draw_chance(0.5)) {
+      pane = {{begin, 0.6 * side, 0.2}, {length, 0, 0}, {0, 0, kCeilingM - 0.2}, 0};
+    } else {
+      pane = {{1.05 * side, begin, 0.2}, {0, length, 0}, {0, 0, kCeilingM - 0.2}, 0};
+    }
+    scene_.clutter.mirrors.push_back({pane, draw_log(0.04, 0.8)});
+  }
+
+  void draw_clutter() {
+    Clutter& clutter = scene_.clutter = {};
+    taken_.clear();
+    for (const SceneLamp& lamp : scene_.lamps) {
+      taken_.push_back({lamp.glow.position_m.head<2>(), lamp.glow.diameter_m / 2});
+    }
+    const int lights = random_.uniform(1, 5);
+    for (int i = 0; i < lights; ++i) draw_foreign_light();
+    if (draw_chance(0.5)) {
+      if (const auto place_m = draw_place(0.1)) {
+        clutter.steady_lamps.push_back(
+            {{place_m->x(), place_m->y(), kCeilingM}, 0.2, draw_log(5e7, 4e8), 0.8});
+      }
+    }
+    if (draw_chance(0.3)) {
+      if (const auto panel = draw_panel()) clutter.windows.push_back(*panel);
+    }
+    if (draw_chance(0.5)) {
+      const int slats = random_.uniform(3, 16);
+      const double open_fraction = random_.uniform(0.3, 0.7);
+      if (const auto panel = draw_panel()) clutter.blinds.push_back({*panel, slats, open_fraction});
+    }
+    if (draw_chance(0.5)) {
+      const int lines = random_.uniform(1, 4), letters = random_.uniform(3, 9);
+      if (const auto panel = draw_panel()) clutter.signs.push_back({*panel, lines, letters, {}});
+    }
+    if (draw_chance(0.5)) draw_mirror();
+    scene_.ambient_e_per_s = draw_log(3e5, 3e7);
+    if (draw_chance(0.5)) {
+      clutter.ambient_flicker =
+          RectifiedSine{draw_chance(0.5) ? 100.0 : 120.0, random_.uniform(0.1, 0.9), 0};
+    }
+  }
+
+  std::uint64_t seed_;
+  Scene scene_;
+  CaptureSet set_;
+  cv::RNG random_;
+  std::vector<Circle> taken_;
+};
+
+void try_foreign(std::uint64_t seed, int images, Score& score) {
+  constexpr int images_of_a_rig = 100;
+  ForeignScene foreign(seed);
+  const FrameRenderer renderer(foreign.scene());
+  std::optional<LightDetector> detector;
+  for (int i = 0; i < images; ++i) {
+    if (i % images_of_a_rig == 0) {
+      foreign.draw_duties(i);
+      detector.emplace(detector_for(foreign.scene()));
+    }
+    const LampShot shot = foreign.draw_shot(i);
+    try_shot(foreign.scene(), renderer, *detector, shot, score);
+  }
+}
+
+void run(const std::string& kind, int images, std::optional<std::uint64_t> seed) {
+  cv::setNumThreads(1);
+  Score score;
+  const auto begin = std::chrono::steady_clock::now();
+  if (kind == "foreign") {
+    try_foreign(seed.value_or(1), images, score);
+  } else if (kind == "chips") {
+    try_scene(chips_scene(), seed.value_or(1), images, true, score);
+  } else {
+    const Scene scene =
+        read_scene(kind == "recessed" ? VLP_SOURCE_DIR "/datasets/recessed/scene.yaml" : kind);
+    try_scene(scene, seed.value_or(scene.seed), images, false, score);
+  }
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+  score.print(taken.count());
+}
+
+}  // namespace
+}  // namespace vlp
+
+int main(int argc, char** argv) {
+  if (argc < 2 || argc > 4) {
+    fmt::print(stderr, "lamp_trials recessed|chips|foreign|SCENE [IMAGES [SEED]]\n");
+    return 2;
+  }
+  try {
+    std::optional<std::uint64_t> seed;
+    if (argc > 3) seed = std::strtoull(argv[3], nullptr, 10);
+    vlp::run(argv[1], argc > 2 ? std::atoi(argv[2]) : 200, seed);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "lamp_trials: {}\n", error.what());
+    return 2;
+  }
+}
