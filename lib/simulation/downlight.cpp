@@ -21,25 +21,6 @@ double wall_share(const Recess& recess, double radius_m, const Eigen::Vector2d& 
   return recess.reflector_share + way * (dark.reflector_share - recess.reflector_share);
 }
 
-/// Returns the share of the source's radiance where a ray from the eye crosses the rim's plane; 0
-/// for an eye above that plane.
-double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d& eye_m,
-                    const Eigen::Vector2d& at_m) {
-  if (eye_m.z() >= 0) return 0;
-  const Eigen::Vector2d slope = (at_m - eye_m.head<2>()) / -eye_m.z();
-  double wall = wall_share(recess, radius_m, at_m);
-  if (recess.rim_power > 0) wall *= std::pow(at_m.norm() / radius_m, recess.rim_power);
-  if (recess.far_side_slope) {
-    const double halvings = (slope.norm() + at_m.dot(slope) / radius_m) / 2;
-    wall *= std::exp2(-halvings / *recess.far_side_slope);
-  }
-  const double ratio = 2 * (at_m + recess.depth_m * slope).norm() / recess.source_diameter_m;
-  const double cosine = 1 / std::sqrt(1 + slope.squaredNorm());
-  const double source =
-      std::pow(cosine, recess.beam_power) * std::exp2(-std::pow(ratio, recess.source_power));
-  return wall + (1 - wall) * source;
-}
-
 /// Of the chips around a place on the disc; those further away add less than 1e-3.
 double share_of_chips(const Chips& chips, double radius_m, const Eigen::Vector2d& at_m) {
   constexpr double widths = 1.6;
@@ -72,6 +53,23 @@ double share_around(const Halo& halo, double radius_m, const Eigen::Vector2d& at
 }
 
 }  // namespace
+
+double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d& eye_m,
+                    const Eigen::Vector2d& at_m) {
+  if (eye_m.z() >= 0) return 0;
+  const Eigen::Vector2d slope = (at_m - eye_m.head<2>()) / -eye_m.z();
+  double wall = wall_share(recess, radius_m, at_m);
+  if (recess.rim_power > 0) wall *= std::pow(at_m.norm() / radius_m, recess.rim_power);
+  if (recess.far_side_slope) {
+    const double halvings = (slope.norm() + at_m.dot(slope) / radius_m) / 2;
+    wall *= std::exp2(-halvings / *recess.far_side_slope);
+  }
+  const double ratio = 2 * (at_m + recess.depth_m * slope).norm() / recess.source_diameter_m;
+  const double cosine = 1 / std::sqrt(1 + slope.squaredNorm());
+  const double source =
+      std::pow(cosine, recess.beam_power) * std::exp2(-std::pow(ratio, recess.source_power));
+  return wall + (1 - wall) * source;
+}
 
 double reach_m(const Glow& glow) {
   return glow.diameter_m / 2 + (glow.halo ? kHaloLengths * glow.halo->length_m : 0);

@@ -29,6 +29,7 @@
 #include "geometry/frames.h"
 #include "detection/mat_view.h"
 #include "lamps/light_detector.h"
+#include "simulation/downlight.h"
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
 #include "simulation/picture.h"
@@ -53,22 +54,53 @@ cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const La
   return cv::imdecode(encoded(image, scene.picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
-/// A lamp's outline as a shot shows it.
+/// A lamp as a shot shows it.
 struct Extent {
-  double radius_px;  ///< largest distance of the outline from the centre
-  double periods;    ///< periods of its stripes across the outline
+  double radius_px;  ///< largest distance of the rim or sides from the centre
+  double periods;    ///< periods of its stripes across the part that is bright
 };
+
+/// Points of a lamp's face that have at least 2 % of its greatest radiance: around a lamp that is
+/// lit evenly, all over one with a recess.
+std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector3d& eye_m) {
+  constexpr double least_fraction = 0.02;
+  constexpr int steps = 60;
+  Glow rim = lamp;
+  rim.halo.reset();
+  if (!lamp.recess) return outline_of(rim);
+  const double radius_m = lamp.diameter_m / 2;
+  std::vector<std::pair<double, Eigen::Vector3d>> shares;
+  double greatest = 0;
+  for (int i = 0; i < steps * steps; ++i) {
+    const Eigen::Vector2d at_m = radius_m * Eigen::Vector2d(2 * (i % steps + 0.5) / steps - 1,
+                                                            2 * (i / steps + 0.5) / steps - 1);
+    if (at_m.norm() > radius_m) continue;
+    const double share = share_inside(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
+    shares.emplace_back(share, lamp.position_m + Eigen::Vector3d(at_m.x(), at_m.y(), 0));
+    greatest = std::max(greatest, share);
+  }
+  std::vector<Eigen::Vector3d> points_m;
+  for (const auto& [share, point_m] : shares) {
+    if (share >= least_fraction * greatest) points_m.push_back(point_m);
+  }
+  return points_m;
+}
 
 Extent extent_of(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
                  const SceneLamp& lamp, const Eigen::Vector2d& center) {
   const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
+  const Lens& lens = renderer.rays().lens();
   double radius_px = 0, first_line = INFINITY, last_line = -INFINITY;
   Glow rim = lamp.glow;
   rim.halo.reset();
   for (const Eigen::Vector3d& point_m : outline_of(rim)) {
-    const auto pixel = renderer.rays().lens().project(camera_from_world * point_m);
+    const auto pixel = lens.project(camera_from_world * point_m);
+    if (pixel) radius_px = std::max(radius_px, (*pixel - center).norm());
+  }
+  const Eigen::Vector3d eye_m = shot.motion.world_from_camera(0).translation();
+  for (const Eigen::Vector3d& point_m : bright_points(lamp.glow, eye_m)) {
+    const auto pixel = lens.project(camera_from_world * point_m);
     if (!pixel) continue;
-    radius_px = std::max(radius_px, (*pixel - center).norm());
     const double line = renderer.rays().line_and_place(*pixel)[0];
     first_line = std::min(first_line, line);
     last_line = std::max(last_line, line);
@@ -77,7 +109,7 @@ Extent extent_of(const Scene& scene, const FrameRenderer& renderer, const LampSh
   return {radius_px, (last_line - first_line) / period_lines};
 }
 
-/// Lamps wholly in view that show a range of periods.
+/// Counts of lamps wholly in view.
 struct Tally {
   int lamps = 0, found = 0, missed = 0, wrong = 0;
 };

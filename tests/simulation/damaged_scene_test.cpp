@@ -31,7 +31,7 @@ TEST(SceneCutShort, IsASceneOnlyWhenTheCutIsAfterWholeCaptures) {
 
 TEST(SceneCutShort, IsReadOrRefusedWhicheverOfTheDatasets) {
   for (const std::string name :
-       {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed"}) {
+       {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed", "foreign"}) {
     const std::string whole =
         TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
     EXPECT_GE(times_read_when_cut(whole, 47), 3) << name;

@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "simulation/plain_scene.h"
 #include "simulation/truth.h"
+#include "support/temporary_folder.h"
 
 namespace vlp {
 namespace {
@@ -183,6 +185,28 @@ TEST_F(ForeignLightTest, IsInTheTruthOfOtherLightsOnly) {
   EXPECT_EQ(lights[0].in_view, 1);
   EXPECT_EQ(true_lamps(scene_, renderer, shot()).size(), 1U);
   EXPECT_EQ(lamp_map_of(scene_, true).lamps.size(), 1U);
+}
+
+TEST_F(ForeignLightTest, IsInATableOfItsOwn) {
+  CaptureSet set{"check", 5e-5, LampShots{}, {}};
+  set.lamps->heights_m = {0.1};
+  set.lamps->spots_m = {Eigen::Vector2d::Zero()};
+  set.lamps->yaws_rad = {0};
+  set.lamps->yaw_jitter_rad = set.lamps->turn_rate_rad_per_s = 0;
+  set.lamps->repeat = 1;
+  set.lamps->interval_s = 1;
+  set.lamps->known = false;
+  const TemporaryFolder folder;
+  write_truth(scene_, FrameRenderer(scene_), set, folder / "");
+  EXPECT_FALSE(std::filesystem::exists(folder / "true_other_lights.csv")) << "there are none";
+  scene_.clutter.foreign_lights = {{{{0.3, 0, 1.6}, 0.12, 1e9, 1}, SquareWave{500, 0.3, 0}, {}}};
+  scene_.clutter.mirrors = {{{{0.4, -1, 0}, {0, 2, 0}, {0, 0, 1.7}, 0}, 0.2}};
+  write_truth(scene_, FrameRenderer(scene_), set, folder / "");
+  const std::string table = TemporaryFolder::content_of(folder / "true_other_lights.csv");
+  EXPECT_EQ(table,
+            "image,kind,lamp,u_px,v_px,in_view\n"
+            "0000.png,mirror_image,1,666.166667,299.500000,1\n"
+            "0000.png,pwm,,499.500000,299.500000,1\n");
 }
 
 TEST(ShotsOfForeignLights, HaveFreePhasesAndLeaveTheOtherDrawsAsTheyAre) {

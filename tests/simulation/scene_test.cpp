@@ -175,9 +175,80 @@ TEST(Scene, HasViewsOfTheBoard) {
   EXPECT_EQ(set.board->velocity_m_per_s, Vector3d(0.1, 0, 0.2));
 }
 
+TEST(Scene, HasForeignLightsMirrorsBlindsAndSigns) {
+  const std::string panel = "corner_m: [0.9, 0.1, 1.5], edges_m: [[0, 0.3, 0], [0, 0, 0.2]], ";
+  const Clutter clutter =
+      scene_of(
+          scene_with(
+              "clutter:\n",
+              "clutter:\n"
+              "  foreign_lights:\n"
+              "    - {position_m: [0, 0.2, 1.6], diameter_m: 0.2, radiance_e_per_s: 1.0e+8, "
+              "edge_share: 0.9, pwm: {frequency_hz: 500, duty: 0.3}, phase: 0.25}\n"
+              "    - {position_m: [0, 0, 1.6], shape: rectangle, size_m: [0.6, 0.1], yaw_rad: 0.5, "
+              "radiance_e_per_s: 2.0e+8, mains: {frequency_hz: 120, depth: 0.4}}\n"
+              "  mirrors: [{" +
+                  panel +
+                  "reflectance: 0.15}]\n"
+                  "  blinds: [{" +
+                  panel +
+                  "radiance_e_per_s: 3.0e+7, slats: 9, open_fraction: 0.4}]\n"
+                  "  signs: [{" +
+                  panel +
+                  "radiance_e_per_s: 4.0e+7, lines: 2, letters: 8}]\n"
+                  "  ambient_flicker: {frequency_hz: 100, depth: 0.6}\n"))
+          .clutter;
+  ASSERT_EQ(clutter.foreign_lights.size(), 2U);
+  const ForeignLight &dimmed = clutter.foreign_lights[0], &tube = clutter.foreign_lights[1];
+  EXPECT_EQ(dimmed.glow.diameter_m, 0.2);
+  EXPECT_EQ(dimmed.glow.edge_share, 0.9);
+  EXPECT_EQ(dimmed.phase, 0.25);
+  EXPECT_EQ(std::get<SquareWave>(dimmed.wave).frequency_hz, 500);
+  EXPECT_EQ(std::get<SquareWave>(dimmed.wave).duty, 0.3);
+  ASSERT_TRUE(tube.glow.rectangle);
+  EXPECT_EQ(tube.glow.rectangle->yaw_rad, 0.5);
+  EXPECT_EQ(tube.glow.radiance_e_per_s, 2e8);
+  EXPECT_EQ(std::get<RectifiedSine>(tube.wave).frequency_hz, 120);
+  EXPECT_EQ(std::get<RectifiedSine>(tube.wave).depth, 0.4);
+  EXPECT_FALSE(tube.phase);
+  ASSERT_EQ(clutter.mirrors.size(), 1U);
+  EXPECT_EQ(clutter.mirrors[0].reflectance, 0.15);
+  EXPECT_EQ(clutter.mirrors[0].pane.edge_b_m, Vector3d(0, 0, 0.2));
+  ASSERT_EQ(clutter.blinds.size(), 1U);
+  EXPECT_EQ(clutter.blinds[0].slats, 9);
+  EXPECT_EQ(clutter.blinds[0].open_fraction, 0.4);
+  EXPECT_EQ(clutter.blinds[0].window.radiance_e_per_s, 3e7);
+  ASSERT_EQ(clutter.signs.size(), 1U);
+  EXPECT_EQ(clutter.signs[0].lines, 2);
+  EXPECT_EQ(clutter.signs[0].letters, 8);
+  EXPECT_GE(clutter.signs[0].strokes.size(), 16U) << "drawn";
+  ASSERT_TRUE(clutter.ambient_flicker);
+  EXPECT_EQ(clutter.ambient_flicker->depth, 0.6);
+}
+
+TEST(Scene, HasRandomChipsAndRecessesFromAside) {
+  const Scene chips = scene_of(scene_with(
+      "edge_share: 0.8}",
+      "edge_share: 0.8, random_chips: {count: 7, sigma_fraction: 0.12, within_fraction: 0.75, "
+      "excess: [0.3, 0.8]}}"));
+  ASSERT_TRUE(chips.lamps.at(0).glow.random_chips);
+  EXPECT_EQ(chips.lamps[0].glow.random_chips->within_fraction, 0.75);
+  EXPECT_EQ(chips.lamps[0].glow.random_chips->max_excess, 0.8);
+  EXPECT_EQ(chips.lamps[0].glow.hot_spots.size(), 7U) << "drawn";
+  const Scene recess = scene_of(scene_with(
+      "depth_m: 0.07,",
+      "depth_m: 0.07, source_power: 1.5, rim_power: 6, beam_power: 7, far_side_slope: 0.06,"));
+  ASSERT_TRUE(recess.clutter.steady_lamps.at(1).recess);
+  const Recess& read = *recess.clutter.steady_lamps[1].recess;
+  EXPECT_EQ(read.source_power, 1.5);
+  EXPECT_EQ(read.rim_power, 6);
+  EXPECT_EQ(read.beam_power, 7);
+  EXPECT_EQ(read.far_side_slope, 0.06);
+}
+
 TEST(ScenesOfTheDatasets, AreReadAndHaveASample) {
   for (const std::string name :
-       {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed"}) {
+       {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed", "foreign"}) {
     SCOPED_TRACE(name);
     const Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
     EXPECT_EQ(scene.camera.id, name);
