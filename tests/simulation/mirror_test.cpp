@@ -90,6 +90,8 @@ TEST_F(MirrorTest, ShowsNothingBesideItsPane) {
 }
 
 TEST_F(MirrorTest, ShowsNoLampBehindIt) {
+  // Its mirror image would be before the pane, in line with the upper part of the pane.
+  pane() = {{0.4, -1, 0}, {0, 2, 0}, {0, 0, 4}, 0};
   scene_.lamps[0].glow.position_m.x() = 0.6;
   const cv::Mat1f with = rendered();
   EXPECT_TRUE(truth().empty());
