@@ -143,7 +143,7 @@ class Score {
     const int lamps = tallies_[0].lamps + tallies_[1].lamps;
     fmt::print("{} images in {:.1f} s, {:.1f} a second; {} lamps wholly in view\n", images_,
                seconds, images_ / seconds, lamps);
-    for (const std::size_t many : {0, 1}) {
+    for (std::size_t many = 0; many < 2; ++many) {
       const auto& [count, found, missed, wrong] = tallies_[many];
       fmt::print("  {} {} periods: {} lamps, {} found, {} missed, {} wrong identities\n",
                  many ? "at least" : "below", kPeriods, count, found, missed, wrong);
@@ -278,7 +278,7 @@ class ForeignScene {
     scene_.board.reset();
     Camera& camera = scene_.camera;
     camera.imager_px = {400, 300};
-    for (const std::size_t i : {0, 1, 2, 3}) camera.intrinsics[i] /= 2;
+    for (std::size_t i = 0; i < 4; ++i) camera.intrinsics[i] /= 2;
     camera.row_time_s = 6e-5;
     scene_.lamps.clear();
     constexpr std::array frequencies_hz = {1100, 1400, 1800, 2300, 2900, 3500, 4100, 4700};

@@ -210,7 +210,7 @@ TEST(DrawRandomParts, DrawsHotSpotsWithinTheirBoundsByTheSeed) {
   Scene again = scene;
   draw_random_parts(again);
   EXPECT_EQ(again.lamps[0].glow.hot_spots.at(6).center_m, spots[6].center_m) << "the same seed";
-  std::swap(again.lamps[0], again.lamps[1]);
+  again.lamps = {scene.lamps[1], scene.lamps[0]};
   draw_random_parts(again);
   EXPECT_EQ(again.lamps[1].glow.hot_spots.at(0).center_m, spots[0].center_m) << "by its id";
   again.seed = 2;
