@@ -50,24 +50,28 @@ void add_labelled(const std::vector<ImageLights>& images, const std::vector<Fram
   }
 }
 
-std::vector<MeasuredPeriod> measured_periods(const std::vector<ImageLights>& images,
-                                             const std::vector<Frame>& labels) {
+std::vector<LightPeriod> measured_periods(const std::vector<ImageLights>& images,
+                                          const std::vector<Frame>& labels) {
   const auto frames = frames_by_image(labels);
-  std::vector<MeasuredPeriod> periods;
-  const auto add = [&](const Light& light, std::optional<int> lamp) {
-    if (trustworthy(light.stripes)) periods.push_back({light.stripes.period_lines, lamp});
+  std::vector<LightPeriod> periods;
+  const auto add = [&](std::size_t image, const Light& light, std::optional<int> lamp) {
+    const Stripes& stripes = light.stripes;
+    if (!trustworthy(stripes)) return;
+    periods.push_back(
+        {{stripes.period_lines, lamp, stripes.duty}, image, light.pixel, light.sigma_px});
   };
-  for (const ImageLights& image : images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const ImageLights& image = images[i];
     if (labels.empty()) {
       for (const Light& light : image.lights) {
-        if (may_be_lamp(light, image.size)) add(light, std::nullopt);
+        if (may_be_lamp(light, image.size)) add(i, light, std::nullopt);
       }
       continue;
     }
     const auto frame = frames.find(image.file.filename().string());
     if (frame == frames.end()) continue;
     for (const Detection& label : frame->second->detections) {
-      if (const Light* light = light_at(image, label.pixel)) add(*light, label.lamp);
+      if (const Light* light = light_at(image, label.pixel)) add(i, *light, label.lamp);
     }
   }
   return periods;

@@ -3,12 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "captures/detections_table.h"
 #include "detection/detect_lights.h"
 #include "lamps/signal/lamp_classifier.h"
-#include "lamps/signal/row_time.h"
+#include "lamps/signal/period_groups.h"
 
 namespace vlp {
 
@@ -27,9 +28,17 @@ struct Labelled {
 void add_labelled(const std::vector<ImageLights>& images, const std::vector<Frame>& labels,
                   Labelled& labelled);
 
+/// Measured period of a light, and the light's place.
+struct LightPeriod : MeasuredPeriod {
+  /// Index of the image.
+  std::size_t image;
+  Eigen::Vector2d pixel;
+  double sigma_px;
+};
+
 /// Periods of the lights that are wholly in view and whose stripes are trustworthy(). With `labels`
 /// only of lights that have one.
-std::vector<MeasuredPeriod> measured_periods(const std::vector<ImageLights>& images,
-                                             const std::vector<Frame>& labels);
+std::vector<LightPeriod> measured_periods(const std::vector<ImageLights>& images,
+                                          const std::vector<Frame>& labels);
 
 }  // namespace vlp

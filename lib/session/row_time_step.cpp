@@ -67,7 +67,7 @@ RowTimeStepResult find_row_time(const SeenLights& seen,
     periods.insert(periods.end(), more.begin(), more.end());
   }
   RowTimeStepResult result;
-  const RowTimeResult estimate = estimate_row_time(periods, lamps);
+  const RowTimeResult estimate = choose_row_time(estimate_row_time(periods, lamps));
   if (!estimate.found) {
     result.fail(StepFailure::undetermined, estimate.problem);
     return result;

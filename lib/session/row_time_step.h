@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "detection/labelled_lights.h"
+#include "lamps/signal/row_time.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 #include "session/step_result.h"

@@ -119,7 +119,7 @@ TEST_F(RealDownlights, TellTheRowTime) {
       if (trustworthy(light.stripes)) periods.push_back({light.stripes.period_lines, {}});
     }
   }
-  const RowTimeResult result = estimate_row_time(periods, map());
+  const RowTimeResult result = choose_row_time(estimate_row_time(periods, map()));
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s / 15.10e-6, 1, 0.002);
 }

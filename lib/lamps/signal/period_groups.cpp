@@ -12,29 +12,38 @@
 namespace vlp {
 namespace {
 
-PeriodGroup group_of(const std::vector<double>& log_periods, std::optional<int> lamp) {
-  PeriodGroup group{upper_median(log_periods), 0, static_cast<int>(log_periods.size()), lamp};
-  std::vector<double> offs;
-  offs.reserve(log_periods.size());
-  for (const double value : log_periods) offs.push_back(std::abs(value - group.log_period));
+PeriodGroup make_group(std::span<const MeasuredPeriod> lights, std::vector<std::size_t> members,
+                       std::optional<int> lamp) {
+  std::vector<double> log_periods, duties;
+  log_periods.reserve(members.size());
+  for (const std::size_t member : members) {
+    log_periods.push_back(std::log(lights[member].period_lines));
+    if (lights[member].duty) duties.push_back(*lights[member].duty);
+  }
+  PeriodGroup group{upper_median(log_periods), 0, std::move(members), lamp, {}};
+  if (!duties.empty()) group.duty = upper_median(std::move(duties));
+  for (double& value : log_periods) value = std::abs(value - group.log_period);
   // A median scatters 1.25 times as much as a mean. Three lights or less do not show their scatter.
   constexpr double single = 0.003, least = 1e-5, sd_of_mad = 1.4826, sd_of_median = 1.2533;
-  const double scatter = group.lights > 3 ? sd_of_mad * upper_median(std::move(offs)) : single;
-  group.sd = std::max(least, sd_of_median * scatter / std::sqrt(double(group.lights)));
+  const std::size_t count = group.lights.size();
+  const double scatter = count > 3 ? sd_of_mad * upper_median(std::move(log_periods)) : single;
+  group.sd = std::max(least, sd_of_median * scatter / std::sqrt(double(count)));
   return group;
 }
 
-/// Takes the densest group out of `sorted`.
-std::vector<double> densest(std::vector<double>& sorted) {
+/// Removes the densest group from `sorted`, lights in the order of their periods, and returns it.
+std::vector<std::size_t> take_densest(std::span<const MeasuredPeriod> lights,
+                                      std::vector<std::size_t>& sorted) {
   constexpr double half_width = 0.015;
+  const auto log_period = [&](std::size_t i) { return std::log(lights[sorted[i]].period_lines); };
   std::size_t best_begin = 0, best_end = 0;
   for (std::size_t begin = 0, end = 0; begin < sorted.size(); ++begin) {
-    while (end < sorted.size() && sorted[end] <= sorted[begin] + 2 * half_width) ++end;
+    while (end < sorted.size() && log_period(end) <= log_period(begin) + 2 * half_width) ++end;
     if (end - begin > best_end - best_begin) best_begin = begin, best_end = end;
   }
   const auto first = sorted.begin() + std::ptrdiff_t(best_begin);
   const auto last = sorted.begin() + std::ptrdiff_t(best_end);
-  std::vector<double> group(first, last);
+  std::vector<std::size_t> group(first, last);
   sorted.erase(first, last);
   return group;
 }
@@ -42,22 +51,26 @@ std::vector<double> densest(std::vector<double>& sorted) {
 }  // namespace
 
 std::vector<PeriodGroup> period_groups(std::span<const MeasuredPeriod> lights) {
-  std::map<int, std::vector<double>> labelled;
-  std::vector<double> others;
-  for (const MeasuredPeriod& light : lights) {
-    (light.lamp ? labelled[*light.lamp] : others).push_back(std::log(light.period_lines));
+  std::map<int, std::vector<std::size_t>> labelled;
+  std::vector<std::size_t> others;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    (lights[i].lamp ? labelled[*lights[i].lamp] : others).push_back(i);
   }
   std::vector<PeriodGroup> groups;
   groups.reserve(labelled.size());
-  for (const auto& [lamp, log_periods] : labelled) groups.push_back(group_of(log_periods, lamp));
-  std::sort(others.begin(), others.end());
+  for (auto& [lamp, members] : labelled) {
+    groups.push_back(make_group(lights, std::move(members), lamp));
+  }
+  std::sort(others.begin(), others.end(), [&](std::size_t a, std::size_t b) {
+    return lights[a].period_lines < lights[b].period_lines;
+  });
   const std::size_t all = others.size();
   std::size_t largest = 0;
   while (!others.empty()) {
-    const std::vector<double> group = densest(others);
+    std::vector<std::size_t> group = take_densest(lights, others);
     largest = std::max(largest, group.size());
     if (10 * group.size() < largest || 50 * group.size() < all) break;
-    groups.push_back(group_of(group, std::nullopt));
+    groups.push_back(make_group(lights, std::move(group), std::nullopt));
   }
   return groups;
 }

@@ -4,13 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <utility>
+
+#include "lamps/signal/row_time.h"
 
 namespace vlp {
 namespace {
 
-constexpr double kFarthest = 0.06, kScatter = 0.003;
+constexpr double kScatter = 0.003, kFarthest = kMaxResidualSds * kScatter;
 constexpr double kShortest_s = 1e-8, kLongest_s = 1e-3;  // what a calibration may hold
+/// Standard deviation of a measured duty about that of the map: blur and a long exposure draw it
+/// towards 0.5, saturation raises it.
+constexpr double kDutySd = 0.1;
 
 double variance_of(const PeriodGroup& group) { return group.sd * group.sd + kScatter * kScatter; }
 
@@ -30,18 +37,17 @@ PeriodMatching::PeriodMatching(std::vector<PeriodGroup> groups, const LampMap& l
     if (!lamp.frequency_hz) continue;
     const double value = std::log(*lamp.frequency_hz);
     log_frequency_[lamp.id] = value;
-    log_frequencies_.push_back(value);
+    lamps_[value].push_back(lamp.id);
+    if (lamp.duty) duty_[lamp.id] = *lamp.duty;
   }
-  std::sort(log_frequencies_.begin(), log_frequencies_.end());
-  const auto end = std::unique(log_frequencies_.begin(), log_frequencies_.end());
-  log_frequencies_.erase(end, log_frequencies_.end());
+  if (duty_.size() < log_frequency_.size()) duty_.clear();
 }
 
 std::vector<PeriodMatch> PeriodMatching::matches() const {
   std::vector<PeriodMatch> all;
   for (const PeriodGroup& group : groups_) {
     const auto known = group.lamp ? log_frequency_.find(*group.lamp) : log_frequency_.end();
-    for (const double log_frequency : log_frequencies_) {
+    for (const auto& [log_frequency, lamps] : lamps_) {
       if (group.lamp && (known == log_frequency_.end() || known->second != log_frequency)) continue;
       const double start = -group.log_period - log_frequency;
       if (start < std::log(kShortest_s) || start > std::log(kLongest_s)) continue;
@@ -69,15 +75,18 @@ PeriodMatch PeriodMatching::refined(double log_row_time) const {
 }
 
 PeriodMatch PeriodMatching::matched(double log_row_time) const {
-  PeriodMatch match{log_row_time, 0, std::vector<std::optional<double>>(groups_.size())};
+  PeriodMatch match{log_row_time, 0, {}, {}};
+  match.residuals.resize(groups_.size());
+  match.lamps.resize(groups_.size());
   std::map<double, std::size_t> taken;  // frequency -> group
+  std::vector<LampsByLogFrequency::const_iterator> nearest(groups_.size(), lamps_.end());
   for (std::size_t i = 0; i < groups_.size(); ++i) {
-    const auto nearest = nearest_frequency(groups_[i], log_row_time);
-    if (!nearest) continue;
-    const double residual = -groups_[i].log_period - *nearest - log_row_time;
+    nearest[i] = nearest_frequency(groups_[i], log_row_time);
+    if (nearest[i] == lamps_.end()) continue;
+    const double residual = -groups_[i].log_period - nearest[i]->first - log_row_time;
     if (std::abs(residual) > kFarthest) continue;
     if (!groups_[i].lamp) {
-      const auto [other, is_free] = taken.try_emplace(*nearest, i);
+      const auto [other, is_free] = taken.try_emplace(nearest[i]->first, i);
       if (!is_free) {
         auto& there = match.residuals[other->second];
         if (std::abs(residual) >= std::abs(*there)) continue;
@@ -89,21 +98,33 @@ PeriodMatch PeriodMatching::matched(double log_row_time) const {
   }
   for (std::size_t i = 0; i < groups_.size(); ++i) {
     match.cost += cost_of(groups_[i], match.residuals[i].value_or(kFarthest));
+    if (!match.residuals[i]) continue;
+    match.lamps[i] = groups_[i].lamp ? std::vector{*groups_[i].lamp} : nearest[i]->second;
+    match.cost += duty_cost(groups_[i], match.lamps[i]);
   }
   return match;
 }
 
-std::optional<double> PeriodMatching::nearest_frequency(const PeriodGroup& group,
-                                                        double log_row_time) const {
+PeriodMatching::LampsByLogFrequency::const_iterator PeriodMatching::nearest_frequency(
+    const PeriodGroup& group, double log_row_time) const {
   if (group.lamp) {
     const auto known = log_frequency_.find(*group.lamp);
-    return known == log_frequency_.end() ? std::nullopt : std::optional(known->second);
+    return known == log_frequency_.end() ? lamps_.end() : lamps_.find(known->second);
   }
   const double wanted = -group.log_period - log_row_time;
-  const auto nearest = std::min_element(
-      log_frequencies_.begin(), log_frequencies_.end(),
-      [&](double a, double b) { return std::abs(a - wanted) < std::abs(b - wanted); });
-  return *nearest;
+  const auto above = lamps_.lower_bound(wanted);
+  if (above == lamps_.begin()) return above;
+  const auto below = std::prev(above);
+  const bool above_is_nearer =
+      above != lamps_.end() && above->first - wanted < wanted - below->first;
+  return above_is_nearer ? above : below;
+}
+
+double PeriodMatching::duty_cost(const PeriodGroup& group, const std::vector<int>& lamps) const {
+  if (duty_.empty() || !group.duty) return 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (const int lamp : lamps) least = std::min(least, std::abs(*group.duty - duty_.at(lamp)));
+  return std::log1p(least * least / (kDutySd * kDutySd));
 }
 
 }  // namespace vlp

@@ -11,30 +11,39 @@
 
 namespace vlp {
 
-/// What a row time makes of groups of lights: of each the residual to its lamp, if it has one, in
-/// log period; and their cost, see row_time.h.
+/// Assignment of period groups to the lamps of a map under one row time.
 struct PeriodMatch {
   double log_row_time;
+  /// See row_time.h.
   double cost;
+  /// Residual of each group in log period; std::nullopt if no lamp is assigned.
   std::vector<std::optional<double>> residuals;
+  /// Lamps that each group may be: its label, or all lamps with its frequency.
+  std::vector<std::vector<int>> lamps;
 };
 
-/// Matches groups of lights with the lamps of a map that have a frequency.
+/// Matches period groups with the lamps of a map that have a frequency.
 class PeriodMatching {
  public:
   PeriodMatching(std::vector<PeriodGroup> groups, const LampMap& lamps);
 
-  /// Of every row time that puts a lamp's frequency to a group's period, each refined.
+  /// Returns a refined match for every row time that puts a lamp's frequency to a group's period.
   std::vector<PeriodMatch> matches() const;
 
  private:
+  using LampsByLogFrequency = std::map<double, std::vector<int>>;
+
   PeriodMatch refined(double log_row_time) const;
   PeriodMatch matched(double log_row_time) const;
-  std::optional<double> nearest_frequency(const PeriodGroup& group, double log_row_time) const;
+  LampsByLogFrequency::const_iterator nearest_frequency(const PeriodGroup& group,
+                                                        double log_row_time) const;
+  /// Cost of the group's duty if the group is one of these lamps.
+  double duty_cost(const PeriodGroup& group, const std::vector<int>& lamps) const;
 
   std::vector<PeriodGroup> groups_;
-  std::vector<double> log_frequencies_;  // different ones, in order
+  LampsByLogFrequency lamps_;
   std::map<int, double> log_frequency_;  // by lamp
+  std::map<int, double> duty_;           // by lamp; empty unless all have one
 };
 
 }  // namespace vlp

@@ -3,6 +3,7 @@
 #include "lamps/signal/row_time.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdio>
 
@@ -20,7 +21,7 @@ RowTime row_time_of(const PeriodMatch& match, const std::vector<PeriodGroup>& gr
     squares += std::pow(*match.residuals[i], 2);
     information += 1 / (groups[i].sd * groups[i].sd);
     ++lamps;
-    lights += groups[i].lights;
+    lights += static_cast<int>(groups[i].lights.size());
   }
   double variance = 1 / information;
   // Not weighted: five lamps cannot show which of them is the one to trust.
@@ -30,52 +31,74 @@ RowTime row_time_of(const PeriodMatch& match, const std::vector<PeriodGroup>& gr
   return {row_time_s, row_time_s * std::sqrt(variance), lamps, lights};
 }
 
-std::string microseconds(double log_row_time) {
+std::string microseconds(double row_time_s) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.2f us", 1e6 * std::exp(log_row_time));
+  std::snprintf(text, sizeof text, "%.2f us", 1e6 * row_time_s);
   return text;
 }
 
 }  // namespace
 
-RowTimeResult estimate_row_time(std::span<const MeasuredPeriod> lights, const LampMap& lamps) {
-  const std::vector<PeriodGroup> groups = period_groups(lights);
-  if (groups.empty()) {
-    return {{},
-            "no light has clear stripes: add captures with lamps nearer, larger or sharper, and "
-            "with a short exposure"};
+RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, const LampMap& lamps) {
+  RowTimeCandidates found{period_groups(lights), {}, {}};
+  if (found.groups.empty()) {
+    found.problem =
+        "no light has clear stripes: add captures with lamps nearer, larger or sharper, and with a "
+        "short exposure";
+    return found;
   }
-  const std::vector<PeriodMatch> matches = PeriodMatching(groups, lamps).matches();
-  const auto best = std::min_element(matches.begin(), matches.end(),
-                                     [](auto& a, auto& b) { return a.cost < b.cost; });
-  if (best == matches.end()) {
-    return {{},
-            "no lamp of the map can have the periods that are seen: are its frequencies right?"};
+  std::vector<PeriodMatch> matches = PeriodMatching(found.groups, lamps).matches();
+  if (matches.empty()) {
+    found.problem =
+        "no lamp of the map can have the periods that are seen: are its frequencies right?";
+    return found;
   }
-  constexpr double same = 0.02, clear = 4;
-  const PeriodMatch* rival = nullptr;
-  for (const PeriodMatch& match : matches) {
-    if (std::abs(match.log_row_time - best->log_row_time) < same) continue;
-    if (rival == nullptr || match.cost < rival->cost) rival = &match;
+  std::stable_sort(matches.begin(), matches.end(),
+                   [](const auto& a, const auto& b) { return a.cost < b.cost; });
+  constexpr double same = 0.02;
+  for (PeriodMatch& match : matches) {
+    if (match.cost >= matches.front().cost + kClearCost) break;
+    const RowTime row_time = row_time_of(match, found.groups);
+    const bool is_known = std::any_of(
+        found.candidates.begin(), found.candidates.end(), [&](const RowTimeCandidate& other) {
+          return std::abs(std::log(row_time.row_time_s / other.row_time.row_time_s)) < same;
+        });
+    if (!is_known) found.candidates.push_back({row_time, match.cost, match.lamps});
   }
-  if (rival != nullptr && rival->cost < best->cost + clear) {
-    return {{},
-            "the " + std::to_string(groups.size()) +
-                " stripe periods that are seen fit a row time of " +
-                microseconds(best->log_row_time) + " and one of " +
-                microseconds(rival->log_row_time) +
-                ": add captures that show more lamps, or a table that says which lamp is which"};
+  return found;
+}
+
+RowTimeResult choose_row_time(const RowTimeCandidates& found,
+                              std::span<const double> position_costs) {
+  if (found.candidates.empty()) return {{}, found.problem};
+  assert(position_costs.empty() || position_costs.size() == found.candidates.size());
+  std::vector<std::pair<double, const RowTimeCandidate*>> ranked;
+  for (std::size_t i = 0; i < found.candidates.size(); ++i) {
+    const double position_cost = position_costs.empty() ? 0 : position_costs[i];
+    ranked.emplace_back(found.candidates[i].cost + position_cost, &found.candidates[i]);
   }
-  const auto explained = std::count_if(best->residuals.begin(), best->residuals.end(),
-                                       [](const auto& residual) { return residual.has_value(); });
-  if (2 * explained < std::ptrdiff_t(groups.size())) {
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  const RowTimeCandidate& best = *ranked.front().second;
+  const std::string groups = std::to_string(found.groups.size());
+  if (ranked.size() > 1 && ranked[1].first < ranked[0].first + kClearCost) {
     return {{},
-            "no row time explains more than " + std::to_string(explained) + " of the " +
-                std::to_string(groups.size()) +
+            "the " + groups + " stripe periods that are seen fit a row time of " +
+                microseconds(best.row_time.row_time_s) + " and one of " +
+                microseconds(ranked[1].second->row_time.row_time_s) +
+                ", and neither the duties nor the places of the lamps decide: add captures that "
+                "show more "
+                "lamps, or a table that says which lamp is which"};
+  }
+  const auto explained = std::count_if(best.lamps.begin(), best.lamps.end(),
+                                       [](const auto& lamps) { return !lamps.empty(); });
+  if (2 * explained < std::ptrdiff_t(found.groups.size())) {
+    return {{},
+            "no row time explains more than " + std::to_string(explained) + " of the " + groups +
                 " stripe periods that are seen: are the frequencies of the lamp map right, and "
                 "all lamps in it?"};
   }
-  return {row_time_of(*best, groups), {}};
+  return {best.row_time, {}};
 }
 
 }  // namespace vlp

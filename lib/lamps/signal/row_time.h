@@ -7,16 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "lamps/signal/period_groups.h"
 #include "rig/lamp_map.h"
 
 namespace vlp {
-
-/// A light whose stripe period was measured.
-struct MeasuredPeriod {
-  double period_lines;
-  /// The lamp that it is of, where somebody says so.
-  std::optional<int> lamp;
-};
 
 struct RowTime {
   double row_time_s;
@@ -28,28 +22,65 @@ struct RowTime {
   int lamps, lights;
 };
 
+/// Row time that explains the measured periods, with the assignment of groups to lamps.
+struct RowTimeCandidate {
+  RowTime row_time;
+  /// See estimate_row_time().
+  double cost;
+  /// Lamps that each group may be, by the index of the group: those with the frequency that it
+  /// then has; empty if no lamp has it.
+  std::vector<std::vector<int>> lamps;
+};
+
+struct RowTimeCandidates {
+  std::vector<PeriodGroup> groups;
+  /// In the order of their cost.
+  std::vector<RowTimeCandidate> candidates;
+  /// Reason why there are no candidates, and what to add.
+  std::string problem;
+};
+
 /// The row time, or why there is none and what to add.
 struct RowTimeResult {
   std::optional<RowTime> found;
   std::string problem;
 };
 
-/// The row time from lights of lamps whose frequencies the map knows: a lamp of frequency f has a
-/// period of 1 / (f row_time) lines (lib/THEORY.md, "Identity"), so that for lamp k of light i
+/// A candidate is the answer if every other one costs this much more: it is then exp(-4) times as
+/// likely, about 2 %.
+inline constexpr double kClearCost = 4;
+
+/// Residuals beyond this many standard deviations count as this many: a lamp that is off its
+/// frequency or its place, or another light, misleads little.
+inline constexpr double kMaxResidualSds = 20;
+
+/// Finds the row times that explain the lights of lamps whose frequencies the map knows. A lamp of
+/// frequency f has a period of 1 / (f row_time) lines (lib/THEORY.md, "Identity"), so that for
+/// lamp k of light i
 ///
 ///     log row_time = -log period_i - log f_k.
 ///
-/// Lights of one lamp, or of one period, are made one by their median. Which lamp an unlabelled
-/// one is of is not known: of the row times that put some lamp's frequency to some period the one
-/// stands for which the sum over the periods of
+/// Lights of one lamp, or of one period, are made one group by their median. Which lamp an
+/// unlabelled group is of is not known. Each row time that puts some lamp's frequency to some
+/// period is refined by iterated least squares, and has the cost
 ///
-///     min over lamps of log(1 + r^2 / s^2),   r the residual above, s^2 = sd^2 + 0.003^2,
+///     sum over groups of min over lamps of log(1 + r^2 / s^2) + log(1 + d^2 / 0.1^2),
 ///
-/// is least, where a lamp serves for one period, and a residual beyond 6 % counts as 6 %: a lamp
-/// that is off its frequency, or another light, misleads it little. Iterated least squares with the
-/// weights of that sum refine it. There is no answer when another row time explains the periods
-/// nearly as well (the sum is larger by less than 4), as when all ratios of frequencies are equal,
-/// or when less than half of the periods are explained.
-RowTimeResult estimate_row_time(std::span<const MeasuredPeriod> lights, const LampMap& lamps);
+/// r the residual above, s^2 = sd^2 + 0.003^2, where a lamp serves for one group, and a residual
+/// beyond kMaxResidualSds 0.003 counts as that; d the measured duty less the lamp's, where all
+/// lamps with a frequency state their duty.
+///
+/// @return  the row times that differ by 2 % or more and cost less than the best one plus
+///          kClearCost; a problem if there is none
+RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, const LampMap& lamps);
+
+/// Chooses the candidate with the least cost.
+///
+/// @param position_costs  cost of the lamps' places for each candidate, added to its own; empty if
+///                        not known
+/// @return  a problem if another candidate costs less than kClearCost more, as when all ratios of
+///          frequencies are equal, or if less than half of the groups have a lamp
+RowTimeResult choose_row_time(const RowTimeCandidates& found,
+                              std::span<const double> position_costs = {});
 
 }  // namespace vlp

@@ -33,13 +33,17 @@ void add(std::vector<MeasuredPeriod>& lights, double frequency_hz, int count, do
   }
 }
 
+RowTimeResult row_time_of(const std::vector<MeasuredPeriod>& lights, const LampMap& map) {
+  return choose_row_time(estimate_row_time(lights, map));
+}
+
 const LampMap kMap = map_of({2000, 2500, 3000, 3500, 4000});
 
 TEST(RowTime, IsExactWithoutNoise) {
   Random random(1);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 1, 0, random);
-  const auto result = estimate_row_time(lights, kMap);
+  const auto result = row_time_of(lights, kMap);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12 * kTrue_s);
   EXPECT_EQ(result.found->lamps, 5);
@@ -56,7 +60,7 @@ TEST(RowTime, ScattersAsItSays) {
     for (const Lamp& lamp : kMap.lamps) {
       add(lights, *lamp.frequency_hz * std::exp(0.005 * random.normal()), 20, 0.002, random);
     }
-    const auto result = estimate_row_time(lights, kMap);
+    const auto result = row_time_of(lights, kMap);
     ASSERT_TRUE(result.found) << result.problem;
     chi_square += std::pow((result.found->row_time_s - kTrue_s) / result.found->sd_s, 2);
   }
@@ -71,7 +75,7 @@ TEST(RowTime, IsNotMisledByALampThatIsOff) {
   for (const double frequency_hz : {2089.0, 2511.0, 3006.0, 3533.0, 4014.0}) {
     lights.push_back({1 / (frequency_hz * kTrue_s), {}});
   }
-  const auto result = estimate_row_time(lights, kMap);
+  const auto result = row_time_of(lights, kMap);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s / kTrue_s, 1, 0.006);
   EXPECT_LT(std::abs(result.found->row_time_s - kTrue_s), 3 * result.found->sd_s);
@@ -83,15 +87,15 @@ TEST(RowTime, IsNotMisledByOtherLights) {
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 20, 0.002, random);
   add(lights, 2700, 20, 0.002, random);  // a lamp that the map lacks
   for (int i = 0; i < 30; ++i) lights.push_back({random.uniform(5, 40), {}});
-  const auto result = estimate_row_time(lights, kMap);
+  const auto result = row_time_of(lights, kMap);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s / kTrue_s, 1, 0.001);
   EXPECT_EQ(result.found->lamps, 5);
 }
 
 TEST(RowTime, NeedsNoLabelsWhereThereIsOneFrequency) {
-  const auto result = estimate_row_time(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}},
-                                        map_of({2500, 2500}));
+  const auto result =
+      row_time_of(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}}, map_of({2500, 2500}));
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
   EXPECT_EQ(result.found->lamps, 1);
@@ -100,7 +104,7 @@ TEST(RowTime, NeedsNoLabelsWhereThereIsOneFrequency) {
 void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
   std::vector<MeasuredPeriod> lights;
   for (const double frequency_hz : seen_hz) lights.push_back({1 / (frequency_hz * kTrue_s), {}});
-  const auto result = estimate_row_time(lights, map);
+  const auto result = row_time_of(lights, map);
   EXPECT_FALSE(result.found);
   EXPECT_THAT(result.problem, HasSubstr("add captures that show more lamps, or a table"));
 }
@@ -113,22 +117,86 @@ TEST(RowTime, IsNotGuessed) {
   expect_ambiguous({2000, 2500, 3125}, even);
 }
 
+/// Lights of these lamps of `map`, with their duties.
+std::vector<MeasuredPeriod> with_duties(const LampMap& map, const std::vector<std::size_t>& seen) {
+  std::vector<MeasuredPeriod> lights;
+  for (const std::size_t i : seen) {
+    const Lamp& lamp = map.lamps[i];
+    lights.push_back({1 / (*lamp.frequency_hz * kTrue_s), {}, lamp.duty});
+  }
+  return lights;
+}
+
+TEST(EstimateRowTime, ReturnsAllThatFitWithTheirLamps) {
+  const LampMap even = map_of({1600, 2000, 2500, 3125});
+  const auto result = estimate_row_time(with_duties(even, {1, 2, 3}), even);
+  ASSERT_EQ(result.groups.size(), 3);
+  ASSERT_EQ(result.candidates.size(), 2) << result.problem;
+  EXPECT_LE(result.candidates[0].cost, result.candidates[1].cost);
+  for (const RowTimeCandidate& candidate : result.candidates) {
+    const double ratio = candidate.row_time.row_time_s / kTrue_s;
+    const bool is_true = std::abs(ratio - 1) < 1e-9;
+    EXPECT_TRUE(is_true || std::abs(ratio - 1.25) < 1e-9) << ratio;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double period_lines = std::exp(result.groups[i].log_period);
+      ASSERT_EQ(candidate.lamps[i].size(), 1);
+      const auto id = static_cast<std::size_t>(candidate.lamps[i][0]);
+      EXPECT_NEAR(period_lines * candidate.row_time.row_time_s * *even.lamps[id - 1].frequency_hz,
+                  1, 1e-9);
+    }
+  }
+}
+
+TEST(RowTime, IsChosenByDutiesWhereThePeriodsDoNotTell) {
+  LampMap even = map_of({1600, 2000, 2500, 3125});
+  const std::vector duties{0.3, 0.7, 0.4, 0.7};
+  for (std::size_t i = 0; i < 4; ++i) even.lamps[i].duty = duties[i];
+  auto lights = with_duties(even, {1, 2, 3});
+  // By so much blur and saturation may change them.
+  for (MeasuredPeriod& light : lights) *light.duty += 0.08;
+  const auto result = row_time_of(lights, even);
+  ASSERT_TRUE(result.found) << result.problem;
+  EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-9 * kTrue_s);
+  // One lamp without a duty: none count.
+  even.lamps[0].duty.reset();
+  EXPECT_FALSE(row_time_of(lights, even).found);
+  // Nor do duties decide that are all alike.
+  for (Lamp& lamp : even.lamps) lamp.duty = 0.5;
+  EXPECT_FALSE(row_time_of(with_duties(even, {1, 2, 3}), even).found);
+}
+
+TEST(ChooseRowTime, AddsTheCostsOfPlaces) {
+  const LampMap even = map_of({1600, 2000, 2500, 3125});
+  const auto found = estimate_row_time(with_duties(even, {1, 2, 3}), even);
+  ASSERT_EQ(found.candidates.size(), 2);
+  for (const std::size_t right : {0U, 1U}) {
+    std::vector<double> costs{30, 30};
+    costs[right] = 2;
+    const auto result = choose_row_time(found, costs);
+    ASSERT_TRUE(result.found) << result.problem;
+    EXPECT_EQ(result.found->row_time_s, found.candidates[right].row_time.row_time_s);
+  }
+  const auto undecided = choose_row_time(found, std::vector<double>{2, 5});
+  EXPECT_FALSE(undecided.found);
+  EXPECT_THAT(undecided.problem, HasSubstr("fit a row time of"));
+}
+
 TEST(RowTime, ComesFromLabelsWhereTheFrequenciesDoNotTell) {
   const LampMap even = map_of({1600, 2000, 2500, 3125});
   const std::vector<MeasuredPeriod> lights{{1 / (2000 * kTrue_s), 2}, {1 / (2500 * kTrue_s), 3}};
-  const auto result = estimate_row_time(lights, even);
+  const auto result = row_time_of(lights, even);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
 }
 
 TEST(RowTime, SaysWhyThereIsNone) {
-  EXPECT_THAT(estimate_row_time({}, kMap).problem, HasSubstr("no light has clear stripes"));
-  EXPECT_THAT(estimate_row_time(std::vector<MeasuredPeriod>{{10, 77}}, kMap).problem,
+  EXPECT_THAT(row_time_of({}, kMap).problem, HasSubstr("no light has clear stripes"));
+  EXPECT_THAT(row_time_of(std::vector<MeasuredPeriod>{{10, 77}}, kMap).problem,
               HasSubstr("no lamp of the map"));
   // Periods of random lights.
   std::vector<MeasuredPeriod> lights;
   for (const double period : {5.0, 7.3, 11.9, 19.1, 30.7, 46.0}) lights.push_back({period, {}});
-  const auto result = estimate_row_time(lights, map_of({2000, 2200}));
+  const auto result = row_time_of(lights, map_of({2000, 2200}));
   EXPECT_FALSE(result.found);
   EXPECT_NE(result.problem, "");
 }
@@ -141,10 +209,10 @@ TEST(PeriodGroups, AreOfOnePeriodEach) {
   for (int i = 0; i < 5; ++i) lights.push_back({random.uniform(30, 60), {}});
   const auto groups = period_groups(lights);
   ASSERT_EQ(groups.size(), 2);
-  EXPECT_EQ(groups[0].lights, 40);
+  EXPECT_EQ(groups[0].lights.size(), 40);
   EXPECT_NEAR(std::exp(groups[0].log_period) * 2000 * kTrue_s, 1, 0.002);
   EXPECT_NEAR(groups[0].sd, 1.25 * 0.003 / std::sqrt(40), 3e-4);
-  EXPECT_EQ(groups[1].lights, 30);
+  EXPECT_EQ(groups[1].lights.size(), 30);
 }
 
 }  // namespace
