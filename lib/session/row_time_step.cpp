@@ -4,16 +4,72 @@
 
 #include <fmt/core.h>
 
+#include <array>
+#include <map>
 #include <utility>
 
 #include "detection/image_file.h"
 #include "rig/input_error.h"
 #include "session/lamp_images.h"
+#include "session/position_cost.h"
 #include "session/skipped_images.h"
 
 namespace vlp {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// The lights of all folders' images with their periods, and the images' sizes. LightPeriod::image
+/// counts through all folders.
+struct PeriodsOfImages {
+  std::vector<LightPeriod> lights;
+  std::vector<std::array<int, 2>> sizes_px;
+
+  PeriodsOfImages(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels) {
+    for (std::size_t i = 0; i < seen.folders.size(); ++i) {
+      for (LightPeriod light : measured_periods(seen.folders[i], labels[i])) {
+        light.image += sizes_px.size();
+        lights.push_back(std::move(light));
+      }
+      for (const ImageLights& image : seen.folders[i]) {
+        sizes_px.push_back({image.size.width, image.size.height});
+      }
+    }
+  }
+
+  /// The lights of each image by their groups. A group that several lights of an image belong to is
+  /// left out there: one of them is not the lamp.
+  std::vector<GroupedLights> by_group(const std::vector<PeriodGroup>& groups) const {
+    std::vector<GroupedLights> images;
+    for (const std::array<int, 2>& size_px : sizes_px) images.push_back({size_px, {}});
+    for (std::size_t group = 0; group < groups.size(); ++group) {
+      std::map<std::size_t, int> count;  // by image
+      for (const std::size_t i : groups[group].lights) ++count[lights[i].image];
+      for (const std::size_t i : groups[group].lights) {
+        const LightPeriod& light = lights[i];
+        if (count[light.image] > 1) continue;
+        images[light.image].lights.push_back({group, light.pixel, light.sigma_px});
+      }
+    }
+    return images;
+  }
+};
+
+/// Chooses a row time by periods and duties or, where they do not decide, by the lamps' places,
+/// too.
+RowTimeResult choose_by_places(const SeenLights& seen,
+                               const std::vector<std::vector<Frame>>& labels,
+                               const LampMap& lamps) {
+  const PeriodsOfImages periods(seen, labels);
+  const RowTimeCandidates found = estimate_row_time(
+      std::vector<MeasuredPeriod>(periods.lights.begin(), periods.lights.end()), lamps);
+  if (found.candidates.size() < 2) return choose_row_time(found);
+  const auto images = periods.by_group(found.groups);
+  return choose_row_time(found, compute_position_costs(found, images, lamps, seen.camera.lens));
+}
+
+}  // namespace
 
 SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps,
                       const std::optional<Calibration>& calibration,
@@ -61,13 +117,8 @@ RowTimeStepResult find_row_time(const SeenLights& seen,
                                 const fs::path& lamps_file,
                                 const std::optional<Calibration>& calibration, HistoryEntry entry) {
   check_frequencies(lamps, lamps_file);
-  std::vector<MeasuredPeriod> periods;
-  for (std::size_t i = 0; i < seen.folders.size(); ++i) {
-    const auto more = measured_periods(seen.folders[i], labels[i]);
-    periods.insert(periods.end(), more.begin(), more.end());
-  }
   RowTimeStepResult result;
-  const RowTimeResult estimate = choose_row_time(estimate_row_time(periods, lamps));
+  const RowTimeResult estimate = choose_by_places(seen, labels, lamps);
   if (!estimate.found) {
     result.fail(StepFailure::undetermined, estimate.problem);
     return result;

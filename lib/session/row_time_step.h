@@ -32,9 +32,10 @@ struct RowTimeStepResult : StepResult {
   RowTime found{};
 };
 
-/// The row time from lamps whose frequencies the map knows (estimate_row_time()); it completes the
-/// camera of `calibration`, where there is one. Throws InputError when no lamp has a frequency.
-/// undetermined.
+/// Finds the row time from lamps whose frequencies the map knows (estimate_row_time()) and, where
+/// several row times explain their periods, from their places (compute_position_costs()). It
+/// completes the camera of `calibration`, where there is one.
+/// Throws InputError when no lamp has a frequency. undetermined.
 RowTimeStepResult find_row_time(const SeenLights& seen,
                                 const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
                                 const std::filesystem::path& lamps_file,

@@ -134,6 +134,33 @@ TEST_F(Train, FindsTheRowTimeAndTheReadOut) {
   EXPECT_EQ(found.history.back().program, "vlp-train");
 }
 
+/// Without its first lamp, which shows too few stripes, the frequencies of this scene fit two row
+/// times.
+TEST_F(Train, FindsTheRowTimeByThePlacesOfTheLamps) {
+  const fs::path set = folder / "archive";
+  const auto simulated = run_program("vlp-simulate " VLP_SOURCE_DIR
+                                     "/datasets/archive/scene.yaml -q --only rotation -o " +
+                                     set.string());
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.errors;
+  const std::string command = "vlp-train --row-time " + (set / "rotation").string() + " --lamps ";
+  const std::string lamps = (set / "lamps.yaml").string();
+  const std::string calibration = " --calibration " + (set / "true_calibration.yaml").string();
+  for (const std::string& camera : {calibration, std::string()}) {
+    const auto result = run_program(command + lamps + camera);
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    EXPECT_THAT(result.output, testing::ContainsRegex("row time    (29[.]9|30[.]0)"));
+    EXPECT_THAT(result.output, HasSubstr("of 5 lamps"));
+  }
+  // Frequencies elsewhere in the room: the places fit neither row time.
+  std::string map = TemporaryFolder::content_of(lamps);
+  map.replace(map.find("[-0.6, 0.3"), 10, "[0.6, 0.32");
+  map.replace(map.find("[0.6, 0.3,"), 10, "[-0.6, 0.3,");
+  const auto swapped = run_program(command + folder.file("swapped.yaml", map).string());
+  EXPECT_EQ(swapped.exit_code, 3) << swapped.output;
+  EXPECT_THAT(swapped.errors, HasSubstr("fit a row time of"));
+  EXPECT_THAT(swapped.errors, HasSubstr("neither the duties nor the places of the lamps decide"));
+}
+
 TEST_F(Train, DoesNotGuessTheRowTime) {
   std::string map = "format: vlp-lamps/1\nlamps:\n";
   for (int id = 1; id <= 9; ++id) {
