@@ -21,7 +21,7 @@ constexpr std::size_t kMinLights = 3, kMinMajority = 4;
 constexpr double kLeanSd_rad = 0.15;
 constexpr double kMaxSquare = kMaxResidualSds * kMaxResidualSds;
 
-/// How exactly the places of lights are predicted.
+/// Bounds on the residuals of predicted places.
 struct Tolerance {
   /// Standard deviation and largest residual of a light, as fractions of the spread of the lights.
   double sd_fraction, max_residual_fraction;
