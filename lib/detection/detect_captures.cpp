@@ -17,21 +17,23 @@ struct CaptureOutcome {
   std::vector<Detection> lamps;
   std::vector<Light> lights;
   std::string refused;
+  bool is_other_readout;
 };
 
 CaptureOutcome outcome_of(const LightDetector& detector, const SourceImage& source,
                           const DetectRun& run) {
   const auto leaning = leaning_detector(detector, run.levels, source.file.filename().string());
-  ImageLights found =
-      detect_image(leaning ? *leaning : detector, source, run.imager_px, run.max_mpx);
-  CaptureOutcome outcome;
+  ImageLights found = detect_image(leaning ? *leaning : detector, source, run.imager_px,
+                                   run.max_mpx, run.any_readout);
+  CaptureOutcome outcome{};
   outcome.file = source.file;
   outcome.time_s = source.time_s;
   outcome.refused = found.refused;
   if (!outcome.refused.empty()) return outcome;
+  outcome.is_other_readout = found.readout != detector.readout();
   if (run.annotate) {
     write_annotated(*run.annotate, source.file,
-                    annotated(found.image, found.lights, detector.readout()));
+                    annotated(found.image, found.lights, found.readout));
   }
   for (Light& light : found.lights) {
     std::vector<EdgePoint>().swap(light.outline);
@@ -73,6 +75,7 @@ CaptureDetections detect_captures(const LightDetector& detector, ImageSource& im
       result.refused.push_back(std::move(outcome.refused));
       continue;
     }
+    if (outcome.is_other_readout) ++result.other_readouts;
     const std::string name = outcome.file.filename().string();
     if (outcome.time_s) result.times_s.emplace(name, *outcome.time_s);
     result.frames.push_back({name, std::move(outcome.lamps)});

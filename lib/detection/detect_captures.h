@@ -28,6 +28,8 @@ struct CaptureDetections {
   std::vector<std::string> refused;
   /// All of them, in their order.
   std::vector<std::filesystem::path> images;
+  /// Images that were read out the other way than the detector has it.
+  int other_readouts = 0;
   /// Of frames of videos, since the video's start, by the name that the frame has in `frames`.
   std::map<std::string, double> times_s;
 };
@@ -49,6 +51,9 @@ struct DetectRun {
   std::optional<std::filesystem::path> annotate = std::nullopt;
   /// Larger images are refused unread.
   double max_mpx = kUsualMaxMpx;
+  /// Whether an image may be read out the other way than the detector has it, see
+  /// detect_either_way().
+  bool any_readout = false;
   /// Of those whose camera leans otherwise than the detector's.
   LevelsOfImages levels = {};
 };

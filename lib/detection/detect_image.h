@@ -22,12 +22,16 @@ struct ImageLights {
   std::vector<Light> lights;
   /// Why the image could not be used, in one line; empty when it could.
   std::string refused;
+  /// Read-out with which the lights were detected.
+  Readout readout;
 };
 
-/// One bad image does not end a run, whatever is bad about it: it cannot be read, or has another
-/// size than `imager_px`, or more than so many million pixels.
+/// Detects the lights of an image. One bad image does not end a run, whatever is bad about it: it
+/// cannot be read, or has another size than `imager_px`, or more than so many million pixels. With
+/// `any_readout` the image may be read out the other way than the detector has it, see
+/// detect_either_way().
 ImageLights detect_image(const LightDetector& detector, const SourceImage& source,
                          const std::optional<std::array<int, 2>>& imager_px = std::nullopt,
-                         double max_mpx = kUsualMaxMpx);
+                         double max_mpx = kUsualMaxMpx, bool any_readout = false);
 
 }  // namespace vlp

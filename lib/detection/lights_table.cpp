@@ -73,36 +73,22 @@ std::string_view name_of(LightReason reason) {
   switch (reason) {
     case LightReason::identified:
       return "identified";
-    case LightReason::clipped:
-      return "clipped";
-    case LightReason::even:
-      return "even";
-    case LightReason::few_stripes:
-      return "few_stripes";
-    case LightReason::unclear:
-      return "unclear";
-    case LightReason::incoherent:
-      return "incoherent";
-    case LightReason::irregular:
-      return "irregular";
-    case LightReason::like_no_lamp:
-      return "like_no_lamp";
-    case LightReason::other_shape:
-      return "other_shape";
-    case LightReason::soft:
-      return "soft";
-    case LightReason::not_round:
-      return "not_round";
-    case LightReason::seen_better:
-      return "seen_better";
-    case LightReason::alone:
-      return "alone";
-    case LightReason::at_edge:
-      return "at_edge";
-    case LightReason::small:
-      return "small";
-    case LightReason::no_outline:
-      return "no_outline";
+    case LightReason::overexposed:
+      return "overexposed";
+    case LightReason::steady:
+      return "steady";
+    case LightReason::too_few_periods:
+      return "too_few_periods";
+    case LightReason::no_clear_period:
+      return "no_clear_period";
+    case LightReason::unknown_period:
+      return "unknown_period";
+    case LightReason::reflection:
+      return "reflection";
+    case LightReason::wrong_shape:
+      return "wrong_shape";
+    case LightReason::incomplete:
+      return "incomplete";
   }
   return {};
 }
@@ -111,52 +97,34 @@ std::string explanation_of(LightReason reason) {
   switch (reason) {
     case LightReason::identified:
       return "its stripes are that lamp's";
-    case LightReason::clipped:
-      return "most of it is as bright as can be, which hides stripes: if it is a lamp, expose "
-             "shorter";
-    case LightReason::even:
+    case LightReason::overexposed:
+      return "most of it is overexposed, which hides stripes: if it is a lamp, expose shorter";
+    case LightReason::steady:
       return fmt::format("its lines differ by less than {:.0f} %: if it is a lamp, expose shorter",
                          100 * kLeastContrast);
-    case LightReason::few_stripes:
+    case LightReason::too_few_periods:
       return fmt::format(
-          "it shows less than {} periods: if it is a lamp, go nearer, or modulate it faster",
-          kLeastPeriods);
-    case LightReason::unclear:
-      return "no period explains half of what varies from line to line: if it is a lamp, see that "
-             "nothing hides a part, and that the read-out is right";
-    case LightReason::incoherent:
-      return "its parts vary each in its way, as letters and patterns do, and no stripes: if it is "
-             "a lamp, is the read-out right?";
-    case LightReason::irregular:
-      return "its stripes keep no time: if it is a lamp, see that nothing hides a part";
-    case LightReason::like_no_lamp:
-      return "its period is like no lamp's, or like two lamps': are frequencies, row time and "
-             "read-out right, and the classifier, if there is one, of these lamps?";
-    case LightReason::other_shape:
-      return "the lamp of its period has another shape in the map: is it a disc, or a rectangle of "
-             "that size, and does nothing hide a part?";
-    case LightReason::soft:
-      return "it is much softer than others, as reflections are: if it is a lamp, bring it into "
-             "focus";
-    case LightReason::not_round:
-      return "most of its edge is not on its outline: if it is a lamp, see that nothing hides a "
-             "part";
-    case LightReason::seen_better:
-      return "another light of the image is that lamp and has the surer centre: if both are lamps, "
-             "give "
-             "each a frequency of its own";
-    case LightReason::alone:
-      return fmt::format(
-          "it shows less than {} periods, and no lamp with more is in the image: go nearer, or "
-          "modulate faster",
-          kEnoughPeriods);
-    case LightReason::at_edge:
-      return "the image's edge cuts it, and the rest has no round outline: if it is a lamp, aim so "
-             "that it is in view";
-    case LightReason::small:
-      return "its outline is too short to be fitted: if it is a lamp, go nearer";
-    case LightReason::no_outline:
-      return "no circle or ellipse fits its outline: if it is a lamp, something hides or joins it";
+          "it shows less than {} periods, or less than {} and no lamp with more is in the image: "
+          "if "
+          "it is a lamp, go nearer, or modulate it faster",
+          kLeastPeriods, kEnoughPeriods);
+    case LightReason::no_clear_period:
+      return "it shows no clear period: if it is a lamp, see that nothing hides a part, and that "
+             "the read-out is right";
+    case LightReason::unknown_period:
+      return "its period is that of no lamp, or of several: check frequencies, row time and "
+             "read-out, and the classifier, if there is one";
+    case LightReason::reflection:
+      return "it is softer than the lamps, or another light has its period: if it is a lamp, "
+             "focus, "
+             "cover what mirrors it, or give each lamp a frequency of its own";
+    case LightReason::wrong_shape:
+      return "its outline is not that of a lamp of the map: if it is a lamp, see that nothing "
+             "hides "
+             "a part or joins it, and check its shape in the map";
+    case LightReason::incomplete:
+      return "the image's edge cuts it, or it is too small for an outline: if it is a lamp, aim so "
+             "that it is in view, or go nearer";
   }
   return {};
 }

@@ -30,12 +30,12 @@ struct CountedReason {
 };
 std::vector<CountedReason> reasons_of(std::span<const LightsOfImage> images);
 
-/// The enumerator as a word, for example "steady" and "few_stripes".
+/// The enumerator as a word, for example "steady" and "too_few_periods".
 std::string_view name_of(LightKind kind);
 std::string_view name_of(LightReason reason);
 
-/// What a reason means of a light and what would help, in a clause: "no circle or ellipse fits its
-/// edge: ...".
+/// What a reason means of a light and what would help, in a clause: "it shows no clear
+/// period: ...".
 std::string explanation_of(LightReason reason);
 
 /// A line for a person: where the light is, what it is and why, and what was measured.

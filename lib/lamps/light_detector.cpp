@@ -14,13 +14,13 @@
 #include "lamps/image/levels.h"
 #include "lamps/image/lines.h"
 #include "lamps/image/runs.h"
-#include "lamps/shape/glow.h"
-#include "lamps/shape/glow_envelope.h"
+#include "lamps/light_by_modulation.h"
 #include "lamps/shape/rectangle.h"
 #include "lamps/shape/rim.h"
 #include "lamps/shape/unknown_lens.h"
 #include "lamps/signal/coherence.h"
 #include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/modulated_lights.h"
 #include "rig/detection.h"
 #include "rig/find_lamp.h"
 
@@ -75,9 +75,55 @@ void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   }
 }
 
-/// How far two centres are apart, per axis.
-double apart(const Light& a, const Light& b) {
-  return (a.pixel - b.pixel).norm() / std::numbers::sqrt2;
+/// Width of a sharp edge over the radius.
+constexpr double kMaxRise = 0.3;
+
+bool is_sharp(const Light& light) { return light.rise_px <= kMaxRise * light.radius_px; }
+
+bool has_clear_outline(const Light& light) {
+  return !light.glows && !light.is_doubtful && is_sharp(light) && light.roundness >= kMinRoundness;
+}
+
+/// Whether two lights are at one place.
+bool are_at_one_place(const Light& a, const Light& b) {
+  return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
+}
+
+/// Why a light does not flicker; nothing when it does.
+std::optional<LightReason> why_steady(const Light& light) {
+  constexpr double least_clarity = 0.5, mostly = 0.5;
+  const Stripes& stripes = light.stripes;
+  if (!(stripes.contrast >= kLeastContrast)) {
+    return light.clipped > mostly ? LightReason::overexposed : LightReason::steady;
+  }
+  if (!(stripes.periods >= kLeastPeriods)) return LightReason::too_few_periods;
+  if (!(stripes.clarity >= least_clarity)) return LightReason::no_clear_period;
+  if (!(light.coherence >= kLeastCoherence)) return LightReason::no_clear_period;
+  return std::nullopt;
+}
+
+/// Whether a light without an outline is modulated beyond doubt: its parts across the lines show
+/// the same stripes, or so many periods fit so well that no pattern repeats like that by chance.
+bool is_modulated(const ImageView& lines, const ModulatedLight& light,
+                  const Background& background) {
+  constexpr double min_coherence = 0.9, beyond_chance = 30;
+  if (light.box.height < kEnoughPeriods * light.fit.period_lines) return false;
+  return light.evidence > beyond_chance ||
+         coherence_of(lines, light.chords, background, light.fit.period_lines) >= min_coherence;
+}
+
+/// Merges boxes that overlap, until none do.
+std::vector<PixelBox> merge_overlapping(std::vector<PixelBox> boxes) {
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    for (std::size_t j = 0; j < boxes.size(); ++j) {
+      if (j == i || intersection(boxes[i], boxes[j]).area() == 0) continue;
+      boxes[i] = around(boxes[i], boxes[j]);
+      boxes.erase(boxes.begin() + std::ptrdiff_t(j));
+      if (j < i) --i;
+      j = std::size_t(-1);  // the larger box may overlap those before, too
+    }
+  }
+  return boxes;
 }
 
 }  // namespace
@@ -100,7 +146,23 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
       classifier_(std::move(classifier)),
       most_dark_rows_(most_dark_rows_of(lamps, camera.row_time_s)),
       has_rectangles_(std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
-                                  [](const Lamp& lamp) { return lamp.rectangle.has_value(); })) {}
+                                  [](const Lamp& lamp) { return lamp.rectangle.has_value(); })) {
+  if (!camera_.row_time_s || classifier_) return;
+  for (const Lamp& lamp : lamps_.lamps) {
+    if (!lamp.frequency_hz) continue;
+    const double period = 1 / (*lamp.frequency_hz * *camera_.row_time_s);
+    const auto is_same = [&](double other) {
+      return std::abs(period / other - 1) < 2 * kLampDrift;
+    };
+    const auto other = std::find_if(lamp_periods_.begin(), lamp_periods_.end(), is_same);
+    if (other == lamp_periods_.end()) {
+      lamp_periods_.push_back(period);
+      lamps_by_period_.push_back(lamp.id);
+    } else {  // several lamps: their duties decide
+      lamps_by_period_[std::size_t(other - lamp_periods_.begin())].reset();
+    }
+  }
+}
 
 LightDetector LightDetector::leaning(
     const std::optional<Eigen::Matrix3d>& level_from_camera) const {
@@ -114,9 +176,14 @@ LightDetector LightDetector::leaning(
   return {lamps_, camera, classifier_};
 }
 
+LightDetector LightDetector::with_readout(Readout readout) const {
+  DetectorCamera camera = camera_;
+  camera.readout = readout;
+  return {lamps_, camera, classifier_};
+}
+
 std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blob& blob,
                                                const Background& background) const {
-  constexpr double least_roundness = 0.5, softest_edge = 0.3;
   constexpr std::size_t most_lights = 4;
   const PixelBox box = blob.box();
   std::vector<LightPart> parts;
@@ -137,27 +204,57 @@ std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blo
   for (LightPart& part : parts) {
     if (part.light) part.light->outside = double(rest.size()) / double(part.light->outline.size());
   }
-  const auto sharp = [](const LightPart& part) {
-    return part.light && part.light->rise_px <= softest_edge * part.light->radius_px;
-  };
+  constexpr double min_edge_roundness = 0.5;
+  // Lights that touch have an edge each, and may be of different brightness.
+  const auto sharp_parts = std::count_if(parts.begin(), parts.end(), [](const LightPart& part) {
+    return part.light && is_sharp(*part.light);
+  });
   const std::optional<Light>& first = parts.front().light;
-  const bool edge = sharp(parts.front()) && first->roundness >= least_roundness &&
-                    !unevenly_lit(lines, blob, first->outline, background);
-  if (edge) return parts;
-  // Lights that touch have an edge each, and no rim around all.
-  std::optional<Rim> rim;
-  if (std::count_if(parts.begin(), parts.end(), sharp) < 2) {
-    rim = rim_of(lines, blob, background, shape_);
+  const bool has_edge = sharp_parts > 1 || (sharp_parts == 1 && first && is_sharp(*first) &&
+                                            first->roundness >= min_edge_roundness &&
+                                            !unevenly_lit(lines, blob, first->outline, background));
+  for (LightPart& part : parts) {
+    if (part.light) part.light->is_doubtful = !has_edge;
   }
-  if (!rim || !rim->clear) {
-    if (auto glow = glow_of(lines, blob, background, shape_)) {
-      // Either may be what it is; the other's centre is as far off.
-      if (rim) glow->sigma_px = std::hypot(glow->sigma_px, apart(rim->light, *glow));
-      return {{std::move(glow), {}, box}};
-    }
-  }
-  if (rim) return {{std::move(rim->light), {}, box}};
   return parts;
+}
+
+void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
+                                      const Background& background,
+                                      std::vector<Light>& lights) const {
+  const auto is_settled = [&](const Light& light) {
+    if (!has_clear_outline(light)) return false;
+    const auto steady = why_steady(light);
+    if (steady) return *steady == LightReason::steady || *steady == LightReason::overexposed;
+    return lamp_of(light.stripes).has_value();
+  };
+  std::vector<PixelBox> boxes;
+  for (const Blob& blob : blobs) {
+    const PixelBox box = blob.box();
+    const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
+    const bool is_known = std::any_of(lights.begin(), lights.end(), [&](const Light& light) {
+      return is_settled(light) &&
+             (shape_.turned(light.pixel) - middle).norm() < light.radius_px / 2 &&
+             std::max(box.width, box.height) < 3 * light.radius_px;
+    });
+    if (!is_known) boxes.push_back(grow(box, std::max(box.width, box.height) / 2, lines.size()));
+  }
+  for (const ModulatedLight& found : find_modulated_lights(
+           lines, merge_overlapping(std::move(boxes)), background, lamp_periods_)) {
+    if (!is_modulated(lines, found, background)) continue;
+    Light light = light_by_modulation(lines, found, blobs, background, shape_);
+    if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
+    // Lamps that share a period differ in duty; without known periods a classifier decides.
+    const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
+    if (has_choice) light.lamp = lamp_of(light.stripes);
+    const auto is_at_it = [&](const Light& other) { return are_at_one_place(other, light); };
+    const auto is_better = [&](const Light& other) {
+      return is_at_it(other) && (!found.lamp || other.by_modulation || is_settled(other));
+    };
+    if (std::any_of(lights.begin(), lights.end(), is_better)) continue;
+    std::erase_if(lights, is_at_it);
+    lights.push_back(std::move(light));
+  }
 }
 
 void LightDetector::measure(const ImageView& lines, const Background& background,
@@ -178,19 +275,13 @@ void LightDetector::measure(const ImageView& lines, const Background& background
     const auto chords = chords_within(shape_.turned(light.face), lines.size());
     return judge(line_signal(lines, chords, background.level));
   }
-  if (light.glows || light.uneven) {
-    // Its stripes reach further than its outline.
-    const Eigen::Vector2d beyond(0, light.radius_px);
-    const auto chords = chords_of(low - beyond, high + beyond, lines.size());
-    const auto signal = line_signal(lines, chords, background.level);
-    return judge(striped_part(without_glow(signal)));
-  }
   const DiscImage disc{low, high, shape_.turned(light.pixel)};
   auto outline = refined(lines, light.outline, disc, background);
   auto better = shape_.light_of(std::move(outline.points), background, outline.mottled);
   if (better && 2 * better->outline.size() > light.outline.size()) {
     better->roundness = light.roundness;
     better->outside = light.outside;
+    better->is_doubtful = light.is_doubtful;
     light = std::move(*better);
   }
   const auto chords = chords_of(shape_.turned(light.low), shape_.turned(light.high), lines.size());
@@ -225,6 +316,7 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
   std::vector<Light> lights = join(parts, shape_, background);
   for (Light& light : lights) measure(lines, background, light);
   correct_shear(lights);
+  add_by_modulation(lines, blobs, background, lights);
   for (Light& light : formless_lights(std::move(parts), lights, shape_, lines.size())) {
     lights.push_back(std::move(light));
   }
@@ -237,19 +329,6 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
 }
 
 namespace {
-
-/// Why a light does not flicker; nothing when it does.
-std::optional<LightReason> why_steady(const Light& light) {
-  constexpr double least_clarity = 0.5, mostly = 0.5;
-  const Stripes& stripes = light.stripes;
-  if (!(stripes.contrast >= kLeastContrast)) {
-    return light.clipped > mostly ? LightReason::clipped : LightReason::even;
-  }
-  if (!(stripes.periods >= kLeastPeriods)) return LightReason::few_stripes;
-  if (!(stripes.clarity >= least_clarity)) return LightReason::unclear;
-  if (!(light.coherence >= kLeastCoherence)) return LightReason::incoherent;
-  return std::nullopt;
-}
 
 /// What a lean of 5 degrees that nobody knows of changes the logarithm of a rectangle's ratio of
 /// sides by, 35 degrees from the axis.
@@ -268,6 +347,31 @@ void add_hidden_end(double off, double leaned_off, Light& light) {
 void refuse(Light& light, LightReason reason) {
   light.lamp.reset();
   light.reason = reason;
+}
+
+/// Of lights that seem to be one lamp keeps the one with an outline and the surest centre, or,
+/// without outlines, the largest; no one where two are about as large, because one is a mirror
+/// image.
+void keep_best_claim(int lamp, std::vector<Light>& lights) {
+  constexpr double min_area_ratio = 2;
+  std::vector<Light*> claims;
+  for (Light& light : lights) {
+    if (light.lamp == lamp) claims.push_back(&light);
+  }
+  std::sort(claims.begin(), claims.end(), [](const Light* a, const Light* b) {
+    if (a->glows != b->glows) return b->glows;
+    return a->glows ? a->radius_px > b->radius_px : a->sigma_px < b->sigma_px;
+  });
+  if (claims.size() < 2) return;
+  const double ratio = std::pow(claims[0]->radius_px / claims[1]->radius_px, 2);
+  const bool is_apart =
+      (claims[0]->pixel - claims[1]->pixel).norm() > claims[0]->radius_px + claims[1]->radius_px;
+  const bool are_alike = claims[0]->glows == claims[1]->glows;
+  const bool is_clear = !are_alike || ratio > min_area_ratio ||
+                        (!claims[0]->glows && (!is_apart || 1 / ratio > min_area_ratio));
+  for (std::size_t i = is_clear ? 1 : 0; i < claims.size(); ++i) {
+    refuse(*claims[i], LightReason::reflection);
+  }
 }
 
 }  // namespace
@@ -296,21 +400,24 @@ std::optional<double> LightDetector::shape_off(const Light& light, int lamp) con
 }
 
 void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) const {
-  constexpr double much_softer = 5, least_roundness = 0.45, most_outside = 0.25;
+  constexpr double much_softer = 5, most_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity();
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
     const auto steady = why_steady(light);
     light.kind = steady ? LightKind::steady : LightKind::unknown;
-    light.reason = steady.value_or(LightReason::like_no_lamp);
-    if (steady) continue;
-    if (!light.uneven) sharpest_px = std::min(sharpest_px, light.rise_px);
-    light.lamp = lamp_of(light.stripes);
-    if (!readable(light.stripes)) light.reason = LightReason::irregular;
+    light.reason = steady.value_or(LightReason::unknown_period);
+    if (steady) {
+      light.lamp.reset();
+      continue;
+    }
+    if (!light.uneven && !light.glows) sharpest_px = std::min(sharpest_px, light.rise_px);
+    if (!light.by_modulation) light.lamp = lamp_of(light.stripes);
+    if (!readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
     const auto off = shape_off(light, *light.lamp);
     if (!off) {
-      refuse(light, LightReason::other_shape);
+      refuse(light, LightReason::wrong_shape);
     } else if (is_rectangle(light) && shape_.has_lens()) {
       add_hidden_end(*off, shape_.knows_level() ? 0 : kLeanedOff, light);
     }
@@ -321,28 +428,17 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
     // circle through the rest is not to be trusted.
     const bool strays = light.outside > most_outside;
     if (!light.uneven && light.rise_px > much_softer * sharpest_px) {
-      refuse(light, LightReason::soft);
-    } else if (strays || light.roundness < least_roundness) {
-      refuse(light, LightReason::not_round);
+      refuse(light, LightReason::reflection);
+    } else if (strays || light.roundness < kMinRoundness) {
+      refuse(light, LightReason::wrong_shape);
     }
   }
-  // Of two lights with one identity the one with the surer centre has it.
-  for (const Lamp& lamp : lamps_.lamps) {
-    std::vector<Light*> claims;
-    for (Light& light : lights) {
-      if (light.lamp == lamp.id) claims.push_back(&light);
-    }
-    const auto best = std::min_element(claims.begin(), claims.end(),
-                                       [](auto* a, auto* b) { return a->sigma_px < b->sigma_px; });
-    for (Light* claim : claims) {
-      if (claim != *best) refuse(*claim, LightReason::seen_better);
-    }
-  }
+  for (const Lamp& lamp : lamps_.lamps) keep_best_claim(lamp.id, lights);
   const bool sure = std::any_of(lights.begin(), lights.end(), [](const Light& light) {
     return light.lamp && light.stripes.periods >= kEnoughPeriods;
   });
   for (Light& light : lights) {
-    if (light.lamp && !sure) refuse(light, LightReason::alone);
+    if (light.lamp && !sure) refuse(light, LightReason::too_few_periods);
     if (!light.lamp) continue;
     light.kind = wholly_in_view(light, size) ? LightKind::lamp : LightKind::cut;
     light.reason = LightReason::identified;

@@ -26,13 +26,14 @@ DetectorCamera detector_camera(const Calibration& calibration);
 /// Finds and identifies the lamps of a map in images of a rolling shutter. Const and safe to share
 /// between threads.
 ///
-/// Centre: from the outline of the lit lines, never from brightness, see LightShape. A lamp that
-/// is lit unevenly is outlined by its rim, see rim_of(). Rectangles are looked for when the map has
-/// one, see rectangle_of(). A light that has no edge because it glows is
-/// outlined where it passes a tenth of its brightest level; how round its glow is limits its centre
-/// then, and sigma_px may be too small. Identity: a lamp of
-/// frequency f has stripes of 1 / (f row_time) lines (Chen and Guan, section 2.1), or what a
-/// trained classifier says.
+/// Centre: from the outline of the lit lines, never from brightness, see LightShape. Rectangles are
+/// searched if the map has one, see rectangle_of(). Where no light with a clear outline is
+/// identified, lights are found by their modulation, whatever their shape, see
+/// find_modulated_lights(). Their centre is that of their rim, see rim_of(), or, without a clear
+/// one, of the area that they light.
+///
+/// Identity: a lamp of frequency f has stripes of 1 / (f row_time) lines (Chen and Guan, section
+/// 2.1); with a trained classifier it is the classifier's answer.
 class LightDetector {
  public:
   LightDetector(const LampMap& lamps, const DetectorCamera& camera,
@@ -45,13 +46,19 @@ class LightDetector {
   /// nobody knows. Then ellipses are fitted in the image, as without a lens.
   LightDetector leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
+  /// Returns the same detector for images that are read along rows, or along columns.
+  LightDetector with_readout(Readout readout) const;
+
   Readout readout() const { return camera_.readout; }
 
  private:
-  /// What may be lights: a blob by its edge, several when it is of several lights that touch, or by
-  /// its glow when it has no edge.
+  /// Fits outlines to a blob: one, or several where lights touch; none where it is lit unevenly.
   std::vector<LightPart> parts_of(const ImageView& lines, const Blob& blob,
                                   const Background& background) const;
+  /// Searches blobs for modulated lights where no light with a clear outline is identified, and
+  /// puts these in the place of others there.
+  void add_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
+                         const Background& background, std::vector<Light>& lights) const;
   /// The outline once more, exactly, and the stripes.
   void measure(const ImageView& lines, const Background& background, Light& light) const;
   /// The centres of lights that a moving camera sees in part, see Shear.
@@ -69,6 +76,10 @@ class LightDetector {
   std::optional<LampClassifier> classifier_;
   int most_dark_rows_;
   bool has_rectangles_;
+  /// Different periods of the map's lamps, in lines, and the lamp of each; std::nullopt where
+  /// several lamps share it. Empty where the row time is not known or a classifier decides.
+  std::vector<double> lamp_periods_;
+  std::vector<std::optional<int>> lamps_by_period_;
 };
 
 }  // namespace vlp

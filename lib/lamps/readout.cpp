@@ -2,22 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/readout.h"
 
-#include "lamps/light_detector.h"
+#include <utility>
 
 namespace vlp {
-namespace {
-
-double clear_stripes(const ImageView& image, Readout readout) {
-  const LightDetector detector({}, {readout, {}, {}});
-  double sum = 0;
-  for (const Light& light : detector.detect(image)) {
-    if (!flickers(light)) continue;
-    sum += light.stripes.clarity * light.stripes.contrast * light.roundness;
-  }
-  return sum;
-}
-
-}  // namespace
 
 std::optional<Readout> ReadoutEvidence::readout() const {
   constexpr double times = 3, least = 1;
@@ -26,9 +13,19 @@ std::optional<Readout> ReadoutEvidence::readout() const {
   return std::nullopt;
 }
 
+double readout_evidence(std::span<const Light> lights) {
+  double sum = 0;
+  for (const Light& light : lights) {
+    if (!flickers(light)) continue;
+    sum += light.stripes.clarity * light.stripes.contrast * light.roundness;
+  }
+  return sum;
+}
+
 void add_evidence(const ImageView& image, ReadoutEvidence& evidence) {
-  evidence.rows += clear_stripes(image, Readout::rows);
-  evidence.columns += clear_stripes(image, Readout::columns);
+  const LightDetector by_rows({}, {Readout::rows, {}, {}});
+  evidence.rows += readout_evidence(by_rows.detect(image));
+  evidence.columns += readout_evidence(by_rows.with_readout(Readout::columns).detect(image));
 }
 
 std::optional<Readout> find_readout(std::size_t images,
@@ -46,6 +43,18 @@ std::optional<Readout> find_readout(std::size_t images,
     if (evidence.rows + evidence.columns >= enough && evidence.readout()) break;
   }
   return evidence.readout();
+}
+
+LightsByReadout detect_either_way(const LightDetector& detector, const ImageView& image) {
+  const Readout usual = detector.readout();
+  const Readout other = usual == Readout::rows ? Readout::columns : Readout::rows;
+  LightsByReadout result{usual, detector.detect(image)};
+  std::vector<Light> lights = detector.with_readout(other).detect(image);
+  const double with_usual = readout_evidence(result.lights), with_other = readout_evidence(lights);
+  const ReadoutEvidence evidence = usual == Readout::rows ? ReadoutEvidence{with_usual, with_other}
+                                                          : ReadoutEvidence{with_other, with_usual};
+  if (evidence.readout() == other) result = {other, std::move(lights)};
+  return result;
 }
 
 }  // namespace vlp

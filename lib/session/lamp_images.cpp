@@ -157,6 +157,11 @@ struct LampSearch {
                                               });
     result.warnings.insert(result.warnings.end(), source.warnings().begin(),
                            source.warnings().end());
+    if (found.other_readouts > 0) {
+      result.notes.push_back(fmt::format("{} of {} images show stripes along {}",
+                                         found.other_readouts, found.images.size(),
+                                         camera.readout == Readout::rows ? "columns" : "rows"));
+    }
     return found;
   }
 
@@ -196,7 +201,13 @@ LampSearch::LampSearch(const LampImages& lamp_images, StepResult& result)
     }
     run.levels = levels_told(captures, *input.camera, input.yaw_in_robot_rad);
   }
-  camera.readout = readout_of(images, stated, result, from_videos);
+  // The images of one lens have one orientation; others may be turned, as phones turn them, so that
+  // a folder need not have one read-out.
+  run.any_readout = !stated && !input.camera;
+  StepResult of_folder;
+  camera.readout = readout_of(images, stated, run.any_readout ? of_folder : result, from_videos);
+  if (run.any_readout)
+    result.notes.insert(result.notes.end(), of_folder.notes.begin(), of_folder.notes.end());
   if (!input.annotate.empty()) run.annotate = picture_folder(input);
 }
 

@@ -78,6 +78,8 @@ BodyFrame make_frame(const GroupedLights& image, std::vector<AssignedLight>& ass
                      const LampMap& lamps, const Lens& lens, double sd_fraction) {
   std::vector<Eigen::Vector2d> pixels;
   std::vector<Eigen::Vector3d> positions_m;
+  pixels.reserve(image.lights.size());
+  positions_m.reserve(assigned.size());
   for (const GroupedLight& light : image.lights) pixels.push_back(light.pixel);
   for (const AssignedLight& light : assigned) positions_m.push_back(light.lamp->position_m);
   const double spread_px = rms_spread(pixels), spread_m = rms_spread(positions_m);

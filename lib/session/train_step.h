@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "lamps/signal/confusion.h"
 #include "detection/labelled_lights.h"
+#include "lamps/signal/confusion.h"
 #include "session/row_time_step.h"
 
 namespace vlp {

@@ -72,6 +72,7 @@ Eigen::Isometry3d panel_from_world(const Panel& panel) {
 
 std::vector<Eigen::AlignedBox2d> bars_of(const Blind& blind) {
   std::vector<Eigen::AlignedBox2d> bars;
+  bars.reserve(std::size_t(blind.slats));
   for (int slat = 0; slat < blind.slats; ++slat) {
     bars.emplace_back(Eigen::Vector2d(0, double(slat) / blind.slats),
                       Eigen::Vector2d(1, (slat + blind.open_fraction) / blind.slats));

@@ -134,7 +134,7 @@ UnitImage look_at_lamps(const std::filesystem::path& file, const StationConfig& 
       const cv::Point high(static_cast<int>(light.high.x()), static_cast<int>(light.high.y()));
       const bool white = white_share(image, {low, high}) > least_white;
       overexposed += light.kind == LightKind::unknown && white ? 1 : 0;
-      if (light.kind == LightKind::unknown && light.reason == LightReason::like_no_lamp) {
+      if (light.kind == LightKind::unknown && light.reason == LightReason::unknown_period) {
         result.unknown_hz.push_back(1 / (light.stripes.period_lines * *config.type.row_time_s));
       }
       if (light.kind != LightKind::lamp) continue;

@@ -26,8 +26,8 @@
 
 #include "camera/lens.h"
 #include "detection/lights_table.h"
-#include "geometry/frames.h"
 #include "detection/mat_view.h"
+#include "geometry/frames.h"
 #include "lamps/light_detector.h"
 #include "simulation/downlight.h"
 #include "simulation/exposure.h"

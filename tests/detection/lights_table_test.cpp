@@ -37,9 +37,9 @@ Light light_of_kind(LightKind kind, LightReason reason) {
 TEST(LightsTable, HasARowForEachLight) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
-  Light steady = light_of_kind(LightKind::steady, LightReason::clipped);
+  Light steady = light_of_kind(LightKind::steady, LightReason::overexposed);
   steady.stripes = {};
-  const Light formless = light_of_kind(LightKind::formless, LightReason::small);
+  const Light formless = light_of_kind(LightKind::formless, LightReason::incomplete);
   const TemporaryFolder folder;
   write_lights(folder / "lights.csv",
                std::vector<LightsOfImage>{
@@ -57,7 +57,7 @@ TEST(LightsTable, HasARowForEachLight) {
   EXPECT_EQ(text(0, "v_px"), "79.5000");
   EXPECT_EQ(text(0, "outline"), "edge");
   EXPECT_EQ(text(0, "period_lines"), "11.2500");
-  EXPECT_EQ(text(1, "reason"), "clipped");
+  EXPECT_EQ(text(1, "reason"), "overexposed");
   EXPECT_EQ(text(1, "contrast"), "0.0000") << "measured, and none";
   for (const char* column : {"lamp", "period_lines", "periods", "clarity", "coherence", "duty"}) {
     EXPECT_EQ(text(1, column), "") << column;
@@ -73,18 +73,18 @@ TEST(LightsTable, HasARowForEachLight) {
 TEST(LightsTable, CountsReasonsThoseOfLikelyLampsFirst) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
-  const Light soft = light_of_kind(LightKind::unknown, LightReason::soft);
-  const Light even = light_of_kind(LightKind::steady, LightReason::even);
-  const Light small = light_of_kind(LightKind::formless, LightReason::small);
+  const Light soft = light_of_kind(LightKind::unknown, LightReason::reflection);
+  const Light even = light_of_kind(LightKind::steady, LightReason::steady);
+  const Light small = light_of_kind(LightKind::formless, LightReason::incomplete);
   const std::vector<LightsOfImage> images{{"a.png", {small, small, lamp, soft, even}},
                                           {"b.png", {small, even, lamp}}};
   const auto reasons = reasons_of(images);
   ASSERT_EQ(reasons.size(), 3U);
-  EXPECT_EQ(reasons[0].reason, LightReason::even);
+  EXPECT_EQ(reasons[0].reason, LightReason::steady);
   EXPECT_EQ(reasons[0].lights, 2);
-  EXPECT_EQ(reasons[1].reason, LightReason::soft);
+  EXPECT_EQ(reasons[1].reason, LightReason::reflection);
   EXPECT_EQ(reasons[1].kind, LightKind::unknown);
-  EXPECT_EQ(reasons[2].reason, LightReason::small) << "though it is the most frequent";
+  EXPECT_EQ(reasons[2].reason, LightReason::incomplete) << "though it is the most frequent";
   EXPECT_EQ(reasons[2].lights, 3);
   EXPECT_EQ(count_of(images, LightKind::lamp), 2);
   EXPECT_EQ(count_of(images, LightKind::cut), 0);
@@ -93,15 +93,15 @@ TEST(LightsTable, CountsReasonsThoseOfLikelyLampsFirst) {
 TEST(LightsTable, HasWordsOfItsOwnForEachReason) {
   std::set<std::string> names, explanations;
   int reasons = 0;
-  for (int i = 0; i <= static_cast<int>(LightReason::no_outline); ++i, ++reasons) {
+  for (int i = 0; i <= static_cast<int>(LightReason::incomplete); ++i, ++reasons) {
     names.emplace(name_of(static_cast<LightReason>(i)));
     explanations.insert(explanation_of(static_cast<LightReason>(i)));
   }
   EXPECT_EQ(names.size(), std::size_t(reasons));
   EXPECT_EQ(explanations.size(), std::size_t(reasons));
   EXPECT_FALSE(names.contains("") || explanations.contains(""));
-  EXPECT_THAT(line_of(light_of_kind(LightKind::unknown, LightReason::alone)),
-              HasSubstr("(101.2, 79.5) unknown: it shows less than 2.5 periods"));
+  EXPECT_THAT(line_of(light_of_kind(LightKind::unknown, LightReason::too_few_periods)),
+              HasSubstr("(101.2, 79.5) unknown: it shows less than 1.3 periods"));
 }
 
 constexpr int kReasonPeriod_lines = 11;
@@ -122,7 +122,7 @@ cv::Mat drawn_lamp_at(const Eigen::Vector2d& center, double radius_px, double le
 TEST(LightReasons, TellAClippedLampFromASteadyOne) {
   const DrawnStripes steady{.period_lines = kReasonPeriod_lines, .duty = 1};
   for (const auto& [level, reason] :
-       {std::pair(0.7, LightReason::even), {1.5, LightReason::clipped}}) {
+       {std::pair(0.7, LightReason::steady), {1.5, LightReason::overexposed}}) {
     const auto lights = lights_in_drawing(drawn_lamp_at({150.3, 99.6}, 38, level, steady));
     ASSERT_EQ(lights.size(), 1U);
     EXPECT_EQ(lights[0].kind, LightKind::steady);
@@ -135,9 +135,10 @@ TEST(LightReasons, AreThereForWhatHasNoForm) {
   cv::rectangle(cross, {50, 95, 200, 8}, 200, cv::FILLED);
   cv::rectangle(cross, {146, 20, 8, 160}, 200, cv::FILLED);
   for (const auto& [image, reason] :
-       {std::pair(drawn_lamp_at({150.3, 99.6}, 4, 0.7, {.period_lines = 4}), LightReason::small),
-        {drawn_lamp_at({150.3, -30.6}, 38), LightReason::at_edge},
-        {cross, LightReason::no_outline}}) {
+       {std::pair(drawn_lamp_at({150.3, 99.6}, 4, 0.7, {.period_lines = 4}),
+                  LightReason::incomplete),
+        {drawn_lamp_at({150.3, -30.6}, 38), LightReason::incomplete},
+        {cross, LightReason::wrong_shape}}) {
     const auto lights = lights_in_drawing(image);
     ASSERT_EQ(lights.size(), 1U) << name_of(reason);
     EXPECT_EQ(lights[0].kind, LightKind::formless);

@@ -108,7 +108,7 @@ TEST(LightDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
   ASSERT_EQ(alone.size(), 1U);
   EXPECT_LT(alone[0].stripes.periods, kEnoughPeriods);
   EXPECT_EQ(alone[0].kind, LightKind::unknown);
-  EXPECT_EQ(alone[0].reason, LightReason::alone);
+  EXPECT_EQ(alone[0].reason, LightReason::too_few_periods);
   const auto both = detector.detect(image_view(drawn({few, more}, size, CV_8U, 0.5)));
   ASSERT_EQ(both.size(), 2U);
   for (const Light& light : both) EXPECT_EQ(light.kind, LightKind::lamp);

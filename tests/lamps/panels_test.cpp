@@ -62,7 +62,7 @@ TEST(Panels, AreNoLampsOfAnotherShape) {
       if (!is_rectangle(light)) continue;
       EXPECT_FALSE(light.lamp);
       EXPECT_EQ(light.kind, LightKind::unknown);
-      refused += light.reason == LightReason::other_shape;
+      refused += light.reason == LightReason::wrong_shape;
     }
   }
   EXPECT_GT(refused, 6);

@@ -18,6 +18,7 @@
 #include "detection/image_file.h"
 #include "detection/mat_view.h"
 #include "lamps/light_detector.h"
+#include "lamps/readout.h"
 #include "lamps/signal/row_time.h"
 #include "support/real_data.h"
 
@@ -85,7 +86,7 @@ Identified identified(const fs::path& data, const Picture& picture) {
 TEST_F(RealDownlights, AreIdentified) {
   const Identified found = identified(data, [](const fs::path& file) { return read_image(file); });
   EXPECT_EQ(found.wrong, 0);
-  EXPECT_GE(found.lamps, 24);  // measured: 25, all of them
+  EXPECT_EQ(found.lamps, 25);
 }
 
 TEST_F(RealDownlights, AreIdentifiedInEachFormat) {
@@ -96,7 +97,7 @@ TEST_F(RealDownlights, AreIdentifiedInEachFormat) {
                      q);
     });
     EXPECT_EQ(found.wrong, 0) << ending << quality;
-    EXPECT_GE(found.lamps, 22) << ending << quality;  // measured: 23 or 24
+    EXPECT_EQ(found.lamps, 25) << ending << quality;
   }
 }
 
@@ -122,6 +123,36 @@ TEST_F(RealDownlights, TellTheRowTime) {
   const RowTimeResult result = choose_row_time(estimate_row_time(periods, map()));
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s / 15.10e-6, 1, 0.002);
+}
+
+/// The same lamps from the side: a bright core near one edge and crescents of the rim.
+TEST(RealDownlightsFromTheSide, AreIdentified) {
+  const fs::path data = real_data("downlights-oblique");
+  if (data.empty()) GTEST_SKIP() << "no real captures here";
+  const Identified found = identified(data, [](const fs::path& file) { return read_image(file); });
+  EXPECT_EQ(found.wrong, 0);
+  EXPECT_EQ(found.lamps, 12);
+}
+
+/// Photographs along rows and along columns, in which no read-out is stated.
+TEST(RealGlows, AreIdentifiedWithTheReadoutOfEachPhotograph) {
+  const fs::path data = real_data("luxapose");
+  if (data.empty()) GTEST_SKIP() << "no real captures here";
+  const LightDetector by_rows(read_lamp_map(data / "lamps.yaml"), {Readout::rows, 1 / 47540.0, {}});
+  for (const LightDetector& detector : {by_rows, by_rows.with_readout(Readout::columns)}) {
+    for (const auto& [name, readout, count] :
+         {std::tuple("x_0_y_1.27.jpg", Readout::rows, 5),
+          std::tuple("2014-02-27--18-15-03-62.jpg", Readout::columns, 3),
+          std::tuple("small_blob.jpg", Readout::rows, 5)}) {
+      const cv::Mat image = read_image(data / name);
+      const LightsByReadout found = detect_either_way(detector, image_view(image));
+      EXPECT_EQ(found.readout, readout) << name;
+      EXPECT_EQ(std::count_if(found.lights.begin(), found.lights.end(),
+                              [](const Light& light) { return light.kind == LightKind::lamp; }),
+                count)
+          << name;
+    }
+  }
 }
 
 /// Glowing bulbs, from a phone's own JPEG files and the same pictures in other formats.

@@ -90,7 +90,8 @@ TEST_F(Detect, SaysOfEachLightWhatItIsAndWhy) {
   EXPECT_EQ(kinds["lamp"], lamps.rows());
   EXPECT_EQ(kinds["steady"], 2U) << "the steady lamp and the window";
   EXPECT_EQ(kinds["unknown"], 1U) << "the reflection of lamp 5";
-  EXPECT_THAT(found.output, HasSubstr("1         unknown, soft: it is much softer than others"));
+  EXPECT_THAT(found.output,
+              HasSubstr("1         unknown, reflection: it is softer than the lamps"));
   EXPECT_THAT(found.errors, HasSubstr(") lamp 5: its stripes are that lamp's; radius 28.6 px"));
 }
 

@@ -95,12 +95,13 @@ TEST_F(RealGlowChain, OfFiveLampsEndsAtTheRigsCentre) {
 TEST_F(RealGlowChain, OfThreeLampsEndsWhereTheOtherTwoAreOutOfView) {
   const auto located = locate("2014-02-27--18-15-03-62.jpg", 4352, 7712, "columns");
   ASSERT_EQ(located.exit_code, 0) << located.errors;
-  EXPECT_THAT(located.errors, HasSubstr("the residuals show "));
+  // The lamps have no outline: their sigma_px contains the residuals of a lens that is not known.
+  EXPECT_THAT(located.errors, testing::Not(HasSubstr("the residuals show ")));
   const FixRow row = only_fix();
   EXPECT_EQ(row.lamps, 3);
   const double distance_m = kCeiling_m - row.fix->pose.position_m.z();
-  EXPECT_NEAR(distance_m, 2.346, 0.02);                                      // measured: 2.353
-  EXPECT_NEAR(row.fix->residual_px * distance_m / kFocal_px, 8.3e-3, 1e-3);  // measured: 8.6e-3
+  EXPECT_NEAR(distance_m, 2.346, 0.02);
+  EXPECT_NEAR(row.fix->residual_px * distance_m / kFocal_px, 8.3e-3, 1e-3);
   EXPECT_THAT(lamps_in_view(row.fix->pose), testing::ElementsAre(3000, 3500, 4000));
 }
 

@@ -6,39 +6,32 @@
 #include <optional>
 #include <vector>
 
-#include "lamps/signal/stripes.h"
 #include "lamps/shape/outline.h"
 #include "lamps/shape/shear.h"
+#include "lamps/signal/stripes.h"
 
 namespace vlp {
 
-/// What became of a light in an image.
+/// Kind of a light in an image.
 enum class LightKind {
   lamp,     ///< wholly in the image and identified: fit for a fix
-  cut,      ///< identified, but the image's edge cuts it
-  unknown,  ///< flickers, but is not told to be one lamp of the map, see LightReason
-  steady,   ///< does not flicker
-  formless  ///< bright, but without a round outline, so that it has no centre
+  cut,      ///< identified, but cut by the image's edge
+  unknown,  ///< modulated, but not identified as one lamp of the map, see LightReason
+  steady,   ///< not modulated
+  formless  ///< bright, but neither modulated nor of a known outline
 };
 
-/// What decided that, of lights that are not identified the first that speaks against it.
+/// Reason why a light is no lamp; of several the first that applies.
 enum class LightReason {
-  identified,    ///< a lamp, and one that is cut
-  clipped,       ///< steady: contrast below kLeastContrast, and most of it as bright as can be
-  even,          ///< steady: contrast below kLeastContrast
-  few_stripes,   ///< steady: less than kLeastPeriods
-  unclear,       ///< steady: no period explains half of what varies from line to line
-  incoherent,    ///< steady: its parts vary each in its way, see coherence_of()
-  irregular,     ///< unknown: the stripes are not readable()
-  like_no_lamp,  ///< unknown: the period is like no lamp's, or like two lamps'
-  other_shape,   ///< unknown: that lamp has another shape in the map: disc, rectangle, its sides
-  soft,          ///< unknown: much softer than others, a reflection
-  not_round,     ///< unknown: most of its edge is not on its outline
-  seen_better,   ///< unknown: another light is that lamp, and has the surer centre
-  alone,         ///< unknown: less than kEnoughPeriods, and no lamp with more in the image
-  at_edge,       ///< formless: the image's edge cuts it
-  small,         ///< formless: its outline has less than twice kLeastOutlinePoints
-  no_outline     ///< formless: neither a circle nor an ellipse fits its outline
+  identified,       ///< a lamp, or one that is cut
+  overexposed,      ///< steady: contrast below kLeastContrast, most pixels at full scale
+  steady,           ///< steady: contrast below kLeastContrast
+  too_few_periods,  ///< less than kLeastPeriods, or less than kEnoughPeriods and no lamp with more
+  no_clear_period,  ///< no period explains it, its parts differ, or its stripes are irregular
+  unknown_period,   ///< its period is that of no lamp, or of several
+  reflection,       ///< it is softer or smaller than another light, or as large as its mirror image
+  wrong_shape,      ///< its outline is not that of its lamp, or cannot be fitted
+  incomplete        ///< cut by the image's edge, or too small for an outline
 };
 
 /// One that is formless has its box, `pixel` in the middle, and its edge; no stripes, no sigma.
@@ -65,8 +58,13 @@ struct Light {
   /// Share of the pixels in the middle of a steady light that are as bright as the brightest there:
   /// of one that is clipped, most.
   double clipped;
-  /// Whether it has no edge, and its outline is a level.
+  /// Whether it was found by its modulation, which decided its stripes.
+  bool by_modulation;
+  /// Whether it has no outline: its centre is that of the area that it lights.
   bool glows;
+  /// Whether its outline may be another one than the lamp's: soft, seen in part, or of a source in
+  /// a reflector, much brighter inside than next to it.
+  bool is_doubtful;
   /// Whether it is lit unevenly, and its outline is a rim, see rim_of(); its roundness is the share
   /// of the ends of its lit lines that show the rim.
   bool uneven;
@@ -89,6 +87,9 @@ struct Light {
   /// Of a circle in the level plane what it leaves of the outline; of no points else.
   OutlineSums sums;
 };
+
+/// Part of an outline that has to be seen for it to be trusted: Light::roundness.
+inline constexpr double kMinRoundness = 0.45;
 
 inline bool is_rectangle(const Light& light) { return !light.face.empty(); }
 

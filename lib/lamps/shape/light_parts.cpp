@@ -47,10 +47,10 @@ LightReason reason_of(const LightPart& part, const ImageSize& size) {
   const PixelBox& box = part.box;
   const bool inside =
       box.x > 0 && box.y > 0 && box.right() < size.width && box.bottom() < size.height;
-  if (!inside) return LightReason::at_edge;
+  if (!inside) return LightReason::incomplete;
   // What is not of the light itself takes up some of the points.
   const bool small = part.outline.size() < 2 * kLeastOutlinePoints;
-  return small ? LightReason::small : LightReason::no_outline;
+  return small ? LightReason::incomplete : LightReason::wrong_shape;
 }
 
 bool overlap(const Light& a, const Light& b) {

@@ -10,9 +10,9 @@
 #include <limits>
 #include <numbers>
 
+#include "geometry/median.h"
 #include "lamps/shape/robust_circle.h"
 #include "lamps/shape/robust_ellipse.h"
-#include "geometry/median.h"
 #include "rig/detection.h"
 
 namespace vlp {

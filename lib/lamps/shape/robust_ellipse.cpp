@@ -9,9 +9,9 @@
 #include <numbers>
 #include <utility>
 
+#include "geometry/symmetric.h"
 #include "lamps/shape/m_estimate.h"
 #include "lamps/shape/robust_circle.h"
-#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {

@@ -10,8 +10,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "lamps/signal/lamp_rule.h"
 #include "geometry/symmetric.h"
+#include "lamps/signal/lamp_rule.h"
 #include "rig/file.h"
 #include "rig/yaml_reader.h"
 #include "rig/yaml_writer.h"

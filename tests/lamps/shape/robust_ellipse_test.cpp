@@ -10,8 +10,8 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-#include "lamps/shape/robust_circle.h"
 #include "geometry/arc.h"
+#include "lamps/shape/robust_circle.h"
 #include "support/near.h"
 
 namespace vlp {

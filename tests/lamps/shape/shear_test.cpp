@@ -6,8 +6,8 @@
 
 #include <numbers>
 
-#include "lamps/shape/robust_circle.h"
 #include "geometry/arc.h"
+#include "lamps/shape/robust_circle.h"
 #include "support/near.h"
 #include "support/random.h"
 

@@ -1,0 +1,392 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "lamps/signal/modulated_lights.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "lamps/image/runs.h"
+#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/stripes.h"
+
+namespace vlp {
+namespace {
+
+/// Bins of the shortest period: enough for its third harmonic.
+constexpr double kBinsPerPeriod = 8;
+/// Fraction of the variance that the period of a modulated light may leave.
+constexpr double kMaxUnexplained = 0.45;
+/// Log-likelihood ratio that decides between two periods: odds of 20.
+constexpr double kMinLogRatio = 3;
+/// Modulation depth of the fundamental below which a light is steady.
+constexpr double kMinLightDepth = 0.3;
+/// Cells of the smallest light.
+constexpr int kMinCells = 4;
+/// Largest phase difference of two regions of one lamp, in rad.
+constexpr double kMaxPhase_rad = 1.2;
+
+/// A region and what its profile is.
+struct RegionCandidate {
+  ModulatedRegion region;
+  LineProfile profile;
+  PeriodFit fit;
+  std::optional<std::size_t> lamp;
+  /// Fits of the lamps' periods, by lamp.
+  std::vector<PeriodFit> lamp_fits;
+  bool is_modulated = false;
+  bool is_other_period = false;  ///< a period that no lamp has is better
+};
+
+/// Log-likelihood ratio of two fits. Three harmonics leave 6 independent values of a period, or as
+/// many as it has lines; the unknowns are the coefficients and the period.
+double log_ratio(const PeriodFit& better, const PeriodFit& worse) {
+  constexpr double values_per_period = 6, unknowns = 7, min_unexplained = 1e-3;
+  const double periods =
+      worse.periods > 0 ? std::min(better.periods, worse.periods) : better.periods;
+  const double values = periods * std::min(values_per_period, better.period_lines);
+  return std::max(1.0, values - unknowns) / 2 *
+         std::log(std::max(worse.unexplained, min_unexplained) /
+                  std::max(better.unexplained, min_unexplained));
+}
+
+/// Brightness of a region along the read-out, in the region and `margin` lines on both sides. A
+/// cell column counts by the amplitude that it has in the region.
+LineProfile profile_of(const CellLevels& cells, const ModulationMap& map,
+                       const ModulatedRegion& region, double margin_lines) {
+  const int first_cell = (region.box.x - cells.box.x) / kCellWidth_px;
+  std::vector<float> weights(std::size_t(region.box.width / kCellWidth_px), 0);
+  for (const auto& [step, begin, end] : region.spans) {
+    for (int x = begin; x < end; x += kCellWidth_px) {
+      const int cell = (x - cells.box.x) / kCellWidth_px;
+      weights[std::size_t(cell - first_cell)] += map.amplitude[map.index(step, cell)];
+    }
+  }
+  const auto bin_at = [&](double line) {
+    const double bin = (line - cells.box.y) / cells.lines_per_bin;
+    return static_cast<int>(std::clamp(bin, 0.0, double(cells.bins)));
+  };
+  const int begin = bin_at(region.box.y - margin_lines);
+  const int end = bin_at(region.box.bottom() + margin_lines);
+  LineProfile profile{
+      cells.box.y + (begin + 0.5) * cells.lines_per_bin - 0.5, cells.lines_per_bin, {}};
+  for (int bin = begin; bin < end; ++bin) {
+    const float* row = cells.row(bin) + first_cell;
+    double sum = 0;
+    for (std::size_t c = 0; c < weights.size(); ++c) sum += double(weights[c]) * double(row[c]);
+    profile.levels.push_back(std::max(0.0, sum));
+  }
+  return profile;
+}
+
+/// Fits a lamp's period, give or take its drift.
+PeriodFit fit_lamp(const LineProfile& profile, double period_lines) {
+  constexpr double finest = kLampDrift / 16;
+  PeriodFit best = fit_period(profile, period_lines);
+  const auto improve = [&](double drift) {
+    if (std::abs(drift) > kLampDrift) return;
+    const PeriodFit fit = fit_period(profile, period_lines * (1 + drift));
+    if (fit.unexplained < best.unexplained) best = fit;
+  };
+  for (double step = kLampDrift; step > finest; step /= 2) {
+    const double middle = best.period_lines / period_lines - 1;
+    improve(middle - step);
+    improve(middle + step);
+  }
+  return best;
+}
+
+std::size_t best_lamp(const RegionCandidate& candidate) {
+  const auto best = std::min_element(
+      candidate.lamp_fits.begin(), candidate.lamp_fits.end(),
+      [](const PeriodFit& a, const PeriodFit& b) { return a.unexplained < b.unexplained; });
+  return std::size_t(best - candidate.lamp_fits.begin());
+}
+
+/// Returns whether two fits have one phase at a line between two regions, where that counts least
+/// that their periods are not quite the same.
+bool are_in_phase(const RegionCandidate& a, const PeriodFit& fit_of_a, const RegionCandidate& b,
+                  const PeriodFit& fit_of_b) {
+  const auto middle = [](const PixelBox& box) { return box.y + box.height / 2.0; };
+  const double line = (middle(a.region.box) + middle(b.region.box)) / 2;
+  const auto phase_at = [&](const PeriodFit& fit) {
+    return 2 * std::numbers::pi * line / fit.period_lines - fit.phase_rad;
+  };
+  const double difference = phase_at(fit_of_a) - phase_at(fit_of_b);
+  return std::abs(std::remainder(difference, 2 * std::numbers::pi)) < kMaxPhase_rad;
+}
+
+/// Candidates that have a lamp beyond doubt, by lamp; nullptr where none has.
+using Claims = std::vector<const RegionCandidate*>;
+
+/// Takes the best lamp of a candidate if every rival is worse by far. A lamp that another candidate
+/// has is no rival, unless this one may be a part or a mirror image of it by its phase.
+void decide(const Claims& claims, RegionCandidate& candidate) {
+  if (candidate.lamp_fits.empty() || !candidate.is_modulated || candidate.is_other_period) return;
+  const std::size_t best = best_lamp(candidate);
+  const PeriodFit& fit = candidate.lamp_fits[best];
+  if (fit.unexplained > kMaxUnexplained) return;
+  for (std::size_t i = 0; i < candidate.lamp_fits.size(); ++i) {
+    const PeriodFit& other = candidate.lamp_fits[i];
+    if (i == best || log_ratio(fit, other) > kMinLogRatio) continue;
+    if (claims[i] == nullptr || are_in_phase(candidate, other, *claims[i], claims[i]->fit)) return;
+  }
+  candidate.lamp = best;
+  candidate.fit = fit;
+}
+
+RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, ModulatedRegion region,
+                        std::span<const double> lamp_periods_lines, double min_period_lines) {
+  RegionCandidate candidate{std::move(region), {}, {}, {}, {}, false, false};
+  double margin = min_period_lines;
+  for (const double period : lamp_periods_lines) margin = std::max(margin, period);
+  candidate.profile = profile_of(cells, map, candidate.region, margin);
+  const LineProfile& profile = candidate.profile;
+  candidate.fit = find_period(profile, min_period_lines);
+  for (const double period : lamp_periods_lines) {
+    candidate.lamp_fits.push_back(period < kShortestPeriod_lines ? PeriodFit{period}
+                                                                 : fit_lamp(profile, period));
+  }
+  if (!lamp_periods_lines.empty()) {
+    const PeriodFit& lamp = candidate.lamp_fits[best_lamp(candidate)];
+    candidate.is_other_period = log_ratio(candidate.fit, lamp) > kMinLogRatio;
+    if (!candidate.is_other_period) candidate.fit = lamp;
+  }
+  // Few periods mean something only where they are a lamp's.
+  const bool has_lamp_period = !lamp_periods_lines.empty() && !candidate.is_other_period;
+  const double min_periods = has_lamp_period ? kLeastPeriods : kEnoughPeriods;
+  candidate.is_modulated = candidate.fit.unexplained < kMaxUnexplained &&
+                           candidate.fit.depth > kMinLightDepth &&
+                           candidate.region.box.height > min_periods * candidate.fit.period_lines;
+  return candidate;
+}
+
+/// Distance between two boxes, along the axis in which it is larger.
+int gap_between(const PixelBox& a, const PixelBox& b) {
+  const int across = std::max(a.x, b.x) - std::min(a.right(), b.right());
+  const int along = std::max(a.y, b.y) - std::min(a.bottom(), b.bottom());
+  return std::max(across, along);
+}
+
+/// Whether two candidates are parts of one light.
+bool belong_together(const RegionCandidate& a, const RegionCandidate& b) {
+  if (a.lamp != b.lamp) return false;
+  const double ratio = a.fit.period_lines / b.fit.period_lines;
+  if (!a.lamp && std::abs(ratio - 1) > 2 * kLampDrift) return false;
+  const auto size = [](const RegionCandidate& c) {
+    return std::max(c.region.box.width, c.region.box.height);
+  };
+  if (2 * gap_between(a.region.box, b.region.box) > std::max(size(a), size(b))) return false;
+  return are_in_phase(a, a.fit, b, b.fit);
+}
+
+/// Area of cells above a level, and the mean of their places.
+struct LitArea {
+  double cells = 0, energy = 0;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+
+  Eigen::Vector2d center() const { return sum / cells; }
+};
+
+/// Adds the cells of a region that are above each fraction of `peak`.
+template <std::size_t n>
+void add_area(const ModulationMap& map, const ModulatedRegion& region, double peak,
+              const std::array<double, n>& fractions, std::array<LitArea, n>& areas) {
+  for (const auto& [step, begin, end] : region.spans) {
+    const double line = map.line(step);
+    for (int x = begin; x < end; x += kCellWidth_px) {
+      const double amplitude = map.amplitude[map.index(step, (x - map.box.x) / kCellWidth_px)];
+      for (std::size_t i = 0; i < n; ++i) {
+        if (amplitude < fractions[i] * peak) continue;
+        areas[i].sum += Eigen::Vector2d(x + (kCellWidth_px - 1) / 2.0, line);
+        areas[i].energy += amplitude;
+        ++areas[i].cells;
+      }
+    }
+  }
+}
+
+/// The columns of a region on each of its lines.
+std::vector<Run> chords_in(const ModulationMap& map, const ModulatedRegion& region) {
+  std::vector<Run> chords;
+  for (const auto& [step, begin, end] : region.spans) {
+    const int first = map.box.y + step * map.lines_per_step;
+    const int last = std::min(first + map.lines_per_step, map.box.bottom()) - 1;
+    if (!chords.empty() && chords.back().row >= first) {  // another span of these lines
+      for (auto chord = chords.rbegin(); chord != chords.rend() && chord->row >= first; ++chord) {
+        chord->end = std::min(end, map.box.right());
+      }
+      continue;
+    }
+    for (int line = first; line <= last; ++line) {
+      chords.push_back({line, begin, std::min(end, map.box.right())});
+    }
+  }
+  return chords;
+}
+
+/// Measures the stripes of a candidate behind its envelope. The period and the duty are those of
+/// the passages through the middle of the levels where these keep time with the fitted period, and
+/// the fitted period else.
+Stripes measure_stripes(const RegionCandidate& candidate) {
+  const PeriodFit& fit = candidate.fit;
+  Stripes stripes = stripes_of(divide_by_envelope(candidate.profile, fit.period_lines));
+  if (!(std::abs(stripes.period_lines / fit.period_lines - 1) < 2 * kLampDrift)) {
+    stripes.period_lines = fit.period_lines;
+  }
+  stripes.clarity = 1 - fit.unexplained;
+  stripes.periods = std::max(0.0, candidate.region.box.height / fit.period_lines - 1);
+  stripes.regular = true;
+  return stripes;
+}
+
+ModulatedLight make_light(const ModulationMap& map,
+                          const std::vector<const RegionCandidate*>& parts) {
+  // The whole area, half of the brightest level, and between them.
+  constexpr std::array<double, 3> fractions{0, 0.25, 0.5};
+  const RegionCandidate& brightest = **std::max_element(
+      parts.begin(), parts.end(), [](auto* a, auto* b) { return a->region.peak < b->region.peak; });
+  ModulatedLight light{brightest.region.box,
+                       {},
+                       0,
+                       0,
+                       0,
+                       brightest.fit,
+                       brightest.lamp,
+                       measure_stripes(brightest),
+                       log_ratio(brightest.fit, PeriodFit{}),
+                       0,
+                       chords_in(map, brightest.region)};
+  std::array<LitArea, fractions.size()> areas;
+  for (const RegionCandidate* part : parts) {
+    // What is darker is light that the lamp throws on its surroundings.
+    if (part->region.peak < double(kBorderFraction) * brightest.region.peak) continue;
+    light.box = around(light.box, part->region.box);
+    add_area(map, part->region, brightest.region.peak, fractions, areas);
+  }
+  light.energy = areas[0].energy;
+  light.center = areas[0].center();
+  const double cell_px2 = double(kCellWidth_px) * map.lines_per_step;
+  light.radius_px = std::sqrt(areas[0].cells * cell_px2 / std::numbers::pi);
+  for (std::size_t i = 1; i < areas.size(); ++i) {
+    const double apart_px = (areas[i].center() - light.center).norm() / std::numbers::sqrt2;
+    light.asymmetry_px = std::max(light.asymmetry_px, apart_px);
+  }
+  light.center_sd_px = std::hypot(light.asymmetry_px, light.radius_px / std::numbers::sqrt2);
+  return light;
+}
+
+/// Makes one light of candidates that belong together.
+std::vector<ModulatedLight> join_parts(const ModulationMap& map,
+                                       std::vector<RegionCandidate>& candidates) {
+  std::erase_if(candidates, [](const RegionCandidate& c) { return !c.is_modulated; });
+  std::vector<ModulatedLight> lights;
+  std::vector<bool> used(candidates.size(), false);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (used[i]) continue;
+    std::vector<const RegionCandidate*> parts{&candidates[i]};
+    used[i] = true;
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      for (std::size_t j = i + 1; j < candidates.size(); ++j) {
+        if (used[j] || !belong_together(*parts[k], candidates[j])) continue;
+        used[j] = true;
+        parts.push_back(&candidates[j]);
+      }
+    }
+    lights.push_back(make_light(map, parts));
+  }
+  // Near a lamp, what has no period of its own is light that the lamp throws on its surroundings.
+  std::erase_if(lights, [&](const ModulatedLight& light) {
+    return !light.lamp &&
+           std::any_of(lights.begin(), lights.end(), [&](const ModulatedLight& other) {
+             return other.lamp && other.energy > light.energy &&
+                    gap_between(light.box, other.box) <
+                        std::max(other.box.width, other.box.height) / 2;
+           });
+  });
+  return lights;
+}
+
+/// Periods to demodulate at: those of the lamps, or, where they are not known, a bank of filters
+/// that overlap.
+std::vector<double> periods_to_search(std::span<const double> lamp_periods_lines, int lines) {
+  constexpr double bank_ratio = 1.15, min_bank_lines = 4;
+  std::vector<double> periods;
+  for (const double period : lamp_periods_lines) {
+    if (period >= kShortestPeriod_lines) periods.push_back(period);
+  }
+  if (!lamp_periods_lines.empty()) return periods;
+  for (double period = min_bank_lines; period < lines / kLeastPeriods; period *= bank_ratio) {
+    periods.push_back(period);
+  }
+  return periods;
+}
+
+/// A searched part of the image.
+struct BoxSearch {
+  ModulationMap map;
+  std::vector<RegionCandidate> candidates;
+};
+
+std::optional<BoxSearch> search_box(const ImageView& lines, const PixelBox& box,
+                                    const Background& background,
+                                    std::span<const double> lamp_periods_lines) {
+  // Noise is coarser than one grey level only where the image has it.
+  constexpr double min_noise = 1;
+  const auto periods = periods_to_search(lamp_periods_lines, box.height);
+  if (periods.empty()) return std::nullopt;
+  const double shortest = *std::min_element(periods.begin(), periods.end());
+  const int lines_per_bin = std::max(1, static_cast<int>(shortest / kBinsPerPeriod));
+  const CellLevels cells = average_cells(lines, box, background.level, lines_per_bin);
+  BoxSearch result{map_modulation(cells, periods), {}};
+  const double noise = std::max(min_noise, background.noise);
+  for (ModulatedRegion& region :
+       find_modulated_regions(result.map, min_significant_amplitude(noise, shortest))) {
+    if (region.cells < kMinCells) continue;
+    result.candidates.push_back(examine(cells, result.map, std::move(region), lamp_periods_lines,
+                                        std::max(kShortestPeriod_lines, shortest / 2)));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
+                                                  std::span<const PixelBox> boxes,
+                                                  const Background& background,
+                                                  std::span<const double> lamp_periods_lines) {
+  std::vector<BoxSearch> searches;
+  for (const PixelBox& box : boxes) {
+    if (auto found = search_box(lines, box, background, lamp_periods_lines)) {
+      searches.push_back(std::move(*found));
+    }
+  }
+  const Claims none(lamp_periods_lines.size(), nullptr);
+  Claims claims = none;
+  for (BoxSearch& each : searches) {
+    for (RegionCandidate& candidate : each.candidates) decide(none, candidate);
+  }
+  for (const BoxSearch& each : searches) {
+    for (const RegionCandidate& candidate : each.candidates) {
+      if (!candidate.lamp) continue;
+      const RegionCandidate*& claim = claims[*candidate.lamp];
+      if (claim == nullptr || claim->region.peak < candidate.region.peak) claim = &candidate;
+    }
+  }
+  for (BoxSearch& each : searches) {
+    for (RegionCandidate& candidate : each.candidates) {
+      if (!candidate.lamp) decide(claims, candidate);
+    }
+  }
+  std::vector<ModulatedLight> lights;
+  for (BoxSearch& each : searches) {
+    for (ModulatedLight& light : join_parts(each.map, each.candidates)) {
+      lights.push_back(std::move(light));
+    }
+  }
+  return lights;
+}
+
+}  // namespace vlp

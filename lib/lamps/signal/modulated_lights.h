@@ -1,0 +1,73 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "lamps/image/background.h"
+#include "lamps/image/image_view.h"
+#include "lamps/image/runs.h"
+#include "lamps/signal/modulation_map.h"
+#include "lamps/signal/period_fit.h"
+#include "lamps/signal/stripes.h"
+
+namespace vlp {
+
+/// A light that was found by its modulation, whatever its shape.
+struct ModulatedLight {
+  PixelBox box;  ///< around its cells
+  /// Centre of the area that it lights, (column, line), and the radius of the disc of that area, in
+  /// pixels.
+  Eigen::Vector2d center;
+  double radius_px;
+  /// Largest distance per axis of the centre of a brighter part of the area from `center`, in
+  /// pixels: of that above a quarter, and above a half, of the largest amplitude.
+  double asymmetry_px;
+  /// Standard deviation per axis of the lamp's centre from `center`, in pixels. A source deep in a
+  /// reflector is seen anywhere in the lamp: the lamp's centre may lie on the border of the lit
+  /// area.
+  double center_sd_px;
+  PeriodFit fit;
+  /// Index of the lamp period that it has; std::nullopt where it has none or may have two.
+  std::optional<std::size_t> lamp;
+  Stripes stripes;  ///< of its brightest part, behind its envelope
+  /// Log-likelihood ratio of the fit against no modulation.
+  double evidence;
+  /// Sum of the amplitude over its cells.
+  double energy;
+  /// Columns of its brightest part on each line.
+  std::vector<Run> chords;
+};
+
+/// Finds lights in parts of an image by their modulation and decides which of the lamps' periods
+/// they have.
+///
+/// Each region of the modulation map (see find_modulated_regions()) has a line profile, in which a
+/// column counts by its amplitude. The profile is fitted with each lamp's period, give or take its
+/// drift, and with any other period. With the fractions u of the variance that the fits leave, the
+/// log-likelihood ratio of two periods is
+///
+///     L = n / 2 log(u_2 / u_1),   n = periods min(6, lines of a period) - 7,
+///
+/// where n is the number of independent values that three harmonics leave of the periods that both
+/// cover. The
+/// best lamp is taken if it leaves less than 45 %, if L against every other lamp exceeds 3, and if
+/// no period that is no lamp's is better by 3. A lamp that another region of the image has beyond
+/// doubt does not count as a rival, unless the phase is that lamp's, too. Regions with one lamp and
+/// one phase that are near each other are one light.
+///
+/// With no lamp periods (the row time is not known) the lights have the period that fits best.
+///
+/// @param lines  image whose rows are the lines that the shutter reads
+/// @param boxes  parts of the image to search
+/// @param lamp_periods_lines  periods of the lamps of the map, in lines; may be empty
+std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
+                                                  std::span<const PixelBox> boxes,
+                                                  const Background& background,
+                                                  std::span<const double> lamp_periods_lines);
+
+}  // namespace vlp
