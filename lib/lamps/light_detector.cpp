@@ -84,12 +84,12 @@ bool has_clear_outline(const Light& light) {
   return !light.glows && !light.is_doubtful && is_sharp(light) && light.roundness >= kMinRoundness;
 }
 
-/// Whether two lights are at one place.
+/// Returns whether the centre of one light is within the other one's radius.
 bool are_at_one_place(const Light& a, const Light& b) {
   return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
 }
 
-/// Why a light does not flicker; nothing when it does.
+/// Returns the reason why a light is steady; std::nullopt if it is modulated.
 std::optional<LightReason> why_steady(const Light& light) {
   constexpr double least_clarity = 0.5, mostly = 0.5;
   const Stripes& stripes = light.stripes;

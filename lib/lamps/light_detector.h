@@ -52,7 +52,7 @@ class LightDetector {
   Readout readout() const { return camera_.readout; }
 
  private:
-  /// Fits outlines to a blob: one, or several where lights touch; none where it is lit unevenly.
+  /// Fits outlines to a blob: one, or several where lights touch. Sets Light::is_doubtful.
   std::vector<LightPart> parts_of(const ImageView& lines, const Blob& blob,
                                   const Background& background) const;
   /// Searches blobs for modulated lights where no light with a clear outline is identified, and
