@@ -87,7 +87,8 @@ Light light_by_modulation(const ImageView& lines, const ModulatedLight& found,
   }
   light.by_modulation = true;
   light.stripes = found.stripes;
-  light.coherence = 1;
+  light.peak = found.peak;
+  light.coherence = found.phase_coherence;
   return light;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "geometry/frames.h"
+#include "geometry/median.h"
 #include "lamps/image/background.h"
 #include "lamps/image/levels.h"
 #include "lamps/image/lines.h"
@@ -28,32 +29,33 @@ namespace vlp {
 
 namespace {
 
-/// How many lines without light a lamp may show between two stripes.
-int most_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_time_s) {
+/// Returns the largest number of lines without light between two stripes of a lamp.
+int max_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_time_s) {
   constexpr int unknown = 24, spare = 3;
   if (!row_time_s) return unknown;
-  double most = 0;
+  double max_rows = 0;
   for (const Lamp& lamp : lamps.lamps) {
     if (!lamp.frequency_hz) return unknown;
-    most = std::max(most, (1 - lamp.duty.value_or(0.5)) / (*lamp.frequency_hz * *row_time_s));
+    max_rows =
+        std::max(max_rows, (1 - lamp.duty.value_or(0.5)) / (*lamp.frequency_hz * *row_time_s));
   }
-  return static_cast<int>(std::ceil(most)) + spare;
+  return static_cast<int>(std::ceil(max_rows)) + spare;
 }
 
-/// Whether no pixel can be brighter: full scale of 8 bits, or of a converter of 10 to 16.
+/// Returns whether no pixel can be brighter: full scale of 8 bits, or of a converter of 10 to 16.
 bool is_full_scale(double level, int bits_per_pixel) {
   constexpr double nearly = 0.98;
-  const int least_bits = bits_per_pixel == 16 ? 10 : 8, most_bits = bits_per_pixel;
-  for (int bits = least_bits; bits <= most_bits; bits += 2) {
+  const int min_bits = bits_per_pixel == 16 ? 10 : 8;
+  for (int bits = min_bits; bits <= bits_per_pixel; bits += 2) {
     const double full = std::exp2(bits) - 1;
     if (level <= full && level >= nearly * full) return true;
   }
   return false;
 }
 
-/// Of a steady light, see Light::clipped.
-double clipped_share(const ImageView& lines, const Eigen::Vector2d& low,
-                     const Eigen::Vector2d& high) {
+/// Returns Light::clipped of a steady light.
+double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
+                        const Eigen::Vector2d& high) {
   const Eigen::Vector2d middle = (low + high) / 2, size = (high - low) / 2;
   const ImageView pixels = lines.part({static_cast<int>(std::lround(middle.x() - size.x() / 2)),
                                        static_cast<int>(std::lround(middle.y() - size.y() / 2)),
@@ -65,8 +67,8 @@ double clipped_share(const ImageView& lines, const Eigen::Vector2d& low,
   return double(count_pixels_at(pixels, brightest)) / (double(pixels.width) * pixels.height);
 }
 
-/// To what the outlines say. Which of two lights has the surer centre is not for it to say: it is
-/// the smaller one's.
+/// Adds the error of an unknown lens to the sigma of the lights. Called last, because of two lights
+/// that claim one lamp the sigma by their outlines decides.
 void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
@@ -91,25 +93,15 @@ bool are_at_one_place(const Light& a, const Light& b) {
 
 /// Returns the reason why a light is steady; std::nullopt if it is modulated.
 std::optional<LightReason> why_steady(const Light& light) {
-  constexpr double least_clarity = 0.5, mostly = 0.5;
+  constexpr double min_clarity = 0.5, min_clipped = 0.5;
   const Stripes& stripes = light.stripes;
   if (!(stripes.contrast >= kLeastContrast)) {
-    return light.clipped > mostly ? LightReason::overexposed : LightReason::steady;
+    return light.clipped > min_clipped ? LightReason::overexposed : LightReason::steady;
   }
   if (!(stripes.periods >= kLeastPeriods)) return LightReason::too_few_periods;
-  if (!(stripes.clarity >= least_clarity)) return LightReason::no_clear_period;
+  if (!(stripes.clarity >= min_clarity)) return LightReason::no_clear_period;
   if (!(light.coherence >= kLeastCoherence)) return LightReason::no_clear_period;
   return std::nullopt;
-}
-
-/// Whether a light without an outline is modulated beyond doubt: its parts across the lines show
-/// the same stripes, or so many periods fit so well that no pattern repeats like that by chance.
-bool is_modulated(const ImageView& lines, const ModulatedLight& light,
-                  const Background& background) {
-  constexpr double min_coherence = 0.9, beyond_chance = 30;
-  if (light.box.height < kEnoughPeriods * light.fit.period_lines) return false;
-  return light.evidence > beyond_chance ||
-         coherence_of(lines, light.chords, background, light.fit.period_lines) >= min_coherence;
 }
 
 /// Merges boxes that overlap, until none do.
@@ -144,7 +136,7 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
       camera_(camera),
       shape_(camera),
       classifier_(std::move(classifier)),
-      most_dark_rows_(most_dark_rows_of(lamps, camera.row_time_s)),
+      max_dark_rows_(max_dark_rows_of(lamps, camera.row_time_s)),
       has_rectangles_(std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
                                   [](const Lamp& lamp) { return lamp.rectangle.has_value(); })) {
   if (!camera_.row_time_s || classifier_) return;
@@ -184,7 +176,7 @@ LightDetector LightDetector::with_readout(Readout readout) const {
 
 std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blob& blob,
                                                const Background& background) const {
-  constexpr std::size_t most_lights = 4;
+  constexpr std::size_t max_lights = 4;
   const PixelBox box = blob.box();
   std::vector<LightPart> parts;
   auto rest = outline_of(lines, blob, background);
@@ -193,7 +185,7 @@ std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blo
       return {{std::move(light), {}, box}};
     }
   }
-  while (parts.size() < most_lights) {
+  while (parts.size() < max_lights) {
     auto light = shape_.light_of(rest, background);
     if (!light && !parts.empty()) break;
     auto outline = std::move(rest);
@@ -241,7 +233,6 @@ void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<
   }
   for (const ModulatedLight& found : find_modulated_lights(
            lines, merge_overlapping(std::move(boxes)), background, lamp_periods_)) {
-    if (!is_modulated(lines, found, background)) continue;
     Light light = light_by_modulation(lines, found, blobs, background, shape_);
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
     // Lamps that share a period differ in duty; without known periods a classifier decides.
@@ -263,13 +254,14 @@ void LightDetector::measure(const ImageView& lines, const Background& background
   const auto judge = [&](const std::vector<double>& signal) {
     const Eigen::Vector2d from = shape_.turned(light.low), to = shape_.turned(light.high);
     light.stripes = stripes_of(signal);
+    light.peak = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
     if (light.stripes.period_lines > 0) {
       const auto chords = is_rectangle(light)
                               ? chords_within(shape_.turned(light.face), lines.size())
                               : chords_of(from, to, lines.size());
       light.coherence = coherence_of(lines, chords, background, light.stripes.period_lines);
     }
-    if (light.stripes.contrast < kLeastContrast) light.clipped = clipped_share(lines, from, to);
+    if (light.stripes.contrast < kLeastContrast) light.clipped = clipped_fraction(lines, from, to);
   };
   if (is_rectangle(light)) {
     const auto chords = chords_within(shape_.turned(light.face), lines.size());
@@ -307,7 +299,7 @@ void LightDetector::correct_shear(std::vector<Light>& lights) const {
 std::vector<Light> LightDetector::detect(const ImageView& image) const {
   const Background background = background_of(image);
   const auto [lines, lit, memory] = lines_of(image, camera_.readout, background);
-  const auto blobs = group_runs(find_runs(lines, background.threshold, lit), most_dark_rows_);
+  const auto blobs = group_runs(find_runs(lines, background.threshold, lit), max_dark_rows_);
   std::vector<LightPart> parts;
   parts.reserve(blobs.size());
   for (const Blob& blob : blobs) {
@@ -330,12 +322,12 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
 
 namespace {
 
-/// What a lean of 5 degrees that nobody knows of changes the logarithm of a rectangle's ratio of
-/// sides by, 35 degrees from the axis.
+/// Change of the logarithm of a rectangle's ratio of sides by an unknown tilt of 5 degrees, 35
+/// degrees from the axis.
 constexpr double kLeanedOff = 0.06;
 
-/// Of a rectangle whose sides have not quite the lamp's ratio something may hide one end: what is
-/// left of it has its centre half as far off. That is in its sigma.
+/// Adds the error of a partly hidden rectangle to its sigma. If its ratio of sides is not that of
+/// the lamp, something may hide one end: the centre of the visible part has half of that offset.
 void add_hidden_end(double off, double leaned_off, Light& light) {
   constexpr double clear = 3;
   if (!(off > leaned_off + clear * light.aspect_sd)) return;
@@ -349,26 +341,57 @@ void refuse(Light& light, LightReason reason) {
   light.reason = reason;
 }
 
-/// Of lights that seem to be one lamp keeps the one with an outline and the surest centre, or,
-/// without outlines, the largest; no one where two are about as large, because one is a mirror
-/// image.
+/// Refuses lights whose period is not that of their lamp by the row time that the lights of the
+/// image share. A wrong row time changes the ratio of measured and expected period of all lights
+/// alike: their median. Needs three lights. Those with few or unclear stripes are left out: the
+/// rule allows them kMostOffUnclear only.
+void refuse_other_row_times(const LampMap& lamps, double row_time_s, std::vector<Light>& lights) {
+  constexpr std::size_t min_lights = 3;
+  std::vector<std::pair<Light*, double>> log_ratios;
+  std::vector<double> sorted;
+  for (Light& light : lights) {
+    const Lamp* lamp = light.lamp ? find_lamp(lamps.lamps, *light.lamp) : nullptr;
+    if (lamp == nullptr || !lamp->frequency_hz) continue;
+    if (light.by_modulation || !trustworthy(light.stripes)) continue;
+    const double log_ratio =
+        std::log(light.stripes.period_lines * row_time_s * *lamp->frequency_hz);
+    log_ratios.emplace_back(&light, log_ratio);
+    sorted.push_back(log_ratio);
+  }
+  if (sorted.size() < min_lights) return;
+  const double common = upper_median(std::move(sorted));
+  for (const auto& [light, log_ratio] : log_ratios) {
+    if (std::abs(log_ratio - common) > 2 * kLampDrift) refuse(*light, LightReason::unknown_period);
+  }
+}
+
+/// Keeps one of the lights that are identified as one lamp, because the others are mirror images:
+/// one with an outline rather than one without; of several with an outline the one with the
+/// smallest sigma, of several without the largest. Refuses all if two of them are about as large
+/// and as bright. A mirror reflects less than all light, and a camera shows the corners of an image
+/// darker.
 void keep_best_claim(int lamp, std::vector<Light>& lights) {
-  constexpr double min_area_ratio = 2;
+  constexpr double min_area_ratio = 2, min_peak_ratio = 2;
   std::vector<Light*> claims;
   for (Light& light : lights) {
     if (light.lamp == lamp) claims.push_back(&light);
   }
+  if (claims.size() < 2) return;
   std::sort(claims.begin(), claims.end(), [](const Light* a, const Light* b) {
     if (a->glows != b->glows) return b->glows;
     return a->glows ? a->radius_px > b->radius_px : a->sigma_px < b->sigma_px;
   });
-  if (claims.size() < 2) return;
   const double ratio = std::pow(claims[0]->radius_px / claims[1]->radius_px, 2);
   const bool is_apart =
       (claims[0]->pixel - claims[1]->pixel).norm() > claims[0]->radius_px + claims[1]->radius_px;
   const bool are_alike = claims[0]->glows == claims[1]->glows;
-  const bool is_clear = !are_alike || ratio > min_area_ratio ||
-                        (!claims[0]->glows && (!is_apart || 1 / ratio > min_area_ratio));
+  bool is_clear = !are_alike || ratio > min_area_ratio ||
+                  (!claims[0]->glows && (!is_apart || 1 / ratio > min_area_ratio));
+  if (!is_clear) {
+    std::sort(claims.begin(), claims.end(),
+              [](const Light* a, const Light* b) { return a->peak > b->peak; });
+    is_clear = claims[0]->peak > min_peak_ratio * claims[1]->peak;
+  }
   for (std::size_t i = is_clear ? 1 : 0; i < claims.size(); ++i) {
     refuse(*claims[i], LightReason::reflection);
   }
@@ -388,20 +411,23 @@ std::optional<int> LightDetector::lamp_of(const Stripes& stripes) const {
 }
 
 std::optional<double> LightDetector::shape_off(const Light& light, int lamp) const {
-  // A lens that nobody knows changes the ratio of the sides by more than a lean.
-  const double most_off = shape_.has_lens() ? 2 * kLeanedOff : 0.3;
+  // An unknown lens changes the ratio of the sides by more than a lean.
+  const double max_off = shape_.has_lens() ? 2 * kLeanedOff : 0.3;
   const Lamp* mapped = find_lamp(lamps_.lamps, lamp);  // a classifier may know others
   const auto rectangle = mapped != nullptr ? mapped->rectangle : std::nullopt;
   if (rectangle.has_value() != is_rectangle(light)) return std::nullopt;
   if (!rectangle) return 0;
   const double aspect = rectangle->size_m.maxCoeff() / rectangle->size_m.minCoeff();
   const double off = std::abs(std::log(light.aspect / aspect));
-  return off < most_off ? std::optional(off) : std::nullopt;
+  return off < max_off ? std::optional(off) : std::nullopt;
 }
 
 void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) const {
-  constexpr double much_softer = 5, most_outside = 0.25;
-  double sharpest_px = std::numeric_limits<double>::infinity();
+  // A surface that blurs the image of a lamp reflects less than 5 % of its light to one side, which
+  // a tone curve of gamma 2.2 shows as a quarter of its level.
+  constexpr double min_peak_ratio = 0.25;
+  constexpr double max_rise_ratio = 5, max_outside = 0.25;
+  double sharpest_px = std::numeric_limits<double>::infinity(), brightest = 0;
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
     const auto steady = why_steady(light);
@@ -411,7 +437,10 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
       light.lamp.reset();
       continue;
     }
-    if (!light.uneven && !light.glows) sharpest_px = std::min(sharpest_px, light.rise_px);
+    if (!light.uneven && !light.glows) {
+      sharpest_px = std::min(sharpest_px, light.rise_px);
+      brightest = std::max(brightest, light.peak);
+    }
     if (!light.by_modulation) light.lamp = lamp_of(light.stripes);
     if (!readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
@@ -426,13 +455,17 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
     if (!light.lamp) continue;
     // A lamp's reflection flickers like the lamp. Where most of the edge is not the lamp's, a
     // circle through the rest is not to be trusted.
-    const bool strays = light.outside > most_outside;
-    if (!light.uneven && light.rise_px > much_softer * sharpest_px) {
+    const bool strays = light.outside > max_outside;
+    const bool is_soft = light.glows
+                             ? light.peak < min_peak_ratio * brightest
+                             : !light.uneven && light.rise_px > max_rise_ratio * sharpest_px;
+    if (is_soft) {
       refuse(light, LightReason::reflection);
     } else if (strays || light.roundness < kMinRoundness) {
       refuse(light, LightReason::wrong_shape);
     }
   }
+  if (camera_.row_time_s) refuse_other_row_times(lamps_, *camera_.row_time_s, lights);
   for (const Lamp& lamp : lamps_.lamps) keep_best_claim(lamp.id, lights);
   const bool sure = std::any_of(lights.begin(), lights.end(), [](const Light& light) {
     return light.lamp && light.stripes.periods >= kEnoughPeriods;

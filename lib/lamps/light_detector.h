@@ -74,7 +74,7 @@ class LightDetector {
   DetectorCamera camera_;
   LightShape shape_;
   std::optional<LampClassifier> classifier_;
-  int most_dark_rows_;
+  int max_dark_rows_;
   bool has_rectangles_;
   /// Different periods of the map's lamps, in lines, and the lamp of each; std::nullopt where
   /// several lamps share it. Empty where the row time is not known or a classifier decides.

@@ -114,6 +114,50 @@ TEST(LightDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
   for (const Light& light : both) EXPECT_EQ(light.kind, LightKind::lamp);
 }
 
+/// Kinds of the lights of an image, from left to right.
+std::vector<std::pair<LightKind, LightReason>> kinds_of(std::vector<Light> lights) {
+  std::sort(lights.begin(), lights.end(),
+            [](const Light& a, const Light& b) { return a.pixel.x() < b.pixel.x(); });
+  std::vector<std::pair<LightKind, LightReason>> kinds;
+  for (const Light& light : lights) kinds.emplace_back(light.kind, light.reason);
+  return kinds;
+}
+
+TEST(LightDetector, KeepsTheBrighterOneOfALampAndItsMirrorImage) {
+  const cv::Size size(300, 160);
+  const LightDetector detector(LampMap{{drawn_lamp(1, 11)}}, drawn_camera(size));
+  const DrawnLamp lamp{.center = {81.3, 79.6}};
+  DrawnLamp mirror_image{.center = {210.3, 79.6}};
+  const auto kinds_beside = [&](double fraction) {
+    mirror_image.level = fraction * lamp.level;
+    return kinds_of(detector.detect(image_view(drawn({lamp, mirror_image}, size, CV_8U, 0.5))));
+  };
+  const std::pair lamp_kind(LightKind::lamp, LightReason::identified);
+  const std::pair reflection(LightKind::unknown, LightReason::reflection);
+  EXPECT_EQ(kinds_beside(0.4), (std::vector{lamp_kind, reflection}));
+  EXPECT_EQ(kinds_beside(0.8), (std::vector{reflection, reflection}));
+}
+
+TEST(LightDetector, RefusesAPeriodThatTheOtherLightsContradict) {
+  const cv::Size size(520, 160);
+  const LightDetector detector(
+      LampMap{{drawn_lamp(1, 9), drawn_lamp(2, 11), drawn_lamp(3, 14), drawn_lamp(4, 18)}},
+      drawn_camera(size));
+  const auto kinds_with = [&](double first, double others) {
+    std::vector<DrawnLamp> lamps;
+    for (const double period : {first * 9, others * 11, others * 14, others * 18}) {
+      lamps.push_back({.center = {70.3 + 120 * double(lamps.size()), 79.6},
+                       .stripes = {.period_lines = period}});
+    }
+    return kinds_of(detector.detect(image_view(drawn(lamps, size, CV_8U, 0.5))));
+  };
+  const std::pair lamp(LightKind::lamp, LightReason::identified);
+  const std::pair other_period(LightKind::unknown, LightReason::unknown_period);
+  EXPECT_EQ(kinds_with(1.05, 1), (std::vector{other_period, lamp, lamp, lamp}));
+  EXPECT_EQ(kinds_with(1.05, 1.04), (std::vector{lamp, lamp, lamp, lamp}))
+      << "the row time is wrong";
+}
+
 TEST(LightDetector, FindsNothingInImagesWithoutLamps) {
   const LightDetector detector = Captures("paper-rig", "sample").detector();
   for (const int type : {CV_8U, CV_16U}) {

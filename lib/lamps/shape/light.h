@@ -58,6 +58,8 @@ struct Light {
   /// Share of the pixels in the middle of a steady light that are as bright as the brightest there:
   /// of one that is clipped, most.
   double clipped;
+  /// Level of its brightest lines above the dark, in grey levels.
+  double peak;
   /// Whether it was found by its modulation, which decided its stripes.
   bool by_modulation;
   /// Whether it has no outline: its centre is that of the area that it lights.

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -16,17 +18,62 @@
 namespace vlp {
 namespace {
 
-/// In pixels of a box.
+/// The ellipse |unit_from_pixel (p - center)| = 1, (column, row).
+struct Ellipse {
+  Eigen::Vector2d center;
+  Matrix2 unit_from_pixel;
+
+  /// Columns where a line crosses it, and the height of the line over that of the ellipse, 0 in the
+  /// middle, 1 where the line is tangent. Returns std::nullopt for lines that miss it.
+  struct Crossing {
+    double begin, end, height;
+  };
+  std::optional<Crossing> cross(double line) const {
+    const Eigen::Vector2d by_column = unit_from_pixel.col(0);
+    const Eigen::Vector2d at_line = unit_from_pixel.col(1) * (line - center.y());
+    // |by_column u + at_line|^2 = 1
+    const double a = by_column.squaredNorm(), b = by_column.dot(at_line);
+    const double determinant = by_column.x() * at_line.y() - by_column.y() * at_line.x();
+    const double square = determinant * determinant / a;
+    if (!(square < 1)) return std::nullopt;
+    const double half = std::sqrt((1 - square) / a), middle = center.x() - b / a;
+    return Crossing{middle - half, middle + half, std::sqrt(square)};
+  }
+
+  /// Cosine of the angle between the outline's normal at a point and the lines.
+  double cosine_at(const Eigen::Vector2d& pixel) const {
+    const Eigen::Vector2d normal =
+        unit_from_pixel.transpose() * (unit_from_pixel * (pixel - center));
+    return std::abs(normal.x()) / normal.norm();
+  }
+
+  double mean_radius_px() const { return 1 / std::sqrt(std::abs(unit_from_pixel.determinant())); }
+};
+
+/// Derivative of the level plane with respect to (column, row), at a pixel, of determinant 1.
+Matrix2 unit_plane_from_pixel(const LightShape& shape, const Eigen::Vector2d& pixel) {
+  constexpr double step_px = 1;
+  Matrix2 derivative = Matrix2::Identity();
+  const auto at = shape.plane_of(shape.turned(pixel));
+  for (int i = 0; i < 2; ++i) {
+    const auto beside = shape.plane_of(shape.turned(pixel + step_px * Eigen::Vector2d::Unit(i)));
+    if (!at || !beside) return Matrix2::Identity();
+    derivative.col(i) = *beside - *at;
+  }
+  const double determinant = std::abs(derivative.determinant());
+  return determinant > 0 ? Matrix2(derivative / std::sqrt(determinant)) : Matrix2::Identity();
+}
+
+/// An ellipse in pixels of a box, and the sum of e over its crossings with lit lines.
 struct Ring {
-  double u, v, radius;
-  /// Of e over its crossings with lit lines.
+  Ellipse ellipse;
   double sum;
 };
 
-/// The box of a light and a margin around it, above the dark.
+/// Levels above the dark in the box of a light and a margin around it.
 class Face {
  public:
-  /// Means are of so many pixels.
+  /// Computes means over `window` pixels of a line.
   Face(const ImageView& image, const PixelBox& box, const Background& background, int window)
       : box_(box), window_(window) {
     constexpr double share = 0.02;
@@ -44,7 +91,7 @@ class Face {
   }
 
   const PixelBox& box() const { return box_; }
-  /// Lines of bright stripes.
+  /// Returns the lines of bright stripes, of the box.
   const std::vector<int>& lit_lines() const { return lit_; }
   std::vector<int> lit_lines_of_image() const {
     std::vector<int> lines = lit_;
@@ -53,13 +100,14 @@ class Face {
   }
   bool has(int column) const { return column >= window_ && column + window_ <= box_.width; }
 
-  /// Mean level before the border between a column and the one before it, and after it.
+  /// Returns the mean levels before and after the border between a column and the one before it.
   std::pair<double, double> around(int line, int column) const {
     const float* line_means = means(line);
     return {std::max(0.F, line_means[column - 1]), std::max(0.F, line_means[column + window_ - 1])};
   }
 
-  /// e, unbounded, of a light that begins at that border, or ends there; 0 at the box's edge.
+  /// Returns e, unbounded, of a light that begins at that border, or ends there; 0 at the edge of
+  /// the box.
   double step(int line, int column, bool begins) const {
     if (!has(column)) return 0;
     const auto [before, after] = around(line, column);
@@ -71,12 +119,12 @@ class Face {
     return std::log(ratio / slope);
   }
 
-  /// Where a line passes that share of the way between the levels on both sides of that border,
-  /// next to it.
-  std::optional<double> passage(int line, int column, double share) const {
+  /// Returns the column next to a border where a line passes that fraction of the way between the
+  /// levels on both sides of it.
+  std::optional<double> passage(int line, int column, double fraction) const {
     const auto [before, after] = around(line, column);
     const auto [dark, bright] = std::minmax(before, after);
-    const double middle = dark + share * (bright - dark), sign = after > before ? 1 : -1;
+    const double middle = dark + fraction * (bright - dark), sign = after > before ? 1 : -1;
     const float* levels = this->levels(line);
     const double border = column - 0.5;
     std::optional<double> nearest;
@@ -107,8 +155,8 @@ class Face {
     }
   }
 
-  void find_lit_lines(double least_level) {
-    constexpr double least_lit = 0.55;
+  void find_lit_lines(double min_level) {
+    constexpr double min_lit = 0.55;
     std::vector<double> brightest(static_cast<std::size_t>(box_.height));
     std::vector<float> line;
     for (int row = 0; row < box_.height; ++row) {
@@ -122,7 +170,7 @@ class Face {
       const auto begin = brightest.begin() + std::max(0, row - near);
       const auto end = brightest.begin() + std::min(box_.height, row + near + 1);
       const double level = brightest[static_cast<std::size_t>(row)];
-      if (level > least_level && level > least_lit * *std::max_element(begin, end)) {
+      if (level > min_level && level > min_lit * *std::max_element(begin, end)) {
         lit_.push_back(row);
       }
     }
@@ -135,13 +183,14 @@ class Face {
   std::vector<int> lit_;
 };
 
-/// Of some of the lit lines e at each border, for a light that begins there and for one that ends.
+/// Steps e of some of the lit lines at each border, for a light that begins there and for one that
+/// ends.
 class Steps {
  public:
   explicit Steps(const Face& face) : width_(face.box().width) {
-    constexpr std::size_t most_lines = 48;
+    constexpr std::size_t max_lines = 48;
     const std::vector<int>& lit = face.lit_lines();
-    every_ = (lit.size() + most_lines - 1) / most_lines;
+    every_ = (lit.size() + max_lines - 1) / max_lines;
     for (std::size_t i = 0; i < lit.size(); i += every_) {
       lines_.push_back(lit[i]);
       for (int border = 0; border < width_; ++border) {
@@ -152,15 +201,14 @@ class Steps {
     }
   }
 
-  /// Over all lit lines.
-  double sum_of(double u, double v, double radius) const {
-    constexpr double steepest = 0.94;  // where lines still cross the circle
+  /// Returns the sum of e over the crossings of an ellipse with all lit lines.
+  double sum_of(const Ellipse& ellipse) const {
+    constexpr double max_height = 0.94;  // where lines still cross the outline
     double sum = 0;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
-      const double off = lines_[i] - v;
-      if (std::abs(off) > steepest * radius) continue;
-      const double half = std::sqrt(radius * radius - off * off);
-      sum += at(i, u - half, 0) + at(i, u + half, 1);
+      const auto crossing = ellipse.cross(lines_[i]);
+      if (!crossing || crossing->height > max_height) continue;
+      sum += at(i, crossing->begin, 0) + at(i, crossing->end, 1);
     }
     return sum * double(every_);
   }
@@ -179,49 +227,60 @@ class Steps {
   std::vector<double> e_;
 };
 
-/// The rings of the largest sum: the best, and the best of those that are far from it.
-std::array<Ring, 2> best_rings(const Face& face, const PixelBox& blob) {
-  constexpr double fine = 20, far = 0.15;
+/// Returns the ring of the largest sum. Rings are circles behind the lens, with
+/// `unit_plane_from_pixel` there.
+Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_plane_from_pixel) {
+  constexpr double fine = 20, max_radius = 0.75, max_shift = 0.35;
   const Steps steps(face);
   const double size = std::max(blob.width, blob.height), step = std::max(1.0, size / 2 / fine);
-  const double u0 = blob.x - face.box().x + blob.width / 2.0;
-  const double v0 = blob.y - face.box().y + blob.height / 2.0;
-  std::vector<Ring> rings;
-  for (double radius = size / 6; radius <= 0.6 * size; radius += step) {
-    for (double dv = -size / 4; dv <= size / 4; dv += step) {
-      for (double du = -size / 4; du <= size / 4; du += step) {
-        const double u = u0 + du, v = v0 + dv;
-        rings.push_back({u, v, radius, steps.sum_of(u, v, radius)});
+  const Eigen::Vector2d middle(blob.x - face.box().x + blob.width / 2.0,
+                               blob.y - face.box().y + blob.height / 2.0);
+  Ring best{{middle, unit_plane_from_pixel}, -std::numeric_limits<double>::infinity()};
+  for (double radius = size / 6; radius <= max_radius * size; radius += step) {
+    const Matrix2 unit_from_pixel = unit_plane_from_pixel / radius;
+    for (double dv = -max_shift * size; dv <= max_shift * size; dv += step) {
+      for (double du = -max_shift * size; du <= max_shift * size; du += step) {
+        const Ellipse ellipse{middle + Eigen::Vector2d(du, dv), unit_from_pixel};
+        const double sum = steps.sum_of(ellipse);
+        if (sum > best.sum) best = {ellipse, sum};
       }
     }
   }
-  const auto less = [](const Ring& a, const Ring& b) { return a.sum < b.sum; };
-  const Ring best = *std::max_element(rings.begin(), rings.end(), less);
-  std::erase_if(rings, [&](const Ring& ring) {
-    const double away = std::hypot(ring.u - best.u, ring.v - best.v, ring.radius - best.radius);
-    return away < far * size;
-  });
-  const auto other = std::max_element(rings.begin(), rings.end(), less);
-  return {best, other == rings.end() ? Ring{best.u, best.v, best.radius, 0} : *other};
+  return best;
 }
 
-/// The clearest steps near an ellipse in the box from `low` to `high`, in the image.
-std::vector<EdgePoint> steps_near(const Face& face, const Eigen::Vector2d& low,
-                                  const Eigen::Vector2d& high, double reach_px) {
-  constexpr double least_step = 0.35, flattest = 0.3;
-  const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
+/// Returns the ellipse of a light's outline near its centre.
+Ellipse ellipse_of(const Light& light, const LightShape& shape) {
+  const Eigen::Vector2d low = shape.turned(light.low), high = shape.turned(light.high);
+  const Eigen::Vector2d center = (low + high) / 2;
+  Matrix2 unit_from_pixel;
+  const auto at = shape.plane_of(shape.turned(center));
+  for (int i = 0; i < 2; ++i) {
+    // Over the whole outline, because the lens bends.
+    const double reach_px = (high - low)[i] / 2;
+    const auto beside = shape.plane_of(shape.turned(center + reach_px * Eigen::Vector2d::Unit(i)));
+    const auto before = shape.plane_of(shape.turned(center - reach_px * Eigen::Vector2d::Unit(i)));
+    if (!at || !beside || !before) return {center, Matrix2::Identity() / light.radius_px};
+    unit_from_pixel.col(i) = light.unit_from_plane * (*beside - *before) / (2 * reach_px);
+  }
+  return {center, unit_from_pixel};
+}
+
+/// Returns the clearest steps within `reach_px` of an ellipse in the image.
+std::vector<EdgePoint> steps_near(const Face& face, const Ellipse& ellipse, double reach_px) {
+  constexpr double min_step = 0.35, min_cosine = 0.3;
   std::vector<EdgePoint> points;
   std::vector<double> levels;
   for (const int line : face.lit_lines()) {
-    const double up = (line + face.box().y - center.y()) / half.y();
-    if (std::abs(up) >= 1) continue;
-    const double across = std::sqrt(1 - up * up);
-    const double cosine = across / half.x() / std::hypot(across / half.x(), up / half.y());
-    if (cosine < flattest) continue;
+    const auto crossing = ellipse.cross(line + face.box().y);
+    if (!crossing) continue;
     for (const bool begins : {true, false}) {
-      const double at = center.x() + (begins ? -1 : 1) * across * half.x() - face.box().x + 0.5;
+      const double column = begins ? crossing->begin : crossing->end;
+      const double cosine = ellipse.cosine_at({column, double(line + face.box().y)});
+      if (cosine < min_cosine) continue;
+      const double at = column - face.box().x + 0.5;
       const double reach = reach_px / std::max(cosine, 0.5);
-      double best = least_step;
+      double best = min_step;
       std::optional<int> border;
       for (int i = static_cast<int>(std::ceil(at - reach)); i <= at + reach; ++i) {
         const double step = face.step(line, i, begins);
@@ -248,8 +307,56 @@ std::vector<EdgePoint> steps_near(const Face& face, const Eigen::Vector2d& low,
   return points;
 }
 
-/// What one line of ten reaches in the middle of its runs or half way to their ends, above the
-/// dark.
+/// Fits a light to the steps near a ring.
+std::optional<Light> fit_near(const Ring& ring, const Face& face, const Background& background,
+                              const LightShape& shape) {
+  Ellipse ellipse = ring.ellipse;
+  ellipse.center += Eigen::Vector2d(face.box().x, face.box().y);
+  std::optional<Light> light;
+  for (const double reach : {0.16, 0.12, 0.08, 0.08}) {
+    const double reach_px = reach * ring.ellipse.mean_radius_px();
+    auto better = shape.light_of(steps_near(face, ellipse, reach_px), background);
+    if (!better) return std::nullopt;
+    light = std::move(better);
+    ellipse = ellipse_of(*light, shape);
+  }
+  return light;
+}
+
+/// Returns the standard deviation per axis of a light's centre by the delete-a-group jackknife
+/// (Efron and Tibshirani 1993, section 11.5): its outline is fitted again without each of its
+/// pieces. A piece that shows another edge than the others moves the centre by more than the
+/// scatter of its points. Returns std::nullopt if the outline without one of them has no centre.
+std::optional<double> jackknife_sd_px(const Light& light, const Background& background,
+                                      const LightShape& shape) {
+  constexpr std::size_t pieces = 8;
+  const Eigen::Vector2d center = shape.turned(light.pixel);
+  std::vector<EdgePoint> outline = light.outline;
+  const auto angle = [&](const EdgePoint& point) {
+    return std::atan2(point.pixel.y() - center.y(), point.pixel.x() - center.x());
+  };
+  std::sort(outline.begin(), outline.end(),
+            [&](const EdgePoint& a, const EdgePoint& b) { return angle(a) < angle(b); });
+  std::array<Eigen::Vector2d, pieces> centers;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < pieces; ++i) {
+    std::vector<EdgePoint> others = outline;
+    const auto at = [&](std::size_t piece) {
+      return others.begin() + std::ptrdiff_t(piece * outline.size() / pieces);
+    };
+    others.erase(at(i), at(i + 1));
+    const auto without = shape.light_of(std::move(others), background);
+    if (!without) return std::nullopt;
+    centers[i] = without->pixel;
+    mean += centers[i] / double(pieces);
+  }
+  double squares = 0;
+  for (const Eigen::Vector2d& each : centers) squares += (each - mean).squaredNorm();
+  return std::sqrt(double(pieces - 1) / double(pieces) * squares / 2);
+}
+
+/// Returns the level above the dark that one line of ten reaches in the middle of its runs or half
+/// way to their ends.
 template <typename Level>
 double bright_level(const ImageView& image, const Blob& blob, double dark) {
   std::vector<Level> levels;
@@ -264,7 +371,7 @@ double bright_level(const ImageView& image, const Blob& blob, double dark) {
   return *tenth - dark;
 }
 
-/// How many points err together: those of a stripe, whose lines follow one another.
+/// Returns the number of points with a common error: those of a stripe, on consecutive lines.
 double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
   constexpr double next = 2.5;
   std::array<double, 2> last{-1e9, -1e9};
@@ -277,15 +384,15 @@ double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
   return double(outline.size()) / std::max(1.0, stripes);
 }
 
-/// The light by the steps next to its outline, in which sides of another contrast are as far out as
-/// others, and the sigma of its centre; whether most of them show one.
+/// Fits a light and the sigma of its centre to the steps next to its outline, which have no bias
+/// where the contrast of the sides differs. Returns whether most pieces of the outline show one.
 bool fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
                   const Background& background, const LightShape& shape, Light& light,
                   double& sigma_px) {
   constexpr int rounds = 3;
-  constexpr double first_blur_px = 0.9, most = 0.6;
-  // Cameras for people code light^(1 / 2.2), nearly, and those that do not have hardly the depth to
-  // show a rim; give or take, which the centre by another one tells.
+  constexpr double first_blur_px = 0.9, min_agreeing = 0.6;
+  // Consumer cameras code light^(1 / 2.2), nearly; others barely have the depth to show a rim. The
+  // centre by another gamma gives the error that this causes.
   constexpr double gamma = 2, other_gamma = 1.8;
   StepPicture picture{first_blur_px, gamma};
   for (int round = 1; round < rounds; ++round) {
@@ -305,19 +412,19 @@ bool fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
   if (!shift || !other) return false;
   light.pixel += shape.turned(shift->px);
   sigma_px = std::sqrt(shift->covariance.trace() / 2 + (shift->px - other->px).squaredNorm() / 2);
-  return shift->agreeing > most * double(steps.looked_at);
+  return shift->agreeing > min_agreeing * double(steps.looked_at);
 }
 
 }  // namespace
 
 bool unevenly_lit(const ImageView& image, const Blob& blob, const std::vector<EdgePoint>& outline,
                   const Background& background) {
-  constexpr double much = 3, least_ends = 0.2;
-  constexpr int least_width = 8;
+  constexpr double much = 3, min_ends = 0.2;
+  constexpr int min_width = 8;
   if (outline.empty()) return false;
   const auto wide = std::count_if(blob.runs.begin(), blob.runs.end(),
-                                  [](const Run& run) { return run.width() >= least_width; });
-  if (double(outline.size()) < least_ends * 2 * double(wide)) return true;
+                                  [](const Run& run) { return run.width() >= min_width; });
+  if (double(outline.size()) < min_ends * 2 * double(wide)) return true;
   std::vector<double> levels;
   levels.reserve(outline.size());
   for (const EdgePoint& point : outline) levels.push_back(point.level);
@@ -329,50 +436,40 @@ bool unevenly_lit(const ImageView& image, const Blob& blob, const std::vector<Ed
 
 std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Background& background,
                           const LightShape& shape) {
-  constexpr int least_size = 20, least_lines = 10;
-  constexpr double margin = 0.2, least_step = 0.28, clear_step = 0.33, least_shown = 0.5;
-  constexpr double one_point = 2;
+  constexpr int min_size = 20, min_lines = 10;
+  constexpr double margin = 0.2, min_step = 0.28;
   const PixelBox box = blob.box();
-  if (std::min(box.width, box.height) < least_size) return std::nullopt;
+  if (std::min(box.width, box.height) < min_size) return std::nullopt;
   const int more = static_cast<int>(margin * std::max(box.width, box.height));
   const PixelBox wide =
       intersection({box.x - more, box.y - more, box.width + 2 * more, box.height + 2 * more},
                    {0, 0, image.width, image.height});
-  // As coarse as the search for the ring; fine enough for the rim.
+  // Windows for the search of the ring and for the rim.
   const int size = std::max(wide.width, wide.height);
   const int fine = std::clamp(size / 30, 2, 6), coarse = std::max(fine, size / 50);
   const Face blurred(image, wide, background, coarse);
   const Face face = fine == coarse ? blurred : Face(image, wide, background, fine);
-  if (face.lit_lines().size() < least_lines) return std::nullopt;
-  const auto [best, other] = best_rings(blurred, box);
-  const auto crossings = 2 * std::count_if(face.lit_lines().begin(), face.lit_lines().end(),
-                                           [&, v = best.v, r = best.radius](int line) {
-                                             return std::abs(line - v) < r;
-                                           });
-  if (!(best.sum > least_step * double(crossings))) return std::nullopt;
+  if (face.lit_lines().size() < min_lines) return std::nullopt;
+  const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
+  const Ring best = find_best_ring(blurred, box, unit_plane_from_pixel(shape, middle));
+  const auto crossings =
+      2 * std::count_if(face.lit_lines().begin(), face.lit_lines().end(),
+                        [&](int line) { return best.ellipse.cross(line).has_value(); });
+  if (!(best.sum > min_step * double(crossings))) return std::nullopt;
 
-  Eigen::Vector2d center(best.u + wide.x, best.v + wide.y);
-  Eigen::Vector2d low = center.array() - best.radius, high = center.array() + best.radius;
-  std::optional<Light> light;
-  for (const double reach : {0.16, 0.12, 0.08, 0.08}) {
-    auto better = shape.light_of(steps_near(face, low, high, reach * best.radius), background);
-    if (!better) return std::nullopt;
-    light = std::move(better);
-    low = shape.turned(light->low), high = shape.turned(light->high);
-  }
-  // Before the steps are fitted, of which there are others.
+  auto light = fit_near(best, face, background, shape);
+  if (!light) return std::nullopt;
+  // Of the clearest steps; the fitted ones are others.
   const double shown = std::min(1.0, double(light->outline.size()) / double(crossings));
   double sigma_px = light->sigma_px * std::sqrt(points_of_a_stripe(light->outline));
   const bool fitted =
       fit_to_steps(image, face.lit_lines_of_image(), background, shape, *light, sigma_px);
-  // The other ring may be the rim, unless most of this one has a step.
-  const double odds = fitted ? 0 : 1 / (1 + std::exp((best.sum - other.sum) / one_point));
-  const double away = std::pow(best.u - other.u, 2) + std::pow(best.v - other.v, 2);
-  light->sigma_px = std::sqrt(sigma_px * sigma_px + odds * away / 2);
+  std::optional<double> jackknife_px;
+  if (!fitted) jackknife_px = jackknife_sd_px(*light, background, shape);
+  light->sigma_px = std::max(sigma_px, jackknife_px.value_or(0));
   light->uneven = true;
   light->roundness = shown;
-  const bool clear =
-      fitted || (best.sum > clear_step * double(crossings) && light->roundness > least_shown);
+  const bool clear = fitted || jackknife_px;
   return Rim{std::move(*light), clear};
 }
 

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <utility>
 
-#include "lamps/image/runs.h"
 #include "lamps/signal/lamp_rule.h"
 #include "lamps/signal/stripes.h"
 
@@ -19,10 +19,12 @@ namespace {
 constexpr double kBinsPerPeriod = 8;
 /// Fraction of the variance that the period of a modulated light may leave.
 constexpr double kMaxUnexplained = 0.45;
-/// Log-likelihood ratio that decides between two periods: odds of 20.
-constexpr double kMinLogRatio = 3;
+/// Log-likelihood ratio that decides between two periods: odds of 50.
+constexpr double kMinLogRatio = 4;
 /// Modulation depth of the fundamental below which a light is steady.
 constexpr double kMinLightDepth = 0.3;
+/// Phase coherence of a light whose parts are out of phase by a quarter of a period.
+constexpr double kMinPhaseCoherence = 0.9;
 /// Cells of the smallest light.
 constexpr int kMinCells = 4;
 /// Largest phase difference of two regions of one lamp, in rad.
@@ -36,6 +38,7 @@ struct RegionCandidate {
   std::optional<std::size_t> lamp;
   /// Fits of the lamps' periods, by lamp.
   std::vector<PeriodFit> lamp_fits;
+  double phase_coherence = 0;
   bool is_modulated = false;
   bool is_other_period = false;  ///< a period that no lamp has is better
 };
@@ -137,9 +140,41 @@ void decide(const Claims& claims, RegionCandidate& candidate) {
   candidate.fit = fit;
 }
 
+/// Returns |sum z| / sum |z| over the cells of a region, where z is the complex amplitude of a cell
+/// at that period: 1 if all parts of the region are modulated in phase.
+double phase_coherence_of(const CellLevels& cells, const ModulationMap& map,
+                          const ModulatedRegion& region, double period_lines) {
+  const double period = period_lines / cells.lines_per_bin;
+  std::complex<double> sum;
+  double amplitudes = 0;
+  for (const auto& [step, begin, end] : region.spans) {
+    const double middle = (map.line(step) + 0.5 - cells.box.y) / cells.lines_per_bin;
+    const int first = std::max(0, static_cast<int>(std::ceil(middle - period)));
+    const int last = std::min(cells.bins, static_cast<int>(std::floor(middle + period)));
+    for (int x = begin; x < end; x += kCellWidth_px) {
+      const int cell = (x - cells.box.x) / kCellWidth_px;
+      std::complex<double> z;
+      for (int bin = first; bin < last; ++bin) {
+        const double weight = std::max(0.0, period - std::abs(bin + 0.5 - middle));
+        z += std::polar(weight * double(cells.row(bin)[cell]),
+                        -2 * std::numbers::pi * (bin + 0.5) / period);
+      }
+      sum += z;
+      amplitudes += std::abs(z);
+    }
+  }
+  return std::abs(sum) / amplitudes;
+}
+
+/// Returns the number of periods that a region shows. The window of two periods widens it by half
+/// a period on both sides.
+double count_periods(const RegionCandidate& candidate) {
+  return std::max(0.0, candidate.region.box.height / candidate.fit.period_lines - 1);
+}
+
 RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, ModulatedRegion region,
                         std::span<const double> lamp_periods_lines, double min_period_lines) {
-  RegionCandidate candidate{std::move(region), {}, {}, {}, {}, false, false};
+  RegionCandidate candidate{std::move(region), {}, {}, {}, {}, 0, false, false};
   double margin = min_period_lines;
   for (const double period : lamp_periods_lines) margin = std::max(margin, period);
   candidate.profile = profile_of(cells, map, candidate.region, margin);
@@ -154,12 +189,14 @@ RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, Modul
     candidate.is_other_period = log_ratio(candidate.fit, lamp) > kMinLogRatio;
     if (!candidate.is_other_period) candidate.fit = lamp;
   }
+  candidate.phase_coherence =
+      phase_coherence_of(cells, map, candidate.region, candidate.fit.period_lines);
   // Few periods mean something only where they are a lamp's.
   const bool has_lamp_period = !lamp_periods_lines.empty() && !candidate.is_other_period;
   const double min_periods = has_lamp_period ? kLeastPeriods : kEnoughPeriods;
-  candidate.is_modulated = candidate.fit.unexplained < kMaxUnexplained &&
-                           candidate.fit.depth > kMinLightDepth &&
-                           candidate.region.box.height > min_periods * candidate.fit.period_lines;
+  candidate.is_modulated =
+      candidate.fit.unexplained < kMaxUnexplained && candidate.fit.depth > kMinLightDepth &&
+      candidate.phase_coherence > kMinPhaseCoherence && count_periods(candidate) > min_periods;
   return candidate;
 }
 
@@ -208,25 +245,6 @@ void add_area(const ModulationMap& map, const ModulatedRegion& region, double pe
   }
 }
 
-/// The columns of a region on each of its lines.
-std::vector<Run> chords_in(const ModulationMap& map, const ModulatedRegion& region) {
-  std::vector<Run> chords;
-  for (const auto& [step, begin, end] : region.spans) {
-    const int first = map.box.y + step * map.lines_per_step;
-    const int last = std::min(first + map.lines_per_step, map.box.bottom()) - 1;
-    if (!chords.empty() && chords.back().row >= first) {  // another span of these lines
-      for (auto chord = chords.rbegin(); chord != chords.rend() && chord->row >= first; ++chord) {
-        chord->end = std::min(end, map.box.right());
-      }
-      continue;
-    }
-    for (int line = first; line <= last; ++line) {
-      chords.push_back({line, begin, std::min(end, map.box.right())});
-    }
-  }
-  return chords;
-}
-
 /// Measures the stripes of a candidate behind its envelope. The period and the duty are those of
 /// the passages through the middle of the levels where these keep time with the fitted period, and
 /// the fitted period else.
@@ -237,7 +255,7 @@ Stripes measure_stripes(const RegionCandidate& candidate) {
     stripes.period_lines = fit.period_lines;
   }
   stripes.clarity = 1 - fit.unexplained;
-  stripes.periods = std::max(0.0, candidate.region.box.height / fit.period_lines - 1);
+  stripes.periods = count_periods(candidate);
   stripes.regular = true;
   return stripes;
 }
@@ -256,9 +274,9 @@ ModulatedLight make_light(const ModulationMap& map,
                        brightest.fit,
                        brightest.lamp,
                        measure_stripes(brightest),
-                       log_ratio(brightest.fit, PeriodFit{}),
-                       0,
-                       chords_in(map, brightest.region)};
+                       brightest.phase_coherence,
+                       std::numbers::pi / 2 * brightest.region.peak,
+                       0};
   std::array<LitArea, fractions.size()> areas;
   for (const RegionCandidate* part : parts) {
     // What is darker is light that the lamp throws on its surroundings.

@@ -35,12 +35,13 @@ struct ModulatedLight {
   /// Index of the lamp period that it has; std::nullopt where it has none or may have two.
   std::optional<std::size_t> lamp;
   Stripes stripes;  ///< of its brightest part, behind its envelope
-  /// Log-likelihood ratio of the fit against no modulation.
-  double evidence;
+  /// |sum z| / sum |z| over the cells of its brightest part, see find_modulated_lights().
+  double phase_coherence;
+  /// Level of its brightest lines above the dark, in grey levels, by the largest amplitude: that of
+  /// a square wave over 2 / pi.
+  double peak;
   /// Sum of the amplitude over its cells.
   double energy;
-  /// Columns of its brightest part on each line.
-  std::vector<Run> chords;
 };
 
 /// Finds lights in parts of an image by their modulation and decides which of the lamps' periods
@@ -55,10 +56,15 @@ struct ModulatedLight {
 ///
 /// where n is the number of independent values that three harmonics leave of the periods that both
 /// cover. The
-/// best lamp is taken if it leaves less than 45 %, if L against every other lamp exceeds 3, and if
-/// no period that is no lamp's is better by 3. A lamp that another region of the image has beyond
+/// best lamp is taken if it leaves less than 45 %, if L against every other lamp exceeds 4, and if
+/// no period that is no lamp's is better by 4. A lamp that another region of the image has beyond
 /// doubt does not count as a rival, unless the phase is that lamp's, too. Regions with one lamp and
 /// one phase that are near each other are one light.
+///
+/// A shutter exposes all pixels of a line at one time, so that all parts of a lamp are modulated in
+/// phase, whatever its shape; the parts of letters and patterns are not. With the complex amplitude
+/// z of each cell at the period, the phase coherence |sum z| / sum |z| of a light exceeds 0.9. Bars
+/// whose phase changes by a quarter of a period across the light reach that.
 ///
 /// With no lamp periods (the row time is not known) the lights have the period that fits best.
 ///

@@ -16,8 +16,6 @@ namespace {
 constexpr int kHarmonics = 3;
 /// Envelope below which a line has too little light, over the envelope's maximum.
 constexpr double kMinEnvelope = 0.08;
-/// Periods below which a fit means nothing.
-constexpr double kMinPeriods = 1.2;
 
 /// Mean over `length` bins around each bin, of those that there are.
 std::vector<double> moving_mean(const std::vector<double>& values, double length) {
@@ -95,7 +93,7 @@ PeriodFit fit_period(const LineProfile& profile, double period_lines) {
     squares += weight * value * value;
   }
   fit.periods = lit / period;
-  if (fit.periods < kMinPeriods || !(squares > 0)) return fit;
+  if (!(squares > 0)) return fit;
   const Cholesky<2 * kHarmonics> factor(normal);
   if (!factor.determines(1e-9)) return fit;
   const HarmonicCoefficients coefficients = factor.solve(normal.gradient);

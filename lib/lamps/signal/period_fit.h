@@ -35,8 +35,9 @@ struct PeriodFit {
 ///     y(l) / E(l) - 1 = sum_h c_h cos(2 pi h l / P) + s_h sin(2 pi h l / P),   h = 1, 2, 3,
 ///
 /// whatever the shape of the light. The coefficients are those of weighted least squares with the
-/// weights E(l); lines count where E exceeds 8 % of its maximum. Returns a fit that leaves all of
-/// the variance where they are fewer than 1.2 periods.
+/// weights E(l); lines count where E exceeds 8 % of its maximum. A period that is longer than the
+/// lit lines fits most signals: it cannot be excluded. Returns a fit that leaves all of the
+/// variance if the lines do not determine the coefficients.
 PeriodFit fit_period(const LineProfile& profile, double period_lines);
 
 /// Divides a profile by its envelope for that period, see fit_period(), where it has light: the

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <numbers>
 #include <opencv2/core.hpp>
 
 #include "detection/mat_view.h"
@@ -39,7 +40,7 @@ TEST(FindModulatedLights, IdentifiesGlowsAndTheirCentres) {
       EXPECT_EQ(lights[0].lamp, i);
       EXPECT_LT((lights[0].center - center).norm(), 2);
       EXPECT_NEAR(lights[0].stripes.period_lines / kLampPeriods_lines[i], 1, 0.01);
-      EXPECT_GT(lights[0].evidence, 20);
+      EXPECT_GT(lights[0].phase_coherence, 0.97);
     }
   }
 }
@@ -59,6 +60,29 @@ TEST(FindModulatedLights, LeavesAPeriodThatNoLampHasUnknown) {
                      kLampPeriods_lines)) {
       EXPECT_FALSE(light.lamp) << period;
     }
+  }
+}
+
+/// A disc of bars that are tilted, so that their phase changes across the lines.
+cv::Mat draw_bars(double period_lines, double tilt_rad) {
+  cv::Mat image(kSearchSize, CV_8U);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      const Eigen::Vector2d away(column - 203.3, row - 131.6);
+      const double periods = (away.y() + std::tan(tilt_rad) * away.x()) / period_lines;
+      const bool is_bright = away.norm() < 70 && periods - std::floor(periods) < 0.5;
+      image.at<unsigned char>(row, column) = is_bright ? 180 : 4;
+    }
+  }
+  return image;
+}
+
+TEST(FindModulatedLights, FindsNoneInTiltedBars) {
+  EXPECT_EQ(find_lights(draw_bars(11, 0), kLampPeriods_lines).size(), 1U);
+  for (const double tilt_deg : {6.0, 10.0, 20.0, 40.0}) {
+    const auto lights =
+        find_lights(draw_bars(11, tilt_deg * std::numbers::pi / 180), kLampPeriods_lines);
+    EXPECT_TRUE(lights.empty()) << tilt_deg;
   }
 }
 
