@@ -136,9 +136,10 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
       camera_(camera),
       shape_(camera),
       classifier_(std::move(classifier)),
-      max_dark_rows_(max_dark_rows_of(lamps, camera.row_time_s)),
-      has_rectangles_(std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
-                                  [](const Lamp& lamp) { return lamp.rectangle.has_value(); })) {
+      max_dark_rows_(max_dark_rows_of(lamps, camera.row_time_s)) {
+  for (const Lamp& lamp : lamps_.lamps) {
+    if (lamp.rectangle) rectangle_sizes_m_.push_back(lamp.rectangle->size_m);
+  }
   if (!camera_.row_time_s || classifier_) return;
   for (const Lamp& lamp : lamps_.lamps) {
     if (!lamp.frequency_hz) continue;
@@ -180,8 +181,8 @@ std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blo
   const PixelBox box = blob.box();
   std::vector<LightPart> parts;
   auto rest = outline_of(lines, blob, background);
-  if (has_rectangles_) {
-    if (auto light = rectangle_of(lines, blob, rest, background, shape_)) {
+  if (!rectangle_sizes_m_.empty()) {
+    if (auto light = rectangle_of(lines, blob, rest, background, shape_, rectangle_sizes_m_)) {
       return {{std::move(light), {}, box}};
     }
   }
@@ -321,10 +322,6 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
 }
 
 namespace {
-
-/// Change of the logarithm of a rectangle's ratio of sides by an unknown tilt of 5 degrees, 35
-/// degrees from the axis.
-constexpr double kLeanedOff = 0.06;
 
 /// Adds the error of a partly hidden rectangle to its sigma. If its ratio of sides is not that of
 /// the lamp, something may hide one end: the centre of the visible part has half of that offset.

@@ -75,7 +75,8 @@ class LightDetector {
   LightShape shape_;
   std::optional<LampClassifier> classifier_;
   int max_dark_rows_;
-  bool has_rectangles_;
+  /// Sizes of the map's rectangles.
+  std::vector<Eigen::Vector2d> rectangle_sizes_m_;
   /// Different periods of the map's lamps, in lines, and the lamp of each; std::nullopt where
   /// several lamps share it. Empty where the row time is not known or a classifier decides.
   std::vector<double> lamp_periods_;

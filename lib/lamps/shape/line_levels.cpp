@@ -112,7 +112,9 @@ LineLevel LineLevels::predicted(int line) const {
   const double mean = sum / count;
   const double scatter =
       count > 1 ? std::max(0.0, squares - count * mean * mean) / (count - 1) : alone_sd * alone_sd;
-  return {mean, std::sqrt(lamp_sd * lamp_sd + variance / count + scatter / count)};
+  // Levels that change from period to period, as vignetting makes them, scatter by that change, and
+  // their mean is wrong by as much: the scatter is not divided by their number.
+  return {mean, std::sqrt(lamp_sd * lamp_sd + variance / count + scatter)};
 }
 
 }  // namespace vlp

@@ -32,6 +32,8 @@ class LineLevels {
   /// Above the dark, in grey levels.
   double brightest() const { return brightest_; }
   std::optional<LineLevel> at(int line) const;
+  /// Period of the stripes; 0 for steady light.
+  double period_lines() const { return period_lines_; }
   /// The level at that column over that in the middle.
   double share_at(double column) const { return std::max(0.1, 1 + slope_ * (column - middle_)); }
 
@@ -41,7 +43,6 @@ class LineLevels {
   int first_;
   double brightest_ = 0, middle_ = 0, slope_ = 0;
   std::vector<LineLevel> measured_;
-  /// 0 of steady light.
   double period_lines_ = 0, period_sd_ = 0;
 };
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/shape/rectangle.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -75,17 +76,30 @@ double aspect_of(const Sides& sides) {
   return std::max(ratio, 1 / ratio);
 }
 
+double square(double value) { return value * value; }
+
+/// Standard deviation of the angles and of the logarithm of the ratio of sides in the plane: a
+/// calibrated tilt is known to some tenths of a degree.
+double lean_sd(const LightShape& shape) {
+  return shape.knows_level() ? kLeanedOff / 30 : kLeanedOff;
+}
+
+/// Variance of the distance of an edge's middle, in square pixels.
+double middle_variance(const StraightEdge& edge) { return edge.covariance_px.sum() / 4; }
+
+/// Distance of the middle of one side from another one.
+double distance(const Side& from, const Side& to) {
+  return std::abs(((to.from + to.to) / 2 - (from.from + from.to) / 2).dot(from.inwards()));
+}
+
 /// Of the logarithm of aspect_of().
 double aspect_sd_of(const std::array<StraightEdge, 4>& edges, double per_px) {
   constexpr double of_blur = 0.25;
-  const auto square = [](double value) { return value * value; };
   double variance = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const StraightEdge &edge = edges[i], &opposite = edges[(i + 2) % 4];
-    const Eigen::Vector2d across = opposite.side.from - edge.side.from;
-    const double apart_px = std::abs(across.dot(edge.side.inwards())) / per_px;
-    const double middle_variance = edge.covariance_px.sum() / 4;
-    variance += (middle_variance + square(of_blur * edge.blur_px)) / square(apart_px);
+    const double apart_px = distance(edge.side, opposite.side) / per_px;
+    variance += (middle_variance(edge) + square(of_blur * edge.blur_px)) / square(apart_px);
   }
   return std::sqrt(variance);
 }
@@ -283,31 +297,73 @@ std::vector<Eigen::Vector2d> face_of(const Sides& sides, double inset, const Lig
   return face;
 }
 
-/// Of the centre, in pixels of the image: by the ends of the sides, each side by itself.
-std::optional<Matrix2> center_covariance(const std::array<StraightEdge, 4>& edges, double per_px,
-                                         const LightShape& shape) {
+/// Covariance of the distances of the ends from the edges: from and to of each edge in turn.
+using EndsCovariance = Eigen::Matrix<double, 8, 8>;
+
+EndsCovariance ends_covariance(const std::array<StraightEdge, 4>& edges) {
+  EndsCovariance covariance = EndsCovariance::Zero();
+  for (int i = 0; i < 4; ++i) {
+    covariance.block<2, 2>(2 * i, 2 * i) = edges[std::size_t(i)].covariance_px;
+  }
+  return covariance;
+}
+
+/// Moves the sides to what is most probable for a rectangle, and corrects the covariance (Kalman's
+/// update): a tilt error makes opposite sides converge by its product with their distance, in the
+/// plane at height 1, and changes right angles by lean_sd(). Angles that contradict are left:
+/// something hides a part.
+void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
+                        EndsCovariance& covariance) {
+  constexpr double clear = 16;      // chi-squared of three angles: one in a thousand
+  constexpr double per_lean = 1.5;  // tilt error in rad over lean_sd()
+  constexpr std::array<std::array<std::size_t, 2>, 3> pairs = {{{0, 2}, {1, 3}, {0, 1}}};
+  Eigen::Matrix<double, 3, 8> slope = Eigen::Matrix<double, 3, 8>::Zero();
+  Eigen::Vector3d angles, sds;
+  for (int i = 0; i < 3; ++i) {
+    const auto [a, b] = pairs[std::size_t(i)];
+    const Side &side = sides[a], &other = sides[b];
+    const bool opposite = b - a == 2;
+    const Eigen::Vector2d expected = opposite ? -side.way() : side.inwards();
+    angles[i] = std::atan2(cross_of(expected, other.way()), expected.dot(other.way()));
+    sds[i] = lean_sd(shape) * (opposite ? per_lean * distance(side, other) : 1);
+    const double length_px = (side.to - side.from).norm() / per_px;
+    const double other_px = (other.to - other.from).norm() / per_px;
+    slope.block<1, 2>(i, 2 * Eigen::Index(a)) << 1 / length_px, -1 / length_px;
+    slope.block<1, 2>(i, 2 * Eigen::Index(b)) << -1 / other_px, 1 / other_px;
+  }
+  Eigen::Matrix3d spread = slope * covariance * slope.transpose();
+  spread.diagonal() += sds.cwiseAbs2();
+  const Eigen::LDLT<Eigen::Matrix3d> factor(spread);
+  if (!(angles.dot(factor.solve(angles)) < clear)) return;
+  const Eigen::Matrix<double, 8, 3> gain = factor.solve(slope * covariance).transpose();
+  const Eigen::Matrix<double, 8, 1> moved_px = -gain * angles;
+  covariance -= gain * slope * covariance;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d inwards = sides[i].inwards() * per_px;
+    sides[i].from += moved_px[2 * Eigen::Index(i)] * inwards;
+    sides[i].to += moved_px[2 * Eigen::Index(i) + 1] * inwards;
+  }
+}
+
+/// Computes the covariance of the image of the centre, in square pixels, from that of the ends.
+std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovariance& ends,
+                                         double per_px, const LightShape& shape) {
   constexpr double moved_px = 0.05;
-  Sides sides;
-  for (std::size_t i = 0; i < 4; ++i) sides[i] = edges[i].side;
   const auto pixel_with = [&](const Sides& moved) -> std::optional<Eigen::Vector2d> {
     const auto center = center_of(moved);
     return center ? shape.pixel_of(*center) : std::nullopt;
   };
   const auto here = pixel_with(sides);
-  Matrix2 covariance = Matrix2::Zero();
-  for (std::size_t i = 0; i < 4; ++i) {
-    Matrix2 slope;
-    const Eigen::Vector2d move = moved_px * per_px * sides[i].inwards();
-    for (const int end : {0, 1}) {
-      Sides moved = sides;
-      (end == 0 ? moved[i].from : moved[i].to) += move;
-      const auto there = pixel_with(moved);
-      if (!here || !there) return std::nullopt;
-      slope.col(end) = (*there - *here) / moved_px;
-    }
-    covariance += slope * edges[i].covariance_px * slope.transpose();
+  Eigen::Matrix<double, 2, 8> slope;
+  for (int end = 0; end < 8; ++end) {
+    Sides moved = sides;
+    Side& side = moved[std::size_t(end / 2)];
+    (end % 2 == 0 ? side.from : side.to) += moved_px * per_px * side.inwards();
+    const auto there = pixel_with(moved);
+    if (!here || !there) return std::nullopt;
+    slope.col(end) = (*there - *here) / moved_px;
   }
-  return covariance;
+  return slope * ends * slope.transpose();
 }
 
 /// By the cross products of its corners, one after the other.
@@ -335,14 +391,20 @@ bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
 }
 
 /// `points` are the outline in the plane.
-std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& sides, double per_px,
+std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
                               const std::vector<Eigen::Vector2d>& points,
                               const Eigen::Vector2d& middle, const LightShape& shape) {
   constexpr double stray_px = 3;
-  if (!rectangular(sides)) return std::nullopt;
+  Sides sides;
+  for (std::size_t i = 0; i < 4; ++i) sides[i] = edges[i].side;
+  EndsCovariance ends = ends_covariance(edges);
+  if (shape.has_lens()) apply_right_angles(shape, per_px, sides, ends);
+  const auto corners = corners_of(sides);
+  if (!corners || !rectangular(sides)) return std::nullopt;
   const auto center = center_of(sides);
   if (!center || !has_corners(points, sides, *center)) return std::nullopt;
-  const auto covariance = center_covariance(edges, per_px, shape);
+  const auto covariance = center_covariance(sides, ends, per_px, shape);
+  sides = sides_of(*corners);
   auto pixel = shape.pixel_of(*center);
   const auto around = face_of(sides, 0, shape);
   if (!pixel || !covariance || around.empty()) return std::nullopt;
@@ -359,14 +421,17 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& s
     light.high = light.high.cwiseMax(at);
   }
   light.radius_px = std::sqrt(area_of(around) / std::numbers::pi);
-  double bow_px = 0;
+  double bow_px = 0, end_sd_px = 0;
   light.roundness = 1;
   for (StraightEdge& edge : edges) {
+    end_sd_px = std::max(end_sd_px, std::sqrt(edge.covariance_px.diagonal().maxCoeff()));
     bow_px = std::max(bow_px, std::abs(edge.bow_px));
     light.rise_px = std::max(light.rise_px, edge.points.empty() ? 0 : edge.points[0].rise_px);
     light.roundness = std::min(light.roundness, edge.share);
     light.outline.insert(light.outline.end(), edge.points.begin(), edge.points.end());
   }
+  light.low.array() -= 2 * end_sd_px;
+  light.high.array() += 2 * end_sd_px;
   const double sigma_px = std::hypot(std::sqrt(covariance->trace() / 2), lens_sd_px);
   if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
   light.sigma_px = std::max(kMinSigma_px, sigma_px);
@@ -381,6 +446,147 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, const Sides& s
   light.aspect_sd = aspect_sd_of(edges, per_px);
   return light.face.empty() ? std::nullopt : std::optional(std::move(light));
 }
+
+/// The edges of a rectangle in the order of its sides; std::nullopt for those that are not found.
+using FoundEdges = std::array<std::optional<StraightEdge>, 4>;
+
+/// Returns the blur of the surest edge. @pre There is one.
+double surest_blur_px(const FoundEdges& edges) {
+  const StraightEdge* surest = nullptr;
+  for (const auto& edge : edges) {
+    if (!edge) continue;
+    if (surest == nullptr || middle_variance(*edge) < middle_variance(*surest)) surest = &*edge;
+  }
+  return surest->blur_px;
+}
+
+/// Finds hidden edges from those that are seen, see rectangle_of().
+class HiddenEdges {
+ public:
+  HiddenEdges(const ImageView& lines, const LineLevels& levels, double dark, double per_px,
+              const LightShape& shape)
+      : lines_(lines), levels_(levels), dark_(dark), per_px_(per_px), shape_(shape) {}
+
+  /// Adds the edges that are missing. Returns false if two neighbours are, or if there is none.
+  bool add_to(FoundEdges& edges, const Sides& sides, EdgeSearch search,
+              const std::vector<Eigen::Vector2d>& sizes_m) const {
+    constexpr double ramp_lines = 3;
+    const FoundEdges seen = edges;
+    search.stations = 24;
+    double narrow = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (!seen[i] && !seen[(i + 1) % 4]) return false;
+      narrow = std::min(narrow, (sides[i].to - sides[i].from).norm());
+    }
+    search.blur_px = surest_blur_px(seen);
+    // As far as the next stripe, but not to the opposite edge.
+    search.reach_px = std::max(search.reach_px,
+                               std::min(levels_.period_lines() + ramp_lines, narrow / per_px_ / 2));
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (seen[i]) continue;
+      const auto side = predict_side(sides[i], seen, i);
+      if (!side) return false;
+      const auto find = [&](double offset_px, double offset_sd_px) {
+        // Twice as wide: the angles count once more, see apply_right_angles().
+        const double slant_sd_px = turn_sd(seen, i) * side_length_px(*side);
+        return hidden_edge_at(lines_, *side, levels_, dark_, per_px_, search, shape_,
+                              {offset_px, offset_sd_px, slant_sd_px});
+      };
+      edges[i] = find(0, std::numeric_limits<double>::infinity());
+      if (!edges[i]) return false;
+      if (!seen[(i + 2) % 4]) continue;
+      const auto place = place_by_size(edges, i, sizes_m);
+      if (!place) continue;
+      const Eigen::Vector2d moved =
+          (edges[i]->side.from + edges[i]->side.to) / 2 - (side->from + side->to) / 2;
+      edges[i] = find(place->offset_px + moved.dot(side->inwards()) / per_px_, place->sd_px);
+      if (!edges[i]) return false;
+    }
+    return true;
+  }
+
+ private:
+  /// Place of an edge's middle from where it was found, inside positive.
+  struct Place {
+    double offset_px, sd_px;
+  };
+
+  double side_length_px(const Side& side) const { return (side.to - side.from).norm() / per_px_; }
+
+  /// Variance of the direction of an edge, in rad.
+  double turn_variance(const StraightEdge& edge) const {
+    const Eigen::Vector2d difference(-1, 1);
+    return difference.dot(edge.covariance_px * difference) / square(side_length_px(edge.side));
+  }
+
+  double weight_of(const StraightEdge& edge) const {
+    return 1 / (turn_variance(edge) + square(lean_sd(shape_)));
+  }
+
+  /// Standard deviation of the direction of edge i by the others.
+  double turn_sd(const FoundEdges& seen, std::size_t i) const {
+    double sum = 0, variance = 0;
+    for (std::size_t k = 1; k < 4; ++k) {
+      const auto& other = seen[(i + k) % 4];
+      if (!other) continue;
+      sum += weight_of(*other);
+      variance += square(weight_of(*other)) * turn_variance(*other);
+    }
+    return std::sqrt(variance / square(sum) + square(lean_sd(shape_)));
+  }
+
+  /// Turns side i about its middle as the other edges are turned, up to where its neighbours are.
+  std::optional<Side> predict_side(const Side& side, const FoundEdges& seen, std::size_t i) const {
+    double sum = 0, moment = 0;
+    for (std::size_t k = 1; k < 4; ++k) {
+      const auto& other = seen[(i + k) % 4];
+      if (!other) continue;
+      const Eigen::Vector2d way =
+          Eigen::Rotation2Dd(-double(k) * std::numbers::pi / 2) * other->side.way();
+      sum += weight_of(*other);
+      moment += weight_of(*other) * std::atan2(cross_of(side.way(), way), side.way().dot(way));
+    }
+    const Eigen::Vector2d middle = (side.from + side.to) / 2;
+    const Eigen::Vector2d half = Eigen::Rotation2Dd(moment / sum) * (side.to - middle);
+    const Side turned{middle - half, middle + half};
+    const auto from = meeting(turned, seen[(i + 3) % 4]->side);
+    const auto to = meeting(turned, seen[(i + 1) % 4]->side);
+    return from && to ? std::optional(Side{*from, *to}) : std::nullopt;
+  }
+
+  /// Predicts edge i from the other three by the ratio of the sides of the only size that agrees
+  /// with the place where it was found; std::nullopt if several or none do.
+  std::optional<Place> place_by_size(const FoundEdges& edges, std::size_t i,
+                                     const std::vector<Eigen::Vector2d>& sizes_m) const {
+    constexpr double size_sd_m = 0.001;      // of sizes that are stated to the millimetre
+    constexpr double bounds = 2, clear = 3;  // standard deviations: an even one ends at sqrt(3)
+    const StraightEdge &edge = *edges[i], &opposite = *edges[(i + 2) % 4];
+    const StraightEdge &left = *edges[(i + 1) % 4], &right = *edges[(i + 3) % 4];
+    const double length_px = distance(left.side, right.side) / per_px_;
+    const double depth_px = distance(opposite.side, edge.side) / per_px_;
+    std::optional<Place> place;
+    for (const Eigen::Vector2d& size_m : sizes_m) {
+      for (const double ratio : {size_m[0] / size_m[1], size_m[1] / size_m[0]}) {
+        const double relative_variance =
+            square(lean_sd(shape_)) + square(size_sd_m) * size_m.cwiseAbs2().cwiseInverse().sum();
+        const double variance = relative_variance * square(ratio * length_px) +
+                                middle_variance(opposite) +
+                                square(ratio) * (middle_variance(left) + middle_variance(right));
+        const Place here{depth_px - ratio * length_px, std::sqrt(variance)};
+        const double reach_px = bounds * std::sqrt(middle_variance(edge)) + clear * here.sd_px;
+        if (std::abs(here.offset_px) > reach_px) continue;
+        if (place && std::abs(place->offset_px - here.offset_px) > 0.1 * here.sd_px) return {};
+        place = here;
+      }
+    }
+    return place;
+  }
+
+  const ImageView& lines_;
+  const LineLevels& levels_;
+  double dark_, per_px_;
+  const LightShape& shape_;
+};
 
 }  // namespace
 
@@ -423,7 +629,8 @@ bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d
 
 std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
                                   const std::vector<EdgePoint>& outline,
-                                  const Background& background, const LightShape& shape) {
+                                  const Background& background, const LightShape& shape,
+                                  const std::vector<Eigen::Vector2d>& sizes_m) {
   constexpr double least_px = 10, most_slender = 40;
   constexpr std::size_t least_lines = 8;
   const PixelBox box = blob.box();
@@ -447,7 +654,14 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
   if (!first) return std::nullopt;
   std::optional<Corners> corners = first->corners;
 
-  double bow_px = 0;
+  // No disc, of which stripes hide a part, too, is so slender.
+  constexpr double least_slender = 3;
+  const auto is_rather_round = [&](const Sides& sides) {
+    if (aspect_of(sides) > least_slender) return false;
+    const auto disc = shape.light_of(outline, background);
+    return disc && disc->roundness >= first->near;
+  };
+  double bow_px = 0, blur_px = 0;
   std::array<StraightEdge, 4> edges;
   struct Pass {
     double inset_px;
@@ -466,21 +680,32 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
     if (rows != static_cast<int>(chords.size())) return std::nullopt;
     const LineLevels levels(lines, chords, background);
     search.reach_px = std::min(search.reach_px + bow_px, narrow / per_px / 2);
+    search.blur_px = blur_px;
+    FoundEdges found_edges;
+    for (std::size_t i = 0; i < 4; ++i) {
+      found_edges[i] =
+          straight_edge_at(lines, sides[i], levels, background.level, per_px, search, shape);
+    }
+    if (!std::ranges::all_of(found_edges, [](const auto& edge) { return edge.has_value(); })) {
+      const HiddenEdges hidden(lines, levels, background.level, per_px, shape);
+      if (!shape.has_lens() || !hidden.add_to(found_edges, sides, search, sizes_m) ||
+          is_rather_round(sides)) {
+        return std::nullopt;
+      }
+    }
+    blur_px = surest_blur_px(found_edges);
+    bow_px = 0;
     Sides found;
     for (std::size_t i = 0; i < 4; ++i) {
-      auto edge =
-          straight_edge_at(lines, sides[i], levels, background.level, per_px, search, shape);
-      if (!edge) return std::nullopt;
-      edges[i] = std::move(*edge);
+      edges[i] = std::move(*found_edges[i]);
       found[i] = edges[i].side;
+      bow_px = std::max(bow_px, std::abs(edges[i].bow_px));
     }
-    bow_px = 0;
-    for (const StraightEdge& edge : edges) bow_px = std::max(bow_px, std::abs(edge.bow_px));
     corners = rectangular(found) ? corners_of(found) : std::nullopt;
     if (!corners) return std::nullopt;
   }
   const Eigen::Vector2d middle((lines.width - 1) / 2.0, (lines.height - 1) / 2.0);
-  return light_of(edges, sides_of(*corners), per_px, points, middle, shape);
+  return light_of(edges, per_px, points, middle, shape);
 }
 
 }  // namespace vlp

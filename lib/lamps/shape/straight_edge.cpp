@@ -6,8 +6,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <numbers>
+#include <utility>
 
 #include "geometry/normal_equations.h"
 #include "lamps/shape/m_estimate.h"
@@ -66,8 +68,15 @@ struct Model {
 class Samples {
  public:
   Samples(const ImageView& lines, const Side& side, const LineLevels& levels, double dark,
-          double per_px, const EdgeSearch& search, const LightShape& shape)
-      : lines_(lines), side_(side), levels_(levels), dark_(dark), per_px_(per_px), shape_(shape) {
+          double per_px, const EdgeSearch& search, const LightShape& shape,
+          bool may_leave_image = false)
+      : lines_(lines),
+        side_(side),
+        levels_(levels),
+        dark_(dark),
+        per_px_(per_px),
+        shape_(shape),
+        may_leave_image_(may_leave_image) {
     if (!trace()) return;
     // A corner is blurred by both sides.
     constexpr double corner_px = 4;
@@ -162,7 +171,10 @@ class Samples {
       Eigen::Vector2d pixel = middle;
       pixel[across] += i;
       const int column = static_cast<int>(pixel.x()), row = static_cast<int>(pixel.y());
-      if (column < 0 || row < 0 || column >= lines_.width || row >= lines_.height) return false;
+      if (column < 0 || row < 0 || column >= lines_.width || row >= lines_.height) {
+        if (may_leave_image_) continue;
+        return false;
+      }
       const auto lit = levels_.at(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
@@ -182,33 +194,44 @@ class Samples {
   const LineLevels& levels_;
   double dark_, per_px_;
   const LightShape& shape_;
+  bool may_leave_image_;
   std::array<Eigen::Vector2d, kPieces + 1> trace_;
 };
 
-/// What is known of the level along a side that is so long beforehand: it changes by a tenth in 100
-/// px, and bends by half of that, give or take. Of short sides the pixels do not tell. So much a
-/// lens of that focal length bends it at most: one of 115 degrees from corner to corner.
+/// Size of the residuals that the weights of samples and priors refer to.
+constexpr double kNoise = 0.01;
+
+/// Length, in pixels, of a side, and what is known beforehand of all sides of a light.
+struct Known {
+  double length_px;
+  /// Sigma of the blur; 0 if it is not known.
+  double blur_px;
+  double focal_px;
+};
+
+/// Number of priors: the level changes by a tenth in 100 px and bends by half of that, give or
+/// take, because the pixels of short sides do not determine it; the blur; and the bow, at most that
+/// of a lens of 115 degrees from corner to corner.
 template <int N>
-constexpr std::size_t kExpected = N > kBow ? 3 : 2;
+constexpr std::size_t kExpected = N > kBow ? 4 : 3;
 
 template <int N>
-CurveDistance<N> expected(const Model<N>& model, std::size_t which, double length_px,
-                          double focal_px) {
-  constexpr double noise = 0.01, change = 0.1 / 100, bend = 0.05 / 100;
+CurveDistance<N> expected(const Model<N>& model, std::size_t which, const Known& known) {
+  constexpr double change = 0.1 / 100, bend = 0.05 / 100, blur_sd = 0.15;
   CurveDistance<N> result{0, Eigen::Matrix<double, N, 1>::Zero()};
+  const auto expect = [&](int unknown, double value, double sd) {
+    result.error = kNoise / sd * (model.x[unknown] - value);
+    result.slope[unknown] = kNoise / sd;
+  };
   if (which == 0) {
-    const double weight = noise / (change * length_px);
-    result.error = weight * (model.x[kLevelTo] - model.x[kLevelFrom]);
-    result.slope[kLevelTo] = weight;
-    result.slope[kLevelFrom] = -weight;
+    expect(kLevelTo, model.x[kLevelFrom], change * known.length_px);
+    result.slope[kLevelFrom] = -result.slope[kLevelTo];
   } else if (which == 1) {
-    const double weight = noise / (bend * length_px);
-    result.error = weight * model.x[kLevelBend];
-    result.slope[kLevelBend] = weight;
+    expect(kLevelBend, 0, bend * known.length_px);
+  } else if (which == 2) {
+    if (known.blur_px > 0) expect(kBlur, known.blur_px, blur_sd * known.blur_px);
   } else if constexpr (N > kBow) {
-    const double weight = noise / (length_px * length_px / (12 * focal_px));
-    result.error = weight * model.x[kBow];
-    result.slope[kBow] = weight;
+    expect(kBow, 0, known.length_px * known.length_px / (12 * known.focal_px));
   }
   return result;
 }
@@ -217,17 +240,17 @@ CurveDistance<N> expected(const Model<N>& model, std::size_t which, double lengt
 /// than dark ones (White 1980), and by the levels of lines, each wrong for all of its pixels.
 template <int N>
 std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vector<Sample>& samples,
-                                          const std::vector<bool>& inliers, double length_px,
-                                          double focal_px) {
+                                          const std::vector<double>& weights,
+                                          const std::vector<bool>& inliers, const Known& known) {
   Normal<std::size_t(N)> normal;
   double count = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!inliers[i]) continue;
-    normal.add_row(model.residual(samples[i]).slope, 0);
+    normal.add_row(model.residual(samples[i]).slope, 0, weights[i]);
     ++count;
   }
   for (std::size_t which = 0; which < kExpected<N>; ++which) {
-    normal.add_row(expected(model, which, length_px, focal_px).slope, 0);
+    normal.add_row(expected(model, which, known).slope, 0);
   }
   const Cholesky<std::size_t(N)> factor(normal);
   if (!factor.determines(1e-12) || !(count > N)) return std::nullopt;
@@ -245,7 +268,7 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
     if (!inliers[i]) continue;
     double with_level = 0;
     const auto [error, slope] = model.residual(samples[i], &with_level);
-    const Eigen::Vector2d moved = ends_moved_by(slope);
+    const Eigen::Vector2d moved = weights[i] * ends_moved_by(slope);
     covariance += error * error * moved * moved.transpose();
     auto& [by_level, sd] =
         of_lines.try_emplace(samples[i].line, Eigen::Vector2d(0, 0), 0).first->second;
@@ -262,22 +285,24 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
 
 template <int N>
 std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per_px,
-                                double focal_px) {
+                                const Known& known) {
   constexpr std::array tolerances = {5.0, 5.0, 5.0, 5.0, 2.0, 1.0, 0.5, 0.3, 0.3, 0.3};
   constexpr double first_blur_px = 1.5, sharpest_px = 0.3, softest_px = 6;
   constexpr double most_move_px = 1.5, farthest_px = 8, least_step = 0.4, most_sd_px = 0.5;
   constexpr double near = 3, least_lit = 0.3, explained = 0.15, least_share = 0.8;
   const std::vector<Sample>& samples = all.samples;
-  const std::vector<double> weights(samples.size() + kExpected<N>, 1);
-  const double length_px = (all.at(1) - all.at(0)).norm();
+  std::vector<double> weights(samples.size() + kExpected<N>, 1);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    weights[i] = 1 / (1 + std::pow(samples[i].lit.sd / kNoise, 2));
+  }
   Model<N> model{Eigen::Matrix<double, N, 1>::Zero()};
-  model.x[kBlur] = first_blur_px;
+  model.x[kBlur] = known.blur_px > 0 ? known.blur_px : first_blur_px;
   model.x[kLevelFrom] = model.x[kLevelTo] = 1;
   std::optional<MEstimateStep<N>> last;
   for (const double tolerance : tolerances) {
     last = m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
       return i < samples.size() ? model.residual(samples[i])
-                                : expected(model, i - samples.size(), length_px, focal_px);
+                                : expected(model, i - samples.size(), known);
     });
     if (!last) return std::nullopt;
     auto step = last->step;
@@ -291,7 +316,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   const auto& x = model.x;
   const double least_level = std::min(x[kLevelFrom], x[kLevelTo]);
   if (!(least_level - x[kOutside] > least_step)) return std::nullopt;
-  const auto covariance = covariance_of_ends(model, samples, last->inliers, length_px, focal_px);
+  const auto covariance = covariance_of_ends(model, samples, weights, last->inliers, known);
   if (!covariance) return std::nullopt;
 
   const Eigen::Vector2d inwards = side.inwards() * per_px;
@@ -313,6 +338,108 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   return edge;
 }
 
+/// Probability of the places of an edge of known blur, by the pixels near the side.
+class HiddenEdge {
+ public:
+  HiddenEdge(std::vector<Sample> samples, double blur_px)
+      : samples_(std::move(samples)), blur_px_(blur_px) {
+    std::stable_sort(samples_.begin(), samples_.end(),
+                     [](const Sample& a, const Sample& b) { return a.line < b.line; });
+  }
+
+  /// Returns -2 log of the probability, up to a constant, with the ends at these distances. The
+  /// level of each line is the most probable one within its standard deviation.
+  double cost(const Eigen::Vector2d& ends_px) const {
+    constexpr double noise = 2 * kNoise, line_sd = 0.02;  // an even level, no light outside
+    double sum = 0;
+    for (auto sample = samples_.begin(); sample != samples_.end();) {
+      const int line = sample->line;
+      const double sd = std::hypot(sample->lit.sd, line_sd * sample->lit.level);
+      double moment = 0, squares = 0;
+      for (; sample != samples_.end() && sample->line == line; ++sample) {
+        const double share = inside(*sample, ends_px);
+        const double error = (sample->value - sample->lit.level * share) / noise;
+        sum += error * error;
+        moment += error * share / noise;
+        squares += share * share / (noise * noise);
+      }
+      sum -= moment * moment / (1 / (sd * sd) + squares);
+    }
+    return sum;
+  }
+
+  /// Returns the share of the pixels on lit lines that an edge with such ends explains.
+  double explained_share(const Eigen::Vector2d& ends_px) const {
+    constexpr double least_lit = 0.3, explained = 0.15;
+    int lit = 0, like = 0;
+    for (const Sample& sample : samples_) {
+      const double level = sample.lit.level;
+      if (level < least_lit) continue;
+      ++lit;
+      const double error = sample.value - level * inside(sample, ends_px);
+      like += std::abs(error) < explained * level + 2 * kNoise;
+    }
+    return lit > 0 ? double(like) / lit : 0;
+  }
+
+ private:
+  double inside(const Sample& sample, const Eigen::Vector2d& ends_px) const {
+    constexpr double clear = 4;
+    const double move = (1 - sample.t) * ends_px[0] + sample.t * ends_px[1];
+    const double depth = (sample.depth_px - sample.per_move * move) / blur_px_;
+    if (std::abs(depth) > clear) return depth > 0;
+    return std::erfc(-depth / std::numbers::sqrt2) / 2;
+  }
+
+  std::vector<Sample> samples_;  // by line
+  double blur_px_;
+};
+
+/// Mean and covariance of the distances of both ends from the side.
+struct Ends {
+  Eigen::Vector2d mean_px;
+  Matrix2 covariance_px;
+};
+
+Ends average_ends(const HiddenEdge& edge, const EdgePrior& prior, double reach_px) {
+  constexpr int rounds = 4, offsets = 21, slants = 9;
+  constexpr double deviations = 3.5;
+  Matrix2 ends_from_node;  // a node is an offset and a slant
+  ends_from_node << 1, -1, 1, 1;
+  Eigen::Vector2d mean(prior.offset_px, 0);
+  Eigen::Vector2d range(std::min(deviations * prior.offset_sd_px, reach_px),
+                        deviations * prior.slant_sd_px);
+  Matrix2 covariance = Matrix2::Zero();
+  for (int round = 0; round < rounds; ++round) {
+    const Eigen::Vector2d step = 2 * range.cwiseQuotient(Eigen::Vector2d(offsets - 1, slants - 1));
+    std::vector<std::pair<Eigen::Vector2d, double>> nodes;
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < offsets; ++i) {
+      for (int j = 0; j < slants; ++j) {
+        const Eigen::Vector2d node = mean - range + step.cwiseProduct(Eigen::Vector2d(i, j));
+        nodes.emplace_back(node, edge.cost(ends_from_node * node) +
+                                     std::pow((node[0] - prior.offset_px) / prior.offset_sd_px, 2) +
+                                     std::pow(node[1] / prior.slant_sd_px, 2));
+        least = std::min(least, nodes.back().second);
+      }
+    }
+    double sum = 0;
+    Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+    for (auto& [node, weight] : nodes) {
+      weight = std::exp((least - weight) / 2);
+      sum += weight;
+      moment += weight * node;
+    }
+    mean = moment / sum;
+    covariance = (step.cwiseAbs2() / 12).asDiagonal();  // each node stands for its cell
+    for (const auto& [node, weight] : nodes) {
+      covariance += weight / sum * (node - mean) * (node - mean).transpose();
+    }
+    range = (deviations * covariance.diagonal().cwiseSqrt()).cwiseMax(step / 2);
+  }
+  return {ends_from_node * mean, ends_from_node * covariance * ends_from_node.transpose()};
+}
+
 }  // namespace
 
 std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side& side,
@@ -322,12 +449,13 @@ std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side&
   constexpr std::size_t least = 40;
   const Samples all(lines, side, levels, dark, per_px, search, shape);
   if (all.samples.size() < least) return std::nullopt;
-  const double focal_px = std::hypot(lines.width, lines.height) / 2;
-  auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, focal_px)
-                               : fit<kBow + 1>(all, side, per_px, focal_px);
+  const double length_px = (all.at(1) - all.at(0)).norm();
+  const Known known{length_px, search.blur_px, std::hypot(lines.width, lines.height) / 2};
+  auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, known)
+                               : fit<kBow + 1>(all, side, per_px, known);
   if (!edge) return std::nullopt;
   const Side& found = edge->side;
-  const auto points = static_cast<int>((all.at(1) - all.at(0)).norm());
+  const auto points = static_cast<int>(length_px);
   for (int i = 0; i < points; ++i) {
     const double t = (i + 0.5) / points;
     const auto pixel = shape.pixel_of(found.from + t * (found.to - found.from));
@@ -339,6 +467,22 @@ std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side&
         {at, lit->level * levels.brightest(), rise_of_blur * edge->blur_px, false});
   }
   return edge;
+}
+
+std::optional<StraightEdge> hidden_edge_at(const ImageView& lines, const Side& side,
+                                           const LineLevels& levels, double dark, double per_px,
+                                           const EdgeSearch& search, const LightShape& shape,
+                                           const EdgePrior& prior) {
+  constexpr double least_share = 0.8;
+  const Samples all(lines, side, levels, dark, per_px, search, shape, true);
+  if (all.samples.empty()) return std::nullopt;
+  const HiddenEdge hidden(all.samples, search.blur_px);
+  const auto [ends_px, covariance_px] = average_ends(hidden, prior, search.reach_px);
+  const double share = hidden.explained_share(ends_px);
+  if (share < least_share) return std::nullopt;
+  const Eigen::Vector2d inwards = side.inwards() * per_px;
+  const Side found{side.from + ends_px[0] * inwards, side.to + ends_px[1] * inwards};
+  return StraightEdge{found, covariance_px, search.blur_px, 0, share, {}};
 }
 
 }  // namespace vlp

@@ -41,10 +41,20 @@ struct StraightEdge {
   std::vector<EdgePoint> points;
 };
 
-/// Which pixels are looked at: so far to both sides, at so many places along it at most.
+/// Pixels to use, and the blur that is expected.
 struct EdgeSearch {
+  /// Distance from the side, to both sides.
   double reach_px;
+  /// Maximum number of places along the side.
   std::size_t stations;
+  /// Sigma of the blur of the light's other edges; 0 if it is not known.
+  double blur_px = 0;
+};
+
+/// Prior of a hidden edge, by the other edges: distance of its middle from the side, inside
+/// positive, and half the difference of the distances of its ends, which is 0 but for its sd.
+struct EdgePrior {
+  double offset_px, offset_sd_px, slant_sd_px;
 };
 
 /// The edge near a side, of a light whose lines are lit to levels s(line). With d, the distance
@@ -58,11 +68,28 @@ struct EdgeSearch {
 /// and h are those with the least residuals of all pixels near the side (Gauss-Newton,
 /// Tukey's biweight), d in rays behind the lens; without a lens a bow is one more unknown,
 /// known beforehand to what a lens of 115 degrees from corner to corner bends a side so long.
-/// The covariance is by the scatter of the pixels and by what the levels of lines are worth, see
-/// LineLevels. Nothing where that leaves an end uncertain by more than half a pixel, or where most
-/// pixels do not look like an edge.
+/// Pixels on lines with an uncertain level have less weight. The blur is that of the search within
+/// 15 %, if it has one. The covariance is by the scatter of the pixels and by the standard
+/// deviations of the levels of lines, see LineLevels. Returns std::nullopt if that leaves an end
+/// uncertain by more than half a pixel, or if most pixels do not look like an edge.
 std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side& side,
                                              const LineLevels& levels, double dark, double per_px,
                                              const EdgeSearch& search, const LightShape& shape);
+
+/// Estimates an edge that a dark stripe hides in part or whole: the mean and the covariance of its
+/// ends, by the probability of all pixels near the side.
+///
+/// An edge in a dark stripe lies between the last lit line and the next line that would be lit, if
+/// the light reached so far. The pixels are those of straight_edge_at() with L = 1 and h = 0;
+/// the level of each line is any within its standard deviation. The probability, times the prior,
+/// is summed on a grid of offsets and slants, four times ever finer. Returns std::nullopt if the
+/// side is not in the image, or if the mean contradicts a fifth of the pixels on lit lines. The
+/// edge may lie outside the image; it has no `points`.
+///
+/// @pre search.blur_px > 0
+std::optional<StraightEdge> hidden_edge_at(const ImageView& lines, const Side& side,
+                                           const LineLevels& levels, double dark, double per_px,
+                                           const EdgeSearch& search, const LightShape& shape,
+                                           const EdgePrior& prior);
 
 }  // namespace vlp
