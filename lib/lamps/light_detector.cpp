@@ -67,8 +67,8 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
   return double(count_pixels_at(pixels, brightest)) / (double(pixels.width) * pixels.height);
 }
 
-/// Adds the error of an unknown lens to the sigma of the lights. Called last, because of two lights
-/// that claim one lamp the sigma by their outlines decides.
+/// Adds the error of an unknown lens to the sigma of the lights. Called last: keep_best_claim()
+/// compares sigmas without this error.
 void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
@@ -340,25 +340,28 @@ void refuse(Light& light, LightReason reason) {
 
 /// Refuses lights whose period is not that of their lamp by the row time that the lights of the
 /// image share. A wrong row time changes the ratio of measured and expected period of all lights
-/// alike: their median. Needs three lights. Those with few or unclear stripes are left out: the
-/// rule allows them kMostOffUnclear only.
+/// alike: the median of those with clear stripes, of which it needs three. Other periods may differ
+/// by kMostOffUnclear from those of their lamps.
 void refuse_other_row_times(const LampMap& lamps, double row_time_s, std::vector<Light>& lights) {
   constexpr std::size_t min_lights = 3;
+  const auto has_clear_period = [](const Light& light) {
+    return !light.by_modulation && trustworthy(light.stripes);
+  };
   std::vector<std::pair<Light*, double>> log_ratios;
-  std::vector<double> sorted;
+  std::vector<double> clear_ones;
   for (Light& light : lights) {
     const Lamp* lamp = light.lamp ? find_lamp(lamps.lamps, *light.lamp) : nullptr;
     if (lamp == nullptr || !lamp->frequency_hz) continue;
-    if (light.by_modulation || !trustworthy(light.stripes)) continue;
     const double log_ratio =
         std::log(light.stripes.period_lines * row_time_s * *lamp->frequency_hz);
     log_ratios.emplace_back(&light, log_ratio);
-    sorted.push_back(log_ratio);
+    if (has_clear_period(light)) clear_ones.push_back(log_ratio);
   }
-  if (sorted.size() < min_lights) return;
-  const double common = upper_median(std::move(sorted));
+  if (clear_ones.size() < min_lights) return;
+  const double common = (lower_median(clear_ones) + upper_median(clear_ones)) / 2;
   for (const auto& [light, log_ratio] : log_ratios) {
-    if (std::abs(log_ratio - common) > 2 * kLampDrift) refuse(*light, LightReason::unknown_period);
+    const double max_off = kLampDrift + (has_clear_period(*light) ? kLampDrift : kMostOffUnclear);
+    if (std::abs(log_ratio - common) > max_off) refuse(*light, LightReason::unknown_period);
   }
 }
 
@@ -385,9 +388,14 @@ void keep_best_claim(int lamp, std::vector<Light>& lights) {
   bool is_clear = !are_alike || ratio > min_area_ratio ||
                   (!claims[0]->glows && (!is_apart || 1 / ratio > min_area_ratio));
   if (!is_clear) {
-    std::sort(claims.begin(), claims.end(),
+    const auto alike_end = std::find_if(claims.begin(), claims.end(), [&](const Light* claim) {
+      return claim->glows != claims[0]->glows;
+    });
+    std::sort(claims.begin(), alike_end,
               [](const Light* a, const Light* b) { return a->peak > b->peak; });
-    is_clear = claims[0]->peak > min_peak_ratio * claims[1]->peak;
+    // The level of lines and the amplitude of cells are no measures of one kind.
+    is_clear = claims[0]->by_modulation == claims[1]->by_modulation &&
+               claims[0]->peak > min_peak_ratio * claims[1]->peak;
   }
   for (std::size_t i = is_clear ? 1 : 0; i < claims.size(); ++i) {
     refuse(*claims[i], LightReason::reflection);
@@ -434,10 +442,7 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
       light.lamp.reset();
       continue;
     }
-    if (!light.uneven && !light.glows) {
-      sharpest_px = std::min(sharpest_px, light.rise_px);
-      brightest = std::max(brightest, light.peak);
-    }
+    if (!light.uneven && !light.glows) sharpest_px = std::min(sharpest_px, light.rise_px);
     if (!light.by_modulation) light.lamp = lamp_of(light.stripes);
     if (!readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
@@ -447,6 +452,7 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
     } else if (is_rectangle(light) && shape_.has_lens()) {
       add_hidden_end(*off, shape_.knows_level() ? 0 : kLeanedOff, light);
     }
+    if (light.lamp && !light.glows) brightest = std::max(brightest, light.peak);
   }
   for (Light& light : lights) {
     if (!light.lamp) continue;

@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
+#include <vector>
 
 #include "lamps/rendered_captures.h"
 

@@ -21,9 +21,9 @@
 namespace vlp {
 
 struct Score {
-  /// `wrong` are identified lamps that are farther from their place than their sigma allows, or not
-  /// in view; those nearer to another lamp than to their own are `confused`.
-  int lamps = 0, missed = 0, wrong = 0, confused = 0;
+  /// `wrong` are identified lamps that are farther from their place than Captures::max_error_px, or
+  /// not in view.
+  int lamps = 0, missed = 0, wrong = 0;
   double squares = 0, worst_px = 0, chi_square = 0;
   /// Of an error to the sigma_px that is stated.
   double worst_ratio = 0;
@@ -44,6 +44,9 @@ class Captures {
         renderer_(scene_),
         set_(*std::find_if(scene_.sets.begin(), scene_.sets.end(),
                            [&](const CaptureSet& set) { return set.folder == folder; })) {}
+
+  /// Error of a centre from which on a lamp counts as wrong.
+  double max_error_px = 5;
 
   LampShot shot(std::size_t index) const { return lamp_shot(scene_, set_, index); }
   cv::Mat image(const LampShot& shot) const {
@@ -92,14 +95,10 @@ class Captures {
         continue;
       }
       const double error_px = (light->second.pixel - pixel).norm();
-      score.confused += std::any_of(truth.begin(), truth.end(), [&](const TrueLamp& other) {
-        return (light->second.pixel - other.pixel).norm() < error_px;
-      });
       const double sigma_px = light->second.sigma_px;
       found.erase(light);
-      const bool is_wrong = error_px > std::max(5.0, 6 * sigma_px);
-      score.wrong += is_wrong;
-      if (is_wrong || !counts(id)) continue;
+      if (error_px > max_error_px) ++score.wrong;
+      if (error_px > max_error_px || !counts(id)) continue;
       const double chi_square = error_px * error_px / 2 / std::pow(sigma_px, 2);
       if (in_view < 1) {
         ++score.hidden;

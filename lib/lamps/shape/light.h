@@ -29,7 +29,7 @@ enum class LightReason {
   too_few_periods,  ///< less than kLeastPeriods, or less than kEnoughPeriods and no lamp with more
   no_clear_period,  ///< no period explains it, its parts differ, or its stripes are irregular
   unknown_period,   ///< its period is that of no lamp, or of several
-  reflection,       ///< it is softer or smaller than another light, or as large as its mirror image
+  reflection,       ///< softer, dimmer or smaller than another light, or like its mirror image
   wrong_shape,      ///< its outline is not that of its lamp, or cannot be fitted
   incomplete        ///< cut by the image's edge, or too small for an outline
 };

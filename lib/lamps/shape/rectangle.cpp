@@ -78,17 +78,18 @@ double aspect_of(const Sides& sides) {
 
 double square(double value) { return value * value; }
 
-/// Standard deviation of the angles and of the logarithm of the ratio of sides in the plane: a
-/// calibrated tilt is known to some tenths of a degree.
-double lean_sd(const LightShape& shape) {
+/// Returns the standard deviation of the angles and of the logarithm of the ratio of sides in the
+/// plane: a calibrated tilt is known to some tenths of a degree. Every tilt that is stated counts
+/// as calibrated, and a level camera as one of unknown tilt.
+double get_tilt_sd(const LightShape& shape) {
   return shape.knows_level() ? kLeanedOff / 30 : kLeanedOff;
 }
 
-/// Variance of the distance of an edge's middle, in square pixels.
-double middle_variance(const StraightEdge& edge) { return edge.covariance_px.sum() / 4; }
+/// Returns the variance of the distance of an edge's middle, in square pixels.
+double compute_middle_variance(const StraightEdge& edge) { return edge.covariance_px.sum() / 4; }
 
-/// Distance of the middle of one side from another one.
-double distance(const Side& from, const Side& to) {
+/// Returns the distance of the middle of one side from another one.
+double compute_distance(const Side& from, const Side& to) {
   return std::abs(((to.from + to.to) / 2 - (from.from + from.to) / 2).dot(from.inwards()));
 }
 
@@ -98,8 +99,8 @@ double aspect_sd_of(const std::array<StraightEdge, 4>& edges, double per_px) {
   double variance = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const StraightEdge &edge = edges[i], &opposite = edges[(i + 2) % 4];
-    const double apart_px = distance(edge.side, opposite.side) / per_px;
-    variance += (middle_variance(edge) + square(of_blur * edge.blur_px)) / square(apart_px);
+    const double apart_px = compute_distance(edge.side, opposite.side) / per_px;
+    variance += (compute_middle_variance(edge) + square(of_blur * edge.blur_px)) / square(apart_px);
   }
   return std::sqrt(variance);
 }
@@ -200,7 +201,7 @@ struct FirstCorners {
 
 std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& points,
                                           double per_px) {
-  constexpr double near_px = 2, least_share = 0.7;
+  constexpr double near_px = 2, min_fraction = 0.7;
   constexpr double coarse_share = 0.08;
   Corners corners = rectangle_around(points);
   const double size = std::min((corners[1] - corners[0]).norm(), (corners[2] - corners[1]).norm());
@@ -216,7 +217,7 @@ std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& po
   const auto near = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& point) {
     return off(sides[nearest(sides, point)], point) < near_px * per_px;
   });
-  if (double(near) < least_share * double(points.size())) return std::nullopt;
+  if (double(near) < min_fraction * double(points.size())) return std::nullopt;
   return FirstCorners{corners, double(near) / double(points.size())};
 }
 
@@ -300,7 +301,7 @@ std::vector<Eigen::Vector2d> face_of(const Sides& sides, double inset, const Lig
 /// Covariance of the distances of the ends from the edges: from and to of each edge in turn.
 using EndsCovariance = Eigen::Matrix<double, 8, 8>;
 
-EndsCovariance ends_covariance(const std::array<StraightEdge, 4>& edges) {
+EndsCovariance make_ends_covariance(const std::array<StraightEdge, 4>& edges) {
   EndsCovariance covariance = EndsCovariance::Zero();
   for (int i = 0; i < 4; ++i) {
     covariance.block<2, 2>(2 * i, 2 * i) = edges[std::size_t(i)].covariance_px;
@@ -310,12 +311,12 @@ EndsCovariance ends_covariance(const std::array<StraightEdge, 4>& edges) {
 
 /// Moves the sides to what is most probable for a rectangle, and corrects the covariance (Kalman's
 /// update): a tilt error makes opposite sides converge by its product with their distance, in the
-/// plane at height 1, and changes right angles by lean_sd(). Angles that contradict are left:
+/// plane at height 1, and changes right angles by get_tilt_sd(). Angles that contradict are left:
 /// something hides a part.
 void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
                         EndsCovariance& covariance) {
   constexpr double clear = 16;      // chi-squared of three angles: one in a thousand
-  constexpr double per_lean = 1.5;  // tilt error in rad over lean_sd()
+  constexpr double per_lean = 1.5;  // tilt error in rad over get_tilt_sd()
   constexpr std::array<std::array<std::size_t, 2>, 3> pairs = {{{0, 2}, {1, 3}, {0, 1}}};
   Eigen::Matrix<double, 3, 8> slope = Eigen::Matrix<double, 3, 8>::Zero();
   Eigen::Vector3d angles, sds;
@@ -325,7 +326,7 @@ void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
     const bool opposite = b - a == 2;
     const Eigen::Vector2d expected = opposite ? -side.way() : side.inwards();
     angles[i] = std::atan2(cross_of(expected, other.way()), expected.dot(other.way()));
-    sds[i] = lean_sd(shape) * (opposite ? per_lean * distance(side, other) : 1);
+    sds[i] = get_tilt_sd(shape) * (opposite ? per_lean * compute_distance(side, other) : 1);
     const double length_px = (side.to - side.from).norm() / per_px;
     const double other_px = (other.to - other.from).norm() / per_px;
     slope.block<1, 2>(i, 2 * Eigen::Index(a)) << 1 / length_px, -1 / length_px;
@@ -379,7 +380,7 @@ double area_of(const std::vector<Eigen::Vector2d>& polygon) {
 /// (2 v / width)^2 is 1 on an ellipse within the sides, and up to 2 on the sides.
 bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
                  const Eigen::Vector2d& center) {
-  constexpr double beyond = 1.35, least_share = 0.1;
+  constexpr double beyond = 1.35, min_fraction = 0.1;
   const auto off_middle = [&](const Eigen::Vector2d& at, std::size_t i) {
     const double length = (sides[i].to - sides[i].from).norm();
     return std::pow(2 * (at - center).dot(sides[i].way()) / length, 2);
@@ -387,7 +388,7 @@ bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
   const auto far = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
     return off_middle(at, 0) + off_middle(at, 1) > beyond;
   });
-  return double(far) >= least_share * double(points.size());
+  return double(far) >= min_fraction * double(points.size());
 }
 
 /// `points` are the outline in the plane.
@@ -397,7 +398,7 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
   constexpr double stray_px = 3;
   Sides sides;
   for (std::size_t i = 0; i < 4; ++i) sides[i] = edges[i].side;
-  EndsCovariance ends = ends_covariance(edges);
+  EndsCovariance ends = make_ends_covariance(edges);
   if (shape.has_lens()) apply_right_angles(shape, per_px, sides, ends);
   const auto corners = corners_of(sides);
   if (!corners || !rectangular(sides)) return std::nullopt;
@@ -451,11 +452,12 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
 using FoundEdges = std::array<std::optional<StraightEdge>, 4>;
 
 /// Returns the blur of the surest edge. @pre There is one.
-double surest_blur_px(const FoundEdges& edges) {
+double find_surest_blur_px(const FoundEdges& edges) {
   const StraightEdge* surest = nullptr;
   for (const auto& edge : edges) {
     if (!edge) continue;
-    if (surest == nullptr || middle_variance(*edge) < middle_variance(*surest)) surest = &*edge;
+    if (surest == nullptr || compute_middle_variance(*edge) < compute_middle_variance(*surest))
+      surest = &*edge;
   }
   return surest->blur_px;
 }
@@ -467,35 +469,36 @@ class HiddenEdges {
               const LightShape& shape)
       : lines_(lines), levels_(levels), dark_(dark), per_px_(per_px), shape_(shape) {}
 
-  /// Adds the edges that are missing. Returns false if two neighbours are, or if there is none.
+  /// Adds the missing edges. Returns false if two neighbouring edges are missing or a missing edge
+  /// is not found.
   bool add_to(FoundEdges& edges, const Sides& sides, EdgeSearch search,
               const std::vector<Eigen::Vector2d>& sizes_m) const {
     constexpr double ramp_lines = 3;
     const FoundEdges seen = edges;
     search.stations = 24;
-    double narrow = std::numeric_limits<double>::infinity();
+    double min_side = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < 4; ++i) {
       if (!seen[i] && !seen[(i + 1) % 4]) return false;
-      narrow = std::min(narrow, (sides[i].to - sides[i].from).norm());
+      min_side = std::min(min_side, (sides[i].to - sides[i].from).norm());
     }
-    search.blur_px = surest_blur_px(seen);
-    // As far as the next stripe, but not to the opposite edge.
-    search.reach_px = std::max(search.reach_px,
-                               std::min(levels_.period_lines() + ramp_lines, narrow / per_px_ / 2));
+    search.blur_px = find_surest_blur_px(seen);
+    // Reaches to the next stripe, but not to the opposite edge.
+    search.reach_px = std::max(
+        search.reach_px, std::min(levels_.period_lines() + ramp_lines, min_side / per_px_ / 2));
     for (std::size_t i = 0; i < 4; ++i) {
       if (seen[i]) continue;
       const auto side = predict_side(sides[i], seen, i);
       if (!side) return false;
       const auto find = [&](double offset_px, double offset_sd_px) {
-        // Twice as wide: the angles count once more, see apply_right_angles().
-        const double slant_sd_px = turn_sd(seen, i) * side_length_px(*side);
+        // Twice the sd, because apply_right_angles() uses the angles again.
+        const double slant_sd_px = compute_direction_sd(seen, i) * side_length_px(*side);
         return hidden_edge_at(lines_, *side, levels_, dark_, per_px_, search, shape_,
                               {offset_px, offset_sd_px, slant_sd_px});
       };
       edges[i] = find(0, std::numeric_limits<double>::infinity());
       if (!edges[i]) return false;
       if (!seen[(i + 2) % 4]) continue;
-      const auto place = place_by_size(edges, i, sizes_m);
+      const auto place = predict_place(edges, i, sizes_m);
       if (!place) continue;
       const Eigen::Vector2d moved =
           (edges[i]->side.from + edges[i]->side.to) / 2 - (side->from + side->to) / 2;
@@ -513,26 +516,26 @@ class HiddenEdges {
 
   double side_length_px(const Side& side) const { return (side.to - side.from).norm() / per_px_; }
 
-  /// Variance of the direction of an edge, in rad.
-  double turn_variance(const StraightEdge& edge) const {
+  /// Returns the variance of the direction of an edge, in rad^2.
+  double compute_direction_variance(const StraightEdge& edge) const {
     const Eigen::Vector2d difference(-1, 1);
     return difference.dot(edge.covariance_px * difference) / square(side_length_px(edge.side));
   }
 
-  double weight_of(const StraightEdge& edge) const {
-    return 1 / (turn_variance(edge) + square(lean_sd(shape_)));
+  double compute_direction_weight(const StraightEdge& edge) const {
+    return 1 / (compute_direction_variance(edge) + square(get_tilt_sd(shape_)));
   }
 
-  /// Standard deviation of the direction of edge i by the others.
-  double turn_sd(const FoundEdges& seen, std::size_t i) const {
+  /// Returns the standard deviation of the direction of edge i by the others.
+  double compute_direction_sd(const FoundEdges& seen, std::size_t i) const {
     double sum = 0, variance = 0;
     for (std::size_t k = 1; k < 4; ++k) {
       const auto& other = seen[(i + k) % 4];
       if (!other) continue;
-      sum += weight_of(*other);
-      variance += square(weight_of(*other)) * turn_variance(*other);
+      sum += compute_direction_weight(*other);
+      variance += square(compute_direction_weight(*other)) * compute_direction_variance(*other);
     }
-    return std::sqrt(variance / square(sum) + square(lean_sd(shape_)));
+    return std::sqrt(variance / square(sum) + square(get_tilt_sd(shape_)));
   }
 
   /// Turns side i about its middle as the other edges are turned, up to where its neighbours are.
@@ -543,8 +546,9 @@ class HiddenEdges {
       if (!other) continue;
       const Eigen::Vector2d way =
           Eigen::Rotation2Dd(-double(k) * std::numbers::pi / 2) * other->side.way();
-      sum += weight_of(*other);
-      moment += weight_of(*other) * std::atan2(cross_of(side.way(), way), side.way().dot(way));
+      sum += compute_direction_weight(*other);
+      moment += compute_direction_weight(*other) *
+                std::atan2(cross_of(side.way(), way), side.way().dot(way));
     }
     const Eigen::Vector2d middle = (side.from + side.to) / 2;
     const Eigen::Vector2d half = Eigen::Rotation2Dd(moment / sum) * (side.to - middle);
@@ -556,24 +560,28 @@ class HiddenEdges {
 
   /// Predicts edge i from the other three by the ratio of the sides of the only size that agrees
   /// with the place where it was found; std::nullopt if several or none do.
-  std::optional<Place> place_by_size(const FoundEdges& edges, std::size_t i,
+  std::optional<Place> predict_place(const FoundEdges& edges, std::size_t i,
                                      const std::vector<Eigen::Vector2d>& sizes_m) const {
     constexpr double size_sd_m = 0.001;      // of sizes that are stated to the millimetre
     constexpr double bounds = 2, clear = 3;  // standard deviations: an even one ends at sqrt(3)
     const StraightEdge &edge = *edges[i], &opposite = *edges[(i + 2) % 4];
     const StraightEdge &left = *edges[(i + 1) % 4], &right = *edges[(i + 3) % 4];
-    const double length_px = distance(left.side, right.side) / per_px_;
-    const double depth_px = distance(opposite.side, edge.side) / per_px_;
+    const double length_px = compute_distance(left.side, right.side) / per_px_;
+    const double depth_px = compute_distance(opposite.side, edge.side) / per_px_;
     std::optional<Place> place;
+    // The variance of the opposite edge counts three times: edges are taken as independent, but its
+    // error moves both.
     for (const Eigen::Vector2d& size_m : sizes_m) {
       for (const double ratio : {size_m[0] / size_m[1], size_m[1] / size_m[0]}) {
         const double relative_variance =
-            square(lean_sd(shape_)) + square(size_sd_m) * size_m.cwiseAbs2().cwiseInverse().sum();
-        const double variance = relative_variance * square(ratio * length_px) +
-                                middle_variance(opposite) +
-                                square(ratio) * (middle_variance(left) + middle_variance(right));
+            square(get_tilt_sd(shape_)) +
+            square(size_sd_m) * size_m.cwiseAbs2().cwiseInverse().sum();
+        const double variance =
+            relative_variance * square(ratio * length_px) + 3 * compute_middle_variance(opposite) +
+            square(ratio) * (compute_middle_variance(left) + compute_middle_variance(right));
         const Place here{depth_px - ratio * length_px, std::sqrt(variance)};
-        const double reach_px = bounds * std::sqrt(middle_variance(edge)) + clear * here.sd_px;
+        const double reach_px =
+            bounds * std::sqrt(compute_middle_variance(edge)) + clear * here.sd_px;
         if (std::abs(here.offset_px) > reach_px) continue;
         if (place && std::abs(place->offset_px - here.offset_px) > 0.1 * here.sd_px) return {};
         place = here;
@@ -655,9 +663,9 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
   std::optional<Corners> corners = first->corners;
 
   // No disc, of which stripes hide a part, too, is so slender.
-  constexpr double least_slender = 3;
+  constexpr double min_aspect = 3;
   const auto is_rather_round = [&](const Sides& sides) {
-    if (aspect_of(sides) > least_slender) return false;
+    if (aspect_of(sides) > min_aspect) return false;
     const auto disc = shape.light_of(outline, background);
     return disc && disc->roundness >= first->near;
   };
@@ -669,17 +677,17 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
   };
   for (auto [inset_px, search] : {Pass{5, {7, 48}}, Pass{3.5, {5, 48}}, Pass{3.5, {4, 96}}}) {
     const Sides sides = sides_of(*corners);
-    const double narrow =
+    const double min_side =
         std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
-    if (!(narrow > least_px * per_px) || aspect_of(sides) > most_slender) return std::nullopt;
-    const double inset = std::min((inset_px + bow_px) * per_px, narrow / 3);
+    if (!(min_side > least_px * per_px) || aspect_of(sides) > most_slender) return std::nullopt;
+    const double inset = std::min((inset_px + bow_px) * per_px, min_side / 3);
     const auto chords = chords_within(shape.turned(face_of(sides, inset, shape)), lines.size());
     if (chords.size() < least_lines) return std::nullopt;
     // Lines that follow one another, or levels would be taken for those of others.
     const int rows = chords.back().row - chords.front().row + 1;
     if (rows != static_cast<int>(chords.size())) return std::nullopt;
     const LineLevels levels(lines, chords, background);
-    search.reach_px = std::min(search.reach_px + bow_px, narrow / per_px / 2);
+    search.reach_px = std::min(search.reach_px + bow_px, min_side / per_px / 2);
     search.blur_px = blur_px;
     FoundEdges found_edges;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -693,7 +701,7 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
         return std::nullopt;
       }
     }
-    blur_px = surest_blur_px(found_edges);
+    blur_px = find_surest_blur_px(found_edges);
     bow_px = 0;
     Sides found;
     for (std::size_t i = 0; i < 4; ++i) {

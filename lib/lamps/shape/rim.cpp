@@ -51,7 +51,7 @@ struct Ellipse {
 };
 
 /// Derivative of the level plane with respect to (column, row), at a pixel, of determinant 1.
-Matrix2 unit_plane_from_pixel(const LightShape& shape, const Eigen::Vector2d& pixel) {
+Matrix2 compute_unit_plane_from_pixel(const LightShape& shape, const Eigen::Vector2d& pixel) {
   constexpr double step_px = 1;
   Matrix2 derivative = Matrix2::Identity();
   const auto at = shape.plane_of(shape.turned(pixel));
@@ -250,7 +250,7 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
 }
 
 /// Returns the ellipse of a light's outline near its centre.
-Ellipse ellipse_of(const Light& light, const LightShape& shape) {
+Ellipse make_ellipse(const Light& light, const LightShape& shape) {
   const Eigen::Vector2d low = shape.turned(light.low), high = shape.turned(light.high);
   const Eigen::Vector2d center = (low + high) / 2;
   Matrix2 unit_from_pixel;
@@ -267,7 +267,7 @@ Ellipse ellipse_of(const Light& light, const LightShape& shape) {
 }
 
 /// Returns the clearest steps within `reach_px` of an ellipse in the image.
-std::vector<EdgePoint> steps_near(const Face& face, const Ellipse& ellipse, double reach_px) {
+std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse, double reach_px) {
   constexpr double min_step = 0.35, min_cosine = 0.3;
   std::vector<EdgePoint> points;
   std::vector<double> levels;
@@ -315,10 +315,10 @@ std::optional<Light> fit_near(const Ring& ring, const Face& face, const Backgrou
   std::optional<Light> light;
   for (const double reach : {0.16, 0.12, 0.08, 0.08}) {
     const double reach_px = reach * ring.ellipse.mean_radius_px();
-    auto better = shape.light_of(steps_near(face, ellipse, reach_px), background);
+    auto better = shape.light_of(find_steps_near(face, ellipse, reach_px), background);
     if (!better) return std::nullopt;
     light = std::move(better);
-    ellipse = ellipse_of(*light, shape);
+    ellipse = make_ellipse(*light, shape);
   }
   return light;
 }
@@ -326,9 +326,10 @@ std::optional<Light> fit_near(const Ring& ring, const Face& face, const Backgrou
 /// Returns the standard deviation per axis of a light's centre by the delete-a-group jackknife
 /// (Efron and Tibshirani 1993, section 11.5): its outline is fitted again without each of its
 /// pieces. A piece that shows another edge than the others moves the centre by more than the
-/// scatter of its points. Returns std::nullopt if the outline without one of them has no centre.
-std::optional<double> jackknife_sd_px(const Light& light, const Background& background,
-                                      const LightShape& shape) {
+/// scatter of its points. Outliers of the fit are excluded beforehand. Returns std::nullopt if the
+/// outline without one of them has no centre.
+std::optional<double> estimate_jackknife_sd_px(const Light& light, const Background& background,
+                                               const LightShape& shape) {
   constexpr std::size_t pieces = 8;
   const Eigen::Vector2d center = shape.turned(light.pixel);
   std::vector<EdgePoint> outline = light.outline;
@@ -385,10 +386,11 @@ double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
 }
 
 /// Fits a light and the sigma of its centre to the steps next to its outline, which have no bias
-/// where the contrast of the sides differs. Returns whether most pieces of the outline show one.
-bool fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
-                  const Background& background, const LightShape& shape, Light& light,
-                  double& sigma_px) {
+/// where the contrast of the sides differs. Returns std::nullopt unless most pieces of the outline
+/// show one.
+std::optional<Light> fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
+                                  const Background& background, const LightShape& shape,
+                                  Light light) {
   constexpr int rounds = 3;
   constexpr double first_blur_px = 0.9, min_agreeing = 0.6;
   // Consumer cameras code light^(1 / 2.2), nearly; others barely have the depth to show a rim. The
@@ -397,10 +399,10 @@ bool fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
   StepPicture picture{first_blur_px, gamma};
   for (int round = 1; round < rounds; ++round) {
     auto steps = fit_rim_steps(image, light, lit_lines, background, picture, round > 1, shape);
-    if (!shift_of(steps.pieces, shape.has_lens())) return false;
+    if (!shift_of(steps.pieces, shape.has_lens())) return std::nullopt;
     picture.blur_px = steps.blur_px;
     auto better = shape.light_of(std::move(steps.points), background);
-    if (!better || 2 * better->outline.size() < light.outline.size()) return false;
+    if (!better || 2 * better->outline.size() < light.outline.size()) return std::nullopt;
     light = std::move(*better);
   }
   const auto steps = fit_rim_steps(image, light, lit_lines, background, picture, true, shape);
@@ -409,10 +411,13 @@ bool fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
   const auto other =
       shift_of(fit_rim_steps(image, light, lit_lines, background, picture, true, shape).pieces,
                shape.has_lens());
-  if (!shift || !other) return false;
+  if (!shift || !other || !(shift->agreeing > min_agreeing * double(steps.looked_at))) {
+    return std::nullopt;
+  }
   light.pixel += shape.turned(shift->px);
-  sigma_px = std::sqrt(shift->covariance.trace() / 2 + (shift->px - other->px).squaredNorm() / 2);
-  return shift->agreeing > min_agreeing * double(steps.looked_at);
+  light.sigma_px =
+      std::sqrt(shift->covariance.trace() / 2 + (shift->px - other->px).squaredNorm() / 2);
+  return light;
 }
 
 }  // namespace
@@ -451,7 +456,7 @@ std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Backgr
   const Face face = fine == coarse ? blurred : Face(image, wide, background, fine);
   if (face.lit_lines().size() < min_lines) return std::nullopt;
   const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
-  const Ring best = find_best_ring(blurred, box, unit_plane_from_pixel(shape, middle));
+  const Ring best = find_best_ring(blurred, box, compute_unit_plane_from_pixel(shape, middle));
   const auto crossings =
       2 * std::count_if(face.lit_lines().begin(), face.lit_lines().end(),
                         [&](int line) { return best.ellipse.cross(line).has_value(); });
@@ -459,18 +464,21 @@ std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Backgr
 
   auto light = fit_near(best, face, background, shape);
   if (!light) return std::nullopt;
-  // Of the clearest steps; the fitted ones are others.
+  // Counts the clearest steps, before fit_to_steps() replaces them.
   const double shown = std::min(1.0, double(light->outline.size()) / double(crossings));
-  double sigma_px = light->sigma_px * std::sqrt(points_of_a_stripe(light->outline));
-  const bool fitted =
-      fit_to_steps(image, face.lit_lines_of_image(), background, shape, *light, sigma_px);
-  std::optional<double> jackknife_px;
-  if (!fitted) jackknife_px = jackknife_sd_px(*light, background, shape);
-  light->sigma_px = std::max(sigma_px, jackknife_px.value_or(0));
+  auto fitted = fit_to_steps(image, face.lit_lines_of_image(), background, shape, *light);
+  bool is_clear = fitted.has_value();
+  if (fitted) {
+    light = std::move(fitted);
+  } else {
+    const double scatter_px = light->sigma_px * std::sqrt(points_of_a_stripe(light->outline));
+    const auto jackknife_px = estimate_jackknife_sd_px(*light, background, shape);
+    light->sigma_px = std::max(scatter_px, jackknife_px.value_or(0));
+    is_clear = jackknife_px.has_value();
+  }
   light->uneven = true;
   light->roundness = shown;
-  const bool clear = fitted || jackknife_px;
-  return Rim{std::move(*light), clear};
+  return Rim{std::move(*light), is_clear};
 }
 
 }  // namespace vlp

@@ -18,8 +18,8 @@ namespace vlp {
 bool unevenly_lit(const ImageView& image, const Blob& blob, const std::vector<EdgePoint>& outline,
                   const Background& background);
 
-/// A light by its rim, and whether the rim is clear: most pieces of it show a step, or no piece of
-/// it alone determines its centre.
+/// A light by its rim, and whether the rim is clear: most pieces of it show a step, or the outline
+/// without any one of eight pieces still has a centre.
 struct Rim {
   Light light;
   bool clear;
@@ -42,7 +42,8 @@ struct Rim {
 ///    tone curve causes. Otherwise sigma is the larger one of the scatter of the points and the
 ///    jackknife over eight pieces of the outline.
 ///
-/// Returns std::nullopt if the blob is smaller than 20 px, or no circle has such steps.
+/// Returns std::nullopt if the blob is smaller than 20 px or has less than 10 lit lines, if no
+/// circle has such steps, or if the steps determine no circle.
 std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Background& background,
                           const LightShape& shape);
 

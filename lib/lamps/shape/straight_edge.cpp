@@ -69,14 +69,14 @@ class Samples {
  public:
   Samples(const ImageView& lines, const Side& side, const LineLevels& levels, double dark,
           double per_px, const EdgeSearch& search, const LightShape& shape,
-          bool may_leave_image = false)
+          bool can_leave_image = false)
       : lines_(lines),
         side_(side),
         levels_(levels),
         dark_(dark),
         per_px_(per_px),
         shape_(shape),
-        may_leave_image_(may_leave_image) {
+        can_leave_image_(can_leave_image) {
     if (!trace()) return;
     // A corner is blurred by both sides.
     constexpr double corner_px = 4;
@@ -172,7 +172,7 @@ class Samples {
       pixel[across] += i;
       const int column = static_cast<int>(pixel.x()), row = static_cast<int>(pixel.y());
       if (column < 0 || row < 0 || column >= lines_.width || row >= lines_.height) {
-        if (may_leave_image_) continue;
+        if (can_leave_image_) continue;
         return false;
       }
       const auto lit = levels_.at(row);
@@ -194,7 +194,7 @@ class Samples {
   const LineLevels& levels_;
   double dark_, per_px_;
   const LightShape& shape_;
-  bool may_leave_image_;
+  bool can_leave_image_;
   std::array<Eigen::Vector2d, kPieces + 1> trace_;
 };
 
@@ -202,9 +202,9 @@ class Samples {
 constexpr double kNoise = 0.01;
 
 /// Length, in pixels, of a side, and what is known beforehand of all sides of a light.
-struct Known {
+struct Priors {
   double length_px;
-  /// Sigma of the blur; 0 if it is not known.
+  /// Sigma of the blur; 0 if it is not priors.
   double blur_px;
   double focal_px;
 };
@@ -213,10 +213,10 @@ struct Known {
 /// take, because the pixels of short sides do not determine it; the blur; and the bow, at most that
 /// of a lens of 115 degrees from corner to corner.
 template <int N>
-constexpr std::size_t kExpected = N > kBow ? 4 : 3;
+constexpr std::size_t kNumPriors = N > kBow ? 4 : 3;
 
 template <int N>
-CurveDistance<N> expected(const Model<N>& model, std::size_t which, const Known& known) {
+CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const Priors& priors) {
   constexpr double change = 0.1 / 100, bend = 0.05 / 100, blur_sd = 0.15;
   CurveDistance<N> result{0, Eigen::Matrix<double, N, 1>::Zero()};
   const auto expect = [&](int unknown, double value, double sd) {
@@ -224,14 +224,14 @@ CurveDistance<N> expected(const Model<N>& model, std::size_t which, const Known&
     result.slope[unknown] = kNoise / sd;
   };
   if (which == 0) {
-    expect(kLevelTo, model.x[kLevelFrom], change * known.length_px);
+    expect(kLevelTo, model.x[kLevelFrom], change * priors.length_px);
     result.slope[kLevelFrom] = -result.slope[kLevelTo];
   } else if (which == 1) {
-    expect(kLevelBend, 0, bend * known.length_px);
+    expect(kLevelBend, 0, bend * priors.length_px);
   } else if (which == 2) {
-    if (known.blur_px > 0) expect(kBlur, known.blur_px, blur_sd * known.blur_px);
+    if (priors.blur_px > 0) expect(kBlur, priors.blur_px, blur_sd * priors.blur_px);
   } else if constexpr (N > kBow) {
-    expect(kBow, 0, known.length_px * known.length_px / (12 * known.focal_px));
+    expect(kBow, 0, priors.length_px * priors.length_px / (12 * priors.focal_px));
   }
   return result;
 }
@@ -241,7 +241,7 @@ CurveDistance<N> expected(const Model<N>& model, std::size_t which, const Known&
 template <int N>
 std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vector<Sample>& samples,
                                           const std::vector<double>& weights,
-                                          const std::vector<bool>& inliers, const Known& known) {
+                                          const std::vector<bool>& inliers, const Priors& priors) {
   Normal<std::size_t(N)> normal;
   double count = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -249,8 +249,8 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
     normal.add_row(model.residual(samples[i]).slope, 0, weights[i]);
     ++count;
   }
-  for (std::size_t which = 0; which < kExpected<N>; ++which) {
-    normal.add_row(expected(model, which, known).slope, 0);
+  for (std::size_t which = 0; which < kNumPriors<N>; ++which) {
+    normal.add_row(evaluate_prior(model, which, priors).slope, 0);
   }
   const Cholesky<std::size_t(N)> factor(normal);
   if (!factor.determines(1e-12) || !(count > N)) return std::nullopt;
@@ -276,6 +276,11 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
     sd = samples[i].lit.sd;
   }
   covariance *= count / (count - N);
+  for (std::size_t which = 0; which < kNumPriors<N>; ++which) {
+    const Eigen::Vector2d moved =
+        kNoise * ends_moved_by(evaluate_prior(model, which, priors).slope);
+    covariance += moved * moved.transpose();
+  }
   for (const auto& [line, of_line] : of_lines) {
     const Eigen::Vector2d moved = of_line.first * of_line.second;
     covariance += moved * moved.transpose();
@@ -285,24 +290,24 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
 
 template <int N>
 std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per_px,
-                                const Known& known) {
+                                const Priors& priors) {
   constexpr std::array tolerances = {5.0, 5.0, 5.0, 5.0, 2.0, 1.0, 0.5, 0.3, 0.3, 0.3};
   constexpr double first_blur_px = 1.5, sharpest_px = 0.3, softest_px = 6;
   constexpr double most_move_px = 1.5, farthest_px = 8, least_step = 0.4, most_sd_px = 0.5;
-  constexpr double near = 3, least_lit = 0.3, explained = 0.15, least_share = 0.8;
+  constexpr double near = 3, min_lit = 0.3, explained = 0.15, min_fraction = 0.8;
   const std::vector<Sample>& samples = all.samples;
-  std::vector<double> weights(samples.size() + kExpected<N>, 1);
+  std::vector<double> weights(samples.size() + kNumPriors<N>, 1);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     weights[i] = 1 / (1 + std::pow(samples[i].lit.sd / kNoise, 2));
   }
   Model<N> model{Eigen::Matrix<double, N, 1>::Zero()};
-  model.x[kBlur] = known.blur_px > 0 ? known.blur_px : first_blur_px;
+  model.x[kBlur] = priors.blur_px > 0 ? priors.blur_px : first_blur_px;
   model.x[kLevelFrom] = model.x[kLevelTo] = 1;
   std::optional<MEstimateStep<N>> last;
   for (const double tolerance : tolerances) {
     last = m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
       return i < samples.size() ? model.residual(samples[i])
-                                : expected(model, i - samples.size(), known);
+                                : evaluate_prior(model, i - samples.size(), priors);
     });
     if (!last) return std::nullopt;
     auto step = last->step;
@@ -316,7 +321,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   const auto& x = model.x;
   const double least_level = std::min(x[kLevelFrom], x[kLevelTo]);
   if (!(least_level - x[kOutside] > least_step)) return std::nullopt;
-  const auto covariance = covariance_of_ends(model, samples, weights, last->inliers, known);
+  const auto covariance = covariance_of_ends(model, samples, weights, last->inliers, priors);
   if (!covariance) return std::nullopt;
 
   const Eigen::Vector2d inwards = side.inwards() * per_px;
@@ -329,12 +334,12 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   if (!(edge.covariance_px.diagonal().maxCoeff() < most_sd_px * most_sd_px)) return std::nullopt;
   int close = 0, like = 0;
   for (const Sample& sample : samples) {
-    if (sample.lit.level < least_lit || std::abs(sample.depth_px) > near) continue;
+    if (sample.lit.level < min_lit || std::abs(sample.depth_px) > near) continue;
     ++close;
     like += std::abs(model.residual(sample).error) < explained * sample.lit.level + 0.02;
   }
   edge.share = close > 0 ? double(like) / close : 0;
-  if (edge.share < least_share) return std::nullopt;
+  if (edge.share < min_fraction) return std::nullopt;
   return edge;
 }
 
@@ -369,12 +374,12 @@ class HiddenEdge {
   }
 
   /// Returns the share of the pixels on lit lines that an edge with such ends explains.
-  double explained_share(const Eigen::Vector2d& ends_px) const {
-    constexpr double least_lit = 0.3, explained = 0.15;
+  double compute_explained_fraction(const Eigen::Vector2d& ends_px) const {
+    constexpr double min_lit = 0.3, explained = 0.15;
     int lit = 0, like = 0;
     for (const Sample& sample : samples_) {
       const double level = sample.lit.level;
-      if (level < least_lit) continue;
+      if (level < min_lit) continue;
       ++lit;
       const double error = sample.value - level * inside(sample, ends_px);
       like += std::abs(error) < explained * level + 2 * kNoise;
@@ -445,14 +450,14 @@ Ends average_ends(const HiddenEdge& edge, const EdgePrior& prior, double reach_p
 std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side& side,
                                              const LineLevels& levels, double dark, double per_px,
                                              const EdgeSearch& search, const LightShape& shape) {
-  constexpr double least_lit = 0.35, rise_of_blur = 1.349;
+  constexpr double min_lit = 0.35, rise_of_blur = 1.349;
   constexpr std::size_t least = 40;
   const Samples all(lines, side, levels, dark, per_px, search, shape);
   if (all.samples.size() < least) return std::nullopt;
   const double length_px = (all.at(1) - all.at(0)).norm();
-  const Known known{length_px, search.blur_px, std::hypot(lines.width, lines.height) / 2};
-  auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, known)
-                               : fit<kBow + 1>(all, side, per_px, known);
+  const Priors priors{length_px, search.blur_px, std::hypot(lines.width, lines.height) / 2};
+  auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, priors)
+                               : fit<kBow + 1>(all, side, per_px, priors);
   if (!edge) return std::nullopt;
   const Side& found = edge->side;
   const auto points = static_cast<int>(length_px);
@@ -462,7 +467,7 @@ std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side&
     if (!pixel) continue;
     const Eigen::Vector2d at = shape.turned(*pixel);
     const auto lit = levels.at(static_cast<int>(std::lround(at.y())));
-    if (!lit || lit->level < least_lit) continue;
+    if (!lit || lit->level < min_lit) continue;
     edge->points.push_back(
         {at, lit->level * levels.brightest(), rise_of_blur * edge->blur_px, false});
   }
@@ -473,13 +478,13 @@ std::optional<StraightEdge> hidden_edge_at(const ImageView& lines, const Side& s
                                            const LineLevels& levels, double dark, double per_px,
                                            const EdgeSearch& search, const LightShape& shape,
                                            const EdgePrior& prior) {
-  constexpr double least_share = 0.8;
+  constexpr double min_fraction = 0.8;
   const Samples all(lines, side, levels, dark, per_px, search, shape, true);
   if (all.samples.empty()) return std::nullopt;
   const HiddenEdge hidden(all.samples, search.blur_px);
   const auto [ends_px, covariance_px] = average_ends(hidden, prior, search.reach_px);
-  const double share = hidden.explained_share(ends_px);
-  if (share < least_share) return std::nullopt;
+  const double share = hidden.compute_explained_fraction(ends_px);
+  if (share < min_fraction) return std::nullopt;
   const Eigen::Vector2d inwards = side.inwards() * per_px;
   const Side found{side.from + ends_px[0] * inwards, side.to + ends_px[1] * inwards};
   return StraightEdge{found, covariance_px, search.blur_px, 0, share, {}};

@@ -19,11 +19,11 @@ namespace {
 constexpr double kBinsPerPeriod = 8;
 /// Fraction of the variance that the period of a modulated light may leave.
 constexpr double kMaxUnexplained = 0.45;
-/// Log-likelihood ratio that decides between two periods: odds of 50.
+/// Log-likelihood ratio that decides between two periods: odds of 55.
 constexpr double kMinLogRatio = 4;
 /// Modulation depth of the fundamental below which a light is steady.
 constexpr double kMinLightDepth = 0.3;
-/// Phase coherence of a light whose parts are out of phase by a quarter of a period.
+/// Minimum phase coherence: that of a light whose phase changes by a quarter of a period across it.
 constexpr double kMinPhaseCoherence = 0.9;
 /// Cells of the smallest light.
 constexpr int kMinCells = 4;
@@ -142,8 +142,8 @@ void decide(const Claims& claims, RegionCandidate& candidate) {
 
 /// Returns |sum z| / sum |z| over the cells of a region, where z is the complex amplitude of a cell
 /// at that period: 1 if all parts of the region are modulated in phase.
-double phase_coherence_of(const CellLevels& cells, const ModulationMap& map,
-                          const ModulatedRegion& region, double period_lines) {
+double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map,
+                               const ModulatedRegion& region, double period_lines) {
   const double period = period_lines / cells.lines_per_bin;
   std::complex<double> sum;
   double amplitudes = 0;
@@ -163,7 +163,7 @@ double phase_coherence_of(const CellLevels& cells, const ModulationMap& map,
       amplitudes += std::abs(z);
     }
   }
-  return std::abs(sum) / amplitudes;
+  return amplitudes > 0 ? std::abs(sum) / amplitudes : 0;
 }
 
 /// Returns the number of periods that a region shows. The window of two periods widens it by half
@@ -190,7 +190,7 @@ RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, Modul
     if (!candidate.is_other_period) candidate.fit = lamp;
   }
   candidate.phase_coherence =
-      phase_coherence_of(cells, map, candidate.region, candidate.fit.period_lines);
+      compute_phase_coherence(cells, map, candidate.region, candidate.fit.period_lines);
   // Few periods mean something only where they are a lamp's.
   const bool has_lamp_period = !lamp_periods_lines.empty() && !candidate.is_other_period;
   const double min_periods = has_lamp_period ? kLeastPeriods : kEnoughPeriods;
@@ -275,8 +275,11 @@ ModulatedLight make_light(const ModulationMap& map,
                        brightest.lamp,
                        measure_stripes(brightest),
                        brightest.phase_coherence,
-                       std::numbers::pi / 2 * brightest.region.peak,
+                       0,
                        0};
+  constexpr double min_duty = 0.1;
+  const double duty = std::clamp(light.stripes.duty, min_duty, 1 - min_duty);
+  light.peak = std::numbers::pi / 2 / std::sin(std::numbers::pi * duty) * brightest.region.peak;
   std::array<LitArea, fractions.size()> areas;
   for (const RegionCandidate* part : parts) {
     // What is darker is light that the lamp throws on its surroundings.

@@ -10,7 +10,6 @@
 
 #include "lamps/image/background.h"
 #include "lamps/image/image_view.h"
-#include "lamps/image/runs.h"
 #include "lamps/signal/modulation_map.h"
 #include "lamps/signal/period_fit.h"
 #include "lamps/signal/stripes.h"
@@ -37,8 +36,8 @@ struct ModulatedLight {
   Stripes stripes;  ///< of its brightest part, behind its envelope
   /// |sum z| / sum |z| over the cells of its brightest part, see find_modulated_lights().
   double phase_coherence;
-  /// Level of its brightest lines above the dark, in grey levels, by the largest amplitude: that of
-  /// a square wave over 2 / pi.
+  /// Level of its brightest lines above the dark, in grey levels. The fundamental of a square wave
+  /// between 0 and that level has the amplitude (2 / pi) sin(pi duty) times it.
   double peak;
   /// Sum of the amplitude over its cells.
   double energy;
@@ -63,8 +62,8 @@ struct ModulatedLight {
 ///
 /// A shutter exposes all pixels of a line at one time, so that all parts of a lamp are modulated in
 /// phase, whatever its shape; the parts of letters and patterns are not. With the complex amplitude
-/// z of each cell at the period, the phase coherence |sum z| / sum |z| of a light exceeds 0.9. Bars
-/// whose phase changes by a quarter of a period across the light reach that.
+/// z of each cell at the period, the phase coherence |sum z| / sum |z| of a light exceeds 0.9. A
+/// phase change of a quarter of a period across the light reduces it to that.
 ///
 /// With no lamp periods (the row time is not known) the lights have the period that fits best.
 ///
