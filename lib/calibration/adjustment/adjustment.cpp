@@ -352,19 +352,23 @@ class Contradictions {
   bool most_ = false;
 };
 
-/// Root of the squared whitened residuals over their degrees of freedom, less what the unknowns
-/// take of the detections.
+/// Variance factor of the detections: root of their squared whitened residuals over their degrees
+/// of freedom.
 struct Noise {
   double ratio;
   double freedom;
 };
 
-Noise noise_of(const Assembled& all, const Eigen::MatrixXd& covariance) {
+/// Estimates the noise of the detections. Their degrees of freedom are the number of their
+/// coordinates minus the trace of their hat matrix, which is the number of unknowns minus the
+/// fraction of each that priors determine: 1 - sd_after^2 / sd_prior^2 is left to the detections.
+Noise noise_of(const Assembled& all, const AdjustmentProblem::SharedCovariance& shared) {
+  const Eigen::MatrixXd& covariance = shared.matrix;
   const AdjustmentProblem& problem = all.problem;
   const AdjustmentLayout& at = problem.layout();
   const std::vector<double> lengths = lengths_of(problem);
   double squares = 0, freedom = 0;
-  std::vector<int> used(problem.captures.size());
+  std::vector<Eigen::Index> used(problem.captures.size()), place_rows(problem.captures.size());
   std::vector<bool> lamp_used(problem.lamps.size());
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     if (!problem.sightings[i].used) continue;
@@ -373,11 +377,15 @@ Noise noise_of(const Assembled& all, const Eigen::MatrixXd& covariance) {
     ++used[problem.sightings[i].capture];
     lamp_used[problem.sightings[i].lamp] = true;
   }
+  for (const auto& place : problem.places) {
+    if (problem.place_used[place.place]) place_rows[place.capture] += place.size;
+  }
   std::vector<bool> spot_used(static_cast<std::size_t>(at.shared - at.spots) / 3);
   for (std::size_t k = 0; k < used.size(); ++k) {
     if (used[k] == 0) continue;
     const auto& spot = problem.captures[k].spot;
-    freedom -= std::min(spot ? 1 : 4, 2 * used[k]);
+    freedom -=
+        static_cast<double>(std::min<Eigen::Index>(spot ? 1 : 4, 2 * used[k] + place_rows[k]));
     freedom -= problem.told_of_motion(k);
     if (spot) spot_used[*spot] = true;
   }
@@ -390,9 +398,7 @@ Noise noise_of(const Assembled& all, const Eigen::MatrixXd& covariance) {
     freedom -= 3 - covariance.block<3, 3>(at.lamp(i), at.lamp(i)).trace() / (sd_m * sd_m);
   }
   freedom -= 3.0 * static_cast<double>(std::count(spot_used.begin(), spot_used.end(), true));
-  for (std::size_t i = 0; i < all.places.size(); ++i) {
-    if (problem.place_used[i]) freedom += 2;  // what a place says was not known from detections
-  }
+  freedom += shared.determined_by_places;
   return {std::sqrt(squares / std::max(freedom, 1.0)), freedom};
 }
 
@@ -403,10 +409,11 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
   constexpr int rounds = 40;
   for (int round = 0; round < rounds; ++round) {
     if (!problem.solve(false)) return false;
-    covariance = problem.shared_covariance();
+    const auto shared = problem.shared_covariance();
+    covariance = shared.matrix;
     bool changed = leave_out_outliers(problem, all.noise_is_stated);
     if (!changed) changed = contradictions.settle(covariance);
-    const Noise noise = noise_of(all, covariance);
+    const Noise noise = noise_of(all, shared);
     freedom = noise.freedom;
     if (noise.freedom > 0) {
       const double scale = problem.noise_scale * noise.ratio;
@@ -424,7 +431,7 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
     if (!changed) return true;
   }
   if (!problem.solve(false)) return false;
-  covariance = problem.shared_covariance();
+  covariance = problem.shared_covariance().matrix;
   return true;
 }
 

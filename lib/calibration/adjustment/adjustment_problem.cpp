@@ -521,6 +521,55 @@ struct OwnBlock {
 /// A row block of derivatives by the shared unknowns, part by part.
 using Parts = std::vector<std::pair<Eigen::Index, Eigen::MatrixXd>>;
 
+/// Returns the derivatives of the residual of a place, in standard deviations, by the capture's own
+/// unknowns, and puts those by the shared unknowns into `parts`.
+Eigen::MatrixXd whitened_derivatives(const AdjustmentProblem& problem,
+                                     const AdjustmentProblem::PlaceSighting& place, Parts& parts) {
+  const AdjustmentLayout& at = problem.layout();
+  const auto& capture = problem.captures[place.capture];
+  const PlaceDerivatives derivatives = derivatives_of(problem, place);
+  const Eigen::Index rows = place.size;
+  const Eigen::MatrixXd by_position =
+      Eigen::MatrixXd(Eigen::Matrix3d::Identity()).topRows(rows) / place.sd_m;
+  parts.clear();
+  Eigen::MatrixXd by_own(rows, capture.spot ? 1 : 4);
+  if (capture.spot) {
+    by_own = derivatives.by_yaw.head(rows) / place.sd_m;
+    parts.emplace_back(at.spot(*capture.spot), by_position);
+  } else {
+    by_own << by_position, derivatives.by_yaw.head(rows) / place.sd_m;
+  }
+  if (turns_the_arm(problem, place)) {
+    parts.emplace_back(at.lever_arm, derivatives.by_arm.topRows(rows) / place.sd_m);
+  }
+  return by_own;
+}
+
+/// The elimination of a capture's own unknowns: their information N, and N^-1 times the mixed
+/// block.
+struct Elimination {
+  Eigen::MatrixXd own, own_from_shared;
+};
+
+/// Returns the trace of the covariance of rows of whitened residuals, with derivatives B by the
+/// capture's own unknowns and A (`parts`) by the shared ones `columns`:
+/// tr(B N^-1 B' + (A - B N^-1 M) C (A - B N^-1 M)'), where M is the mixed block.
+double predicted_variance(const Eigen::MatrixXd& by_own, const Parts& parts,
+                          const std::vector<Eigen::Index>& columns, const Elimination& eliminated,
+                          const Eigen::MatrixXd& shared_covariance) {
+  Eigen::MatrixXd own_rows = Eigen::MatrixXd::Zero(by_own.rows(), eliminated.own.rows());
+  own_rows.leftCols(by_own.cols()) = by_own;
+  Eigen::MatrixXd shared_rows = Eigen::MatrixXd::Zero(by_own.rows(), shared_covariance.cols());
+  for (const auto& [first, by_shared] : parts) {
+    shared_rows.middleCols(first, by_shared.cols()) = by_shared;
+  }
+  const Eigen::MatrixXd rows =
+      shared_rows(Eigen::all, columns) - own_rows * eliminated.own_from_shared;
+  return own_rows.cwiseProduct(solve_symmetric(eliminated.own, own_rows.transpose()).transpose())
+             .sum() +
+         rows.cwiseProduct(rows * shared_covariance(columns, columns)).sum();
+}
+
 void add_information(const Parts& parts, Eigen::MatrixXd& information) {
   for (const auto& [row, a] : parts) {
     for (const auto& [col, b] : parts) {
@@ -531,7 +580,7 @@ void add_information(const Parts& parts, Eigen::MatrixXd& information) {
 
 }  // namespace
 
-Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
+AdjustmentProblem::SharedCovariance AdjustmentProblem::shared_covariance() const {
   const AdjustmentLayout& at = layout_;
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(at.shared, at.shared);
   constexpr double guess_rad = 1, guess_m = 10;
@@ -569,28 +618,13 @@ Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
   }
   for (const PlaceSighting& place : places) {
     if (!place_used[place.place] || !capture_used[place.capture]) continue;
-    const Capture& capture = captures[place.capture];
-    const PlaceDerivatives derivatives = derivatives_of(*this, place);
-    const Eigen::Index rows = place.size;
-    parts.clear();
-    Eigen::MatrixXd by_own(rows, capture.spot ? 1 : 4);
-    if (capture.spot) {
-      by_own = derivatives.by_yaw.head(rows) / place.sd_m;
-      parts.emplace_back(at.spot(*capture.spot),
-                         Eigen::MatrixXd(Eigen::Matrix3d::Identity()).topRows(rows) / place.sd_m);
-    } else {
-      by_own << Eigen::MatrixXd(Eigen::Matrix3d::Identity()).topRows(rows),
-          derivatives.by_yaw.head(rows);
-      by_own /= place.sd_m;
-    }
-    if (turns_the_arm(*this, place)) {
-      parts.emplace_back(at.lever_arm, derivatives.by_arm.topRows(rows) / place.sd_m);
-    }
+    const Eigen::MatrixXd by_own = whitened_derivatives(*this, place, parts);
     add_information(parts, information);
     OwnBlock& block = own[place.capture];
     block.own.topLeftCorner(by_own.cols(), by_own.cols()) += by_own.transpose() * by_own;
     for (const auto& [first, by_shared] : parts) block.add(by_own, first, by_shared);
   }
+  std::vector<Elimination> eliminated(captures.size());
   for (std::size_t k = 0; k < captures.size(); ++k) {
     const OwnBlock& block = own[k];
     const Eigen::Index size = captures[k].size(), n = std::ssize(block.columns);
@@ -602,8 +636,9 @@ Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
     for (Eigen::Index i = 0; i < n; ++i) {
       mixed.col(i) = block.mixed[static_cast<std::size_t>(i)].head(size);
     }
-    const Eigen::MatrixXd taken =
-        mixed.transpose() * solve_symmetric(known.topLeftCorner(size, size), mixed);
+    eliminated[k] = {known.topLeftCorner(size, size),
+                     solve_symmetric(known.topLeftCorner(size, size), mixed)};
+    const Eigen::MatrixXd taken = mixed.transpose() * eliminated[k].own_from_shared;
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j < n; ++j) {
         information(block.columns[static_cast<std::size_t>(i)],
@@ -622,7 +657,14 @@ Eigen::MatrixXd AdjustmentProblem::shared_covariance() const {
     covariance.middleRows<3>(at.lamp(i)).setZero();
     covariance.middleCols<3>(at.lamp(i)).setZero();
   }
-  return covariance;
+  double determined_by_places = 0;
+  for (const PlaceSighting& place : places) {
+    if (!place_used[place.place] || !capture_used[place.capture]) continue;
+    const Eigen::MatrixXd by_own = whitened_derivatives(*this, place, parts);
+    determined_by_places += predicted_variance(by_own, parts, own[place.capture].columns,
+                                               eliminated[place.capture], covariance);
+  }
+  return {covariance, determined_by_places};
 }
 
 }  // namespace vlp

@@ -139,9 +139,16 @@ class AdjustmentProblem {
   std::optional<Lens> lens() const;
   std::vector<double> intrinsics() const;
 
-  /// Covariance of the shared unknowns at the state, with exact ones at zero. What the residuals
-  /// say nothing of has the standard deviation of a guess: 1 rad, 10 m.
-  Eigen::MatrixXd shared_covariance() const;
+  struct SharedCovariance {
+    /// Covariance of the shared unknowns, zero for exact ones. Unknowns that no residual depends on
+    /// have the standard deviation of a guess: 1 rad, 10 m.
+    Eigen::MatrixXd matrix;
+    /// Number of unknowns that known places determine: the sum of tr(C_place) / sd^2 over the
+    /// places that are used, C_place being the covariance of the adjusted place.
+    double determined_by_places;
+  };
+  /// Computes the covariance of the shared unknowns at the state.
+  SharedCovariance shared_covariance() const;
 
   const LensFreedom& freedom() const { return freedom_; }
 
