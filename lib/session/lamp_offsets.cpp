@@ -3,11 +3,13 @@
 #include "session/lamp_offsets.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
 
-#include "geometry/median.h"
 #include "geometry/plane.h"
+#include "geometry/robust_scatter.h"
 #include "geometry/similarity.h"
 #include "geometry/symmetric.h"
 #include "rig/find_lamp.h"
@@ -71,8 +73,9 @@ struct Displacements {
   /// Two rows a lamp.
   Eigen::VectorXd moved_m;
   Eigen::MatrixXd covariance_m2, projector;
-  /// What is left over, of each view, two rows a lamp.
+  /// Residuals of each view, two rows a lamp.
   std::vector<Eigen::VectorXd> residuals_m;
+  double degrees_of_freedom = 0;
 };
 
 std::optional<Displacements> solved(const LampMap& map, const std::vector<CeilingView>& views) {
@@ -123,6 +126,7 @@ std::optional<Displacements> solved(const LampMap& map, const std::vector<Ceilin
     freedoms += by_view.rows() - 4;
   }
   if (freedoms <= 0) return std::nullopt;
+  found.degrees_of_freedom = static_cast<double>(freedoms);
   const Eigen::MatrixXd closed =
       found.projector * normal * found.projector + open * open.transpose();
   const auto [weights, directions] = symmetric_eigen(closed);
@@ -141,24 +145,26 @@ std::optional<Displacements> solved(const LampMap& map, const std::vector<Ceilin
     squares_m2 += found.residuals_m.emplace_back(off_m[c] - told[c] * moved).squaredNorm();
   }
   found.covariance_m2 =
-      squares_m2 / static_cast<double>(freedoms) * found.projector * inverse * found.projector;
+      squares_m2 / found.degrees_of_freedom * found.projector * inverse * found.projector;
   return found;
 }
 
 /// What contradicts the rest, if anything does: of each view the sighting that is farthest off,
 /// when it is half as far as the farthest of all, which moves the others.
 bool leave_out_outliers(std::vector<CeilingView>& views, const Displacements& found) {
-  constexpr double too_far = 6, median_of_two_axes = 1.1774, rounding_m = 1e-7;
-  std::vector<double> sizes_m;
+  constexpr double sigmas = 6, rounding_m = 1e-7;
+  std::vector<double> squares_m2;
   for (const Eigen::VectorXd& left_m : found.residuals_m) {
     for (Eigen::Index row = 0; row < left_m.size(); row += 2) {
-      sizes_m.push_back(left_m.segment<2>(row).norm());
+      squares_m2.push_back(left_m.segment<2>(row).squaredNorm());
     }
   }
-  const double farthest_m = *std::max_element(sizes_m.begin(), sizes_m.end());
-  const double limit_m =
-      std::max({rounding_m, too_far * upper_median(std::move(sizes_m)) / median_of_two_axes,
-                farthest_m / 2});
+  const double farthest_m = std::sqrt(*std::max_element(squares_m2.begin(), squares_m2.end()));
+  const double variance_m2 =
+      robust_planar_variance(std::move(squares_m2), found.degrees_of_freedom);
+  const double limit_m = std::max(
+      {rounding_m, std::sqrt(planar_outlier_bound(sigmas, found.degrees_of_freedom) * variance_m2),
+       farthest_m / 2});
   bool any = false;
   for (std::size_t c = 0; c < views.size(); ++c) {
     const Eigen::VectorXd& left_m = found.residuals_m[c];

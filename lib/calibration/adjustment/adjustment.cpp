@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "calibration/adjustment/adjustment_problem.h"
-#include "geometry/median.h"
+#include "geometry/robust_scatter.h"
 #include "geometry/symmetric.h"
 #include "positioning/inclination_rotation.h"
 #include "positioning/robust_fix.h"
@@ -201,19 +201,20 @@ std::vector<double> lengths_of(const AdjustmentProblem& problem) {
   return lengths;
 }
 
-/// Leaves out what is beyond the residuals' scatter, as the median shows it. Whether that changes
-/// anything.
-bool leave_out_outliers(AdjustmentProblem& problem, bool noise_is_stated) {
-  constexpr double median_of_rayleigh = 1.17741;  // sqrt(2 ln 2)
-  constexpr double rounding = 1e-6;               // standard deviations
+/// Rejects detections beyond the scatter of the residuals, of which the median is used, and
+/// reinstates those within. Returns true if that changes anything.
+bool leave_out_outliers(AdjustmentProblem& problem, bool noise_is_stated,
+                        double degrees_of_freedom) {
+  constexpr double rounding = 1e-6;  // standard deviations
   const std::vector<double> lengths = lengths_of(problem);
-  std::vector<double> used;
+  std::vector<double> squares;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
-    if (problem.sightings[i].used) used.push_back(lengths[i]);
+    if (problem.sightings[i].used) squares.push_back(lengths[i] * lengths[i]);
   }
-  if (used.empty()) return false;
-  const double scatter = upper_median(used) / median_of_rayleigh;
-  const double limit = kOutlier * std::max(scatter, noise_is_stated ? 1 : rounding);
+  if (squares.empty()) return false;
+  const double scatter = std::sqrt(robust_planar_variance(std::move(squares), degrees_of_freedom) *
+                                   planar_outlier_bound(kOutlier, degrees_of_freedom));
+  const double limit = std::max(scatter, kOutlier * (noise_is_stated ? 1 : rounding));
   bool changed = false;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     const bool use = lengths[i] <= limit;
@@ -411,10 +412,10 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
     if (!problem.solve(false)) return false;
     const auto shared = problem.shared_covariance();
     covariance = shared.matrix;
-    bool changed = leave_out_outliers(problem, all.noise_is_stated);
-    if (!changed) changed = contradictions.settle(covariance);
     const Noise noise = noise_of(all, shared);
     freedom = noise.freedom;
+    bool changed = leave_out_outliers(problem, all.noise_is_stated, freedom);
+    if (!changed) changed = contradictions.settle(covariance);
     if (noise.freedom > 0) {
       const double scale = problem.noise_scale * noise.ratio;
       // Stated noise is taken for too small when chance makes it so once in a thousand.
@@ -502,7 +503,8 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
   bool converged = problem.solve(true) && problem.solve(true);
   if (converged) {
     contradictions.leave_out_the_worst();
-    leave_out_outliers(problem, all.noise_is_stated);
+    const Noise noise = noise_of(all, problem.shared_covariance());
+    leave_out_outliers(problem, all.noise_is_stated, noise.freedom);
     converged = settle(all, contradictions, covariance, freedom);
   }
   if (!converged) {

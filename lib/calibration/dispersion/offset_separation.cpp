@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "geometry/median.h"
+#include "geometry/robust_scatter.h"
 
 namespace vlp {
 namespace {
@@ -73,7 +73,17 @@ std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
   return step;
 }
 
-/// Close enough that what is off by more than five standard deviations can be told.
+/// Degrees of freedom of so many fixes: two rows each, minus offset and world.
+double freedom_of(const std::vector<double>& squares) {
+  return 2 * static_cast<double>(squares.size()) - 4;
+}
+
+/// Variance per axis, above zero so that it can be divided by.
+double variance_of(const std::vector<double>& squares) {
+  return std::max(robust_planar_variance(squares, freedom_of(squares)), kFixRoundingVariance);
+}
+
+/// Approaches the solution so closely that outliers can be recognized.
 bool approach(const StationFixes& fixes, OffsetSeparation& at) {
   constexpr int iterations = 6;
   constexpr double width_squared = 2.385 * 2.385;  // 95 % as good as least squares on normal noise
@@ -81,7 +91,7 @@ bool approach(const StationFixes& fixes, OffsetSeparation& at) {
     const auto equations = linearize(fixes, at);
     if (equations.empty()) return false;
     std::vector<double> weights = squares_of(equations);
-    const double variance = iteration == 0 ? 0 : robust_variance(weights);
+    const double variance = iteration == 0 ? 0 : variance_of(weights);
     for (double& one : weights) {
       one = iteration == 0 ? 1 : 1 / (1 + one / (width_squared * variance));
     }
@@ -97,7 +107,8 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
   auto equations = linearize(fixes, at);
   if (equations.empty()) return std::nullopt;
   const auto squares = squares_of(equations);
-  const double limit = kOutlierVariances * robust_variance(squares);
+  const double limit =
+      planar_outlier_bound(kFixOutlierSigmas, freedom_of(squares)) * variance_of(squares);
   std::vector<bool> used(at.used.size());
   for (std::size_t i = 0; i < squares.size(); ++i) {
     used[equations[i].capture] = squares[i] <= limit;
@@ -117,12 +128,6 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
 }
 
 }  // namespace
-
-double robust_variance(std::vector<double> squares) {
-  constexpr double rounding = 1e-24;
-  const double median_of_unit_variance = 2 * std::log(2.0);
-  return std::max(upper_median(std::move(squares)) / median_of_unit_variance, rounding);
-}
 
 std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes) {
   OffsetSeparation result;

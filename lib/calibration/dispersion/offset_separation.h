@@ -23,15 +23,14 @@ struct OffsetSeparation {
 };
 
 /// Gauss-Newton on fix_k(offset) - station - world, the fixes' derivatives from differences; Cauchy
-/// weights first, then plain least squares without what is off by more than five standard
-/// deviations. Nothing when the captures do not determine it, or it does not converge.
+/// weights first, then plain least squares without outliers (kFixOutlierSigmas). Returns
+/// std::nullopt if the captures do not determine it, or it does not converge.
 std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes);
 
-/// The variance per axis of a plane normal distribution, from the median of squared distances of
-/// which some are wrong; above zero, so that it can be divided by. Precondition: not empty.
-double robust_variance(std::vector<double> squares);
-
-/// A squared distance beyond this many variances contradicts the others.
-inline constexpr double kOutlierVariances = 25;
+/// Standard deviations beyond which a fix is an outlier, if the variance is known
+/// (planar_outlier_bound()).
+inline constexpr double kFixOutlierSigmas = 5;
+/// Variance below which residuals are rounding.
+inline constexpr double kFixRoundingVariance = 1e-24;
 
 }  // namespace vlp

@@ -8,6 +8,7 @@
 #include "calibration/dispersion/offset_separation.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
+#include "geometry/robust_scatter.h"
 
 namespace vlp {
 namespace {
@@ -65,7 +66,9 @@ std::vector<bool> near_median(const OptionalFixes& fixes) {
   for (const auto& fix : fixes) {
     if (fix) squares.push_back((fix->error_m - middle_m).squaredNorm());
   }
-  const double limit = kOutlierVariances * robust_variance(squares);
+  const double freedom = 2 * static_cast<double>(squares.size()) - 2;
+  const double variance = std::max(robust_planar_variance(squares, freedom), kFixRoundingVariance);
+  const double limit = planar_outlier_bound(kFixOutlierSigmas, freedom) * variance;
   std::vector<bool> near;
   near.reserve(fixes.size());
   for (const auto& fix : fixes) {

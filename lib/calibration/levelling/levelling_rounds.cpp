@@ -9,7 +9,7 @@
 #include "calibration/levelling/levelling_checks.h"
 #include "calibration/levelling/map_gauge.h"
 #include "calibration/levelling/measured_lamps.h"
-#include "geometry/median.h"
+#include "geometry/robust_scatter.h"
 
 namespace vlp {
 namespace {
@@ -52,10 +52,9 @@ bool take_out_worst(LampBundle& bundle, const BundleFit& fit) {
       squares.push_back(whitened_residual(bundle, capture, seen).squaredNorm());
     }
   }
-  const double median_of_unit_noise = 2 * std::log(2.0);
-  const double share_left = fit.redundancy / (2.0 * static_cast<double>(squares.size()));
-  const double variance = upper_median(std::move(squares)) / (median_of_unit_noise * share_left);
-  const double limit = limit_sigmas * limit_sigmas * std::max(variance, rounding * rounding);
+  const double variance = robust_planar_variance(std::move(squares), fit.redundancy);
+  const double limit =
+      planar_outlier_bound(limit_sigmas, fit.redundancy) * std::max(variance, rounding * rounding);
   bool any = false;
   for (Capture& capture : bundle.captures) {
     const auto square = [&](const Observation& seen) {

@@ -3,14 +3,17 @@
 #include "calibration/rotation/circle_center.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "calibration/rotation/fit_parts.h"
 #include "geometry/median.h"
+#include "geometry/robust_scatter.h"
 
 namespace vlp {
 namespace {
@@ -63,23 +66,33 @@ std::optional<Circle> typical_circle(const std::vector<Eigen::Vector2d>& points)
   return best;
 }
 
-/// The circle without the points that contradict it, which are added to `outliers` and leave
-/// `trace`.
-std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
-                                        std::vector<SpotOutlier>& outliers) {
-  constexpr double rounding = 1e-9, far = 4.5, sigma_over_median = 1.4826;
-  auto fit = fit_circle(trace.points);
-  // Of fewer the median distance from a circle through three of them says too little.
-  constexpr std::size_t least_to_judge = 8;
-  if (!fit || trace.points.size() < least_to_judge) return fit;
+constexpr double kOutlierSigmas = 4.5;
+/// Fewer points have too little redundancy to find an outlier.
+constexpr std::size_t kMinPointsToTest = 8;
+
+/// Moves points of a trace to the outliers.
+void reject(Trace& trace, std::size_t point, double distance_px,
+            std::vector<SpotOutlier>& outliers) {
+  outliers.push_back({trace.sightings[point], distance_px});
+  trace.sightings.erase(trace.sightings.begin() + static_cast<std::ptrdiff_t>(point));
+  trace.points.erase(trace.points.begin() + static_cast<std::ptrdiff_t>(point));
+}
+
+/// Rejects points far from the circle that most points agree on.
+void reject_gross_outliers(Trace& trace, double focal_px, std::vector<SpotOutlier>& outliers) {
+  constexpr double rounding = 1e-9;
   auto circle = typical_circle(trace.points);
-  const double count = static_cast<double>(trace.points.size());
+  const double freedom = static_cast<double>(trace.points.size()) - 3;
   std::vector<double> off;
   double limit = 0;
   for (int round = 0; circle && round < 4; ++round) {
     off = distances(*circle, trace.points);
-    // Rousseeuw's factor for few points.
-    limit = far * std::max(sigma_over_median * (1 + 5 / (count - 3)) * upper_median(off), rounding);
+    std::vector<double> squares;
+    squares.reserve(off.size());
+    for (const double one : off) squares.push_back(one * one);
+    const double variance =
+        std::max(robust_linear_variance(std::move(squares), freedom), rounding * rounding);
+    limit = std::sqrt(linear_outlier_bound(kOutlierSigmas, freedom) * variance);
     std::vector<Eigen::Vector2d> near;
     near.reserve(off.size());
     for (std::size_t i = 0; i < off.size(); ++i) {
@@ -87,13 +100,44 @@ std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
     }
     const auto better = fit_circle(near);
     if (!better) break;
-    fit = better;
     circle = better->circle;
   }
   for (std::size_t i = off.size(); i-- > 0;) {
-    if (off[i] <= limit) continue;
-    outliers.push_back({trace.sightings[i], off[i] * focal_px});
-    trace.points.erase(trace.points.begin() + static_cast<std::ptrdiff_t>(i));
+    if (off[i] > limit) reject(trace, i, off[i] * focal_px, outliers);
+  }
+}
+
+/// Rejects the point that is farthest from the circle, if the circle through the other points
+/// contradicts it (Student's t, the deleted residual). Returns true if there was one.
+bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
+                  std::vector<SpotOutlier>& outliers) {
+  constexpr double rounding = 1e-9;
+  const std::vector<double> off = distances(circle, trace.points);
+  const auto worst =
+      static_cast<std::size_t>(std::max_element(off.begin(), off.end()) - off.begin());
+  std::vector<Eigen::Vector2d> others = trace.points;
+  others.erase(others.begin() + static_cast<std::ptrdiff_t>(worst));
+  const auto fit = fit_circle(others);
+  if (!fit) return false;
+  const double count = static_cast<double>(others.size()), freedom = count - 3;
+  // The circle's own variance where the point is: 3 / n of that of a point, on average.
+  const double variance =
+      std::max(fit->rms * fit->rms * count / freedom, rounding * rounding) * (1 + 3 / count);
+  const double distance = distances(fit->circle, {trace.points[worst]}).front();
+  if (distance * distance <= student_bound(kOutlierSigmas, freedom) * variance) return false;
+  reject(trace, worst, distance * focal_px, outliers);
+  return true;
+}
+
+/// Fits a circle without outliers, which are moved from `trace` to `outliers`. Returns std::nullopt
+/// if the points do not determine one.
+std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
+                                        std::vector<SpotOutlier>& outliers) {
+  if (trace.points.size() >= kMinPointsToTest) reject_gross_outliers(trace, focal_px, outliers);
+  auto fit = fit_circle(trace.points);
+  while (fit && trace.points.size() >= kMinPointsToTest &&
+         reject_worst(trace, fit->circle, focal_px, outliers)) {
+    fit = fit_circle(trace.points);
   }
   return fit;
 }

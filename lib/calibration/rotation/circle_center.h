@@ -34,8 +34,9 @@ struct CircleCenters {
 /// the undistorted image, and the mean of their centres. On a camera that is tilted by t the centre
 /// of what a lamp at angle phi from the axis traces is not at f tan t but at
 ///   f sin t cos t / (cos^2 t - sin^2 phi),
-/// so that the circles disagree, and their mean is too far out. Points that are farther from their
-/// circle than 4.5 standard deviations are left out, of eight or more. Needs three sightings of a
+/// so that the circles disagree, and their mean is too far out. Of eight points or more on a
+/// circle, those beyond 4.5 standard deviations are rejected: against the median of the distances,
+/// then each against the circle through the others, with Student's t (robust_scatter.h). Needs three sightings of a
 /// lamp at a height; not converged when no lamp has them. The model is RotationModel::shift.
 CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera);
 

@@ -47,7 +47,7 @@ RotationFit fit_joint_center(const SpotCaptures& spot, const Camera& camera) {
   }
   std::vector<double> yaws_rad = yaws_of(spot);
 
-  RobustFit fit;
+  RobustFit fit(spot.stated_px.has_value());
   std::vector<std::vector<const double*>> yaws_at(spot.heights.size());
   for (std::size_t i = 0; i < yaws_rad.size(); ++i) {
     yaws_at[spot.captures[i].height].push_back(&yaws_rad[i]);

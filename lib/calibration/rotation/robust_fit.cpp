@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "geometry/median.h"
+#include "geometry/robust_scatter.h"
 
 namespace vlp {
 namespace {
@@ -92,16 +92,13 @@ void RobustFit::measure() {
   }
 }
 
-double RobustFit::scatter() const {
-  std::vector<double> used;
+double RobustFit::variance() const {
+  std::vector<double> squares;
   for (std::size_t i = 0; i < lengths_.size(); ++i) {
-    if (used_[i]) used.push_back(lengths_[i]);
+    if (used_[i]) squares.push_back(lengths_[i] * lengths_[i]);
   }
-  const auto all = problem(0);
-  const double rows = std::max(all->NumResiduals(), 1);
-  const double share = std::max(rows - free_parameters(*all), 1.0) / rows;
-  constexpr double median_of_rayleigh = 1.17741;  // sqrt(2 ln 2)
-  return std::max(upper_median(used) / (median_of_rayleigh * std::sqrt(share)), kRounding);
+  return std::max(robust_planar_variance(std::move(squares), degrees_of_freedom()),
+                  kRounding * kRounding);
 }
 
 bool RobustFit::solve() {
@@ -109,7 +106,7 @@ bool RobustFit::solve() {
   measure();
   constexpr int loss_rounds = 4;
   for (int round = 0; round < loss_rounds; ++round) {
-    if (!minimize(2 * scatter())) return false;
+    if (!minimize(2 * std::sqrt(variance()))) return false;
   }
   return refine();
 }
@@ -118,8 +115,10 @@ bool RobustFit::refine() {
   measure();
   constexpr int rounds = 6;
   for (int round = 0; round < rounds; ++round) {
-    constexpr double far = 4.5;
-    const double limit = far * scatter();
+    constexpr double sigmas = 4.5;
+    const double limit =
+        std::max(std::sqrt(planar_outlier_bound(sigmas, degrees_of_freedom()) * variance()),
+                 noise_is_stated_ ? sigmas : 0);
     const std::vector<bool> before = used_;
     for (std::size_t i = 0; i < used_.size(); ++i) used_[i] = lengths_[i] <= limit;
     if (round > 0 && used_ == before) break;

@@ -18,10 +18,16 @@ namespace vlp {
 
 /// Least squares on residuals in the plane (pixels over their sigma) of which some are wrong:
 /// Cauchy's loss, its width from the residuals' median, finds them; the last fit is plain least
-/// squares without those farther off than 4.5 standard deviations. Inside this folder only: its
-/// users do not show Ceres in their headers.
+/// squares without outliers: residuals beyond 4.5 standard deviations, with the limit raised for
+/// few degrees of freedom (planar_outlier_bound()). Used in this folder only, as it needs Ceres'
+/// headers.
 class RobustFit {
  public:
+  /// @param noise_is_stated  residuals are in units of a stated sigma: those within 4.5 of it are
+  /// no
+  ///                         outliers, however small the scatter of the others is
+  explicit RobustFit(bool noise_is_stated) : noise_is_stated_(noise_is_stated) {}
+
   /// A residual of two rows and the parameters it depends on, which stay the caller's.
   void add(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
   /// Keeps a parameter at its value.
@@ -71,8 +77,10 @@ class RobustFit {
   std::unique_ptr<ceres::Problem> problem(double loss_width, const Places& places = {}) const;
   bool minimize(double loss_width);
   void measure();
-  double scatter() const;
+  /// Variance of the used residuals per axis, from their median, above rounding.
+  double variance() const;
 
+  bool noise_is_stated_;
   std::vector<Block> blocks_;
   std::vector<std::vector<const double*>> held_;
   std::vector<bool> used_;

@@ -133,7 +133,8 @@ SpotStatus SpotSearch::turn(bool lever_arm) {
   turning_ = fit_turning(fixes_.fixes, fixes_.spots, lever_arm || fixes_.spots > 1);
   const Eigen::Vector3d up(-turning_.delta.x(), -turning_.delta.y(), 1);
   zenith() = (level_from_zenith(zenith()).transpose() * up).normalized();
-  return SpotStatus::ok;
+  // Three captures and a lever arm have no redundancy: noise can move the zenith anywhere.
+  return zenith().z() > 0 ? SpotStatus::ok : SpotStatus::moved;
 }
 
 bool SpotSearch::settled() const {

@@ -121,7 +121,7 @@ bool tells_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
 RotationFit fit_axis(const SpotCaptures& spot, const Camera& camera, bool lever_arm) {
   State state = start_from(spot);
   if (!lever_arm) state.lever_arm_m.setZero();
-  RobustFit fit;
+  RobustFit fit(spot.stated_px.has_value());
   add_residuals(fit, spot, lever_arm, state);
   RotationFit result;
   constexpr int rounds = 10;

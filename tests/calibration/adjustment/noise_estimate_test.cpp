@@ -105,7 +105,9 @@ INSTANTIATE_TEST_SUITE_P(
                     PlaceCase{"ExactWithHeight", 1e-4, true, false, PlaceOf::camera, {}},
                     PlaceCase{"CoarseOfAxes", 0.05, true, true, PlaceOf::axis, {}},
                     PlaceCase{"ExactOfAxes", 1e-4, true, true, PlaceOf::axis, {}},
-                    PlaceCase{"ExactOfCameraOnSpots", 1e-4, true, true, PlaceOf::camera, {}}),
+                    PlaceCase{"ExactOfCameraOnSpots", 1e-4, true, true, PlaceOf::camera, {}},
+                    PlaceCase{"CoarseWithReportedSigmaTooSmall", 0.05, true, false, PlaceOf::camera,
+                              0.15}),
     [](const auto& variant) { return variant.param.name; });
 
 }  // namespace

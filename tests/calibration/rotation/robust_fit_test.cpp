@@ -29,7 +29,7 @@ Matrix2 covariance_with(const std::vector<std::size_t>& order) {
   std::vector<double> memory(2 * turns + 2, 0.0);
   double* offset = memory.data() + 2 * order[turns];
   Random random(1);
-  RobustFit fit;
+  RobustFit fit(false);
   for (int i = 0; i < 60; ++i) {
     const Eigen::Vector2d point(random.uniform(-1, 1), random.uniform(-1, 1));
     const Eigen::Vector2d seen = point + 0.01 * Eigen::Vector2d(random.normal(), random.normal());

@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "geometry/median.h"
+
+/// Scatter of residuals of which some are outliers, from their median, and the bound beyond which a
+/// residual is an outlier, for samples of any size. "Linear" residuals have one coordinate,
+/// "planar" ones two.
+///
+/// Of n normal residuals of variance sigma^2 per coordinate the median of the squares is
+/// q^2 sigma^2 with q = 0.6745 (linear), and 2 ln 2 sigma^2 (planar). Least squares leave the
+/// fraction nu / (rows) of the variance, with nu degrees of freedom. The median scatters as a
+/// variance of m degrees of freedom does: m = 2 n (2 q phi(q))^2 (linear), 2 n ln^2 2 (planar),
+/// where n is nu or nu / 2.
+namespace vlp {
+
+/// Estimates the variance of the errors from the median of the squares of linear residuals.
+///
+/// @param squares             squared residuals, not empty
+/// @param degrees_of_freedom  of the residuals; at least one is assumed
+inline double robust_linear_variance(std::vector<double> squares, double degrees_of_freedom) {
+  assert(!squares.empty());
+  constexpr double median_of_unit_variance = 0.454936;  // 0.67449^2
+  const double rows = static_cast<double>(squares.size());
+  return upper_median(std::move(squares)) / median_of_unit_variance * rows /
+         std::max(degrees_of_freedom, 1.0);
+}
+
+/// Estimates the variance per axis of the errors from the median of the squared lengths of planar
+/// residuals.
+///
+/// @param squares             squared lengths of the residuals, not empty
+/// @param degrees_of_freedom  of the residuals; at least one is assumed
+inline double robust_planar_variance(std::vector<double> squares, double degrees_of_freedom) {
+  assert(!squares.empty());
+  constexpr double median_of_unit_variance = 2 * std::numbers::ln2;
+  const double rows = 2 * static_cast<double>(squares.size());
+  return upper_median(std::move(squares)) / median_of_unit_variance * rows /
+         std::max(degrees_of_freedom, 1.0);
+}
+
+/// Computes the bound of t^2, Student's with m degrees of freedom, that is exceeded as rarely as
+/// sigmas^2 by the square of a normal variable of unit variance.
+///
+/// m (exp((sigmas (8 m + 3) / (8 m + 1))^2 / m) - 1). Source: Wallace, Bounds on normal
+/// approximations to Student's and the chi-square distributions (1959).
+inline double student_bound(double sigmas, double m) {
+  const double z = sigmas * (8 * m + 3) / (8 * m + 1);
+  return m * std::expm1(z * z / m);
+}
+
+/// Computes the bound of the squared residuals in units of robust_linear_variance() that normal
+/// residuals exceed as rarely as they exceed sigmas^2 where the variance is known.
+inline double linear_outlier_bound(double sigmas, double degrees_of_freedom) {
+  constexpr double m_per_residual = 0.367540;  // 2 (2 q phi(q))^2
+  return student_bound(sigmas, m_per_residual * std::max(degrees_of_freedom, 1.0));
+}
+
+/// Computes the same bound for planar residuals, in units of robust_planar_variance().
+///
+/// Half the quotient is F(2, m), and the quotient exceeds x with the probability
+/// (1 + x / m)^(-m / 2): x = m (exp(sigmas^2 / m) - 1).
+inline double planar_outlier_bound(double sigmas, double degrees_of_freedom) {
+  constexpr double m_per_row = std::numbers::ln2 * std::numbers::ln2;
+  const double m = m_per_row * std::max(degrees_of_freedom, 1.0);
+  return m * std::expm1(sigmas * sigmas / m);
+}
+
+}  // namespace vlp

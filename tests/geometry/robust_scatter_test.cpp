@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry/robust_scatter.h"
+
+#include <gtest/gtest.h>
+
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+std::vector<double> drawn_squares(Random& random, std::size_t count, double sigma) {
+  std::vector<double> squares;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = sigma * random.normal(), y = sigma * random.normal();
+    squares.push_back(x * x + y * y);
+  }
+  return squares;
+}
+
+TEST(RobustPlanarVariance, ReturnsTheVariancePerAxis) {
+  Random random(1);
+  const double variance = robust_planar_variance(drawn_squares(random, 20000, 3), 2 * 20000);
+  EXPECT_NEAR(variance / 9, 1, 0.03);
+}
+
+TEST(RobustPlanarVariance, CorrectsForDegreesOfFreedom) {
+  const std::vector<double> squares(10, 1.0);
+  EXPECT_DOUBLE_EQ(robust_planar_variance(squares, 5), 4 * robust_planar_variance(squares, 20));
+}
+
+TEST(PlanarOutlierBound, ApproachesSigmasSquaredForManyDegreesOfFreedom) {
+  EXPECT_NEAR(planar_outlier_bound(4.5, 1e6), 4.5 * 4.5, 1e-3);
+  EXPECT_GT(planar_outlier_bound(4.5, 16), 50);
+}
+
+/// A bound of 2.5 sigmas, which 4.4 % of the residuals exceed where the variance is known, is
+/// exceeded often enough to be counted. The median of few is biased upwards, so that fewer exceed
+/// it.
+TEST(PlanarOutlierBound, LimitsFalseAlarmsOfSmallSamples) {
+  constexpr double sigmas = 2.5;
+  const double expected = std::exp(-sigmas * sigmas / 2);
+  for (const std::size_t count : {5U, 9U, 15U, 41U}) {
+    Random random(2);
+    constexpr int runs = 20000;
+    int beyond = 0;
+    for (int run = 0; run < runs; ++run) {
+      // The residual is not one of those that the variance is from.
+      const double freedom = 2 * static_cast<double>(count);
+      const double variance = robust_planar_variance(drawn_squares(random, count, 1), freedom);
+      const double square = drawn_squares(random, 1, 1).front();
+      beyond += square > planar_outlier_bound(sigmas, freedom) * variance ? 1 : 0;
+    }
+    EXPECT_GT(beyond / expected / runs, 0.5) << count;
+    EXPECT_LT(beyond / expected / runs, 1.15) << count;
+  }
+}
+
+}  // namespace
+}  // namespace vlp
