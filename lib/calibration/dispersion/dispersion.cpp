@@ -40,8 +40,8 @@ bool all_stated(std::span<const StationCapture> captures) {
 }
 
 void fit_paper(DispersionFit& fit, const StationFixes& station, const Eigen::Vector2d& focal_px,
-               DispersionCircle kind) {
-  const PaperOffset found = find_paper_offset(station, focal_px, kind);
+               bool noise_is_stated, DispersionCircle kind) {
+  const PaperOffset found = find_paper_offset(station, focal_px, kind, noise_is_stated);
   fit.status = found.status;
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
@@ -100,7 +100,7 @@ DispersionFit fit_dispersion(std::span<const StationCapture> captures, const Lam
     fit.status = DispersionStatus::ok;
     const Eigen::Vector2d focal_px = calibration.camera.focal_px();
     if (paper) {
-      fit_paper(fit, station, focal_px, circle);
+      fit_paper(fit, station, focal_px, all_stated(captures), circle);
     } else {
       fit_camera(fit, station, all_stated(captures), circle);
     }

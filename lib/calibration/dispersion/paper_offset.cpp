@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/dispersion/paper_offset.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 
 #include "calibration/dispersion/station_statistics.h"
 #include "geometry/enclosing_circle.h"
 #include "geometry/plane.h"
+#include "geometry/robust_scatter.h"
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -43,12 +46,49 @@ Eigen::Matrix2d floor_from_image(const StationFixes& station, const Eigen::Vecto
   return derivative;
 }
 
-Matrix2 covariance_of_mean(const std::vector<Eigen::Vector2d>& points) {
-  const Eigen::Vector2d mean = mean_of(points);
-  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
-  for (const auto& point : points) scatter += (point - mean) * (point - mean).transpose();
-  const double n = static_cast<double>(points.size());
-  return scatter / (n * (n - 1));
+/// Returns the mean noise covariance of the fixes, in m^2: zero where neither sigma_px nor
+/// residuals give the noise.
+Eigen::Matrix2d noise_of_fixes(const OptionalFixes& fixes, const std::vector<bool>& used,
+                               bool noise_is_stated) {
+  Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+  double count = 0, squares_px2 = 0, freedom = 0;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (!fixes[i] || !used[i]) continue;
+    sum += fixes[i]->covariance;
+    squares_px2 += fixes[i]->squared_residuals_px2;
+    freedom += fixes[i]->degrees_of_freedom;
+    ++count;
+  }
+  const double variance_px2 = noise_is_stated ? 1 : freedom > 0 ? squares_px2 / freedom : 0;
+  return sum * (variance_px2 / count);
+}
+
+/// Estimates the covariance of the mean of n errors from their scatter and their noise.
+///
+/// Few errors do not determine a covariance: two give one of rank 1. The sample covariance counts
+/// with n - 1, its isotropic mean with isotropic_weight. The sum is multiplied by
+/// (t(2 n - 2) / 1.96)^2, so that 1.96 sd cover 95 %, and is at least the noise along each axis.
+Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
+                                   const Eigen::Matrix2d& noise) {
+  constexpr double isotropic_weight = 2;  // as three errors
+  constexpr double sigmas_of_95_percent = 1.96;
+  const Eigen::Vector2d mean = mean_of(errors);
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  for (const auto& error : errors) squares += (error - mean) * (error - mean).transpose();
+  const double n = static_cast<double>(errors.size());
+  const double isotropic = squares.trace() / (2 * (n - 1));
+  const double factor = student_bound(sigmas_of_95_percent, 2 * n - 2) /
+                        (sigmas_of_95_percent * sigmas_of_95_percent);
+  const Eigen::Matrix2d scatter =
+      factor / (n - 1 + isotropic_weight) *
+      (squares + isotropic_weight * isotropic * Eigen::Matrix2d::Identity());
+  // The larger of both, in coordinates in which the noise is the unit matrix.
+  const Eigen::LLT<Eigen::Matrix2d> root(noise);
+  if (root.info() != Eigen::Success) return scatter / n;
+  const Eigen::Matrix2d l = root.matrixL(), l_inverse = l.inverse();
+  const auto [values, axes] =
+      symmetric_eigen(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
+  return l * axes * values.cwiseMax(1).asDiagonal() * axes.transpose() * l.transpose() / n;
 }
 
 }  // namespace
@@ -63,7 +103,7 @@ Circle circle_of(const std::vector<Eigen::Vector2d>& points, DispersionCircle ki
 }
 
 PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d& focal_px,
-                              DispersionCircle kind) {
+                              DispersionCircle kind, bool noise_is_stated) {
   const OptionalFixes fixes = station.at({0, 0});
   const std::vector<bool> used = near_median(fixes);
   const TypicalFix typical = typical_of(fixes, used);
@@ -88,8 +128,9 @@ PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d
     }
     PaperOffset found{DispersionStatus::ok, offset_px, {}, used};
     if (kind == DispersionCircle::mean) {
+      const Eigen::Matrix2d noise_m2 = noise_of_fixes(station.at(offset_px), used, noise_is_stated);
       Matrix2 covariance =
-          image_from_floor * covariance_of_mean(errors_m) * image_from_floor.transpose();
+          image_from_floor * covariance_of_mean(errors_m, noise_m2) * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);
       found.covariance = covariance;
     }

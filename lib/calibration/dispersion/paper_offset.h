@@ -18,7 +18,8 @@ struct PaperOffset {
   /// `ok`, many_yaws or diverged; otherwise there is nothing below.
   DispersionStatus status;
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
-  /// For the scatter of the fixes; nothing for the enclosing circle.
+  /// Covariance from the scatter of the fixes, at least that of their noise. std::nullopt for the
+  /// enclosing circle.
   std::optional<Matrix2> covariance = {};
   /// Of each capture.
   std::vector<bool> used = {};
@@ -29,7 +30,11 @@ struct PaperOffset {
 /// of it where the offset is applied as a shift under lamps of one height; after a rotation centre
 /// of model `tilt` it is applied as a turn, which moves fixes by more, and so it is corrected by
 /// what is left of D until nothing is. Precondition: there is a fix.
+///
+/// @param noise_is_stated  all detections state their sigma_px; otherwise the residuals of the
+/// fixes
+///                         give it
 PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d& focal_px,
-                              DispersionCircle kind);
+                              DispersionCircle kind, bool noise_is_stated);
 
 }  // namespace vlp

@@ -51,8 +51,11 @@ std::vector<std::optional<StationFixes::At>> StationFixes::at(
     if (!fix.ok()) continue;
     const Pose& pose = fix.estimate.pose;
     fixes[i] = At{pose.position_m.head<2>() - captures_[i].station_m,
-                  fix.noise_covariance.topLeftCorner<2, 2>(), pose.yaw_rad,
-                  lamps_height(captures_[i], map_) - pose.position_m.z()};
+                  fix.noise_covariance.topLeftCorner<2, 2>(),
+                  pose.yaw_rad,
+                  lamps_height(captures_[i], map_) - pose.position_m.z(),
+                  fix.residual_px * fix.residual_px * fix.lamps,
+                  2 * fix.lamps - 4};
   }
   return fixes;
 }

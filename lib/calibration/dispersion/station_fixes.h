@@ -22,6 +22,9 @@ class StationFixes {
     double yaw_rad;
     /// Of the lamps it rests on, above it.
     double height_m;
+    /// Sum of the squared residuals of its lamps, and its degrees of freedom.
+    double squared_residuals_px2;
+    int degrees_of_freedom;
   };
 
   StationFixes(std::span<const StationCapture> captures, const LampMap& map,

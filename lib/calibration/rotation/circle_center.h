@@ -36,8 +36,9 @@ struct CircleCenters {
 ///   f sin t cos t / (cos^2 t - sin^2 phi),
 /// so that the circles disagree, and their mean is too far out. Of eight points or more on a
 /// circle, those beyond 4.5 standard deviations are rejected: against the median of the distances,
-/// then each against the circle through the others, with Student's t (robust_scatter.h). Needs three sightings of a
-/// lamp at a height; not converged when no lamp has them. The model is RotationModel::shift.
+/// then each against the circle through the others, with Student's t (robust_scatter.h). Needs
+/// three sightings of a lamp at a height; not converged when no lamp has them. The model is
+/// RotationModel::shift.
 CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera);
 
 }  // namespace vlp
