@@ -8,13 +8,15 @@ chance of any false alarm in the whole fleet is FALSE_ALARM_RATE at most: half o
 steps, of which there are more, and a p counts as many times as there are tests of its kind (Bonferroni), which
 holds however figures go together. Axes of a camera's figures are tested apart, as they do.
 
-Stated standard deviations leave out what differs between sessions and not within one (the lens, the map). Where
-neighbouring sessions of the whole fleet differ by more than is stated, the stated ones are multiplied by
-that factor. It is of the smaller 95 % of the differences, so that the few cameras and lamps that changed do not
-hide themselves, and larger by 20 / n for being known from n of them: of deviates z that are
-divided by a factor with a relative variance v, exp(z^4 v / 2) times as many are beyond z as of the true one, which
-z^2 v / 2 of it makes good, with z = 4.5. v = 2 / n is not derived but chosen on the safe side, since a few are left
-out and neighbours go together: of all of n independent ones it would be 1 / (2 n). Of too few differences nothing is tested.
+Stated standard deviations leave out what differs between sessions and not within one (the lens, the map). What
+neighbouring sessions of the whole fleet differ by more than is stated has a standard deviation between sessions of
+its own, tau, for each figure: the variance of a session is sd^2 + tau^2. A factor on the stated ones would take
+those that state little for too certain. tau is of the smaller 95 % of the differences, so that the few cameras and
+lamps that changed do not hide themselves, and makes deviates smaller by 20 / n for being known from n of them: of
+deviates z that are divided by a factor with a relative variance v, exp(z^4 v / 2) times as many are beyond z as of
+the true one, which z^2 v / 2 of it makes good, with z = 4.5. v = 2 / n is not derived but chosen on the safe side,
+since a few are left out and neighbours go together: of all of n independent ones it would be 1 / (2 n). Of too few
+differences nothing is tested. One tau is of all cameras: one that scatters more than the others is called.
 
 `least_found` says what the archive can show: the change of a figure that is called in FOUND_SHARE of cases, as of the
 sessions of the median series, a drift or a step in its middle.
@@ -36,6 +38,8 @@ FALSE_ALARM_RATE = 0.05
 FOUND_SHARE = 0.95
 NORMAL = statistics.NormalDist()
 FEWEST_DIFFERENCES = 20
+MOST_DIFFERENCES = 4000  # they determine tau to 1 %
+TOLERANCE = 0.01  # of tau^2
 KEPT_SHARE = 0.95
 VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1.96) / 0.95
 LEAST_SD_MM = 1e-3
@@ -43,19 +47,35 @@ WITH_LEVER_ARM = ("zenith", "rotation_center", "dispersion_offset")
 FEWEST_LAMPS = 4  # of three a lamp that moved cannot be told
 
 
-def factor_of(differences):
-    """By how much differences, in units of their stated sd, are larger than these; None of too few."""
-    sizes = sorted(abs(difference) for difference in differences if difference)
-    if len(sizes) < FEWEST_DIFFERENCES:
+def between_sessions(differences):
+    """The standard deviation between sessions, tau; None of too few. differences: (square, stated variance)."""
+    differences = [one for one in differences if one[0]]
+    if len(differences) < FEWEST_DIFFERENCES:
         return None
-    smaller = sizes[: math.ceil(KEPT_SHARE * len(sizes))]
-    scale = math.sqrt(statistics.fmean(size**2 for size in smaller) / VARIANCE_OF_KEPT)
-    return max(1.0, scale * (1 + 20 / len(sizes)))
+    some = differences[:: 1 + len(differences) // MOST_DIFFERENCES]
+    kept = math.ceil(KEPT_SHARE * len(some))
+    expected = kept * VARIANCE_OF_KEPT / (1 + 20 / len(some)) ** 2
+
+    def excess(tau2):
+        return sum(sorted(square / (variance + 2 * tau2) for square, variance in some)[:kept]) - expected
+
+    low, high = 0.0, max(square for square, _ in some) / VARIANCE_OF_KEPT
+    if excess(low) <= 0:
+        return 0.0
+    while high - low > TOLERANCE * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
+    return math.sqrt(high)
+
+
+def widened(series, tau):
+    """The series with what differs between sessions in its standard deviations."""
+    return [(value, math.hypot(sd, tau)) for value, sd in series]
 
 
 def neighbours(series):
-    """series: (value, sd). Differences of neighbours in units of their sd."""
-    return [(b - a) / math.hypot(s, t) for (a, s), (b, t) in zip(series, series[1:])]
+    """series: (value, sd). Of neighbours the square of their difference and its stated variance."""
+    return [((b - a) ** 2, s**2 + t**2) for (a, s), (b, t) in zip(series, series[1:])]
 
 
 def steps(series):
@@ -155,37 +175,37 @@ def sd_in_the_middle(series):
     return math.sqrt(sum(1 / sum(1 / sd**2 for _, sd in part) for part in (series[:half], series[half:])))
 
 
-def least_found_of(of_figures, factors, tests):
+def least_found_of(of_figures, between, tests):
     """Of each kind of figure that is tried: {"drift", "step"}, in its unit. of_figures: (kind, times, series)."""
     z = {kind: NORMAL.inv_cdf(FOUND_SHARE) - NORMAL.inv_cdf(FALSE_ALARM_RATE / 4 / max(1, tests[kind])) for kind in tests}
     found = {}
-    for name in (name for name in TWO if factors[name]):
-        of_kind = [(times, series) for kind, times, series in of_figures if kind == name]
+    for name in (name for name in TWO if between[name] is not None):
+        of_kind = [(times, widened(series, between[name])) for kind, times, series in of_figures if kind == name]
         sds = {"drift": usual([lambda of=of: (drift(*of) or (0, None))[1] for of in of_kind])}
         sds["step"] = usual([lambda of=of: sd_in_the_middle(of[1]) for of in of_kind])
-        found[name] = {kind: factors[name] * z[kind] * sd for kind, sd in sds.items() if sd}
+        found[name] = {kind: z[kind] * sd for kind, sd in sds.items() if sd}
     return found
 
 
-def least_found_of_lamps(rooms, factor, tests):
+def least_found_of_lamps(rooms, tau, tests):
     """In mm: a step in the middle, whatever its direction."""
-    series = [one for room in rooms for lamp in room.series for one in room.along(lamp) if len(one) > 1]
+    series = [one for room in rooms for lamp in room.series for one in room.along(lamp, tau) if len(one) > 1]
     z = math.sqrt(-2 * math.log(FALSE_ALARM_RATE / 2 / tests["step"])) + NORMAL.inv_cdf(FOUND_SHARE)
-    return {"step": z * factor * usual([lambda one=one: sd_in_the_middle(one) for one in series])}
+    return {"step": z * usual([lambda one=one: sd_in_the_middle(one) for one in series])}
 
 
 def smallness(change):
     return -abs(change["change"] / change["sd"])
 
 
-def changed_cameras(cameras, factors, tests):
+def changed_cameras(cameras, between, tests):
     alarms = []
     for camera, figures in cameras.items():
         changes = []
         for figure, (rows, series) in figures.items():
-            if factor := factors.get(kind_of(figure)):
-                scaled = [(value, factor * sd) for value, sd in series]
-                changes.append({"figure": figure, **change_of(rows, scaled, tests)})
+            tau = between.get(kind_of(figure))
+            if tau is not None:
+                changes.append({"figure": figure, **change_of(rows, widened(series, tau), tests)})
         changes = sorted((one for one in changes if one["p"] < FALSE_ALARM_RATE), key=smallness)
         if changes:
             alarms.append({"camera": camera, "changes": changes})
@@ -214,11 +234,11 @@ class Room:
                     one[axis] = max(one[axis], usual)
         self.shares = {}
 
-    def along(self, lamp, factor=1.0):
+    def along(self, lamp, tau=0.0):
         """Of x and of y: [(value, sd)]."""
         series = self.series[lamp]
-        x = [(one[1].real, factor * one[2]) for one in series]
-        return [x, [(one[1].imag, factor * one[3]) for one in series]]
+        x = [(one[1].real, one[2]) for one in series]
+        return [widened(x, tau), widened([(one[1].imag, one[3]) for one in series], tau)]
 
     def differences(self):
         return [one for lamp in self.series for series in self.along(lamp) for one in neighbours(series)]
@@ -239,11 +259,11 @@ class Room:
             self.shares[key] = (-1 / len(q) - q[of] * q[moved].conjugate() / square) / own if own > 1e-6 else 0
         return self.shares[key]
 
-    def largest(self, factor):
+    def largest(self, tau):
         """(chi-squared of 2 degrees, lamp, number in its series, change in x and y, their sd) of the change point."""
         best = None
         for lamp in sorted(self.series):
-            x, y = (steps(series) for series in self.along(lamp, factor))
+            x, y = (steps(series) for series in self.along(lamp, tau))
             for k, ((dx, sx), (dy, sy)) in enumerate(zip(x, y), 1):
                 chi2 = (dx / sx) ** 2 + (dy / sy) ** 2
                 if best is None or chi2 > best[0]:
@@ -256,10 +276,10 @@ class Room:
                 if one[0] >= since and moved in self.sessions[one[0]]["lamps"]:
                     one[1] -= change if lamp == moved else self.share(one[0], lamp, moved) * change
 
-    def moved(self, factor, tests):
+    def moved(self, tau, tests):
         found = []
         for _ in range(2 * len(self.series)):
-            best = self.largest(factor)
+            best = self.largest(tau)
             if best is None or 2 * tests["step"] * math.exp(-best[0] / 2) >= FALSE_ALARM_RATE:
                 break
             chi2, lamp, k, change, sd = best
@@ -288,20 +308,23 @@ def fleet_of(rows, lamp_rows):
         for figures in cameras.values()
         for figure, (of_it, series) in figures.items()
     ]
-    factors = {}
+    between = {}
     for name in TWO:
-        factors[name] = factor_of([one for kind, _, series in of_figures if kind == name for one in neighbours(series)])
+        of_name = [one for kind, _, series in of_figures if kind == name for one in neighbours(series)]
+        between[name] = between_sessions(of_name)
     pairs = sum(max(0, len(room.sessions) - 1) for room in rooms)  # the lamps of a session go together
     enough = 2 * pairs >= FEWEST_DIFFERENCES
-    factors["lamps"] = factor_of([one for room in rooms for one in room.differences()]) if enough else None
-    tried = [series for kind, _, series in of_figures if factors[kind]]
+    tau_mm = between_sessions([one for room in rooms for one in room.differences()]) if enough else None
+    between["lamps"] = tau_mm
+    tried = [series for kind, _, series in of_figures if between[kind] is not None]
     tests = {"drift": len(tried), "step": sum(len(series) - 1 for series in tried)}
-    if factors["lamps"]:
+    if tau_mm is not None:
         tests["step"] += sum(room.tests() for room in rooms)
-    least_found = least_found_of(of_figures, factors, tests)
-    if factors["lamps"]:
-        least_found["lamps"] = least_found_of_lamps(rooms, factors["lamps"], tests)
-    moved = [lamp for room in rooms for lamp in (room.moved(factors["lamps"], tests) if factors["lamps"] else [])]
-    alarms = changed_cameras(cameras, factors, tests)
-    found = {"factors": factors, "least_found": least_found, "cameras": alarms, "lamps": moved}
+    least_found = least_found_of(of_figures, between, tests)
+    moved = []
+    if tau_mm is not None:
+        least_found["lamps"] = least_found_of_lamps(rooms, tau_mm, tests)
+        moved = [lamp for room in rooms for lamp in room.moved(tau_mm, tests)]
+    alarms = changed_cameras(cameras, between, tests)
+    found = {"between_sessions": between, "least_found": least_found, "cameras": alarms, "lamps": moved}
     return {"false_alarm_rate": FALSE_ALARM_RATE, "tests": tests, **found}

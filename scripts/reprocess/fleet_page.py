@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The overview's part about cameras and lamps over time."""
 import pictures
-from fleet import camera_series, kind_of, rooms_of, times_of
+from fleet import camera_series, kind_of, rooms_of, times_of, widened
 from html_parts import picture, table
 from outcome import TWO
 
@@ -46,10 +46,11 @@ def cameras(fleet, fleet_rows):
         figures, first = series[alarm["camera"]], alarm["changes"][0]
         name, points = kind_of(first["figure"]), {}
         of_it = figures[first["figure"]][0]
-        times, factor = times_of(of_it), fleet["factors"][name]
+        times, tau = times_of(of_it), fleet["between_sessions"][name]
         for axis in "xy":  # from the first session, so that both are seen
             rows_of_it, one = figures.get(f"{name}_{axis}_{TWO[name]}", ([], []))
-            points[axis] = [(t, value - one[0][0], factor * sd) for t, (value, sd) in zip(times_of(rows_of_it), one)]
+            wide = widened(one, tau)
+            points[axis] = [(t, value - one[0][0], sd) for t, (value, sd) in zip(times_of(rows_of_it), wide)]
         since = first["since"]["session"] if first["kind"] == "step" else None
         at = next((time for time, row in zip(times, of_it) if row["session"] == since), None)
         dated = all(row["date"] for row in of_it)
@@ -74,7 +75,7 @@ def lamps(fleet, lamp_rows):
         times, numbers = times_of(room.sessions), [one[0] for one in room.series[lamp["lamp"]]]
         points = {
             axis: [(times[i], value, sd) for i, (value, sd) in zip(numbers, series)]
-            for axis, series in zip("xy", room.along(lamp["lamp"], fleet["factors"]["lamps"]))
+            for axis, series in zip("xy", room.along(lamp["lamp"], fleet["between_sessions"]["lamps"]))
         }
         is_since = [all(row[key] == lamp["since"][key] for key in ("camera", "session")) for row in room.sessions]
         what = f"lamp {lamp['lamp']} as the others see it, from its place in the map (mm)"
@@ -96,17 +97,17 @@ def least_found(fleet):
 def page(fleet, fleet_rows, lamp_rows):
     html = cameras(fleet, fleet_rows) if fleet["cameras"] else ""
     html += lamps(fleet, lamp_rows) if fleet["lamps"] else ""
-    tested = {name: factor for name, factor in fleet["factors"].items() if factor}
+    tested = {name: tau for name, tau in fleet["between_sessions"].items() if tau is not None}
     if not tested:
         return html + "<p>Too few sessions of a camera, or of a room, to tell whether cameras or lamps change.</p>\n"
     if not html:
         html = "<h2>Cameras and lamps over time</h2>\n"
         html += "<p>No camera changed, and no lamp was moved, as far as can be seen.</p>\n"
-    wide = ", ".join(f"{name.replace('_', ' ')} {factor:.2g}" for name, factor in tested.items() if factor > 1)
+    wide = ", ".join(f"{name.replace('_', ' ')} {tau:.2g} {TWO.get(name, 'mm')}" for name, tau in tested.items() if tau)
     rate = f"{100 * fleet['false_alarm_rate']:.0f} %"
     drifts, steps = fleet["tests"]["drift"], fleet["tests"]["step"]
     html += f"<p>{drifts} figures were tried for drifts, {steps} sessions of figures and lamps for steps; the chance of any "
     html += f"false alarm in all of it is {rate} at most."
     if wide:
-        html += f" Sessions differ by more than they state, and count so: {wide} times."
+        html += f" Sessions differ by more than they state; this standard deviation between sessions counts, too: {wide}."
     return html + " All figures: fleet.csv, lamps.csv.</p>\n" + least_found(fleet)

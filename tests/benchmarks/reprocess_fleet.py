@@ -230,8 +230,8 @@ def verdict(year, results):
     for one in found["lamps"]:
         if (one["room"], one["lamp"]) not in [(f"room {room}", lamp) for room, lamp, _, _ in moves]:
             ask(f"{one['room']}, lamp {one['lamp']}: nothing happened to it", False, f"{one['moved_mm']} mm")
-    factors = ", ".join(f"{name} {factor:.2f}" for name, factor in found["factors"].items() if factor)
-    print(f"neighbouring sessions differ by more than they state: {factors}")
+    between = ", ".join(f"{name} {tau:.3g}" for name, tau in found["between_sessions"].items() if tau)
+    print(f"standard deviations between sessions, besides the stated ones: {between}")
     return missed
 
 

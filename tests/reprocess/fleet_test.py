@@ -101,10 +101,24 @@ class OverTime(unittest.TestCase):
                 alarms += bool(found["cameras"] or found["lamps"])
             self.assertLessEqual(alarms, 6, honest)  # 2 are expected at most; more than 6 in 1 of 200 such tests
 
-    def test_states_by_how_much_sessions_differ_more_than_they_say(self):
-        factors = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=60)))["factors"]
-        for name, (_, _, factor) in made_up_fleet.SDS.items():
-            self.assertAlmostEqual(factors[name] / factor, 1.05, delta=0.12)
+    def test_gives_no_more_false_alarms_where_sessions_state_unequal_sds(self):
+        fleets = 40
+        for unequal in (1, 3**0.5, 3):
+            alarms = 0
+            for seed in range(3000, 3000 + fleets):
+                found = fleet.fleet_of(*fleet_rows(Fleet(seed, cameras=40, sessions=6, unequal=unequal)))
+                alarms += bool(found["cameras"] or found["lamps"])
+            self.assertLessEqual(alarms, 6, unequal)  # as above
+
+    def test_states_the_standard_deviation_between_sessions(self):
+        for unequal in (1, 3):
+            between = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=60, unequal=unequal)))["between_sessions"]
+            for name, (_, sd, factor) in made_up_fleet.SDS.items():
+                wide = (between[name] ** 2 + sd**2) ** 0.5
+                self.assertAlmostEqual(wide / (sd * factor), 1.05, delta=0.15 if unequal == 1 else 0.35)
+        honest = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=60, honest=True)))["between_sessions"]
+        for name, (_, sd, _) in made_up_fleet.SDS.items():
+            self.assertLess(honest[name], 0.5 * sd)
 
     def test_a_session_without_a_lever_arm_is_not_held_against_the_others(self):
         rows, lamps = fleet_rows(Fleet(1))
@@ -117,15 +131,15 @@ class OverTime(unittest.TestCase):
 
     def test_of_too_few_sessions_says_nothing(self):
         found = fleet.fleet_of(*fleet_rows(Fleet(1, cameras=2, sessions=3, broken={0: (1, {"center": (9, 9)})})))
-        self.assertEqual((found["cameras"], found["lamps"], set(found["factors"].values())), ([], [], {None}))
+        self.assertEqual((found["cameras"], found["lamps"], set(found["between_sessions"].values())), ([], [], {None}))
         self.assertEqual(fleet.fleet_of([], [])["cameras"], [])
 
     def test_a_room_whose_sessions_see_too_few_lamps_takes_nothing_off(self):
         rows, lamps = fleet_rows(Fleet(1))
-        expected = fleet.fleet_of(rows, lamps)["factors"]["lamps"]
+        expected = fleet.fleet_of(rows, lamps)["between_sessions"]["lamps"]
         self.assertIsNotNone(expected)
         few = [lamps[0] | {"room": f"room {i}"} for i in range(1000)]
-        self.assertEqual(fleet.fleet_of(rows, lamps + few)["factors"]["lamps"], expected)
+        self.assertEqual(fleet.fleet_of(rows, lamps + few)["between_sessions"]["lamps"], expected)
 
     def test_sessions_without_a_date_put_all_in_the_order_of_names(self):
         rows = [{"camera": "c", "session": f"s{i}", "date": f"2026-01-{20 - i}"} for i in (2, 0, 1)]
@@ -159,11 +173,11 @@ class OverTime(unittest.TestCase):
         made_up = Fleet(1, moved=[(0, 2, 150, complex(3, -4))])
         made_up.chance = unittest.mock.Mock(gauss=lambda mean, sd: mean, uniform=lambda low, high: 1)
         room = fleet.rooms_of(fleet_rows(made_up)[1])[0]
-        _, lamp, k, change, _ = room.largest(1)
+        _, lamp, k, change, _ = room.largest(0)
         self.assertEqual(lamp, 2)
         self.assertAlmostEqual(abs(change - complex(3, -4)), 0, places=4)
         room.take_off(lamp, room.series[lamp][k][0], change)
-        self.assertLess(room.largest(1)[0], 1e-3)
+        self.assertLess(room.largest(0)[0], 1e-3)
 
 
 if __name__ == "__main__":

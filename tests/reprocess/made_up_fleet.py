@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results of a fleet that never was, with known truth: session.json as vlp-calibrate writes it."""
 import datetime
+import math
 import random
 
 # What sessions of datasets/archive state, and how many times as much they scatter.
@@ -14,11 +15,12 @@ PLACES = {i + 1: complex(-0.6 + 0.6 * (i % 3), -0.3 + 0.6 * (i // 3)) for i in r
 class Fleet:
     """cameras x sessions a camera, evenly over a year, in two rooms by turns. drifts: {camera: {figure: whole change
     of x and y}}; broken: {camera: (session, {figure: (x, y)})} at once; moved: [(room, lamp, day, mm as complex)].
-    honest: sessions scatter by what they state."""
+    honest: sessions scatter by what they state. unequal: sessions state sds of 1 / unequal to unequal times SDS, and
+    scatter by these and by what differs between all sessions alike."""
 
-    def __init__(self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False):
+    def __init__(self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False, unequal=1):
         self.chance = random.Random(seed)
-        self.cameras, self.sessions, self.honest = cameras, sessions, honest
+        self.cameras, self.sessions, self.honest, self.unequal = cameras, sessions, honest, unequal
         self.drifts, self.broken, self.moved = dict(drifts), dict(broken), list(moved)
         self.rooms = [self.errors_of_a_map() for _ in range(2)]
 
@@ -46,7 +48,10 @@ class Fleet:
     def result(self, camera, session, usual):
         calibration = {"tilt_deg": 0.5}
         for name, (unit, sd, factor) in SDS.items():
-            scatter = sd if self.honest else sd * factor
+            between = 0 if self.honest else sd * math.sqrt(factor**2 - 1)
+            if self.unequal > 1:
+                sd *= self.unequal ** self.chance.uniform(-1, 1)
+            scatter = math.hypot(sd, between)
             drift = self.drifts.get(camera, {}).get(name, (0, 0))
             since, jump = self.broken.get(camera, (0, {}))
             jump = jump.get(name, (0, 0)) if session >= since else (0, 0)
