@@ -10,7 +10,8 @@ namespace vlp {
 struct ImageBlur {
   /// Sigma of the blur. A step of height A that is blurred by s rises by A / (s sqrt(2 pi)) a pixel
   /// at most; A is the range of the grey levels (1 % to 99 %), the rise that which one pixel in a
-  /// thousand exceeds. Infinite for an image without contrast.
+  /// thousand exceeds, less the variance of smoothing and difference. Infinite for an image without
+  /// contrast.
   double sigma_px;
   /// The level that 1 % of the pixels exceed, as a share of the full scale.
   double bright_share;

@@ -5,12 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 
 namespace vlp {
 namespace {
 
-/// A checkerboard of squares of 40 px, its edges blurred by a Gaussian.
-cv::Mat checkerboard(double sigma_px, double dark, double bright) {
+/// A checkerboard of squares of 40 px, its edges blurred by a Gaussian, turned by an angle so that
+/// pixels sample the edges at all phases.
+cv::Mat checkerboard(double sigma_px, double dark, double bright, double angle_rad = 0.15) {
   cv::Mat1b image(300, 400);
   const auto wave = [&](double at) {
     constexpr double period = 40;
@@ -20,7 +22,9 @@ cv::Mat checkerboard(double sigma_px, double dark, double bright) {
   };
   for (int v = 0; v < image.rows; ++v) {
     for (int u = 0; u < image.cols; ++u) {
-      const double level = 0.5 + 0.5 * wave(u + 0.3) * wave(v + 0.6);
+      const double x = std::cos(angle_rad) * u + std::sin(angle_rad) * v;
+      const double y = std::cos(angle_rad) * v - std::sin(angle_rad) * u;
+      const double level = 0.5 + 0.5 * wave(x) * wave(y);
       image(v, u) = static_cast<unsigned char>(std::lround(dark + (bright - dark) * level));
     }
   }
@@ -28,11 +32,13 @@ cv::Mat checkerboard(double sigma_px, double dark, double bright) {
 }
 
 TEST(ImageBlur, MeasuresTheSigmaOfEdges) {
-  // Of edges along rows and columns, sampled once a pixel: a tenth, and half a pixel where the blur
-  // is no wider than a pixel.
-  for (const double sigma_px : {1.0, 2.0, 3.0, 5.0}) {
-    EXPECT_NEAR(image_blur(checkerboard(sigma_px, 20, 220)).sigma_px, sigma_px,
-                0.1 * sigma_px + 0.1);
+  // Edges with a blur of less than half a pixel are undersampled.
+  for (const double sigma_px : {0.3, 0.5, 1.0, 2.0, 3.0, 5.0}) {
+    for (const double angle_rad : {0.02, 0.15, 0.7}) {
+      const double found_px = image_blur(checkerboard(sigma_px, 20, 220, angle_rad)).sigma_px;
+      std::printf("blur %.2f px at %.2f rad: %.3f px\n", sigma_px, angle_rad, found_px);
+      EXPECT_NEAR(found_px, sigma_px, sigma_px < 0.5 ? 0.2 : 0.02 + 0.05 * sigma_px);
+    }
   }
 }
 
