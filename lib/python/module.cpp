@@ -409,12 +409,27 @@ py::dict truth_table(const std::filesystem::path& file) {
   return table;
 }
 
+/// Throws ImportError if this module cannot read the arrays of the installed numpy: pybind11 before
+/// 2.12 takes the size of an element from a place where NumPy 2 has none, and every element of an
+/// array would be its first.
+void check_numpy() {
+  constexpr unsigned first_with_numpy_2 = 0x020C0000;
+  if (PYBIND11_VERSION_HEX >= first_with_numpy_2) return;
+  const auto version = py::module_::import("numpy").attr("__version__").cast<std::string>();
+  if (std::stoi(version) < 2) return;
+  throw py::import_error("vlp was built with pybind11 " + std::to_string(PYBIND11_VERSION_MAJOR) +
+                         "." + std::to_string(PYBIND11_VERSION_MINOR) +
+                         ", which does not support NumPy " + version +
+                         ": install \"numpy<2\", or build vlp with pybind11 2.12 or later");
+}
+
 }  // namespace
 }  // namespace vlp
 
 PYBIND11_MODULE(vlp, m) {
   using namespace vlp;
   using namespace pybind11::literals;
+  check_numpy();
   m.doc() =
       "Positions from modulated ceiling lamps: lens, lamp map, calibration, lamps in images, "
       "fixes.\n\n"

@@ -4,6 +4,7 @@
 """The Python module: says what the files say, locates as it should, refuses what is none."""
 
 import ast
+import os
 import pathlib
 import re
 import subprocess
@@ -200,6 +201,18 @@ class Module(unittest.TestCase):
         self.assertEqual(tables["Fixes"], list(self.located()))
         self.assertEqual(tables["DetectionsTable"], list(self.seen))
         self.assertEqual(tables["TruthTable"], list(self.truth))
+
+    @unittest.skipUnless("VLP_PYBIND11_VERSION" in os.environ, "run by ctest -R Python.Module")
+    def test_refuses_numpy_2_if_its_pybind11_does_not_support_it(self):
+        imports = "import sys, numpy; numpy.__version__ = '2.0.0'; import vlp"
+        told = subprocess.run([sys.executable, "-c", imports], capture_output=True, text=True)
+        version = [int(number) for number in os.environ["VLP_PYBIND11_VERSION"].split(".")[:2]]
+        if version >= [2, 12]:
+            self.assertEqual((told.returncode, told.stderr), (0, ""))
+            return
+        last = told.stderr.splitlines()[-1]
+        self.assertRegex(last, r"^ImportError: vlp was built with pybind11 2\.\d+, which does not")
+        self.assertRegex(last, r'NumPy 2\.0\.0: install "numpy<2", or build vlp with pybind11 2\.12')
 
     def test_example_runs(self):
         example = [sys.executable, SOURCE / "lib/python/example.py", EXAMPLE]
