@@ -43,6 +43,16 @@ std::optional<Eigen::MatrixXd> covariance_of(const SharedEquations& shared,
   return directions * directions.transpose();
 }
 
+/// Sets the effect of errors of the map on the fit.
+void set_map_effect(const SharedEquations& shared, BundleFit& fit) {
+  const Eigen::Index lamps = shared.information.rows() - 2;
+  const Eigen::MatrixXd mixed = shared.information.topRightCorner(2, lamps);
+  fit.d_tilt_d_lamps = -solve_symmetric(shared.information.topLeftCorner<2, 2>(), mixed);
+  fit.d_chi_squared_d_lamp_squares =
+      shared.information.diagonal().tail(lamps) +
+      mixed.cwiseProduct(fit.d_tilt_d_lamps).colwise().sum().transpose();
+}
+
 /// How many unknowns of motions the sightings determine, where what is known does not: of each one
 /// less its variance over that which was known before.
 double told_of_motions(const LampBundle& bundle, const std::vector<OwnEquations>& own) {
@@ -103,7 +113,7 @@ std::optional<BundleFit> adjust(LampBundle& bundle, const Eigen::MatrixXd& free)
   constexpr int max_iterations = 50;
   constexpr double small_step = 1e-10;  // metres and radians: far below any noise
   constexpr double rounding = 1e-12;    // of the sum of squares, near the minimum
-  BundleFit fit{chi_squared(bundle), static_cast<int>(-free.cols()), 0, {}};
+  BundleFit fit{chi_squared(bundle), static_cast<int>(-free.cols()), 0, {}, {}, {}};
   if (!std::isfinite(fit.chi_squared)) return std::nullopt;
   for (const Capture& capture : bundle.captures) {
     fit.degrees_of_freedom += 2 * static_cast<int>(capture.seen.size()) - 4;
@@ -139,6 +149,7 @@ std::optional<BundleFit> adjust(LampBundle& bundle, const Eigen::MatrixXd& free)
       if (helps || largest <= small_step) {
         if (largest > small_step) break;
         fit.covariance = *covariance;
+        set_map_effect(shared, fit);
         fit.redundancy = fit.degrees_of_freedom - told_of_motions(bundle, own);
         return fit;
       }

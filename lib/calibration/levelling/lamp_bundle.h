@@ -60,6 +60,11 @@ struct BundleFit {
   /// Of (tilt about x and y, then x, y, z of each lamp) when the whitened residuals have unit
   /// variance; zero along what `free` holds.
   Eigen::MatrixXd covariance;
+  /// Effect of errors of a map that is held, with N the information of (tilt t, lamps l) without
+  /// the poses: d tilt / d lamps = -N_tt^-1 N_tl, and what an error of a lamp along an axis adds to
+  /// chi_squared over its square, the diagonal of N_ll - N_lt N_tt^-1 N_tl.
+  Eigen::MatrixXd d_tilt_d_lamps;
+  Eigen::VectorXd d_chi_squared_d_lamp_squares;
 };
 
 /// Moves `bundle` to the least sum of squared whitened residuals: Gauss-Newton, the captures' own

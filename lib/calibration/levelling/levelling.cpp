@@ -94,6 +94,24 @@ bool all_stated(std::span<const Frame> frames) {
   });
 }
 
+/// Covariance of tilt and lamps from pixel noise, which follows the residuals, and, if the map is
+/// held, from the errors that it states. Their part of the residuals is no noise.
+Eigen::MatrixXd covariance_of(const BundleFit& fit, const LampMap& map, bool noise_is_stated,
+                              bool refine_map) {
+  Eigen::VectorXd lamp_variances = Eigen::VectorXd::Zero(fit.covariance.rows() - 2);
+  for (std::size_t i = 0; i < map.lamps.size() && !refine_map; ++i) {
+    const double sd_m = map.lamps[i].sd_m.value_or(0);
+    lamp_variances.segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sd_m * sd_m);
+  }
+  const double of_map = fit.d_chi_squared_d_lamp_squares.dot(lamp_variances);
+  const double noise =
+      std::max((fit.chi_squared - of_map) / fit.degrees_of_freedom, noise_is_stated ? 1.0 : 0.0);
+  Eigen::MatrixXd covariance = noise * fit.covariance;
+  covariance.topLeftCorner<2, 2>() +=
+      fit.d_tilt_d_lamps * lamp_variances.asDiagonal() * fit.d_tilt_d_lamps.transpose();
+  return covariance;
+}
+
 void report_lamps(Levelling& result, const LampBundle& bundle, const LampMap& map,
                   const std::vector<Eigen::Vector3d>& lamps_m, const Eigen::MatrixXd& covariance) {
   const std::vector<bool> seen = lamps_seen(bundle);
@@ -149,7 +167,7 @@ Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, cons
   }
   const double excess = fit->chi_squared / fit->degrees_of_freedom;
   const bool stated = all_stated(frames);
-  const Eigen::MatrixXd covariance = fit->covariance * (stated ? std::max(excess, 1.0) : excess);
+  const Eigen::MatrixXd covariance = covariance_of(*fit, map, stated, options.refine_map);
   if (stated) result.excess = std::sqrt(excess);
   result.center = center_of(bundle.level_from_camera, covariance.topLeftCorner<2, 2>(), lens);
   result.residual_px = residual_px(bundle, lens, fit->redundancy);

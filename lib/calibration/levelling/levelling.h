@@ -39,7 +39,7 @@ struct Levelling {
   std::string undetermined;
 
   /// Model `tilt`; the covariance, of the zenith's image, follows the residuals where they are
-  /// larger than what the detections state.
+  /// larger than what the detections state, and has the errors of a held map by its sd_m.
   RotationCenter center;
   /// With what was found added; as it was without `refine_map`.
   LampMap map;

@@ -5,9 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 
 #include "calibration/levelling/drive.h"
 #include "calibration/levelling/levelling.h"
+#include "geometry/angles.h"
 
 namespace vlp {
 namespace {
@@ -84,6 +88,68 @@ TEST(LevellingScatter, OfARefinedMapIsTheReportedCovariance) {
   for (Lamp& lamp : rig.map.lamps) lamp.position_m.x() += random.uniform(-0.002, 0.002);
   expect_consistent(drive(rig, 16, random, 0.1), rig, surveyed, true, true);
 }
+
+/// A drive under a map with errors of its sd_m.
+struct MapErrors {
+  const char* name;
+  double map_sd_m;
+  /// Yaws are within this of one heading.
+  double yaw_rad;
+  bool noise_is_stated;
+  int captures;
+};
+
+class LevellingUnderMapErrors : public testing::TestWithParam<MapErrors> {};
+
+/// 300 maps of two axes know a standard deviation within 4 %.
+TEST_P(LevellingUnderMapErrors, ReportsTheErrorOfTheZenith) {
+  const MapErrors& errors = GetParam();
+  constexpr int maps = 300;
+  Random random(26);
+  double squares = 0, worst_rad = 0, reported_rad2 = 0;
+  for (int i = 0; i < maps; ++i) {
+    auto rig = leaning_rig(0.05, 1);
+    std::vector<Frame> frames;
+    for (int k = 0; k < errors.captures; ++k) {
+      rig.camera = {{random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0},
+                    0.4 + random.uniform(-errors.yaw_rad, errors.yaw_rad)};
+      frames.push_back({std::to_string(k), with_noise(seen_from(rig, 0.1), random)});
+      for (Detection& detection : frames.back().detections) {
+        if (!errors.noise_is_stated) detection.sigma_px.reset();
+      }
+    }
+    LampMap surveyed = rig.map;
+    for (Lamp& lamp : surveyed.lamps) {
+      lamp.sd_m = errors.map_sd_m;
+      for (double& coordinate : lamp.position_m) coordinate += errors.map_sd_m * random.normal();
+    }
+    const auto result = level_by_lamps(frames, surveyed, rig.calibration.camera);
+    ASSERT_EQ(result.undetermined, "");
+    ASSERT_TRUE(result.center.covariance);
+    const Eigen::Vector2d error =
+        result.center.center_px - rig.calibration.rotation_center->center_px;
+    const double focal_px = rig.calibration.camera.focal_px().x();
+    for (int axis = 0; axis < 2; ++axis) {
+      const double variance = (*result.center.covariance)(axis, axis);
+      squares += error[axis] * error[axis] / variance / (2 * maps);
+      reported_rad2 += variance / (focal_px * focal_px) / (2 * maps);
+    }
+    worst_rad = std::max(worst_rad, error.norm() / focal_px);
+  }
+  std::printf("%s: e/sd %.2f, sd %.4f degrees, worst error %.3f\n", errors.name, std::sqrt(squares),
+              deg_from_rad(std::sqrt(reported_rad2)), deg_from_rad(worst_rad));
+  EXPECT_NEAR(std::sqrt(squares), 1, 0.15);
+}
+
+INSTANTIATE_TEST_SUITE_P(Drives, LevellingUnderMapErrors,
+                         testing::Values(MapErrors{"NoMapErrors", 0, 3, true, 60},
+                                         MapErrors{"OneWay", 2e-3, rad_from_deg(10), true, 60},
+                                         MapErrors{"OneWayNoiseNotStated", 2e-3, rad_from_deg(10),
+                                                   false, 60},
+                                         MapErrors{"AnyYaw", 2e-3, 3, true, 60},
+                                         MapErrors{"AnyYawNoiseNotStated", 2e-3, 3, false, 60},
+                                         MapErrors{"AnyYawFewCaptures", 2e-3, 3, true, 8}),
+                         [](const auto& errors) { return errors.param.name; });
 
 }  // namespace
 }  // namespace vlp
