@@ -140,6 +140,33 @@ int RobustFit::degrees_of_freedom() const {
   return all->NumResiduals() - free_parameters(*all);
 }
 
+std::vector<RobustFit::Jacobians> RobustFit::jacobians() const {
+  std::vector<Jacobians> all;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (!used_[i]) continue;
+    Jacobians at{i, blocks_[i].parameters, {}};
+    for (const int size : blocks_[i].cost->parameter_block_sizes())
+      at.by_parameter.emplace_back(2, size);
+    std::vector<double*> data;
+    for (auto& by : at.by_parameter) data.push_back(by.data());
+    Eigen::Vector2d residual;
+    blocks_[i].cost->Evaluate(at.parameters.data(), residual.data(), data.data());
+    all.push_back(std::move(at));
+  }
+  return all;
+}
+
+std::vector<const double*> RobustFit::held() const {
+  const auto all = problem(0);
+  std::vector<double*> parameters;
+  all->GetParameterBlocks(&parameters);
+  std::vector<const double*> held;
+  for (const double* parameter : parameters) {
+    if (all->IsParameterBlockConstant(parameter)) held.push_back(parameter);
+  }
+  return held;
+}
+
 std::optional<Matrix2> RobustFit::covariance(const double* parameter, const double* other) const {
   // Ceres goes through the parameters by their addresses, and with them goes the rounding.
   const Places places = places_in_order();

@@ -48,6 +48,15 @@ class RobustFit {
   const std::vector<double>& lengths() const { return lengths_; }
   /// Rows of the residuals that are used, less the parameters that are free.
   int degrees_of_freedom() const;
+  /// Derivatives of a used residual by each of its parameters, in their order; held ones too.
+  struct Jacobians {
+    std::size_t residual;
+    std::vector<double*> parameters;
+    std::vector<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> by_parameter;
+  };
+  std::vector<Jacobians> jacobians() const;
+  /// Parameters of used residuals that the last fit held.
+  std::vector<const double*> held() const;
   /// Of parameter blocks of two, for the scatter found: their block of s^2 (J^T J)^-1, a row for
   /// each of the first. Nothing when there are no more residuals than parameters, or the residuals
   /// do not determine it.

@@ -24,7 +24,8 @@ struct RotationFit {
   /// Otherwise there is nothing below.
   bool converged = false;
   /// Its covariances are for the scatter that the fit found, whatever sigma_px the detections state
-  /// (that only weighs them); nothing when there is none to measure.
+  /// (that only weighs them), and for the map's sd_m where the method rests on the map. Without one
+  /// if there is no scatter to measure.
   RotationCenter center = {};
   /// Of each capture in SpotCaptures::captures.
   std::vector<double> yaws_rad = {};

@@ -9,12 +9,14 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <map>
 #include <memory>
 
 #include "calibration/rotation/fit_parts.h"
 #include "calibration/rotation/robust_fit.h"
 #include "calibration/rotation/spot_residual.h"
 #include "geometry/similarity.h"
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -117,6 +119,101 @@ bool tells_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
   return std::sqrt(center.lever_arm_covariance->diagonal().maxCoeff()) <= kLooseLeverArm * height_m;
 }
 
+/// Effect of errors of the map, by its sd_m: of the lamps' heights, and of the size of the whole,
+/// which is the map's along the ceiling.
+struct MapEffect {
+  /// Covariance of (zenith, lever arm).
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  /// Fraction of the squared residuals that is not from the map.
+  double noise_fraction = 1;
+};
+
+/// Propagates the errors of the map.
+///
+/// The fit minimizes |r(x, Z, z_1)|^2 with the heights Z of the lamps and z_1 of the first axis
+/// held: dx = -(J'J)^-1 J' (r_Z dZ + r_z1 dz_1). scale_to_map() chooses z_1 so that, with q the
+/// lamps' places from their mean, sum q . dp = sum q . dP for errors dP of the map.
+MapEffect propagate_map(const RobustFit& fit, const SpotCaptures& spot, const State& state) {
+  const std::size_t lamps = spot.lamps.size();
+  const auto held = fit.held();
+  std::map<const double*, Eigen::Index> first;
+  Eigen::Index unknowns = 0;
+  const auto all = fit.jacobians();
+  for (const auto& at : all) {
+    for (std::size_t k = 0; k < at.parameters.size(); ++k) {
+      const double* parameter = at.parameters[k];
+      if (std::find(held.begin(), held.end(), parameter) != held.end()) continue;
+      if (first.emplace(parameter, unknowns).second) unknowns += at.by_parameter[k].cols();
+    }
+  }
+  // The columns of `right` are the lamps, then z_1.
+  const auto z_1 = static_cast<Eigen::Index>(lamps);
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(unknowns, z_1 + 1);
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(z_1 + 1, z_1 + 1);
+  double chi_squared = 0;
+  constexpr std::size_t axis = 3;  // in the order of AxisResidual
+  for (const auto& at : all) {
+    const SpotObservation& sighting = spot.sightings[at.residual];
+    const Eigen::Vector2d by_axis_z = at.by_parameter[axis].col(2);
+    const bool at_first = spot.captures[sighting.capture].height == 0;
+    const auto lamp = static_cast<Eigen::Index>(sighting.lamp);
+    chi_squared += std::pow(fit.lengths()[at.residual], 2);
+    squares(lamp, lamp) += by_axis_z.squaredNorm();
+    if (at_first) {
+      squares(z_1, z_1) += by_axis_z.squaredNorm();
+      squares(lamp, z_1) -= by_axis_z.squaredNorm();
+      squares(z_1, lamp) -= by_axis_z.squaredNorm();
+    }
+    for (std::size_t j = 0; j < at.parameters.size(); ++j) {
+      const auto row = first.find(at.parameters[j]);
+      if (row == first.end()) continue;
+      const Eigen::MatrixXd transposed = at.by_parameter[j].transpose();
+      for (std::size_t k = 0; k < at.parameters.size(); ++k) {
+        const auto column = first.find(at.parameters[k]);
+        if (column == first.end()) continue;
+        normal.block(row->second, column->second, transposed.rows(), at.by_parameter[k].cols()) +=
+            transposed * at.by_parameter[k];
+      }
+      auto rows = right.middleRows(row->second, transposed.rows());
+      rows.col(lamp) += transposed * by_axis_z;
+      if (at_first) rows.col(z_1) -= transposed * by_axis_z;
+    }
+  }
+  const Eigen::MatrixXd moved = solve_symmetric(normal, right);
+  squares -= right.transpose() * moved;
+  const auto rows_of = [&](const double* parameter) -> Eigen::MatrixXd {
+    return moved.middleRows<2>(first.at(parameter));
+  };
+  Eigen::Vector2d middle_m = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& lamp_m : state.lamps_m) {
+    middle_m += lamp_m / static_cast<double>(lamps);
+  }
+  Eigen::RowVectorXd size = Eigen::RowVectorXd::Zero(z_1 + 1);
+  for (const Eigen::Vector2d& lamp_m : state.lamps_m) {
+    if (!first.contains(lamp_m.data())) continue;
+    size += (lamp_m - middle_m).transpose() * rows_of(lamp_m.data());
+  }
+  Eigen::MatrixXd wanted(4, z_1 + 1);
+  wanted << rows_of(state.zenith.data()), rows_of(state.lever_arm_m.data());
+  MapEffect effect;
+  double of_map = 0;
+  const double z_1_by_size = 1 / size[z_1];
+  for (std::size_t i = 0; i < lamps; ++i) {
+    const auto lamp = static_cast<Eigen::Index>(i);
+    const double variance_m2 = std::pow(spot.lamps[i].sd_m.value_or(0), 2);
+    const double of_size = (state.lamps_m[i] - middle_m).squaredNorm() * std::pow(z_1_by_size, 2);
+    const double z_1_by_height = -size[lamp] * z_1_by_size;
+    const Eigen::Vector4d by_height = wanted.col(lamp) + z_1_by_height * wanted.col(z_1);
+    effect.covariance += variance_m2 * (by_height * by_height.transpose() +
+                                        of_size * wanted.col(z_1) * wanted.col(z_1).transpose());
+    of_map += variance_m2 * (squares(lamp, lamp) + 2 * z_1_by_height * squares(lamp, z_1) +
+                             (std::pow(z_1_by_height, 2) + of_size) * squares(z_1, z_1));
+  }
+  if (chi_squared > 0) effect.noise_fraction = std::max(0.0, 1 - of_map / chi_squared);
+  return effect;
+}
+
 /// With the lever arm estimated, or held at zero.
 RotationFit fit_axis(const SpotCaptures& spot, const Camera& camera, bool lever_arm) {
   State state = start_from(spot);
@@ -130,14 +227,30 @@ RotationFit fit_axis(const SpotCaptures& spot, const Camera& camera, bool lever_
     if (!result.converged) return result;
     if (!lever_arm || scale_to_map(spot, state)) break;
   }
-  const auto zenith_covariance = fit.covariance(state.zenith.data());
+  auto zenith_covariance = fit.covariance(state.zenith.data());
+  const bool map_is_exact = std::all_of(spot.lamps.begin(), spot.lamps.end(), [](const Lamp& lamp) {
+    return !(lamp.sd_m.value_or(0) > 0);
+  });
+  // Without a lever arm any height of a lamp explains its places in the image.
+  const MapEffect map = lever_arm && zenith_covariance && !map_is_exact
+                            ? propagate_map(fit, spot, state)
+                            : MapEffect();
+  if (zenith_covariance) {
+    *zenith_covariance =
+        map.noise_fraction * *zenith_covariance + map.covariance.topLeftCorner<2, 2>();
+  }
   result.center = rotation_center_at(state.zenith, RotationModel::tilt, camera, zenith_covariance);
   if (lever_arm) {
     result.center.lever_arm_m = state.lever_arm_m;
     result.center.lever_arm_covariance = fit.covariance(state.lever_arm_m.data());
     const auto with_zenith = fit.covariance(state.lever_arm_m.data(), state.zenith.data());
+    if (auto& covariance = result.center.lever_arm_covariance) {
+      *covariance = map.noise_fraction * *covariance + map.covariance.bottomRightCorner<2, 2>();
+    }
     if (zenith_covariance && with_zenith) {
-      result.center.lever_arm_by_zenith = *with_zenith * zenith_covariance->inverse();
+      result.center.lever_arm_by_zenith =
+          (map.noise_fraction * *with_zenith + map.covariance.bottomLeftCorner<2, 2>()) *
+          zenith_covariance->inverse();
     }
   }
   describe(result, fit, spot);

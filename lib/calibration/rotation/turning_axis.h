@@ -18,7 +18,8 @@ inline constexpr double kLooseLeverArm = 0.005;
 /// over the zenith, a yaw g_k per capture, the place p_i of each lamp on the ceiling (the map only
 /// says what to start from, so that its errors do not matter; the heights Z_i are the map's), the
 /// lever arm e, and, when there are captures at several heights, where the axis stands, A_h, at
-/// what height z_h. The scale is the map's: the lamps keep their size as a whole.
+/// what height z_h. The scale is the map's: the lamps keep their size as a whole. The covariance
+/// has the errors of heights and scale by the map's sd_m.
 ///
 /// A lever arm and a tilt shift the image by zeta - e/H, where H is the height of a lamp over the
 /// camera. Captures at several heights tell them apart, and so do, less well, lamps at several

@@ -92,6 +92,63 @@ TEST(RotationScatter, ResidualsAreTheNoisePerAxis) {
   }
 }
 
+/// Turns at two heights, or at one under lamps at several, with a map that has errors of its sd_m.
+struct TurnUnderMap {
+  const char* name;
+  double map_sd_m;
+  Eigen::Vector2d lever_arm_m;
+  std::vector<double> heights_m;
+  /// Height of every second lamp above the others.
+  double step_m;
+};
+
+class TurnUnderMapErrors : public testing::TestWithParam<TurnUnderMap> {};
+
+/// 300 maps of two axes know a standard deviation within 4 %.
+TEST_P(TurnUnderMapErrors, ReportsTheErrorsOfZenithAndLeverArm) {
+  constexpr int maps = 300;
+  const TurnUnderMap& turn = GetParam();
+  SpotScene scene = tilted_scene(turn.lever_arm_m, turn.heights_m);
+  scene.only_in_image = false;
+  for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
+    scene.map.lamps[i].position_m.z() += turn.step_m;
+  }
+  const auto frames = scene.frames(0.03);
+  Random random(14);
+  double zenith_squares = 0, arm_squares = 0, arm_variance_m2 = 0;
+  for (int i = 0; i < maps; ++i) {
+    LampMap surveyed = scene.map;
+    for (Lamp& lamp : surveyed.lamps) {
+      lamp.sd_m = turn.map_sd_m;
+      for (double& coordinate : lamp.position_m) coordinate += turn.map_sd_m * random.normal();
+    }
+    const SpotCaptures spot = spot_captures(with_noise(frames, random), surveyed, scene.camera);
+    ASSERT_EQ(spot.status, SpotStatus::ok);
+    const RotationFit fit = fit_turning_axis(spot, scene.camera);
+    ASSERT_TRUE(fit.converged && fit.center.covariance && fit.center.lever_arm_covariance);
+    for (int axis = 0; axis < 2; ++axis) {
+      const double zenith_px = fit.center.center_px[axis] - scene.truth().center_px[axis];
+      const double arm_m = (*fit.center.lever_arm_m)[axis] - scene.lever_arm_m[axis];
+      zenith_squares += zenith_px * zenith_px / (*fit.center.covariance)(axis, axis) / (2 * maps);
+      arm_squares += arm_m * arm_m / (*fit.center.lever_arm_covariance)(axis, axis) / (2 * maps);
+      arm_variance_m2 += (*fit.center.lever_arm_covariance)(axis, axis) / (2 * maps);
+    }
+  }
+  std::printf("%s: zenith e/sd %.2f, lever arm e/sd %.2f, sd %.3f mm\n", turn.name,
+              std::sqrt(zenith_squares), std::sqrt(arm_squares), 1e3 * std::sqrt(arm_variance_m2));
+  EXPECT_NEAR(std::sqrt(zenith_squares), 1, 0.15);
+  EXPECT_NEAR(std::sqrt(arm_squares), 1, 0.15);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    RotationScatter, TurnUnderMapErrors,
+    testing::Values(TurnUnderMap{"ExactMap", 0, {0.25, -0.2}, {0, 0.3}, 0},
+                    TurnUnderMap{"LongArm", 2e-3, {0.25, -0.2}, {0, 0.3}, 0},
+                    TurnUnderMap{"ShortArm", 2e-3, {0.016, -0.012}, {0, 0.3}, 0},
+                    TurnUnderMap{"LampsAtTwoHeights", 2e-3, {0.25, -0.2}, {0, 0.3}, 0.3},
+                    TurnUnderMap{"OneHeight", 1e-3, {0.25, -0.2}, {0}, 0.5}),
+    [](const auto& turn) { return turn.param.name; });
+
 struct SmallTurn {
   int captures, lamps;
 };
