@@ -128,89 +128,98 @@ struct MapEffect {
   double noise_fraction = 1;
 };
 
-/// Propagates the errors of the map.
-///
-/// The fit minimizes |r(x, Z, z_1)|^2 with the heights Z of the lamps and z_1 of the first axis
-/// held: dx = -(J'J)^-1 J' (r_Z dZ + r_z1 dz_1). scale_to_map() chooses z_1 so that, with q the
-/// lamps' places from their mean, sum q . dp = sum q . dP for errors dP of the map.
-MapEffect propagate_map(const RobustFit& fit, const SpotCaptures& spot, const State& state) {
-  const std::size_t lamps = spot.lamps.size();
+/// Derivatives of the fit by the heights of the lamps and, in the last column, by z_1, the height
+/// of the first axis, which the fit holds: of its unknowns x, dx = -(J'J)^-1 J' (r_Z dZ + r_z1
+/// dz_1).
+struct HeightDerivatives {
+  /// Row of each estimated parameter in `by_heights`.
+  std::map<const double*, Eigen::Index> rows;
+  Eigen::MatrixXd by_heights;
+  /// The sum of the squared residuals grows by d' squares d.
+  Eigen::MatrixXd squares;
+  double squared_residuals = 0;
+
+  Eigen::MatrixXd of(const double* point) const { return by_heights.middleRows<2>(rows.at(point)); }
+};
+
+HeightDerivatives differentiate_by_heights(const RobustFit& fit, const SpotCaptures& spot) {
+  HeightDerivatives result;
   const auto held = fit.held();
-  std::map<const double*, Eigen::Index> first;
-  Eigen::Index unknowns = 0;
   const auto all = fit.jacobians();
+  Eigen::Index unknowns = 0;
   for (const auto& at : all) {
     for (std::size_t k = 0; k < at.parameters.size(); ++k) {
       const double* parameter = at.parameters[k];
       if (std::find(held.begin(), held.end(), parameter) != held.end()) continue;
-      if (first.emplace(parameter, unknowns).second) unknowns += at.by_parameter[k].cols();
+      if (result.rows.emplace(parameter, unknowns).second) unknowns += at.by_parameter[k].cols();
     }
   }
-  // The columns of `right` are the lamps, then z_1.
-  const auto z_1 = static_cast<Eigen::Index>(lamps);
+  const auto z_1 = static_cast<Eigen::Index>(spot.lamps.size());
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(unknowns, unknowns);
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(unknowns, z_1 + 1);
-  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(z_1 + 1, z_1 + 1);
-  double chi_squared = 0;
-  constexpr std::size_t axis = 3;  // in the order of AxisResidual
+  result.squares = Eigen::MatrixXd::Zero(z_1 + 1, z_1 + 1);
   for (const auto& at : all) {
     const SpotObservation& sighting = spot.sightings[at.residual];
-    const Eigen::Vector2d by_axis_z = at.by_parameter[axis].col(2);
-    const bool at_first = spot.captures[sighting.capture].height == 0;
-    const auto lamp = static_cast<Eigen::Index>(sighting.lamp);
-    chi_squared += std::pow(fit.lengths()[at.residual], 2);
-    squares(lamp, lamp) += by_axis_z.squaredNorm();
-    if (at_first) {
-      squares(z_1, z_1) += by_axis_z.squaredNorm();
-      squares(lamp, z_1) -= by_axis_z.squaredNorm();
-      squares(z_1, lamp) -= by_axis_z.squaredNorm();
+    constexpr std::size_t axis = 3;  // in the order of AxisResidual
+    // The residual depends on the lamp's height minus the axis'.
+    Eigen::MatrixXd by_heights = Eigen::MatrixXd::Zero(2, z_1 + 1);
+    by_heights.col(static_cast<Eigen::Index>(sighting.lamp)) = -at.by_parameter[axis].col(2);
+    if (spot.captures[sighting.capture].height == 0) {
+      by_heights.col(z_1) = at.by_parameter[axis].col(2);
     }
+    result.squares += by_heights.transpose() * by_heights;
+    result.squared_residuals += std::pow(fit.lengths()[at.residual], 2);
     for (std::size_t j = 0; j < at.parameters.size(); ++j) {
-      const auto row = first.find(at.parameters[j]);
-      if (row == first.end()) continue;
+      const auto row = result.rows.find(at.parameters[j]);
+      if (row == result.rows.end()) continue;
       const Eigen::MatrixXd transposed = at.by_parameter[j].transpose();
+      right.middleRows(row->second, transposed.rows()) -= transposed * by_heights;
       for (std::size_t k = 0; k < at.parameters.size(); ++k) {
-        const auto column = first.find(at.parameters[k]);
-        if (column == first.end()) continue;
+        const auto column = result.rows.find(at.parameters[k]);
+        if (column == result.rows.end()) continue;
         normal.block(row->second, column->second, transposed.rows(), at.by_parameter[k].cols()) +=
             transposed * at.by_parameter[k];
       }
-      auto rows = right.middleRows(row->second, transposed.rows());
-      rows.col(lamp) += transposed * by_axis_z;
-      if (at_first) rows.col(z_1) -= transposed * by_axis_z;
     }
   }
-  const Eigen::MatrixXd moved = solve_symmetric(normal, right);
-  squares -= right.transpose() * moved;
-  const auto rows_of = [&](const double* parameter) -> Eigen::MatrixXd {
-    return moved.middleRows<2>(first.at(parameter));
-  };
+  result.by_heights = solve_symmetric(normal, right);
+  result.squares -= right.transpose() * result.by_heights;
+  return result;
+}
+
+/// Propagates the errors of the map. scale_to_map() chooses z_1 so that, with q the lamps' places
+/// from their mean, sum q . dp = sum q . dP for errors dP of the map.
+MapEffect propagate_map(const RobustFit& fit, const SpotCaptures& spot, const State& state) {
+  const HeightDerivatives at = differentiate_by_heights(fit, spot);
   Eigen::Vector2d middle_m = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& lamp_m : state.lamps_m) middle_m += lamp_m;
+  middle_m /= static_cast<double>(state.lamps_m.size());
+  Eigen::RowVectorXd size = Eigen::RowVectorXd::Zero(at.by_heights.cols());
   for (const Eigen::Vector2d& lamp_m : state.lamps_m) {
-    middle_m += lamp_m / static_cast<double>(lamps);
+    if (!at.rows.contains(lamp_m.data())) continue;
+    size += (lamp_m - middle_m).transpose() * at.of(lamp_m.data());
   }
-  Eigen::RowVectorXd size = Eigen::RowVectorXd::Zero(z_1 + 1);
-  for (const Eigen::Vector2d& lamp_m : state.lamps_m) {
-    if (!first.contains(lamp_m.data())) continue;
-    size += (lamp_m - middle_m).transpose() * rows_of(lamp_m.data());
-  }
-  Eigen::MatrixXd wanted(4, z_1 + 1);
-  wanted << rows_of(state.zenith.data()), rows_of(state.lever_arm_m.data());
+  Eigen::MatrixXd by_heights(4, at.by_heights.cols());
+  by_heights << at.of(state.zenith.data()), at.of(state.lever_arm_m.data());
+  // Errors of (heights, z_1) that the errors of one lamp cause, of its height and along the
+  // ceiling.
   MapEffect effect;
   double of_map = 0;
-  const double z_1_by_size = 1 / size[z_1];
-  for (std::size_t i = 0; i < lamps; ++i) {
+  const Eigen::Index z_1 = size.size() - 1;
+  for (std::size_t i = 0; i < spot.lamps.size(); ++i) {
     const auto lamp = static_cast<Eigen::Index>(i);
-    const double variance_m2 = std::pow(spot.lamps[i].sd_m.value_or(0), 2);
-    const double of_size = (state.lamps_m[i] - middle_m).squaredNorm() * std::pow(z_1_by_size, 2);
-    const double z_1_by_height = -size[lamp] * z_1_by_size;
-    const Eigen::Vector4d by_height = wanted.col(lamp) + z_1_by_height * wanted.col(z_1);
-    effect.covariance += variance_m2 * (by_height * by_height.transpose() +
-                                        of_size * wanted.col(z_1) * wanted.col(z_1).transpose());
-    of_map += variance_m2 * (squares(lamp, lamp) + 2 * z_1_by_height * squares(lamp, z_1) +
-                             (std::pow(z_1_by_height, 2) + of_size) * squares(z_1, z_1));
+    Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(size.size(), 2);
+    errors(lamp, 0) = 1;
+    errors(z_1, 0) = -size[lamp] / size[z_1];
+    errors(z_1, 1) = (state.lamps_m[i] - middle_m).norm() / size[z_1];
+    errors *= spot.lamps[i].sd_m.value_or(0);
+    const Eigen::MatrixXd moved = by_heights * errors;
+    effect.covariance += moved * moved.transpose();
+    of_map += errors.cwiseProduct(at.squares * errors).sum();
   }
-  if (chi_squared > 0) effect.noise_fraction = std::max(0.0, 1 - of_map / chi_squared);
+  if (at.squared_residuals > 0) {
+    effect.noise_fraction = std::max(0.0, 1 - of_map / at.squared_residuals);
+  }
   return effect;
 }
 
