@@ -406,7 +406,7 @@ struct Ends {
   Matrix2 covariance_px;
 };
 
-Ends average_ends(const HiddenEdge& edge, const EdgePrior& prior, double reach_px) {
+Ends average_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, double reach_px) {
   constexpr int rounds = 4, offsets = 21, slants = 9;
   constexpr double deviations = 3.5;
   Matrix2 ends_from_node;  // a node is an offset and a slant
@@ -477,7 +477,7 @@ std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side&
 std::optional<StraightEdge> hidden_edge_at(const ImageView& lines, const Side& side,
                                            const LineLevels& levels, double dark, double per_px,
                                            const EdgeSearch& search, const LightShape& shape,
-                                           const EdgePrior& prior) {
+                                           const HiddenEdgePrior& prior) {
   constexpr double min_fraction = 0.8;
   const Samples all(lines, side, levels, dark, per_px, search, shape, true);
   if (all.samples.empty()) return std::nullopt;

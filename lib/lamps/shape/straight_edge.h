@@ -53,7 +53,7 @@ struct EdgeSearch {
 
 /// Prior of a hidden edge, by the other edges: distance of its middle from the side, inside
 /// positive, and half the difference of the distances of its ends, which is 0 but for its sd.
-struct EdgePrior {
+struct HiddenEdgePrior {
   double offset_px, offset_sd_px, slant_sd_px;
 };
 
@@ -90,6 +90,6 @@ std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side&
 std::optional<StraightEdge> hidden_edge_at(const ImageView& lines, const Side& side,
                                            const LineLevels& levels, double dark, double per_px,
                                            const EdgeSearch& search, const LightShape& shape,
-                                           const EdgePrior& prior);
+                                           const HiddenEdgePrior& prior);
 
 }  // namespace vlp
