@@ -101,13 +101,13 @@ std::string explanation_of(LightReason reason) {
       return "most of it is overexposed, which hides stripes: if it is a lamp, expose shorter";
     case LightReason::steady:
       return fmt::format("its lines differ by less than {:.0f} %: if it is a lamp, expose shorter",
-                         100 * kLeastContrast);
+                         100 * kMinContrast);
     case LightReason::too_few_periods:
       return fmt::format(
           "it shows less than {} periods, or less than {} and no lamp with more is in the image: "
           "if "
           "it is a lamp, go nearer, or modulate it faster",
-          kLeastPeriods, kEnoughPeriods);
+          kMinPeriods, kEnoughPeriods);
     case LightReason::no_clear_period:
       return "it shows no clear period: if it is a lamp, see that nothing hides a part, and that "
              "the read-out is right";

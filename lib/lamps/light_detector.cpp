@@ -95,12 +95,12 @@ bool are_at_one_place(const Light& a, const Light& b) {
 std::optional<LightReason> why_steady(const Light& light) {
   constexpr double min_clarity = 0.5, min_clipped = 0.5;
   const Stripes& stripes = light.stripes;
-  if (!(stripes.contrast >= kLeastContrast)) {
+  if (!(stripes.contrast >= kMinContrast)) {
     return light.clipped > min_clipped ? LightReason::overexposed : LightReason::steady;
   }
-  if (!(stripes.periods >= kLeastPeriods)) return LightReason::too_few_periods;
+  if (!(stripes.periods >= kMinPeriods)) return LightReason::too_few_periods;
   if (!(stripes.clarity >= min_clarity)) return LightReason::no_clear_period;
-  if (!(light.coherence >= kLeastCoherence)) return LightReason::no_clear_period;
+  if (!(light.coherence >= kMinCoherence)) return LightReason::no_clear_period;
   return std::nullopt;
 }
 
@@ -164,7 +164,7 @@ LightDetector LightDetector::leaning(
     camera.level_from_camera = *level_from_camera;
   } else {
     camera.lens.reset();
-    camera.most_slender = 12;  // 85 degrees off its axis
+    camera.max_slender = 12;  // 85 degrees off its axis
   }
   return {lamps_, camera, classifier_};
 }
@@ -262,7 +262,7 @@ void LightDetector::measure(const ImageView& lines, const Background& background
                               : chords_of(from, to, lines.size());
       light.coherence = coherence_of(lines, chords, background, light.stripes.period_lines);
     }
-    if (light.stripes.contrast < kLeastContrast) light.clipped = clipped_fraction(lines, from, to);
+    if (light.stripes.contrast < kMinContrast) light.clipped = clipped_fraction(lines, from, to);
   };
   if (is_rectangle(light)) {
     const auto chords = chords_within(shape_.turned(light.face), lines.size());
@@ -341,7 +341,7 @@ void refuse(Light& light, LightReason reason) {
 /// Refuses lights whose period is not that of their lamp by the row time that the lights of the
 /// image share. A wrong row time changes the ratio of measured and expected period of all lights
 /// alike: the median of those with clear stripes, of which it needs three. Other periods may differ
-/// by kMostOffUnclear from those of their lamps.
+/// by kMaxUnclearDrift from those of their lamps.
 void refuse_other_row_times(const LampMap& lamps, double row_time_s, std::vector<Light>& lights) {
   constexpr std::size_t min_lights = 3;
   const auto has_clear_period = [](const Light& light) {
@@ -360,7 +360,7 @@ void refuse_other_row_times(const LampMap& lamps, double row_time_s, std::vector
   if (clear_ones.size() < min_lights) return;
   const double common = (lower_median(clear_ones) + upper_median(clear_ones)) / 2;
   for (const auto& [light, log_ratio] : log_ratios) {
-    const double max_off = kLampDrift + (has_clear_period(*light) ? kLampDrift : kMostOffUnclear);
+    const double max_off = kLampDrift + (has_clear_period(*light) ? kLampDrift : kMaxUnclearDrift);
     if (std::abs(log_ratio - common) > max_off) refuse(*light, LightReason::unknown_period);
   }
 }

@@ -17,10 +17,10 @@
 
 namespace vlp {
 
-/// Whether the image's edge cuts no part of the light.
+/// Returns whether no part of a light is cut by the image's edge.
 bool wholly_in_view(const Light& light, const ImageSize& size);
 
-/// Of a calibration; rows are taken for the read-out when it is not stated.
+/// Returns the camera of a calibration; the read-out is along rows if it is not stated.
 DetectorCamera detector_camera(const Calibration& calibration);
 
 /// Finds and identifies the lamps of a map in images of a rolling shutter. Const and safe to share
@@ -39,11 +39,11 @@ class LightDetector {
   LightDetector(const LampMap& lamps, const DetectorCamera& camera,
                 std::optional<LampClassifier> classifier = {});
 
-  /// The lights of an image that is not empty, from the top.
+  /// Detects the lights of an image, sorted from the top. @pre The image is not empty.
   std::vector<Light> detect(const ImageView& image) const;
 
-  /// The same detector for a camera that leans otherwise, with its level_from_camera; nothing: as
-  /// nobody knows. Then ellipses are fitted in the image, as without a lens.
+  /// Returns the same detector for a camera with another tilt. If the tilt is unknown, ellipses are
+  /// fitted in the image, as without a lens.
   LightDetector leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
   /// Returns the same detector for images that are read along rows, or along columns.
@@ -59,15 +59,15 @@ class LightDetector {
   /// puts these in the place of others there.
   void add_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
                          const Background& background, std::vector<Light>& lights) const;
-  /// The outline once more, exactly, and the stripes.
+  /// Refines the outline and measures the stripes.
   void measure(const ImageView& lines, const Background& background, Light& light) const;
-  /// The centres of lights that a moving camera sees in part, see Shear.
+  /// Corrects the centres of partly visible lights for the motion of the camera, see Shear.
   void correct_shear(std::vector<Light>& lights) const;
   void identify(std::vector<Light>& lights, const ImageSize& size) const;
-  /// How far a light is from that lamp's shape, round, or a rectangle with its sides' ratio: the
-  /// logarithm of what the ratio is off by, 0 of discs; nothing when it has another shape.
+  /// Returns the difference between the logarithms of the ratios of sides of a light and a lamp, 0
+  /// for discs; std::nullopt if the light has another shape.
   std::optional<double> shape_off(const Light& light, int lamp) const;
-  /// The lamp whose stripes these are; nothing when none or two may be.
+  /// Returns the lamp with these stripes; std::nullopt if none or two agree.
   std::optional<int> lamp_of(const Stripes& stripes) const;
 
   LampMap lamps_;

@@ -31,10 +31,10 @@ void add_evidence(const ImageView& image, ReadoutEvidence& evidence) {
 std::optional<Readout> find_readout(std::size_t images,
                                     const std::function<ImageView(std::size_t)>& image) {
   constexpr double enough = 6;
-  constexpr int most_used = 8;
+  constexpr int max_used = 8;
   ReadoutEvidence evidence;
   int used = 0;
-  for (std::size_t i = 0; i < images && used < most_used; ++i) {
+  for (std::size_t i = 0; i < images && used < max_used; ++i) {
     const ImageView frame = image(i);
     if (frame.empty()) continue;
     const double before = evidence.rows + evidence.columns;

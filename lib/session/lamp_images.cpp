@@ -104,7 +104,7 @@ void warn_of_map(const LampImages& input, const DetectorCamera& detector,
       warnings.push_back(fmt::format(
           "lamp {} has stripes of {:.2g} lines, too fine to be seen: a lower frequency shows them",
           lamp, period_lines));
-    } else if (periods < kLeastPeriods) {
+    } else if (periods < kMinPeriods) {
       warnings.push_back(fmt::format(
           "lamp {} shows only {:.1f} stripes, seen from z = 0: a higher frequency, a larger lamp "
           "or a camera nearer to it shows more",

@@ -31,14 +31,14 @@ bool has_examples(std::span<const LabelledLight> lights, const LampMap& lamps,
   }
   std::string few;
   for (const auto& [lamp, count] : counts) {
-    if (count >= kLeastExamples) continue;
+    if (count >= kMinExamples) continue;
     few += fmt::format("{}{} (has {})", few.empty() ? "" : ", ", lamp, count);
   }
   if (!few.empty()) {
     result.fail(StepFailure::undetermined,
                 fmt::format("too few labelled lights of lamps {}: add captures in which they are "
                             "wholly in view, {} or more of each",
-                            few, kLeastExamples));
+                            few, kMinExamples));
   } else if (counts.size() < 2) {
     result.fail(StepFailure::undetermined, "one lamp: there is nothing to tell apart; add lamps");
   }
@@ -49,7 +49,7 @@ bool has_examples(std::span<const LabelledLight> lights, const LampMap& lamps,
 bool kept_enough(const LampClassifier& classifier, TrainStepResult& result) {
   std::string few;
   for (const auto& lamp : classifier.lamps) {
-    if (lamp.examples >= kLeastExamples) continue;
+    if (lamp.examples >= kMinExamples) continue;
     few += fmt::format("{}{}", few.empty() ? "" : ", ", lamp.lamp);
   }
   if (few.empty()) return true;

@@ -199,7 +199,7 @@ std::optional<double> row_time_that_fits(std::span<const double> frequencies_hz,
   }
   const bool most_fit =
       static_cast<double>(best) >= most * static_cast<double>(frequencies_hz.size());
-  const bool another = found_s && std::abs(row_time_s / *found_s - 1) > kMostOffUnclear;
+  const bool another = found_s && std::abs(row_time_s / *found_s - 1) > kMaxUnclearDrift;
   return most_fit && another ? found_s : std::nullopt;
 }
 

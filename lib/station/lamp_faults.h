@@ -38,7 +38,7 @@ std::vector<std::string> place_faults(std::span<const Frame> frames, const LampM
 /// of the map with it: `frequencies_hz` are theirs with `row_time_s`, f' = f true row time /
 /// row_time_s. Four fifths of them, of three lamps or more, have to fit to 1 %, and it has to lie
 /// within 40 %. Nothing when that is `row_time_s` to within what lights may be off a lamp
-/// (kMostOffUnclear): then they are like two lamps of the map, not like none.
+/// (kMaxUnclearDrift): then they are like two lamps of the map, not like none.
 std::optional<double> row_time_that_fits(std::span<const double> frequencies_hz, const LampMap& map,
                                          double row_time_s);
 

@@ -35,11 +35,11 @@ TEST(TrainStep, NeedsSeveralLightsOfEachLamp) {
 }
 
 TEST(TrainStep, TellsHowLightsThatWereHeldOutAreAnswered) {
-  const TrainStepResult result = Training(kLeastExamples).trained();
+  const TrainStepResult result = Training(kMinExamples).trained();
   ASSERT_TRUE(result.ok()) << result.why;
   EXPECT_EQ(result.classifier.lamps.size(), 6U);
-  EXPECT_EQ(result.labelled.labels, 12 * kLeastExamples);
-  EXPECT_EQ(result.confusion.counts.sum(), 12 * kLeastExamples);
+  EXPECT_EQ(result.labelled.labels, 12 * kMinExamples);
+  EXPECT_EQ(result.confusion.counts.sum(), 12 * kMinExamples);
   EXPECT_EQ(result.confusion.wrong(), 0);
 }
 

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// How often each level occurs.
+/// Number of pixels of each level.
 class Histogram {
  public:
   explicit Histogram(int levels) : counts_(static_cast<std::size_t>(levels), 0) {}
@@ -33,7 +33,7 @@ class Histogram {
     for (int passed = counts_[0]; passed <= rank; passed += counts_[std::size_t(level)]) ++level;
     return level;
   }
-  /// Of the levels that occur, the lowest first.
+  /// Calls a function for the levels that occur, the lowest first.
   template <typename Function>
   void for_each(Function&& function) const {
     for (int level = 0; level <= highest_; ++level) {
@@ -112,7 +112,7 @@ Background background(const Histogram& sample) {
   if (no_noise_below) noise = std::max(noise, noise_above(sample, median));
   // Grey levels are coarse: of those around, the mean and the scatter say more.
   constexpr double around = 3;
-  const double least_noise = 0.3 * step;
+  const double min_noise = 0.3 * step;
   double near = 0, sum = 0, sum_of_squares = 0;
   sample.for_each([&](int level, int count) {
     const double off = level - median;
@@ -123,7 +123,7 @@ Background background(const Histogram& sample) {
   });
   const double level = median + sum / near;
   if (!no_noise_below) noise = std::sqrt(sum_of_squares / near - std::pow(sum / near, 2));
-  noise = std::max(noise, least_noise);
+  noise = std::max(noise, min_noise);
   constexpr double clear = 4.5, least = 1.6;
   return {level, noise, level + std::max(clear * noise, least * step)};
 }

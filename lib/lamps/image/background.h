@@ -6,18 +6,18 @@
 
 namespace vlp {
 
-/// The dark of an image of lamps, from a sample of its pixels.
+/// Dark level and noise of an image of lamps, from a sample of its pixels.
 struct Background {
-  /// Mean of the pixels around the median, and their standard deviation, in grey levels. Of a
-  /// dark that is clipped, at black or above it, by what is brighter than the median.
+  /// Mean of the pixels around the median, and their standard deviation, in grey levels. If the
+  /// dark is clipped, at black or above it, the pixels brighter than the median determine them.
   double level;
   double noise;
-  /// Pixels above are lit: level + 4.5 noise, and at least 1.6 of the steps between the levels that
-  /// the image has more.
+  /// Level above which pixels are lit: level + 4.5 noise, and at least level + 1.6 steps between
+  /// the levels that occur in the image.
   double threshold;
 };
 
-/// @pre The image is not empty.
+/// Estimates the background of an image. @pre The image is not empty.
 Background background_of(const ImageView& image);
 
 }  // namespace vlp

@@ -16,15 +16,14 @@ struct Lines {
   ImageView pixels;
   /// Tiles that may have runs, see lit_tiles().
   TileMask lit;
-  /// Of `pixels`, which last as long, when they are not the image's.
+  /// Memory of `pixels` if they are not the image's.
   std::shared_ptr<void> memory;
 };
 
-/// Read along columns, an image is turned over its diagonal in the tiles in which something is
-/// brighter than the background's threshold, more than one pixel alone, and in those around them,
-/// because turning all of a large image takes longer than finding its lamps. The rest, in which
-/// nothing is to be seen, is at the background's level as far from what is lit as that reaches, and
-/// black beyond, where memory need not even be touched.
+/// Returns the lines of an image. An image that is read along columns is transposed, but only in
+/// the tiles with more than one pixel above the background's threshold and in those around them,
+/// because transposing all of a large image takes longer than detecting its lamps. The next tiles
+/// have the level of the background; those beyond are black, and their memory is not touched.
 Lines lines_of(const ImageView& image, Readout readout, const Background& background);
 
 }  // namespace vlp

@@ -24,10 +24,10 @@ bool any_above(const Level* pixels, int count, Level threshold) {
 template <typename Level>
 void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
                      const std::vector<int>& tiles, std::vector<Run>& runs) {
-  constexpr int most_gap = 2, least_width = 3;
+  constexpr int max_gap = 2, min_width = 3;
   Run run{row, 0, -1};  // none yet
   const auto finish = [&] {
-    if (run.width() >= least_width) runs.push_back(run);
+    if (run.width() >= min_width) runs.push_back(run);
     run.end = -1;
   };
   for (const int tile : tiles) {
@@ -35,7 +35,7 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
     if (!any_above(pixels + begin, end - begin, threshold)) continue;
     for (int column = begin; column < end; ++column) {
       if (pixels[column] <= threshold) continue;
-      if (run.end >= 0 && column - run.end > most_gap) finish();
+      if (run.end >= 0 && column - run.end > max_gap) finish();
       if (run.end < 0) run.begin = column;
       run.end = column + 1;
     }
@@ -105,12 +105,12 @@ std::vector<Run> find_runs(const ImageView& image, double threshold, const TileM
   });
 }
 
-std::vector<Blob> group_runs(const std::vector<Run>& runs, int most_dark_rows) {
+std::vector<Blob> group_runs(const std::vector<Run>& runs, int max_dark_rows) {
   std::vector<Growing> growing;
   std::vector<Blob> done;
   const auto retire = [&](int row) {
     for (std::size_t i = 0; i < growing.size();) {
-      if (growing[i].alive && row - growing[i].last_row <= most_dark_rows + 1) {
+      if (growing[i].alive && row - growing[i].last_row <= max_dark_rows + 1) {
         ++i;
         continue;
       }

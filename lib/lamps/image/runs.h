@@ -10,19 +10,19 @@
 
 namespace vlp {
 
-/// Lit pixels of a row that stand side by side: columns from begin to before end.
+/// Consecutive lit pixels of a row: columns from begin to before end.
 struct Run {
   int row, begin, end;
 
   int width() const { return end - begin; }
 };
 
-/// The runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a run;
-/// runs of less than three pixels are noise. Only tiles that are `lit`, not 0, are searched, or all
-/// of them if it is empty.
+/// Finds the runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a
+/// run; runs of less than three pixels are noise. Searches the tiles that are not 0 in `lit`, or
+/// all if it is empty.
 std::vector<Run> find_runs(const ImageView& image, double threshold, const TileMask& lit = {});
 
-/// Runs that belong to one light: they overlap from row to row, across up to `most_dark_rows` dark
+/// Runs that belong to one light: they overlap from row to row, across up to `max_dark_rows` dark
 /// ones. Lights that touch are one blob.
 struct Blob {
   std::vector<Run> runs;  // by row
@@ -32,6 +32,6 @@ struct Blob {
   PixelBox box() const;
 };
 
-std::vector<Blob> group_runs(const std::vector<Run>& runs, int most_dark_rows);
+std::vector<Blob> group_runs(const std::vector<Run>& runs, int max_dark_rows);
 
 }  // namespace vlp

@@ -24,9 +24,9 @@ enum class LightKind {
 /// Reason why a light is no lamp; of several the first that applies.
 enum class LightReason {
   identified,       ///< a lamp, or one that is cut
-  overexposed,      ///< steady: contrast below kLeastContrast, most pixels at full scale
-  steady,           ///< steady: contrast below kLeastContrast
-  too_few_periods,  ///< less than kLeastPeriods, or less than kEnoughPeriods and no lamp with more
+  overexposed,      ///< steady: contrast below kMinContrast, most pixels at full scale
+  steady,           ///< steady: contrast below kMinContrast
+  too_few_periods,  ///< less than kMinPeriods, or less than kEnoughPeriods and no lamp with more
   no_clear_period,  ///< no period explains it, its parts differ, or its stripes are irregular
   unknown_period,   ///< its period is that of no lamp, or of several
   reflection,       ///< softer, dimmer or smaller than another light, or like its mirror image
@@ -34,29 +34,30 @@ enum class LightReason {
   incomplete        ///< cut by the image's edge, or too small for an outline
 };
 
-/// One that is formless has its box, `pixel` in the middle, and its edge; no stripes, no sigma.
+/// A light in an image. A formless one has its box, with `pixel` in the middle, and its outline; no
+/// stripes and no sigma.
 struct Light {
   LightKind kind;
   LightReason reason;
-  /// Of a lamp, and of one that is cut.
+  /// Id of a lamp, and of one that is cut.
   std::optional<int> lamp;
   /// Image of the centre of its outline, (u, v).
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis, by its outline, or by unknown_lens_sd_px() as well.
+  /// Standard deviation of `pixel` per axis. Without a lens unknown_lens_sd_px() is included.
   double sigma_px;
-  /// Of a rectangle that of the disc of its area.
+  /// Radius; for a rectangle that of the disc of equal area.
   double radius_px;
-  /// Of one that is round, in the plane of LightShape: the outline is where
-  /// |unit_from_plane (p - plane_center)| = 1.
+  /// Outline of a round light in the plane of LightShape: |unit_from_plane (p - plane_center)| = 1.
   Eigen::Vector2d plane_center;
   Matrix2 unit_from_plane;
-  /// The corners of the box around the outline, top left and bottom right.
+  /// Top left and bottom right corner of the box around the outline, (u, v).
   Eigen::Vector2d low, high;
   Stripes stripes;
-  /// See coherence_of(); 0 when the stripes have no period.
+  /// coherence_of(), or ModulatedLight::phase_coherence if `by_modulation`; 0 if the stripes have
+  /// no period.
   double coherence;
-  /// Share of the pixels in the middle of a steady light that are as bright as the brightest there:
-  /// of one that is clipped, most.
+  /// Fraction of the pixels in the middle of a steady light that have the level of its brightest
+  /// pixel, if that is full scale.
   double clipped;
   /// Level of its brightest lines above the dark, in grey levels.
   double peak;
@@ -67,35 +68,35 @@ struct Light {
   /// Whether its outline may be another one than the lamp's: soft, seen in part, or of a source in
   /// a reflector, much brighter inside than next to it.
   bool is_doubtful;
-  /// Whether it is lit unevenly, and its outline is a rim, see rim_of(); its roundness is the share
-  /// of the ends of its lit lines that show the rim.
+  /// Whether it is lit unevenly and its outline is a rim, see rim_of(). Its roundness is the
+  /// fraction of the ends of its lit lines that show the rim.
   bool uneven;
-  /// How soft the outline is: from a quarter to three quarters of the level.
+  /// Width of the edge from 25 % to 75 % of the level.
   double rise_px;
-  /// Of a rectangle, see rectangle_of(), a polygon around it within its edges, (u, v), and its long
-  /// side over the short one, behind the lens, with the standard deviation of its logarithm, by the
-  /// scatter of the edges and a quarter of their blur, which a tone curve may move them by; empty
-  /// of others.
+  /// Rectangles only, see rectangle_of(): polygon within the edges, (u, v); empty for other lights.
   std::vector<Eigen::Vector2d> face;
+  /// Rectangles only: long side over short side behind the lens, and the standard deviation of its
+  /// logarithm. It includes a quarter of the blur of the edges, by which a tone curve may move
+  /// them.
   double aspect, aspect_sd;
-  /// The share of the blob's edge that lies on the circle; of a rectangle the share of the pixels
-  /// along the edge that is seen worst that look like an edge.
+  /// Fraction of the blob's edge that lies on the circle. Rectangles: fraction of the pixels along
+  /// the worst edge that agree with an edge.
   double roundness;
-  /// Points of the blob's edge that lie outside this and its other lights, over those on the
+  /// Number of points of the blob's edge outside all lights of the blob, over the number on the
   /// circle.
   double outside;
-  /// As (column, row) of the lines that the shutter reads: (v, u) for a read-out along columns.
+  /// Points as (column, line): (v, u) for a read-out along columns.
   std::vector<EdgePoint> outline;
-  /// Of a circle in the level plane what it leaves of the outline; of no points else.
+  /// Residuals of a circle in the level plane; empty for other outlines.
   OutlineSums sums;
 };
 
-/// Part of an outline that has to be seen for it to be trusted: Light::roundness.
+/// Minimum Light::roundness of an identified lamp.
 inline constexpr double kMinRoundness = 0.45;
 
 inline bool is_rectangle(const Light& light) { return !light.face.empty(); }
 
-/// Whether it may be a lamp, of this map or another.
+/// Returns whether a light may be a lamp, of this map or another.
 inline bool flickers(const Light& light) {
   return light.kind != LightKind::steady && light.kind != LightKind::formless;
 }

@@ -15,7 +15,7 @@ bool covers(const Light& light, const Eigen::Vector2d& pixel) {
   return (light.pixel - pixel).norm() < light.radius_px;
 }
 
-/// Whether two blobs may be parts of one light.
+/// Returns whether two blobs may be parts of one light.
 bool near(const PixelBox& a, const PixelBox& b) {
   const int gap_across = std::max(a.x, b.x) - std::min(a.x + a.width, b.x + b.width);
   const int gap_along = std::max(a.y, b.y) - std::min(a.y + a.height, b.y + b.height);
@@ -23,33 +23,33 @@ bool near(const PixelBox& a, const PixelBox& b) {
   return 2 * gap_across < size && 2 * gap_along < size;
 }
 
-/// Whether it is no part of a light that something in the way splits.
+/// Returns whether a part is no piece of a light that an occluder splits.
 bool whole(const LightPart& part) {
   return part.light && (part.light->glows || part.light->uneven || is_rectangle(*part.light));
 }
 
 std::size_t points_of(const LightPart& part) { return part.light ? part.light->outline.size() : 0; }
 
-/// Whether that light is of both parts: two lamps side by side have more of their points on a
-/// circle each than on one together. `points` are there in all.
+/// Returns whether a light consists of both parts: two lamps side by side have more of their points
+/// on a circle each than on a common one. `points` is the number of all points.
 bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std::size_t points) {
-  constexpr double least_share = 0.6, least_gain = 1.25, least_of_both = 0.8, most_hidden = 1.5;
+  constexpr double min_share = 0.6, min_gain = 1.25, min_of_both = 0.8, max_hidden = 1.5;
   const PixelBox box = around(a.box, b.box);
-  if (2 * whole.radius_px > most_hidden * std::max(box.width, box.height)) return false;
+  if (2 * whole.radius_px > max_hidden * std::max(box.width, box.height)) return false;
   const auto on_circle = double(whole.outline.size());
   const auto of_a = double(points_of(a)), of_b = double(points_of(b));
-  return on_circle >= least_share * double(points) && on_circle >= least_of_both * (of_a + of_b) &&
-         on_circle >= least_gain * std::max(of_a, of_b);
+  return on_circle >= min_share * double(points) && on_circle >= min_of_both * (of_a + of_b) &&
+         on_circle >= min_gain * std::max(of_a, of_b);
 }
 
-/// Why a part has no form.
+/// Returns the reason why a part has no shape.
 LightReason reason_of(const LightPart& part, const ImageSize& size) {
   const PixelBox& box = part.box;
   const bool inside =
       box.x > 0 && box.y > 0 && box.right() < size.width && box.bottom() < size.height;
   if (!inside) return LightReason::incomplete;
   // What is not of the light itself takes up some of the points.
-  const bool small = part.outline.size() < 2 * kLeastOutlinePoints;
+  const bool small = part.outline.size() < 2 * kMinOutlinePoints;
   return small ? LightReason::incomplete : LightReason::wrong_shape;
 }
 
@@ -60,7 +60,7 @@ bool overlap(const Light& a, const Light& b) {
   return covers(a, b.pixel) || covers(b, a.pixel);
 }
 
-/// No two lights overlap: the one with more of an outline stands, the other is a piece of it.
+/// Removes lights that overlap one with more outline points: they are pieces of it.
 std::vector<Light> without_pieces(std::vector<Light> found) {
   std::stable_sort(found.begin(), found.end(), [](const Light& a, const Light& b) {
     return a.outline.size() > b.outline.size();
@@ -79,10 +79,10 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
 std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
                         const Background& background) {
   // A lamp is in a few pieces; an image of thousands of them shows something else.
-  constexpr int most_tries = 2000;
+  constexpr int max_tries = 2000;
   int tries = 0;
-  for (std::size_t i = 0; i < parts.size() && tries < most_tries; ++i) {
-    for (std::size_t j = i + 1; j < parts.size() && tries < most_tries; ++j) {
+  for (std::size_t i = 0; i < parts.size() && tries < max_tries; ++i) {
+    for (std::size_t j = i + 1; j < parts.size() && tries < max_tries; ++j) {
       if (whole(parts[i]) || whole(parts[j]) || !near(parts[i].box, parts[j].box)) continue;
       ++tries;
       std::vector<EdgePoint> both = parts[i].outline;
@@ -105,11 +105,11 @@ std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
 
 std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vector<Light>& lights,
                                    const LightShape& shape, const ImageSize& size) {
-  constexpr int least_px = 5;
+  constexpr int min_px = 5;
   std::vector<Light> formless;
   for (LightPart& part : parts) {
     const PixelBox& box = part.box;
-    if (std::min(box.width, box.height) < least_px) continue;
+    if (std::min(box.width, box.height) < min_px) continue;
     Light light{};
     light.kind = LightKind::formless;
     light.reason = reason_of(part, size);

@@ -61,9 +61,9 @@ double slenderness(const Matrix2& rim_from_circle) {
   return (half_square + difference) / area;
 }
 
-/// How many points err together: the sum of the products of their errors with those of their
-/// neighbours and their own, over that of their squares. Of points that err each by itself the fit,
-/// which takes off three unknowns, leaves products of -3 / n of the mean square.
+/// Returns the number of points with a common error: the sum of the products of their errors with
+/// those of their neighbours and their own, over that of their squares. Of points that err each by
+/// itself the fit, which takes off three unknowns, leaves products of -3 / n of the mean square.
 double points_together(const std::vector<Eigen::Vector2d>& points,
                        const std::vector<EdgePoint>& outline, const std::vector<bool>& counted,
                        const RobustEllipse& fit) {
@@ -132,7 +132,7 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
     brightest = std::max(brightest, edge.level);
     return !plane;
   });
-  if (points.size() < kLeastOutlinePoints) return std::nullopt;
+  if (points.size() < kMinOutlinePoints) return std::nullopt;
   std::vector<double> weights;
   weights.reserve(outline.size());
   for (const EdgePoint& edge : outline) weights.push_back(std::pow(edge.level / brightest, 2));
@@ -152,13 +152,12 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   } else {
     constexpr double nearly_round = 3;
     fit = fit_robust_ellipse(points, weights, tolerance);
-    if (!fit && camera_.most_slender > nearly_round) {
+    if (!fit && camera_.max_slender > nearly_round) {
       fit = fit_slender_ellipse(points, weights, tolerance);
     }
   }
-  if (!fit || fit->count < static_cast<int>(kLeastOutlinePoints)) return std::nullopt;
-  if (!camera_.lens && slenderness(fit->rim_from_circle) > camera_.most_slender)
-    return std::nullopt;
+  if (!fit || fit->count < static_cast<int>(kMinOutlinePoints)) return std::nullopt;
+  if (!camera_.lens && slenderness(fit->rim_from_circle) > camera_.max_slender) return std::nullopt;
 
   Light light{};
   const auto pixel = pixel_of(fit->center);

@@ -13,20 +13,19 @@
 
 namespace vlp {
 
-/// With less points on it a circle or an ellipse is not beyond doubt.
-inline constexpr std::size_t kLeastOutlinePoints = 10;
+/// Minimum number of points on a circle or an ellipse.
+inline constexpr std::size_t kMinOutlinePoints = 10;
 
-/// What a detector knows of the camera. The row time is needed for identities.
+/// Camera parameters of a detector. Identification needs the row time.
 struct DetectorCamera {
   Readout readout;
   std::optional<double> row_time_s;
-  /// Without it ellipses are fitted in the image itself.
+  /// Lens; without it ellipses are fitted in the image.
   std::optional<Lens> lens;
-  /// level_from_camera, for discs that a tilted camera sees.
+  /// Rotation of a tilted camera.
   Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();
-  /// Ellipses are no lights that are longer than so many times their width: of a disc seen 60
-  /// degrees off its axis.
-  double most_slender = 2;
+  /// Maximum ratio of the axes of an ellipse: that of a disc seen 60 degrees off its axis.
+  double max_slender = 2;
 };
 
 /// The shape of lights by their outline. Edge points go through the lens into the level plane; a
@@ -37,39 +36,39 @@ class LightShape {
  public:
   explicit LightShape(const DetectorCamera& camera) : camera_(camera) {}
 
-  /// The light with that outline, or most of it: everything but kind, lamp and stripes. Of a
-  /// mottled light, see RefinedOutline, the sigma counts neighbouring points by how many err
-  /// together. Nothing when it is not round, or its centre is not known to a pixel or so.
+  /// Fits a light to an outline, or to most of it: all members but kind, lamp and stripes. The
+  /// sigma of a mottled light, see RefinedOutline, allows for the common error of neighbouring
+  /// points. Returns std::nullopt if the outline is not round, or if its centre is not determined
+  /// to about a pixel.
   std::optional<Light> light_of(std::vector<EdgePoint> outline, const Background& background,
                                 bool mottled = false) const;
 
-  /// Moves the centre to where it is with the outline as oval as that, of a light that moves so far
-  /// of the level plane per line, and states its sigma_px.
+  /// Corrects the centre and sigma_px of a light for the oval of its outline and its motion in the
+  /// level plane per line.
   void shift(const Oval& oval, const Eigen::Vector2d& motion_per_line, Light& light) const;
 
-  /// The points that lie outside a light.
+  /// Returns the points outside a light.
   std::vector<EdgePoint> outside(const Light& light, const std::vector<EdgePoint>& outline) const;
 
-  /// (column, row) of the lines that the shutter reads from (u, v) of the image, and back.
+  /// Converts (u, v) of the image to (column, line) and back.
   Eigen::Vector2d turned(const Eigen::Vector2d& at) const;
   std::vector<Eigen::Vector2d> turned(std::vector<Eigen::Vector2d> points) const;
 
   bool has_lens() const { return camera_.lens.has_value(); }
   bool knows_level() const { return !camera_.level_from_camera.isIdentity(0); }
-  /// The point of the level plane, at height 1, that is seen at (u, v), and back; without a lens
-  /// that is the pixel itself.
+  /// Converts (u, v) to a point of the level plane at height 1, and back. Without a lens both are
+  /// equal.
   std::optional<Eigen::Vector2d> plane_of(const Eigen::Vector2d& pixel) const;
   std::optional<Eigen::Vector2d> pixel_of(const Eigen::Vector2d& plane) const;
 
  private:
-  /// By how many lines the shutter reads a point later than the centre, over its x, y.
+  /// Returns the derivative of the line in which a point is read by its x, y.
   Eigen::Vector2d line_slope_at(const Circle& circle) const;
 
-  /// How far the centre of a circle's outline is off because the lens bends the lines that it is
-  /// read in, so that the outline is read later, or sooner, on the whole than the centre: in
-  /// direction a by m (l(a) - l) with the motion m and the lines l, of which the circle's centre
-  /// takes over the part along a that goes with cos a and sin a: of a whole outline, which parts
-  /// are taken for, too.
+  /// Returns the error of the centre of a circle's outline because the lens bends the lines that it
+  /// is read in: on the whole the outline is read later, or sooner, than the centre. In direction a
+  /// it is displaced by m (l(a) - l), with the motion m and the lines l; the error is the part
+  /// along a that varies as cos a and sin a. Parts of an outline are treated as whole ones.
   Eigen::Vector2d read_off(const Circle& circle, const Eigen::Vector2d& motion_per_line) const;
 
   DetectorCamera camera_;

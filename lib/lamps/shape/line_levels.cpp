@@ -13,7 +13,7 @@ namespace vlp {
 
 namespace {
 
-/// Of the pixels of a chord, above the dark: their mean, and the moment about their middle.
+/// Mean of the pixels of a chord above the dark, and their moment about the middle.
 struct ChordSums {
   double middle, mean, moment, spread;
 };
@@ -61,7 +61,7 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<Run>& chords,
     measured_.push_back({level, std::hypot(noise, unevenness * level)});
   }
   const Stripes stripes = stripes_of(signal);
-  if (!(stripes.contrast >= kLeastContrast)) return;
+  if (!(stripes.contrast >= kMinContrast)) return;
   period_lines_ = stripes.period_lines;
   period_sd_ = period_sd(period_lines_, double(signal.size()) / kUsedHeight, 0) * period_lines_;
 }

@@ -12,29 +12,28 @@
 
 namespace vlp {
 
-/// How bright a light is on a line, above the dark and over the brightest, and its standard
+/// Level of a light on a line above the dark, as a fraction of the brightest, and its standard
 /// deviation.
 struct LineLevel {
   double level, sd;
 };
 
-/// The levels that a light has on lines, in the middle of it; across the lines its level changes
-/// evenly, as vignetting makes it. Also on lines next to its edge, where it has no pixels inside:
-/// stripes repeat, so that the level is that of the lines whole periods away, with the
-/// scatter of those, what the line between two of them may miss and what the period's own
-/// uncertainty is worth as the standard deviation. Of steady light it is that of the lines next to
-/// it.
+/// Levels of a light on lines, in the middle of it; along the lines its level changes linearly, by
+/// vignetting. Lines next to its edge have no pixels inside. Stripes repeat, so that their level is
+/// that of the lines whole periods away. Its standard deviation combines the scatter of these, the
+/// interpolation between lines and the uncertainty of the period. Steady light has the level of the
+/// neighbouring lines.
 class LineLevels {
  public:
-  /// `chords` are of lines that follow one another, of which there are eight at least.
+  /// @pre `chords` are those of at least eight consecutive lines.
   LineLevels(const ImageView& lines, const std::vector<Run>& chords, const Background& background);
 
-  /// Above the dark, in grey levels.
+  /// Returns the brightest level above the dark, in grey levels.
   double brightest() const { return brightest_; }
   std::optional<LineLevel> at(int line) const;
-  /// Period of the stripes; 0 for steady light.
+  /// Returns the period of the stripes; 0 for steady light.
   double period_lines() const { return period_lines_; }
-  /// The level at that column over that in the middle.
+  /// Returns the level at a column over that in the middle.
   double share_at(double column) const { return std::max(0.1, 1 + slope_ * (column - middle_)); }
 
  private:

@@ -15,7 +15,7 @@
 
 namespace vlp {
 
-/// The signed distance of a point from a curve, and its slope with the curve's N parameters.
+/// Signed distance of a point from a curve, and its derivative by the N parameters of the curve.
 template <int N>
 struct CurveDistance {
   double error;
@@ -25,24 +25,25 @@ struct CurveDistance {
 /// A step of Gauss-Newton on Tukey's biweight of the distances (Huber 1981).
 template <int N>
 struct MEstimateStep {
-  /// To be taken off the parameters.
+  /// Step to subtract from the parameters.
   Eigen::Matrix<double, N, 1> step;
-  /// Of the parameters, from the scatter of the points that belong to the curve.
+  /// Covariance of the parameters, from the scatter of the points on the curve.
   Eigen::Matrix<double, N, N> covariance;
-  /// Which points belong to it, and how many.
+  /// Points that belong to it, and their number.
   std::vector<bool> inliers;
   int count;
-  /// Root of the mean squared distance of those.
+  /// RMS distance of these.
   double rms;
 };
 
-/// `distance(i)` is that of point i, weights.size() points in all. The scale is the median distance
-/// of those closer than four tolerances, and a tenth of the tolerance at the least. Nothing when
-/// N + 2 points do not remain, or do not determine the curve.
+/// Computes a step from `distance(i)`, the distance of point i, of weights.size() points. The scale
+/// is the median distance of the points closer than four tolerances, at least a tenth of the
+/// tolerance. Returns std::nullopt if less than N + 2 points remain, or if they do not determine
+/// the curve.
 template <int N, typename Distance>
 std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights, double tolerance,
                                                 const Distance& distance) {
-  constexpr int least = N + 2;
+  constexpr int min_points = N + 2;
   std::vector<CurveDistance<N>> distances;
   std::vector<double> sizes;
   distances.reserve(weights.size());
@@ -52,7 +53,7 @@ std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights,
     const double size = std::abs(distances[i].error);
     if (size < 4 * tolerance) sizes.push_back(size);
   }
-  if (sizes.size() < least) return std::nullopt;
+  if (sizes.size() < min_points) return std::nullopt;
   constexpr double sigma_from_median = 1.4826, tukey = 4.685;
   const double median = upper_median(std::move(sizes));
   const double cut =
@@ -76,13 +77,13 @@ std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights,
     sum += weight;
     ++result.count;
   }
-  if (result.count < least || !(slopes > 0)) return std::nullopt;
+  if (result.count < min_points || !(slopes > 0)) return std::nullopt;
   const Cholesky<std::size_t(N)> factor(normal);
   if (!factor.determines(1e-12)) return std::nullopt;
   const auto step = factor.solve(normal.gradient);
   std::copy(step.begin(), step.end(), result.step.begin());
   result.rms = std::sqrt(squares / result.count);
-  // Of an M-estimate: the mean of psi^2 over the squared mean of its slope.
+  // Variance of an M-estimate: the mean of psi^2 over the squared mean of its slope.
   const double variance = psi_squares * all / (slopes * slopes) * result.count / (result.count - N);
   for (int i = 0; i < N; ++i) {
     const auto column = factor.inverse_column(std::size_t(i));

@@ -42,20 +42,20 @@ void add_edge(const Profile<Level>& profile, int width, int row, double dark,
 
 template <typename Level>
 std::vector<EdgePoint> outline(const ImageView& image, const Blob& blob, double dark) {
-  constexpr int least_width = 8;
+  constexpr int min_width = 8;
   std::vector<EdgePoint> points;
   points.reserve(2 * blob.runs.size());
   for (const Run& run : blob.runs) {
-    if (run.width() < least_width) continue;
+    if (run.width() < min_width) continue;
     const auto* row = image.row<Level>(run.row);
     add_edge(Profile<Level>{row, image.width, run.begin, 1}, run.width(), run.row, dark, points);
     add_edge(Profile<Level>{row, image.width, run.end - 1, -1}, run.width(), run.row, dark, points);
   }
   // Between the stripes of a saturated lamp its charge spills over: no outline of its own.
-  constexpr double least_share = 0.35;
+  constexpr double min_share = 0.35;
   double brightest = 0;
   for (const EdgePoint& point : points) brightest = std::max(brightest, point.level);
-  std::erase_if(points, [&](const EdgePoint& p) { return p.level < least_share * brightest; });
+  std::erase_if(points, [&](const EdgePoint& p) { return p.level < min_share * brightest; });
   return points;
 }
 
@@ -69,7 +69,7 @@ class RimEllipse {
   Eigen::Vector2d normal_at(const Eigen::Vector2d& point) const {
     return (point - center_).cwiseQuotient(half_.cwiseAbs2()).normalized();
   }
-  /// Of the curvature where the normal is that.
+  /// Returns the radius of curvature at the point with that normal.
   double radius_px(const Eigen::Vector2d& normal) const {
     return std::pow(half_.prod(), 2) / std::pow(half_.cwiseProduct(normal).norm(), 3);
   }
@@ -123,7 +123,7 @@ struct InnerLevel {
 };
 
 constexpr int kBefore = 8, kSamples = 8;
-/// Of the places on a line.
+/// Variance of the places on a line.
 constexpr double kVariance = (kSamples * kSamples - 1) / 12.0;
 
 template <typename Level>
@@ -135,7 +135,7 @@ Profile<Level> profile_of(const ImageView& image, const InnerLevel& inner) {
 template <typename Level>
 std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<EdgePoint>& points,
                                      const RimEllipse& rim, double dark) {
-  constexpr double flattest = 0.35, depth_px = 3, most_bent = 0.35;
+  constexpr double flattest = 0.35, depth_px = 3, max_bent = 0.35;
   constexpr double square = kSamples * (kSamples * kSamples - 1) / 12.0;
   std::vector<InnerLevel> result;
   result.reserve(points.size());
@@ -161,20 +161,19 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
     inner.slope = moment / square;
     // What hides the light further in bends the line too much.
     const double change = std::abs(inner.slope) * (inner.middle - kBefore);
-    if (change < most_bent * inner.level) result.push_back(inner);
+    if (change < max_bent * inner.level) result.push_back(inner);
   }
   return result;
 }
 
-/// Where the profile passes its edge, near `at`, by all of its pixels there; `width` is the
-/// standard deviation of the blur along it. See refined().
+/// Fits the edge of a profile near `at` to all of its pixels there; `width` is the standard
+/// deviation of the blur along it. See refined().
 template <typename Level>
 std::optional<double> blurred_edge(const Profile<Level>& profile, double at, double width,
                                    double level, double dark) {
   constexpr int rounds = 4;
-  constexpr double reach = 3, least_reach_px = 2, further_in_px = 1, far = 2;
-  const double reach_px =
-      std::max(reach * width, least_reach_px);  // four unknowns want more pixels
+  constexpr double reach = 3, min_reach_px = 2, further_in_px = 1, far = 2;
+  const double reach_px = std::max(reach * width, min_reach_px);  // four unknowns want more pixels
   const int begin = static_cast<int>(std::ceil(at - reach_px));
   const int end = static_cast<int>(std::floor(at + reach_px + further_in_px));
   if (!profile.has(begin) || !profile.has(end)) return std::nullopt;
@@ -199,20 +198,20 @@ std::optional<double> blurred_edge(const Profile<Level>& profile, double at, dou
   return edge;
 }
 
-/// How a light's levels bend: q of 1 + q (u / w)^2, u pixels along a row from the image of the
-/// disc's centre, w from there to the rim. Of a light that is darker at its rim it is negative. The
-/// median by the slopes of each side, and the mean of both, which a change from one side to the
-/// other leaves as it is. None of a light too small for slopes away from the middle,
-/// or of which something hides a side.
+/// Returns the curvature q of a light's levels 1 + q (u / w)^2, u pixels along a row from the image
+/// of the disc's centre, w from there to the rim. It is negative if the light is darker at its rim.
+/// It is the mean of the medians of the slopes of both sides, on which a linear change across the
+/// light has no effect. Returns 0 for a light that is too small for slopes away from the middle, or
+/// of which a side is hidden.
 double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
-  constexpr double least_u = 1 / 3.0;  // of w: nearer to the middle no slope shows the bend
+  constexpr double min_u = 1 / 3.0;  // of w: nearer to the middle no slope shows the bend
   constexpr double most = 0.8;
   std::array<std::vector<double>, 2> bends;
   for (const InnerLevel& inner : levels) {
     const bool begins = inner.point.begins;
     const double width_px = rim.half_width_px(begins);
     const double share = rim.outwards_px(inner.column(inner.middle), begins) / width_px;
-    if (share < least_u) continue;
+    if (share < min_u) continue;
     bends[begins ? 0 : 1].push_back(-inner.slope * width_px / (2 * share * inner.level));
   }
   const std::size_t fewer = std::min(bends[0].size(), bends[1].size());
@@ -229,7 +228,7 @@ double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
 template <typename Level>
 bool mottled(const ImageView& image, const std::vector<InnerLevel>& levels, const RimEllipse& rim,
              double bend, double dark) {
-  constexpr double by_chance = -0.25, beyond_chance = 3.5, least_share = 0.003;
+  constexpr double by_chance = -0.25, beyond_chance = 3.5, min_share = 0.003;
   constexpr int left = kSamples - 2;
   double squares = 0, products = 0, level_squares = 0;
   for (const InnerLevel& inner : levels) {
@@ -249,23 +248,23 @@ bool mottled(const ImageView& image, const std::vector<InnerLevel>& levels, cons
   const double beyond = products - by_chance * squares;
   const double count = left * double(levels.size());
   return beyond > beyond_chance / std::sqrt(count) * squares &&
-         beyond > least_share * least_share * level_squares;
+         beyond > min_share * min_share * level_squares;
 }
 
 template <typename Level>
 RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& points,
                       const DiscImage& disc, double dark) {
   // Of more blur the tail reaches the samples, and would pass for a bend.
-  constexpr double most_blur_to_bend_px = 1.3;
+  constexpr double max_blur_to_bend_px = 1.3;
   // Of the blur that rises show: they are taken from levels between pixels.
   constexpr double between_pixels = 1 / 8.0;
-  constexpr double least_width_px = 0.4;
+  constexpr double min_width_px = 0.4;
   if (points.empty()) return {};
   const RimEllipse rim(disc);
   const double blur = blur_px(points, rim), square = blur * blur;
   const double square_across = std::max(0.0, square - between_pixels);
   const auto levels = inner_levels<Level>(image, points, rim, dark);
-  const bool inside_only = blur < most_blur_to_bend_px;
+  const bool inside_only = blur < max_blur_to_bend_px;
   const double bend = inside_only ? bend_of(levels, rim) : 0;
   RefinedOutline result{{}, inside_only && mottled<Level>(image, levels, rim, bend, dark)};
   result.points.reserve(levels.size());
@@ -288,7 +287,7 @@ RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& poin
     const double behind_bend = square_across / (2 * rim.radius_px(inner.normal) * cosine);
     double edge = *at + square * slope / (level * cosine * cosine) - behind_bend;
     if (result.mottled) {
-      const double width = std::max(std::sqrt(square_across), least_width_px) / cosine;
+      const double width = std::max(std::sqrt(square_across), min_width_px) / cosine;
       const auto fitted = blurred_edge(profile, *at, width, level, dark);
       if (!fitted) continue;
       edge = *fitted - behind_bend;

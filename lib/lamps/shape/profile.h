@@ -18,7 +18,7 @@ struct Profile {
   }
   double operator()(int i) const { return row[edge + direction * i]; }
 
-  /// Where the profile first rises through a level, from `begin` on.
+  /// Returns the first place from `begin` on where the profile rises through a level.
   std::optional<double> crossing(double level, int begin, int end) const {
     for (int i = begin; i < end && has(i) && has(i + 1); ++i) {
       const double below = (*this)(i), above = (*this)(i + 1);

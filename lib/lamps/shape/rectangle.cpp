@@ -61,10 +61,10 @@ std::optional<Eigen::Vector2d> center_of(const Sides& sides) {
 
 /// Whether the angles are right, nearly.
 bool rectangular(const Sides& sides) {
-  const double most_off = std::sin(rad_from_deg(20));
+  const double max_off = std::sin(rad_from_deg(20));
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d way = sides[i].way(), next = sides[(i + 1) % 4].way();
-    if (!(std::abs(way.dot(next)) < most_off && cross_of(way, next) > 0)) return false;
+    if (!(std::abs(way.dot(next)) < max_off && cross_of(way, next) > 0)) return false;
   }
   return true;
 }
@@ -93,7 +93,7 @@ double compute_distance(const Side& from, const Side& to) {
   return std::abs(((to.from + to.to) / 2 - (from.from + from.to) / 2).dot(from.inwards()));
 }
 
-/// Of the logarithm of aspect_of().
+/// Returns the standard deviation of the logarithm of aspect_of().
 double aspect_sd_of(const std::array<StraightEdge, 4>& edges, double per_px) {
   constexpr double of_blur = 0.25;
   double variance = 0;
@@ -133,7 +133,7 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
 Corners rectangle_around(const std::vector<Eigen::Vector2d>& points) {
   const auto hull = convex_hull(points);
   Corners best{points.front(), points.front(), points.front(), points.front()};
-  double least_area = std::numeric_limits<double>::infinity();
+  double min_area = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < hull.size(); ++i) {
     const Eigen::Vector2d& from = hull[i];
     const Eigen::Vector2d way = (hull[(i + 1) % hull.size()] - from).normalized();
@@ -142,8 +142,8 @@ Corners rectangle_around(const std::vector<Eigen::Vector2d>& points) {
       const Eigen::Vector2d away = point - from;
       box.extend(Eigen::Vector2d(way.dot(away), cross_of(way, away)));
     }
-    if (!(box.volume() < least_area)) continue;
-    least_area = box.volume();
+    if (!(box.volume() < min_area)) continue;
+    min_area = box.volume();
     const Eigen::Vector2d left(-way.y(), way.x());
     const auto corner = [&](double along, double across) -> Eigen::Vector2d {
       return from + along * way + across * left;
@@ -167,7 +167,7 @@ std::size_t nearest(const Sides& sides, const Eigen::Vector2d& point) {
 /// The sides through the points next to them; a side along the lines has few, and stays.
 Sides through(const std::vector<Eigen::Vector2d>& points, Sides sides, double within) {
   constexpr std::size_t least = 6;
-  constexpr double least_spread = 0.25;
+  constexpr double min_spread = 0.25;
   const Sides before = sides;
   std::array<std::vector<Eigen::Vector2d>, 4> of_sides;
   for (const Eigen::Vector2d& point : points) {
@@ -185,15 +185,15 @@ Sides through(const std::vector<Eigen::Vector2d>& points, Sides sides, double wi
     const auto axes = symmetric_eigen(spread);
     Eigen::Vector2d way = axes.vectors.col(1);
     const double length = std::sqrt(axes.values[1] / double(of_sides[i].size()) * 12);
-    if (length < least_spread * (sides[i].to - sides[i].from).norm()) continue;
+    if (length < min_spread * (sides[i].to - sides[i].from).norm()) continue;
     if (way.dot(before[i].way()) < 0) way = -way;
     sides[i] = {mean - way * length / 2, mean + way * length / 2};
   }
   return sides;
 }
 
-/// The rectangle's corners before its edges are looked at, and the share of the points next to its
-/// sides; nothing when the outline has another shape.
+/// Corners of a rectangle by its outline, before its edges are fitted, and the fraction of the
+/// points next to its sides.
 struct FirstCorners {
   Corners corners;
   double near;
@@ -224,16 +224,16 @@ std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& po
 /// The same of a slender one that a lens bends which nobody knows: its corners are those of the
 /// best of many that are bent back, which leaves its ends where they are.
 std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& points) {
-  constexpr double most_px = 6, step_px = 0.5, least_aspect = 3;
+  constexpr double max_px = 6, step_px = 0.5, min_aspect = 3;
   const Sides around = sides_of(rectangle_around(points));
-  if (aspect_of(around) < least_aspect) return std::nullopt;
+  if (aspect_of(around) < min_aspect) return std::nullopt;
   const bool first =
       (around[0].to - around[0].from).norm() > (around[1].to - around[1].from).norm();
   const Side& side = around[first ? 0 : 1];
   const double length = (side.to - side.from).norm();
   std::optional<FirstCorners> best;
   std::vector<Eigen::Vector2d> straight = points;
-  for (double bow_px = -most_px; bow_px <= most_px; bow_px += step_px) {
+  for (double bow_px = -max_px; bow_px <= max_px; bow_px += step_px) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double along = 2 * (points[i] - side.from).dot(side.way()) / length - 1;
       straight[i] = points[i] - bow_px * (1 - along * along) * side.inwards();
@@ -599,7 +599,7 @@ class HiddenEdges {
 }  // namespace
 
 std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const ImageSize& size) {
-  constexpr int least_px = 4;
+  constexpr int min_px = 4;
   double top = size.height, bottom = -1;
   for (const Eigen::Vector2d& point : polygon) {
     top = std::min(top, point.y());
@@ -619,7 +619,7 @@ std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, cons
     }
     const int begin = std::max(0, static_cast<int>(std::ceil(left)));
     const int end = std::min(size.width, static_cast<int>(std::floor(right)) + 1);
-    if (end - begin >= least_px) chords.push_back({row, begin, end});
+    if (end - begin >= min_px) chords.push_back({row, begin, end});
   }
   return chords;
 }
@@ -639,10 +639,10 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
                                   const std::vector<EdgePoint>& outline,
                                   const Background& background, const LightShape& shape,
                                   const std::vector<Eigen::Vector2d>& sizes_m) {
-  constexpr double least_px = 10, most_slender = 40;
-  constexpr std::size_t least_lines = 8;
+  constexpr double min_px = 10, max_slender = 40;
+  constexpr std::size_t min_lines = 8;
   const PixelBox box = blob.box();
-  if (outline.size() < kLeastOutlinePoints || std::min(box.width, box.height) < least_px) return {};
+  if (outline.size() < kMinOutlinePoints || std::min(box.width, box.height) < min_px) return {};
   std::vector<Eigen::Vector2d> points;
   points.reserve(outline.size());
   Eigen::AlignedBox2d in_plane, in_image;
@@ -679,10 +679,10 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
     const Sides sides = sides_of(*corners);
     const double min_side =
         std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
-    if (!(min_side > least_px * per_px) || aspect_of(sides) > most_slender) return std::nullopt;
+    if (!(min_side > min_px * per_px) || aspect_of(sides) > max_slender) return std::nullopt;
     const double inset = std::min((inset_px + bow_px) * per_px, min_side / 3);
     const auto chords = chords_within(shape.turned(face_of(sides, inset, shape)), lines.size());
-    if (chords.size() < least_lines) return std::nullopt;
+    if (chords.size() < min_lines) return std::nullopt;
     // Lines that follow one another, or levels would be taken for those of others.
     const int rows = chords.back().row - chords.front().row + 1;
     if (rows != static_cast<int>(chords.size())) return std::nullopt;

@@ -50,7 +50,7 @@ struct StepSample {
   bool clipped() const { return level >= kClipped; }
 };
 
-/// Where a line crosses the outline, and how much deeper each column is there.
+/// Crossing of a line and the outline, and the change of depth per column there.
 struct Crossing {
   int line;
   double column, per_column;
@@ -68,7 +68,7 @@ using StepVector = Eigen::Matrix<double, kStepUnknowns, 1>;
 struct StepModel {
   StepVector x;
   double gamma;
-  /// What is seen where there is no light.
+  /// Level without light.
   double floor;
 
   CurveDistance<kStepUnknowns> residual(const StepSample& sample) const {
@@ -126,7 +126,7 @@ class CrossedOutline {
         low_(shape.turned(light.low)),
         high_(shape.turned(light.high)) {}
 
-  /// Of a pixel behind the outline.
+  /// Returns the depth of a pixel behind the outline.
   double depth_px(double column, double line) const {
     constexpr double half = 0.5;
     const double radii = radii_at(column, line);
@@ -260,23 +260,23 @@ std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& 
 RimSteps fit_rim_steps(const ImageView& image, const Light& light,
                        const std::vector<int>& lit_lines, const Background& background,
                        const StepPicture& picture, bool blur_known, const LightShape& shape) {
-  constexpr double piece_of_radius = 0.2, least_lines = 6, most_sd_px = 0.5;
-  constexpr double least_reach_px = 7, reach_of_blur = 4;
+  constexpr double piece_of_radius = 0.2, min_lines = 6, max_sd_px = 0.5;
+  constexpr double min_reach_px = 7, reach_of_blur = 4;
   constexpr double of_blur = 0.05;  // what sharpening and compression do
-  constexpr std::size_t least_crossings = 3;
-  const double reach_px = std::max(least_reach_px, reach_of_blur * picture.blur_px);
+  constexpr std::size_t min_crossings = 3;
+  const double reach_px = std::max(min_reach_px, reach_of_blur * picture.blur_px);
   const CrossedOutline outline(light, shape);
   const Levels levels(image, shape.turned(light.low), shape.turned(light.high));
-  const int most = static_cast<int>(std::max(least_lines, piece_of_radius * light.radius_px));
+  const int most = static_cast<int>(std::max(min_lines, piece_of_radius * light.radius_px));
   RimSteps result{{}, 0, {}, picture.blur_px};
   double log_blur = 0, weight = 0;
   for (const std::vector<int>& lines : pieces_of(lit_lines, most)) {
     for (const bool begins : {true, false}) {
       const Piece piece = piece_of(levels, lines, begins, outline, reach_px);
-      if (piece.crossings.size() < least_crossings) continue;
+      if (piece.crossings.size() < min_crossings) continue;
       ++result.looked_at;
       const auto step = step_of(piece, levels.of(background.level), picture, blur_known);
-      if (!step || !(step->sd_px < most_sd_px)) continue;
+      if (!step || !(step->sd_px < max_sd_px)) continue;
       log_blur += step->log_blur / std::pow(step->log_blur_sd, 2);
       weight += 1 / std::pow(step->log_blur_sd, 2);
       const double sd_px = std::hypot(step->sd_px, of_blur * picture.blur_px);

@@ -13,14 +13,14 @@
 
 namespace vlp {
 
-/// How an image shows a step of light: with the standard deviation of its blur, and as
+/// Model of a step of light in an image: standard deviation of its blur, and level =
 /// light^(1 / gamma).
 struct StepPicture {
   double blur_px, gamma;
 };
 
-/// A piece of a rim that neighbouring lit lines cross: so far behind the outline, (column, row)
-/// inwards.
+/// A piece of a rim that neighbouring lit lines cross, its distance behind the outline, and the
+/// direction inwards, (column, line).
 struct RimPiece {
   Eigen::Vector2d inwards;
   double behind_px, sd_px;
@@ -28,41 +28,41 @@ struct RimPiece {
 
 struct RimSteps {
   std::vector<RimPiece> pieces;
-  /// How many there may be, with and without a step that is clear.
+  /// Number of pieces with and without a clear step.
   std::size_t looked_at;
-  /// Where lines cross them; the level counts as their weight.
+  /// Points where lines cross them; the level is their weight.
   std::vector<EdgePoint> points;
-  /// The blur that most of them show.
+  /// Median blur.
   double blur_px;
 };
 
-/// The steps next to a light's outline. Of a piece, with the depth d of its pixels behind the
+/// Fits the steps next to a light's outline. With the depth d of the pixels of a piece behind the
 /// outline and t along it, u = d - x, the light is
 ///
 ///     exp(c t) (exp(o + p u + p^2 s^2 / 2) F(-u / s - p s) + exp(i + q u + q^2 s^2 / 2)
 ///               F(u / s + q s)) + floor^gamma:
 ///
-/// exp(o + p u) outside and exp(i + q u) inside, levels that rise on both sides, as a halo and a
-/// source deep in a reflector make them, with a step at x between, up or down, blurred by s, above
-/// what is dark; F the normal distribution. The levels are those of StepPicture, because half of a
-/// coded level is not half of the light: the larger the step, the further out it seems
-/// (lib/THEORY.md). A clipped pixel tells only that its light is no less. The blur is fitted, too,
-/// unless `blur_known`.
+/// exp(o + p u) outside and exp(i + q u) inside are levels that rise on both sides, as with a halo
+/// and a source deep in a reflector. Between them is a step at x, up or down, blurred by s, above
+/// the dark floor; F is the normal distribution. The levels are those of StepPicture, because half
+/// of a coded level is not half of the light: the larger the step, the further out it seems
+/// (lib/THEORY.md). A clipped pixel is a lower bound of its light. The blur is fitted, too, unless
+/// `blur_known`.
 RimSteps fit_rim_steps(const ImageView& image, const Light& light,
                        const std::vector<int>& lit_lines, const Background& background,
                        const StepPicture& picture, bool blur_known, const LightShape& shape);
 
-/// How far an outline is off, (column, row), by pieces of it, and its covariance.
+/// Offset of an outline, (column, line), estimated from pieces of it, and its covariance.
 struct OutlineShift {
   Eigen::Vector2d px;
   Matrix2 covariance;
-  /// How many pieces agree.
+  /// Number of pieces that agree.
   double agreeing;
 };
 
-/// By least squares (Tukey's biweight) with the outline's size and, unless it is `round` behind the
-/// lens, how oval it is, unknown as well. What pieces scatter beyond what they state, all state too
-/// little. Nothing when they are too few.
+/// Estimates the offset of an outline by least squares (Tukey's biweight). Its size is unknown,
+/// too, and its oval unless it is `round` behind the lens. If pieces scatter by more than their
+/// standard deviations, these are scaled. Returns std::nullopt if there are too few pieces.
 std::optional<OutlineShift> shift_of(const std::vector<RimPiece>& pieces, bool round);
 
 }  // namespace vlp

@@ -37,7 +37,7 @@ struct Conic {
 
 std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d> points,
                                                 std::span<const double> weights, double tolerance) {
-  constexpr double most_oval = 1.0 / 8, most_axis_ratio = 3;
+  constexpr double max_oval = 1.0 / 8, max_axis_ratio = 3;
   constexpr int rounds = 10;
   if (points.empty()) return std::nullopt;
   Eigen::Vector2d low = points[0], high = points[0];
@@ -45,7 +45,7 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
     low = low.cwiseMin(point);
     high = high.cwiseMax(point);
   }
-  const double oval = std::max(tolerance, most_oval * (high - low).norm() / 2);
+  const double oval = std::max(tolerance, max_oval * (high - low).norm() / 2);
   const auto circle = fit_robust_circle(points, weights, oval);
   if (!circle) return std::nullopt;
   // In units of the circle, so that centre and conic weigh alike.
@@ -70,7 +70,7 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
   }
   const auto axes = symmetric_eigen(Eigen::Matrix2d(ellipse.conic));
   const double least = axes.values[0], most = axes.values[1];
-  if (!(least * most_axis_ratio * most_axis_ratio > most)) return std::nullopt;
+  if (!(least * max_axis_ratio * max_axis_ratio > most)) return std::nullopt;
   fit.center = circle->circle.center + unit * ellipse.center;
   const Eigen::Vector2d semi_axes = axes.values.cwiseInverse().cwiseSqrt();
   fit.rim_from_circle =

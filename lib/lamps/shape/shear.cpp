@@ -10,10 +10,10 @@
 namespace vlp {
 namespace {
 
-/// Of an oval that the motion explains, what it may differ by: of its size.
+/// Relative deviation of an oval from that by the motion.
 constexpr double kUnlike = 0.15;
 
-/// The oval by the motion (v, w) / 2.
+/// Returns the derivative of the oval by the motion (v, w) / 2.
 Eigen::Matrix<double, 2, 3> oval_from_motion(const OutlineSums& light) {
   const Eigen::Vector2d &slope = light.line_slope(), &at = light.circle().center;
   const Eigen::Matrix2d times_slope{{slope.x(), -slope.y()}, {slope.y(), slope.x()}};
@@ -44,9 +44,9 @@ struct Motion {
 
 Motion motion_of(const std::vector<Shown>& lights) {
   // A camera that turns by more than a radian or two in 10,000 lines is none that sees lamps.
-  constexpr double most_turn = 1e-4;
+  constexpr double max_turn = 1e-4;
   Motion motion{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
-  motion.information(2, 2) = 1 / (most_turn * most_turn);
+  motion.information(2, 2) = 1 / (max_turn * max_turn);
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (const Shown& light : lights) {
     const Eigen::Matrix<double, 3, 2> weighed = light.from_motion.transpose() * light.information;
@@ -103,7 +103,7 @@ std::optional<OutlineSums::Estimate> OutlineSums::solved(const std::optional<Ova
 }
 
 std::optional<Shear> Shear::common(std::span<const OutlineSums> lights) {
-  constexpr double most_sd = 0.01;     // of the radius, of a light that is to tell
+  constexpr double max_sd = 0.01;      // of the radius, of a light that is to tell
   constexpr double beyond_doubt = 30;  // a chi-square of 2
   constexpr double contradicts = 14;   // a chi-square of 2
   std::vector<Shown> shown;
@@ -111,7 +111,7 @@ std::optional<Shear> Shear::common(std::span<const OutlineSums> lights) {
     const auto estimate = light.solved(std::nullopt);
     if (!estimate) continue;
     const Matrix2 covariance = estimate->covariance.bottomRightCorner<2, 2>();
-    if (covariance.trace() > 2 * most_sd * most_sd) continue;
+    if (covariance.trace() > 2 * max_sd * max_sd) continue;
     const Eigen::Vector2d oval = estimate->p.tail<2>();
     shown.push_back({oval_from_motion(light), oval, (covariance + unlike(oval)).inverse()});
   }

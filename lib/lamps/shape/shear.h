@@ -12,15 +12,15 @@
 
 namespace vlp {
 
-/// How oval an outline is: a point in direction a of the centre lies
-/// 1 + oval_0 cos 2a + oval_1 sin 2a radii away.
+/// Ovality of an outline: a point in direction a has the distance
+/// 1 + oval_0 cos 2a + oval_1 sin 2a from the centre, in radii.
 struct Oval {
   Eigen::Vector2d oval;
   Matrix2 covariance;
 };
 
-/// What the circle that is fitted to an outline leaves of it, in the level plane and in units of
-/// its radius: sums for the least squares of p = (centre x, y, radius, oval), where a point in
+/// Normal equations for the residuals of an outline with respect to its fitted circle, in the level
+/// plane and in units of the radius. The unknowns are p = (centre x, y, radius, oval): a point in
 /// direction a lies p_0 cos a + p_1 sin a + p_2 + p_3 cos 2a + p_4 sin 2a further out.
 class OutlineSums {
  public:
@@ -31,18 +31,19 @@ class OutlineSums {
     Matrix5 covariance;
   };
 
-  /// Of no points.
+  /// Creates the sums of no points.
   OutlineSums() = default;
-  /// points, weights: of the whole outline; counted: those that the sums are of. line_slope: of the
-  /// number of the line in which the shutter reads a point near the circle, over the point's x, y.
-  /// together: how many points err together.
+  /// @param points, weights  of the whole outline
+  /// @param counted     points to sum
+  /// @param line_slope  derivative of the line in which a point near the circle is read by its x, y
+  /// @param together    number of neighbouring points with a common error
   OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
               const std::vector<bool>& counted, const Circle& circle,
               const Eigen::Vector2d& line_slope, double together = 1);
 
-  /// With the oval known beforehand, or not at all. The variance is that of what is left,
-  /// times the points that err together. Nothing
-  /// when the points do not tell.
+  /// Solves for p, with the oval as a prior if it is known. The variance is that of the residuals
+  /// times the number of points with a common error. Returns std::nullopt if the points do not
+  /// determine p.
   std::optional<Estimate> solved(const std::optional<Oval>& known) const;
 
   bool empty() const { return count_ == 0; }
@@ -58,20 +59,20 @@ class OutlineSums {
   int count_ = 0;
 };
 
-/// What a shutter that reads line by line makes of circles while the camera moves. In the level
-/// plane lights move by v + w (-y, x) per line, so that a point d off the centre, read s . d lines
-/// later (line_slope), is displaced by that times s . d: in complex numbers the oval is
-/// s (v + i w (x + i y)) / 2. The centre of a whole outline stays, that of a part does not. Lamps
-/// at other heights have another v, which counts as an error of 15 %.
+/// Shear of circles by a rolling shutter in a moving camera. In the level plane lights move by
+/// v + w (-y, x) per line. A point at d from the centre is read s . d lines later (line_slope) and
+/// displaced by that times s . d. In complex numbers the oval is s (v + i w (x + i y)) / 2. The
+/// centre of a whole outline is not displaced, that of a part is. Lamps at other heights have
+/// another v, which counts as an error of 15 %.
 class Shear {
  public:
-  /// From lights of which enough is seen, as far as they agree. Nothing when they are too few, or
-  /// show none beyond doubt.
+  /// Estimates the motion from lights that show enough of their outline, as far as they agree.
+  /// Returns std::nullopt if they are too few, or if the motion is not significant.
   static std::optional<Shear> common(std::span<const OutlineSums> lights);
 
-  /// Of a light there.
+  /// Returns the oval of a light.
   Oval oval_of(const OutlineSums& light) const;
-  /// By how much of the level plane a light there moves per line.
+  /// Returns the motion of a light in the level plane per line.
   Eigen::Vector2d motion_at(const OutlineSums& light) const;
 
  private:

@@ -132,7 +132,7 @@ class Samples {
     return true;
   }
 
-  /// Where the side crosses that column (along 0) or row (1).
+  /// Returns the point where the side crosses a column (along 0) or row (1).
   Eigen::Vector2d crossing(int station, int along) const {
     for (std::size_t i = 0; i + 1 < trace_.size(); ++i) {
       const double a = trace_[i][along] - station, b = trace_[i + 1][along] - station;
@@ -236,8 +236,9 @@ CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const 
   return result;
 }
 
-/// Of the two ends: by the scatter of the pixels, each its own, because bright ones are noisier
-/// than dark ones (White 1980), and by the levels of lines, each wrong for all of its pixels.
+/// Computes the covariance of the two ends: from the squared residual of each pixel, because bright
+/// ones are noisier than dark ones (White 1980), from the levels of lines, whose errors are common
+/// to their pixels, and from the priors.
 template <int N>
 std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vector<Sample>& samples,
                                           const std::vector<double>& weights,
@@ -293,7 +294,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
                                 const Priors& priors) {
   constexpr std::array tolerances = {5.0, 5.0, 5.0, 5.0, 2.0, 1.0, 0.5, 0.3, 0.3, 0.3};
   constexpr double first_blur_px = 1.5, sharpest_px = 0.3, softest_px = 6;
-  constexpr double most_move_px = 1.5, farthest_px = 8, least_step = 0.4, most_sd_px = 0.5;
+  constexpr double max_move_px = 1.5, farthest_px = 8, min_step = 0.4, max_sd_px = 0.5;
   constexpr double near = 3, min_lit = 0.3, explained = 0.15, min_fraction = 0.8;
   const std::vector<Sample>& samples = all.samples;
   std::vector<double> weights(samples.size() + kNumPriors<N>, 1);
@@ -312,15 +313,15 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
     if (!last) return std::nullopt;
     auto step = last->step;
     for (const int end : {kFrom, kTo}) {
-      step[end] = std::clamp(step[end], -most_move_px, most_move_px);
+      step[end] = std::clamp(step[end], -max_move_px, max_move_px);
     }
     model.x -= step;
     model.x[kBlur] = std::clamp(model.x[kBlur], sharpest_px, softest_px);
     if (model.x.template head<2>().cwiseAbs().maxCoeff() > farthest_px) return std::nullopt;
   }
   const auto& x = model.x;
-  const double least_level = std::min(x[kLevelFrom], x[kLevelTo]);
-  if (!(least_level - x[kOutside] > least_step)) return std::nullopt;
+  const double min_level = std::min(x[kLevelFrom], x[kLevelTo]);
+  if (!(min_level - x[kOutside] > min_step)) return std::nullopt;
   const auto covariance = covariance_of_ends(model, samples, weights, last->inliers, priors);
   if (!covariance) return std::nullopt;
 
@@ -331,7 +332,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   edge.blur_px = x[kBlur];
   edge.bow_px = 0;
   if constexpr (N > kBow) edge.bow_px = x[kBow];
-  if (!(edge.covariance_px.diagonal().maxCoeff() < most_sd_px * most_sd_px)) return std::nullopt;
+  if (!(edge.covariance_px.diagonal().maxCoeff() < max_sd_px * max_sd_px)) return std::nullopt;
   int close = 0, like = 0;
   for (const Sample& sample : samples) {
     if (sample.lit.level < min_lit || std::abs(sample.depth_px) > near) continue;

@@ -29,11 +29,11 @@ struct Side {
 struct StraightEdge {
   /// With its ends where the edge was found.
   Side side;
-  /// Of the two ends' distances from the edge, in pixels (LightShape plane's per_px).
+  /// Covariance of the distances of both ends from the edge, in pixels (per_px of the plane).
   Matrix2 covariance_px;
   /// Sigma of the blur across it.
   double blur_px;
-  /// How far its middle stands out of the line through its ends; 0 with a lens.
+  /// Distance of its middle from the line through its ends; 0 with a lens.
   double bow_px;
   /// The share of the pixels next to it that it explains.
   double share;

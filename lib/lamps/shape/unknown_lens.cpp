@@ -10,13 +10,13 @@
 namespace vlp {
 
 double unknown_lens_sd_px(const Light& light, const ImageSize& image) {
-  constexpr double most_lean_rad = rad_from_deg(10);
+  constexpr double max_lean_rad = rad_from_deg(10);
   if (is_rectangle(light)) return 0;
   const double focal_px = std::hypot(image.width, image.height) / 2;
   const Eigen::Vector2d middle((image.width - 1) / 2.0, (image.height - 1) / 2.0);
   const double off_axis = (light.pixel - middle).norm() / focal_px;
   const double bound_px =
-      light.radius_px * light.radius_px / focal_px * std::hypot(off_axis, std::tan(most_lean_rad));
+      light.radius_px * light.radius_px / focal_px * std::hypot(off_axis, std::tan(max_lean_rad));
   return bound_px / std::numbers::sqrt2;
 }
 

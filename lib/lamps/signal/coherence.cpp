@@ -43,12 +43,12 @@ std::vector<PieceLevels> piece_levels(const ImageView& lines, const std::vector<
 double coherence_of(const ImageView& lines, const std::vector<Run>& chords,
                     const Background& background, double period_lines) {
   constexpr double share = 0.05;
-  constexpr std::size_t least_values = 3;
+  constexpr std::size_t min_values = 3;
   const auto levels = visit_levels(lines, [&](auto level) {
     return piece_levels<decltype(level)>(lines, chords, background.level);
   });
   const auto quarter = static_cast<std::size_t>(std::max(1L, std::lround(period_lines / 4)));
-  if (levels.size() + 1 < least_values + 2 * quarter) return 0;
+  if (levels.size() + 1 < min_values + 2 * quarter) return 0;
   double brightest = 0;
   std::vector<PieceLevels> sums{PieceLevels::Zero()};  // of all lines before
   sums.reserve(levels.size() + 1);

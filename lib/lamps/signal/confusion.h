@@ -11,29 +11,30 @@
 
 namespace vlp {
 
-/// What a classifier answers about lights whose lamps are known.
+/// Confusion matrix of a classifier for lights whose lamps are known.
 struct Confusion {
-  /// By id.
+  /// Ids, sorted.
   std::vector<int> lamps;
   /// Lights by their lamp (row) and by the answer (column); the last column is "unknown".
   Eigen::MatrixXi counts;
 
   int right() const;
-  /// Taken for another lamp.
+  /// Number of lights that are identified as another lamp.
   int wrong() const;
   int unknown() const;
 };
 
-/// Of lights that the classifier was not trained on; their lamps may be others than its own.
+/// Computes the confusion matrix for lights that the classifier was not trained on. Their lamps may
+/// be others than its own.
 Confusion confusion_of(const LampClassifier& classifier, std::span<const LabelledLight> lights);
 
-/// Parts that the lights are held out in.
+/// Number of parts for cross-validation.
 inline constexpr int kFolds = 5;
 
 using TrainClassifier = std::function<LampClassifier(std::span<const LabelledLight>)>;
 
-/// Each fifth of the images (every fifth one, so that the answer is always the same) judged by a
-/// classifier that `train` made of the others. `lights` as for train_classifier().
+/// Cross-validates: each fifth of the images (every fifth one, so that the result is deterministic)
+/// is judged by a classifier that `train` makes of the others. `lights` as for train_classifier().
 Confusion cross_validated(std::span<const LabelledLight> lights, const TrainClassifier& train);
 
 }  // namespace vlp

@@ -94,7 +94,7 @@ LampClassifier train_classifier(std::span<const LabelledLight> lights) {
 }
 
 std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stripes) {
-  constexpr double least_probability = 0.99, farthest = 6, farthest_unclear = 3;
+  constexpr double min_probability = 0.99, farthest = 6, farthest_unclear = 3;
   const LampFeatures z = standardized(classifier, features_of(stripes));
   const Eigen::LLT<Eigen::Matrix4d> factor(classifier.covariance);
   if (!readable(stripes)) return std::nullopt;
@@ -110,7 +110,7 @@ std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stri
   // Scores differ by half the difference of the squared distances.
   double sum = 0;
   for (const double distance : distances) sum += std::exp((nearest - distance) / 2);
-  if (lamp == nullptr || 1 / sum < least_probability) return std::nullopt;
+  if (lamp == nullptr || 1 / sum < min_probability) return std::nullopt;
   return lamp->lamp;
 }
 

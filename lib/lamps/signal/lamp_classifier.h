@@ -12,15 +12,15 @@
 
 namespace vlp {
 
-/// The light of a lamp that somebody named.
+/// A light with the id of its lamp.
 struct LabelledLight {
   int lamp;
   Stripes stripes;
-  /// Number of the image that it is from.
+  /// Number of its image.
   std::size_t image;
 };
 
-/// Tells lamps apart by a linear classifier over the features (Chen and Guan, section 2.1): linear
+/// Identifies lamps by a linear classifier over the features (Chen and Guan, section 2.1): linear
 /// discriminant analysis. With z = (features - mean) / scale and one covariance C within
 /// all lamps, the score of lamp k is linear in z,
 ///
@@ -28,44 +28,43 @@ struct LabelledLight {
 ///
 /// for lamps that are seen equally often.
 struct LampClassifier {
-  /// Of all lights that it was trained on, to standardize features.
+  /// Mean and standard deviation of the features of all training lights, to standardize features.
   LampFeatures mean, scale;
-  /// C, of standardized features.
+  /// C, for standardized features.
   Eigen::Matrix4d covariance;
   struct Class {
     int lamp;
-    /// Lights that it was trained on.
+    /// Number of training lights.
     int examples;
     /// c_k, their mean, standardized.
     LampFeatures center;
   };
-  /// By id.
+  /// Sorted by id.
   std::vector<Class> lamps;
-  /// Of the camera that took the lights, when it was known: periods in lines depend on it.
+  /// Row time of the camera that took the training images, if known: periods in lines depend on it.
   std::optional<double> row_time_s;
 };
 
-/// Examples of a lamp below which nothing can be said of it.
-inline constexpr int kLeastExamples = 6;
+/// Minimum number of training lights of a lamp.
+inline constexpr int kMinExamples = 6;
 
-/// Trained on lights of two lamps or more, with kLeastExamples or more of each. Lights that
-/// are far from their lamp's others, being partly hidden for instance, are left out. C is shrunk
-/// towards its diagonal by the weight of ten lights, and lamps may drift by kLampDrift.
+/// Trains a classifier on lights of two lamps or more, with kMinExamples or more of each. Lights
+/// that are far from the others of their lamp, such as partly hidden ones, are left out. C is
+/// shrunk towards its diagonal by the weight of ten lights, and lamps may drift by kLampDrift.
 LampClassifier train_classifier(std::span<const LabelledLight> lights);
 
-/// The lamp with these stripes; nothing when another may be it (probability below 99 %), or when
-/// they are like no lamp's: (z - c_k)^T C^-1 (z - c_k) above 36, a share of 3e-7 of normal
-/// lights, above 9 where the stripes are not trustworthy(), or when they are not readable(). The
-/// stripes have a period.
+/// Returns the lamp with these stripes; std::nullopt if another may be it (probability below 99 %),
+/// if (z - c_k)^T C^-1 (z - c_k) exceeds 36 (3e-7 of normal lights) or, where the stripes are not
+/// trustworthy(), 9, or if they are not readable(). @pre The stripes have a period.
 std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stripes);
 
-/// Two lamps, and how far apart they are: root of (c_j - c_k)^T C^-1 (c_j - c_k).
+/// Two lamps and their distance: root of (c_j - c_k)^T C^-1 (c_j - c_k).
 struct LampDistance {
   int first, second;
   double distance;
 };
 
-/// Pairs too near for lamp_of() to tell apart: at distance 6 one light in forty is unknown.
+/// Returns the pairs that lamp_of() cannot separate: at distance 6 one light in forty is unknown.
 std::vector<LampDistance> inseparable(const LampClassifier& classifier);
 
 /// Reads `vlp-classifier/1`; keys are the names of the fields above, and `features`, which have to

@@ -36,7 +36,7 @@ std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditi
 
 double period_sd(double period_lines, double lines, double exposure_lines) {
   const double periods = kUsedHeight * lines / period_lines;
-  if (periods < kLeastPeriods) return std::numeric_limits<double>::infinity();
+  if (periods < kMinPeriods) return std::numeric_limits<double>::infinity();
   constexpr double noise = 0.02, blunt_lines = 1.2;
   const double sharp = std::max(0.0, 1 - exposure_lines / blunt_lines) / std::sqrt(12.0);
   const double edge = std::hypot(sharp, noise * exposure_lines);
@@ -72,8 +72,7 @@ std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
     const double periods = lines ? kUsedHeight * *lines * *lamp.frequency_hz * conditions.row_time_s
                                  : std::numeric_limits<double>::infinity();
     const double period_lines = 1 / (*lamp.frequency_hz * conditions.row_time_s);
-    if (period_lines < kShortestPeriod_lines || periods < kLeastPeriods ||
-        contrast < kLeastContrast) {
+    if (period_lines < kShortestPeriod_lines || periods < kMinPeriods || contrast < kMinContrast) {
       unreadable.push_back({lamp.id, period_lines, periods, contrast});
     }
   }

@@ -10,14 +10,14 @@
 
 namespace vlp {
 
-/// What decides how well a stripe period can be measured.
+/// Conditions that determine how accurately a stripe period can be measured.
 struct StripeConditions {
   double row_time_s;
-  /// Of the lens, in pixels along the direction in which the lines follow one another.
+  /// Focal length in pixels, along the direction across the lines.
   std::optional<double> focal_px;
-  /// Of the image plane of the camera above the world's origin.
+  /// Height of the camera above the world's origin.
   double camera_height_m;
-  /// When it is not known, it is taken to be short: the worst case for a period.
+  /// Exposure; if unknown, it is assumed to be short, the worst case for a period.
   std::optional<double> exposure_s;
 };
 
@@ -39,7 +39,7 @@ std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditi
 ///     e^2 = max(0, 1 - x / 1.2)^2 / 12 + (0.02 x)^2,
 ///
 /// which bounds what is measured on square waves (where whole numbers of lines make a period, it is
-/// better). Infinity below kLeastPeriods.
+/// better). Infinity below kMinPeriods.
 double period_sd(double period_lines, double lines, double exposure_lines);
 
 /// Two lamps that cannot be told apart with certainty.
@@ -66,8 +66,8 @@ struct LampUnreadable {
   double contrast;
 };
 
-/// Lamps with a period below kShortestPeriod_lines, less than kLeastPeriods, or a contrast below
-/// kLeastContrast.
+/// Lamps with a period below kShortestPeriod_lines, less than kMinPeriods, or a contrast below
+/// kMinContrast.
 std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
                                              const StripeConditions& conditions);
 

@@ -31,7 +31,7 @@ std::optional<int> lamp_by_frequency(const LampMap& lamps, double row_time_s,
                                      const Stripes& stripes) {
   // Lamps keep their frequency to a few per cent. Few stripes, and unclear ones, where something
   // hides a part, have to fit better.
-  const double most_off = trustworthy(stripes) ? 0.06 : kMostOffUnclear;
+  const double max_off = trustworthy(stripes) ? 0.06 : kMaxUnclearDrift;
   if (!readable(stripes) || !(stripes.period_lines > 0)) return std::nullopt;
   const double frequency_hz = 1 / (stripes.period_lines * row_time_s);
   std::vector<Candidate> candidates;
@@ -45,7 +45,7 @@ std::optional<int> lamp_by_frequency(const LampMap& lamps, double row_time_s,
     const bool best = std::all_of(
         candidates.begin(), candidates.end(),
         [&](const Candidate& other) { return &other == &candidate || beats(candidate, other); });
-    if (best && candidate.off < most_off) return candidate.lamp->id;
+    if (best && candidate.off < max_off) return candidate.lamp->id;
   }
   return std::nullopt;
 }

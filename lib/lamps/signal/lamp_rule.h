@@ -9,22 +9,22 @@
 
 namespace vlp {
 
-/// How far a lamp may be from the frequency that the map states, as a share of it, before
-/// it may be taken for another.
+/// Maximum relative deviation of a lamp's frequency from that of the map, before it may be taken
+/// for another lamp.
 inline constexpr double kLampDrift = 0.015;
 
-/// How far a light may be from a lamp's frequency, as a share of it, when its stripes are few or
-/// unclear; those that are not may be farther.
-inline constexpr double kMostOffUnclear = 0.025;
+/// Maximum relative deviation of a light with few or unclear stripes from a lamp's frequency;
+/// lights with clear stripes may deviate more.
+inline constexpr double kMaxUnclearDrift = 0.025;
 
-/// How much nearer in duty a light has to be to one lamp than to another: saturation and blur
-/// change the duty that is seen by up to about half of it.
+/// Minimum difference between the duty errors of two lamps that decides between them: saturation
+/// and blur change the measured duty by up to about half of it.
 inline constexpr double kDutyMargin = 0.15;
 
-/// The lamp of the map whose stripes these are, without any training: a lamp of frequency f has
-/// a period of 1 / (f row_time) lines. Its frequency has to be nearer than any other lamp's, by
-/// kLampDrift and by as much again as it is off itself; of lamps with nearly one frequency
-/// the duties of the map decide. Nothing when the stripes are like no lamp's, or like two lamps'.
+/// Identifies the lamp of the map with these stripes: a lamp of frequency f has a period of
+/// 1 / (f row_time) lines. The deviation of every other lamp's frequency has to be larger by
+/// kLampDrift and twice as large. Lamps with nearly one frequency are separated by the duties of
+/// the map. Returns std::nullopt if the stripes agree with no lamp, or with two.
 std::optional<int> lamp_by_frequency(const LampMap& lamps, double row_time_s,
                                      const Stripes& stripes);
 

@@ -193,7 +193,7 @@ RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, Modul
       compute_phase_coherence(cells, map, candidate.region, candidate.fit.period_lines);
   // Few periods mean something only where they are a lamp's.
   const bool has_lamp_period = !lamp_periods_lines.empty() && !candidate.is_other_period;
-  const double min_periods = has_lamp_period ? kLeastPeriods : kEnoughPeriods;
+  const double min_periods = has_lamp_period ? kMinPeriods : kEnoughPeriods;
   candidate.is_modulated =
       candidate.fit.unexplained < kMaxUnexplained && candidate.fit.depth > kMinLightDepth &&
       candidate.phase_coherence > kMinPhaseCoherence && count_periods(candidate) > min_periods;
@@ -339,7 +339,7 @@ std::vector<double> periods_to_search(std::span<const double> lamp_periods_lines
     if (period >= kShortestPeriod_lines) periods.push_back(period);
   }
   if (!lamp_periods_lines.empty()) return periods;
-  for (double period = min_bank_lines; period < lines / kLeastPeriods; period *= bank_ratio) {
+  for (double period = min_bank_lines; period < lines / kMinPeriods; period *= bank_ratio) {
     periods.push_back(period);
   }
   return periods;

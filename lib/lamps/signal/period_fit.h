@@ -13,7 +13,7 @@ struct LineProfile {
   std::vector<double> levels;  ///< above the dark level, of any scale
 };
 
-/// How well a periodic signal explains a profile.
+/// Fit of a periodic signal to a profile.
 struct PeriodFit {
   double period_lines;
   /// Fraction of the variance of the normalized profile that the signal leaves, 0 to 1.
@@ -29,8 +29,8 @@ struct PeriodFit {
 /// Fits a signal of one period behind a smooth envelope to a profile.
 ///
 /// The envelope E is the moving mean of the profile over exactly one period, twice; at the ends of
-/// the profile over the lines that there are. It follows
-/// everything that is slower than the period and nothing of the period and its harmonics, so that
+/// the profile over the available lines. It contains everything slower than the period and nothing
+/// of the period and its harmonics, so that
 ///
 ///     y(l) / E(l) - 1 = sum_h c_h cos(2 pi h l / P) + s_h sin(2 pi h l / P),   h = 1, 2, 3,
 ///

@@ -16,7 +16,7 @@ struct RowTime {
   double row_time_s;
   /// Standard deviation, from the scatter of the lamps about their frequencies, of the lights
   /// about their lamps, and half a thousandth, by which all measured periods may be off together.
-  /// Of one lamp alone the error of its frequency comes on top.
+  /// With one lamp only, the error of its frequency comes on top.
   double sd_s;
   /// Lamps that it rests on, and lights of them.
   int lamps, lights;

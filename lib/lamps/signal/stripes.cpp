@@ -17,10 +17,11 @@ namespace {
 
 constexpr double kClear = 0.7;
 
-/// Of four frequencies at a time, which processors multiply at once.
+/// Values of four frequencies, which processors multiply at once.
 using Lanes = Eigen::Array4d;
 
-/// The share of the variance that a sine of each frequency (per line) and a constant explain.
+/// Returns the fraction of the variance that a sine of each frequency (per line) and a constant
+/// explain.
 Lanes explained(const std::vector<double>& signal, double mean, double variance,
                 const Lanes& frequencies) {
   const Lanes step = 2 * std::numbers::pi * frequencies;
@@ -49,7 +50,7 @@ Lanes explained(const std::vector<double>& signal, double mean, double variance,
   return (determinant > 1e-6 * n * n).select(share, 0);
 }
 
-/// Where stripes begin or end: the signal passes the middle between dark and bright.
+/// Returns the begins or ends of stripes: the signal passes the middle between dark and bright.
 std::vector<double> passages(const std::vector<double>& signal, double middle, bool rising) {
   std::vector<double> places;
   for (std::size_t i = 1; i < signal.size(); ++i) {
@@ -61,9 +62,9 @@ std::vector<double> passages(const std::vector<double>& signal, double middle, b
   return places;
 }
 
-/// The period that begins and ends of stripes show, by least squares: one offset for the begins,
-/// one for the ends. Exact for square waves, of which a few periods mislead a sine. Nothing when
-/// they are too few or do not keep time with `guess`.
+/// Fits the period to the begins and ends of stripes by least squares: one offset for the begins,
+/// one for the ends. Exact for square waves, where a few periods bias a sine. Returns std::nullopt
+/// if they are too few or do not agree with `guess`.
 std::optional<double> period_of(const std::vector<double>& signal, double middle, double guess) {
   double moment = 0, square = 0, misfit = 0;
   int count = 0;
@@ -96,9 +97,9 @@ std::optional<double> period_of(const std::vector<double>& signal, double middle
       misfit += std::pow(places[type][i] - period * numbers[type][i], 2);
     }
   }
-  constexpr double most_misfit = 0.12, most_off = 0.35;
-  const bool in_time = std::sqrt(misfit / count) < most_misfit * period;
-  if (!in_time || std::abs(period / guess - 1) > most_off) return std::nullopt;
+  constexpr double max_misfit = 0.12, max_off = 0.35;
+  const bool in_time = std::sqrt(misfit / count) < max_misfit * period;
+  if (!in_time || std::abs(period / guess - 1) > max_off) return std::nullopt;
   return period;
 }
 
@@ -124,8 +125,8 @@ bool trustworthy(const Stripes& stripes) {
 bool readable(const Stripes& stripes) { return stripes.regular || stripes.clarity > kClear; }
 
 Stripes stripes_of(const std::vector<double>& signal) {
-  constexpr std::size_t least_lines = 8;
-  if (signal.size() < least_lines) return {};
+  constexpr std::size_t min_lines = 8;
+  if (signal.size() < min_lines) return {};
   const auto n = static_cast<double>(signal.size());
   std::vector<double> sorted = signal;
   std::sort(sorted.begin(), sorted.end());

@@ -57,8 +57,8 @@ TEST(Coherence, IsLostWhenBarsLean) {
     image.convertTo(levels, CV_16U);
     return coherence_in(levels, lamp);
   };
-  EXPECT_GT(of_leaning(2), kLeastCoherence);
-  EXPECT_LT(of_leaning(12), kLeastCoherence);
+  EXPECT_GT(of_leaning(2), kMinCoherence);
+  EXPECT_LT(of_leaning(12), kMinCoherence);
 }
 
 TEST(Coherence, IsSeldomReachedByPartsThatVaryEachInItsWay) {
@@ -75,7 +75,7 @@ TEST(Coherence, IsSeldomReachedByPartsThatVaryEachInItsWay) {
     }
     const ImageView image = image_view(pixels);
     coherent += coherence_of(image, chords_of({40, 40}, {80, 80}, image.size()), {10, 1, 14.5},
-                             4 * patch) > kLeastCoherence;
+                             4 * patch) > kMinCoherence;
   }
   EXPECT_LE(coherent, 10);
 }

@@ -118,7 +118,7 @@ TEST(LampMapCheck, NamesLampsWithoutReadableStripes) {
   const auto unreadable = lamps_unreadable(map, kConditions);
   ASSERT_EQ(unreadable.size(), 2);
   EXPECT_EQ(unreadable[0].lamp, 1);
-  EXPECT_LT(unreadable[0].periods, kLeastPeriods);
+  EXPECT_LT(unreadable[0].periods, kMinPeriods);
   EXPECT_EQ(unreadable[1].lamp, 3);
   EXPECT_LT(unreadable[1].contrast, 0.2);
 }

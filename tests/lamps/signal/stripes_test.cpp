@@ -35,14 +35,14 @@ std::vector<double> square_wave(int lines, double period, double duty, double ph
 }
 
 /// Fewer show a begin or an end but once.
-constexpr double kLeastPeriods = 2.2;
+constexpr double kMinPeriods = 2.2;
 
 class SquareWaves : public testing::TestWithParam<double> {};
 
 TEST_P(SquareWaves, HaveTheirPeriodAndDuty) {
   const double period = GetParam();
   for (const int lines : {40, 55, 70}) {
-    if (lines < kLeastPeriods * period) continue;
+    if (lines < kMinPeriods * period) continue;
     for (const double duty : {0.3, 0.5, 0.7}) {
       for (const double phase : {0.0, 0.2, 0.4, 0.6, 0.8}) {
         SCOPED_TRACE(testing::Message() << lines << " lines, duty " << duty << ", phase " << phase);
@@ -61,7 +61,7 @@ TEST_P(SquareWaves, HaveTheirPeriodAndDuty) {
 TEST_P(SquareWaves, HaveTheirPeriodThroughAnExposure) {
   const double period = GetParam();
   for (const int lines : {40, 55, 70}) {
-    if (lines < kLeastPeriods * period) continue;
+    if (lines < kMinPeriods * period) continue;
     for (const double duty : {0.3, 0.5, 0.7}) {
       for (const double phase : {0.0, 0.2, 0.4, 0.6, 0.8}) {
         for (const double exposure : {0.15, 0.25}) {
