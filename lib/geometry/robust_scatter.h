@@ -15,7 +15,7 @@
 /// residual is an outlier, for samples of any size. "Linear" residuals have one coordinate,
 /// "planar" ones two.
 ///
-/// Of n normal residuals of variance sigma^2 per coordinate the median of the squares is
+/// The median of the squares of n normal residuals with the variance sigma^2 per coordinate is
 /// q^2 sigma^2 with q = 0.6745 (linear), and 2 ln 2 sigma^2 (planar). Least squares leave the
 /// fraction nu / (rows) of the variance, with nu degrees of freedom. The median scatters as a
 /// variance of m degrees of freedom does: m = 2 n (2 q phi(q))^2 (linear), 2 n ln^2 2 (planar),
