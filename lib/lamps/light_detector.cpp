@@ -164,7 +164,7 @@ LightDetector LightDetector::leaning(
     camera.level_from_camera = *level_from_camera;
   } else {
     camera.lens.reset();
-    camera.max_slender = 12;  // 85 degrees off its axis
+    camera.max_axis_ratio = 12;  // 85 degrees off its axis
   }
   return {lamps_, camera, classifier_};
 }
@@ -468,7 +468,10 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
       refuse(light, LightReason::wrong_shape);
     }
   }
-  if (camera_.row_time_s) refuse_other_row_times(lamps_, *camera_.row_time_s, lights);
+  // A classifier does not use the frequencies of the map.
+  if (camera_.row_time_s && !classifier_) {
+    refuse_other_row_times(lamps_, *camera_.row_time_s, lights);
+  }
   for (const Lamp& lamp : lamps_.lamps) keep_best_claim(lamp.id, lights);
   const bool sure = std::any_of(lights.begin(), lights.end(), [](const Light& light) {
     return light.lamp && light.stripes.periods >= kEnoughPeriods;

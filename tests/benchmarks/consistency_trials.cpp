@@ -427,7 +427,7 @@ struct Consistency {
 /// Side of the limits on which a figure lies.
 enum class Verdict { honest, too_small, too_large };
 
-/// Judges stated standard deviations, with the limits widened by so many standard errors of
+/// Judges stated standard deviations, with the limits widened by a number of standard errors of
 /// `independent` errors: too small if errors are larger than stated.
 Verdict judge(const Consistency& found, int independent, double standard_errors) {
   const double n = independent;

@@ -160,6 +160,35 @@ TEST(LightDetector, RefusesAPeriodThatTheOtherLightsContradict) {
       << "the row time is wrong";
 }
 
+TEST(LightDetector, DoesNotCompareWhatAClassifierIdentifiesWithTheMap) {
+  const cv::Size size(520, 160);
+  const std::vector<double> periods{9, 11, 14, 18};
+  LampMap map;
+  for (std::size_t i = 0; i < periods.size(); ++i) {
+    map.lamps.push_back(drawn_lamp(static_cast<int>(i) + 1, periods[i]));
+  }
+  const auto draw = [&](double phase) {
+    std::vector<DrawnLamp> lamps;
+    for (const double period : periods) {
+      lamps.push_back({.center = {70.3 + 120 * double(lamps.size()), 79.6},
+                       .stripes = {.period_lines = period, .phase = phase}});
+    }
+    return drawn(lamps, size, CV_8U, 0.5);
+  };
+  std::vector<LabelledLight> training;
+  const LightDetector by_map(map, drawn_camera(size));
+  for (std::size_t i = 0; i < 10; ++i) {
+    for (const Light& light : by_map.detect(image_view(draw(double(i) / 10)))) {
+      if (light.lamp) training.push_back({*light.lamp, light.stripes, i});
+    }
+  }
+  ASSERT_EQ(training.size(), 40U);
+  *map.lamps[0].frequency_hz *= 1.05;
+  const LightDetector by_classifier(map, drawn_camera(size), train_classifier(training));
+  const std::pair lamp(LightKind::lamp, LightReason::identified);
+  EXPECT_EQ(kinds_of(by_classifier.detect(image_view(draw(0.33)))), std::vector(4, lamp));
+}
+
 TEST(LightDetector, FindsNothingInImagesWithoutLamps) {
   const LightDetector detector = Captures("paper-rig", "sample").detector();
   for (const int type : {CV_8U, CV_16U}) {

@@ -73,12 +73,12 @@ std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
   return step;
 }
 
-/// Degrees of freedom of so many fixes: two rows each, minus offset and world.
+/// Returns the degrees of freedom of fixes: two rows each, minus offset and world.
 double freedom_of(const std::vector<double>& squares) {
   return 2 * static_cast<double>(squares.size()) - 4;
 }
 
-/// Variance per axis, above zero so that it can be divided by.
+/// Returns the variance per axis, above zero so that it can be divided by.
 double variance_of(const std::vector<double>& squares) {
   return std::max(robust_planar_variance(squares, freedom_of(squares)), kFixRoundingVariance);
 }

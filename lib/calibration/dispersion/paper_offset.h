@@ -31,9 +31,8 @@ struct PaperOffset {
 /// of model `tilt` it is applied as a turn, which moves fixes by more, and so it is corrected by
 /// what is left of D until nothing is. Precondition: there is a fix.
 ///
-/// @param noise_is_stated  all detections state their sigma_px; otherwise the residuals of the
-/// fixes
-///                         give it
+/// @param noise_is_stated  whether all detections state their sigma_px; otherwise it is estimated
+///                         from the residuals of the fixes
 PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d& focal_px,
                               DispersionCircle kind, bool noise_is_stated);
 

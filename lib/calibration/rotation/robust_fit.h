@@ -23,9 +23,8 @@ namespace vlp {
 /// headers.
 class RobustFit {
  public:
-  /// @param noise_is_stated  residuals are in units of a stated sigma: those within 4.5 of it are
-  /// no
-  ///                         outliers, however small the scatter of the others is
+  /// @param noise_is_stated  whether residuals are in units of a stated sigma. Those within 4.5 are
+  ///                         then no outliers, even if the others scatter less
   explicit RobustFit(bool noise_is_stated) : noise_is_stated_(noise_is_stated) {}
 
   /// A residual of two rows and the parameters it depends on, which stay the caller's.

@@ -152,12 +152,13 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   } else {
     constexpr double nearly_round = 3;
     fit = fit_robust_ellipse(points, weights, tolerance);
-    if (!fit && camera_.max_slender > nearly_round) {
+    if (!fit && camera_.max_axis_ratio > nearly_round) {
       fit = fit_slender_ellipse(points, weights, tolerance);
     }
   }
   if (!fit || fit->count < static_cast<int>(kMinOutlinePoints)) return std::nullopt;
-  if (!camera_.lens && slenderness(fit->rim_from_circle) > camera_.max_slender) return std::nullopt;
+  if (!camera_.lens && slenderness(fit->rim_from_circle) > camera_.max_axis_ratio)
+    return std::nullopt;
 
   Light light{};
   const auto pixel = pixel_of(fit->center);

@@ -25,7 +25,7 @@ struct DetectorCamera {
   /// Rotation of a tilted camera.
   Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();
   /// Maximum ratio of the axes of an ellipse: that of a disc seen 60 degrees off its axis.
-  double max_slender = 2;
+  double max_axis_ratio = 2;
 };
 
 /// The shape of lights by their outline. Edge points go through the lens into the level plane; a

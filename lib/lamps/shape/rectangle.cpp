@@ -639,7 +639,7 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
                                   const std::vector<EdgePoint>& outline,
                                   const Background& background, const LightShape& shape,
                                   const std::vector<Eigen::Vector2d>& sizes_m) {
-  constexpr double min_px = 10, max_slender = 40;
+  constexpr double min_px = 10, max_aspect = 40;
   constexpr std::size_t min_lines = 8;
   const PixelBox box = blob.box();
   if (outline.size() < kMinOutlinePoints || std::min(box.width, box.height) < min_px) return {};
@@ -679,7 +679,7 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
     const Sides sides = sides_of(*corners);
     const double min_side =
         std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
-    if (!(min_side > min_px * per_px) || aspect_of(sides) > max_slender) return std::nullopt;
+    if (!(min_side > min_px * per_px) || aspect_of(sides) > max_aspect) return std::nullopt;
     const double inset = std::min((inset_px + bow_px) * per_px, min_side / 3);
     const auto chords = chords_within(shape.turned(face_of(sides, inset, shape)), lines.size());
     if (chords.size() < min_lines) return std::nullopt;

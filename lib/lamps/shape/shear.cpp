@@ -103,7 +103,7 @@ std::optional<OutlineSums::Estimate> OutlineSums::solved(const std::optional<Ova
 }
 
 std::optional<Shear> Shear::common(std::span<const OutlineSums> lights) {
-  constexpr double max_sd = 0.01;      // of the radius, of a light that is to tell
+  constexpr double max_sd = 0.01;      // of the radius; of lights that are used
   constexpr double beyond_doubt = 30;  // a chi-square of 2
   constexpr double contradicts = 14;   // a chi-square of 2
   std::vector<Shown> shown;
