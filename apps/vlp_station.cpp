@@ -9,7 +9,7 @@
 #include "program/station/station_run.h"
 #include "program/station/station_shift.h"
 #include "station/records.h"
-#include "station/watched_run.h"
+#include "station/station_config.h"
 
 namespace vlp {
 namespace {

@@ -15,11 +15,8 @@
 #include <limits>
 #include <opencv2/core/utility.hpp>
 #include <random>
-#include <utility>
 
 #include "calibration/intrinsics/mrcal_files.h"
-#include "captures/digest.h"
-#include "rig/calibration_text.h"
 #include "station/database_name.h"
 
 namespace vlp {
@@ -147,32 +144,6 @@ RunRecord new_record(const char* kind, const StationConfig& config, const std::s
   record.program = program.program + " " + program.version;
   record.libraries = library_versions();
   record.config_sha256 = config.sha256;
-  return record;
-}
-
-RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program) {
-  RunRecord record = new_record("unit", unit.config(), unit.camera_id(), run, program);
-  if (const auto calibration = unit.calibration()) {
-    record.calibration = calibration_text(*calibration);
-  }
-  record.figures = unit.figures();
-  record.judge(unit.causes());
-  for (const StationStep step : kStationSteps) {
-    for (const auto& [name, image] : unit.step(step).images) {
-      std::string refused = image.refused;
-      if (image.discarded) refused.append(" (not kept)");
-      record.images.push_back({.step = name_of(step),
-                               .name = name,
-                               .sha256 = image.sha256,
-                               .refused = std::move(refused)});
-    }
-    for (const auto& file : unit.step(step).waiting) {
-      record.images.push_back({.step = name_of(step),
-                               .name = file.filename().string(),
-                               .sha256 = sha256_of_file(file),
-                               .refused = "not looked at: a step before is not done"});
-    }
-  }
   return record;
 }
 

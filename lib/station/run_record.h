@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "evaluation/gate.h"
-#include "station/unit.h"
+#include "session/step_history.h"
+#include "station/station_config.h"
+#include "station/verdict.h"
 
 namespace vlp {
 
@@ -104,9 +106,6 @@ double seconds_since(const std::string& utc);
 /// what it rests on, and who measured.
 RunRecord new_record(const char* kind, const StationConfig& config, const std::string& camera,
                      const std::string& run, const ProgramVersion& program);
-
-/// The record of a unit that ends now.
-RunRecord record_of(const Unit& unit, const std::string& run, const ProgramVersion& program);
 
 /// OpenCV, Ceres, mrcal and so on, each with its version.
 std::string library_versions();

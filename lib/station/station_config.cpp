@@ -3,13 +3,13 @@
 #include "station/station_config.h"
 
 #include <algorithm>
+#include <cctype>
 #include <regex>
 
 #include "captures/digest.h"
 #include "geometry/angles.h"
 #include "rig/yaml_reader.h"
 #include "station/database_name.h"
-#include "station/watched_run.h"
 
 namespace vlp {
 namespace {
@@ -187,6 +187,15 @@ std::string records_of(const YamlValue& value, const fs::path& file) {
 }
 
 }  // namespace
+
+std::string camera_id_problem(const std::string& camera_id) {
+  const bool plain = std::all_of(camera_id.begin(), camera_id.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.';
+  });
+  constexpr std::size_t longest = 64;
+  if (plain && !camera_id.empty() && camera_id.size() <= longest && camera_id[0] != '.') return "";
+  return "a camera's id has letters, digits, '-', '_' and '.', up to 64, no '.' first";
+}
 
 std::string serial_problem(const StationConfig& config, const std::string& serial) {
   std::string problem = camera_id_problem(serial);

@@ -100,6 +100,9 @@ struct StationConfig {
   Retention keep;
 };
 
+/// Returns why a text cannot be a camera's id, which names folders; an empty string if it can.
+std::string camera_id_problem(const std::string& camera_id);
+
 /// Why a text cannot be the id of a unit of the station, which names folders; empty when it can.
 std::string serial_problem(const StationConfig& config, const std::string& serial);
 

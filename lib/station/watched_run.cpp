@@ -8,7 +8,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 
 #include "rig/file.h"
 #include "rig/input_error.h"
@@ -35,15 +34,6 @@ std::string state_of_tables(const fs::path& folder) {
 }
 
 }  // namespace
-
-std::string camera_id_problem(const std::string& camera_id) {
-  const bool plain = std::all_of(camera_id.begin(), camera_id.end(), [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.';
-  });
-  constexpr std::size_t longest = 64;
-  if (plain && !camera_id.empty() && camera_id.size() <= longest && camera_id[0] != '.') return "";
-  return "a camera's id has letters, digits, '-', '_' and '.', up to 64, no '.' first";
-}
 
 WatchedRun::WatchedRun(Unit& unit, Spool& spool)
     : unit_(unit), folder_(unit.config().captures / unit.camera_id()) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "station/run_record.h"
 #include "station/spool.h"
 #include "station/unit.h"
 #include "station/watched_folder.h"
@@ -65,8 +66,5 @@ class WatchedRun {
   std::vector<std::vector<std::filesystem::path>> waiting_;
   std::vector<std::string> tables_;
 };
-
-/// Why a text cannot be a camera's id, which names folders; empty when it can.
-std::string camera_id_problem(const std::string& camera_id);
 
 }  // namespace vlp

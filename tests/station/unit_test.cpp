@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "station/station_screen.h"
+#include "station/unit_record.h"
 #include "station/unit_report.h"
 #include "support/temporary_folder.h"
 
@@ -91,7 +92,7 @@ TEST_F(UnitTest, IsNotJudgedWhenItEndsEarly) {
       unit.causes(),
       ElementsAre(Field(&Cause::text,
                         "boards: the operator ended the run before there was enough (0/36)")));
-  const RunRecord record = record_of(unit, new_run(), {"test", "0"});
+  const RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
   EXPECT_EQ(record.verdict, "INVALID");
   EXPECT_TRUE(record.invalid());
   std::string screen;
@@ -132,7 +133,7 @@ TEST_F(UnitTest, IsShownIn80Columns) {
   add_bad(1);
   add_bad(2);
   for (const ScreenLine& line : station_screen(unit)) EXPECT_LE(line.text.size(), 80u) << line.text;
-  const RunRecord record = record_of(unit, new_run(), {"test", "0"});
+  const RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
   EXPECT_FALSE(record.passed());
   for (const ScreenLine& line : verdict_screen(record)) {
     EXPECT_LE(line.text.size(), 80u) << line.text;
@@ -140,7 +141,7 @@ TEST_F(UnitTest, IsShownIn80Columns) {
 }
 
 TEST_F(UnitTest, HasAReportOfItsVerdict) {
-  RunRecord record = record_of(unit, new_run(), {"test", "0"});
+  RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
   EXPECT_THAT(unit_report(record, "", {}),
               AllOf(HasSubstr("<strong>INVALID</strong><p>boards: not enough"),
                     HasSubstr("not\u00a0reached"), Not(HasSubstr("NOT\u00a0MET"))));

@@ -20,6 +20,7 @@
 #include "station/publish_run.h"
 #include "station/run_hooks.h"
 #include "station/spool.h"
+#include "station/unit_record.h"
 #include "station/verify_station.h"
 
 namespace vlp {
@@ -130,7 +131,7 @@ RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions
       spdlog::warn("{} before the next unit; this one was begun before it was", due);
     }
   }
-  RunRecord record = record_of(unit, run, kProgram);
+  RunRecord record = make_unit_record(unit, run, kProgram);
   record.operator_name = options.operator_name;
   record.shift = options.shift;
   return record;
