@@ -8,7 +8,7 @@
 #include "program/station/station_records.h"
 #include "program/station/station_run.h"
 #include "program/station/station_shift.h"
-#include "station/records.h"
+#include "station/records/records.h"
 #include "station/station_config.h"
 
 namespace vlp {

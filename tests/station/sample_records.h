@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "station/records.h"
+#include "station/records/records.h"
 #include "station/station_config.h"
 #include "support/temporary_folder.h"
 

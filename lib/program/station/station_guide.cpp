@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "station/golden_due.h"
-#include "station/station_screen.h"
+#include "station/records/golden_due.h"
+#include "station/unit/station_screen.h"
 
 namespace vlp {
 namespace {

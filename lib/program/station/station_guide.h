@@ -4,7 +4,7 @@
 
 #include "program/station/station_run.h"
 #include "program/station/terminal.h"
-#include "station/step_sources.h"
+#include "station/unit/step_sources.h"
 
 namespace vlp {
 

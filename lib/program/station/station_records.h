@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "station/records.h"
+#include "station/records/records.h"
 
 namespace vlp {
 

@@ -15,13 +15,13 @@
 #include "program/app.h"
 #include "program/station/station_guide.h"
 #include "rig/input_error.h"
-#include "station/golden_due.h"
-#include "station/hook.h"
-#include "station/publish_run.h"
-#include "station/run_hooks.h"
-#include "station/spool.h"
-#include "station/unit_record.h"
-#include "station/verify_station.h"
+#include "station/records/golden_due.h"
+#include "station/records/hook.h"
+#include "station/records/publish_run.h"
+#include "station/records/run_hooks.h"
+#include "station/records/spool.h"
+#include "station/unit/unit_record.h"
+#include "station/unit/verify_station.h"
 
 namespace vlp {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "station/station_screen.h"
+#include "station/unit/station_screen.h"
 
 namespace vlp {
 

@@ -1,0 +1,115 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/archive_runs.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "captures/csv_reader.h"
+#include "captures/digest.h"
+#include "evaluation/gate.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostBytes = 1 << 26;
+
+/// 2026-03-14 or 2026-03-14T09:30:00.25 as 2026-03-14T09:30:00Z.
+std::string utc_of_date(const std::string& date) {
+  constexpr std::size_t day = 10, whole = 19;
+  return date.size() == day ? date + "T00:00:00Z" : date.substr(0, whole) + "Z";
+}
+
+/// As new_run() has it.
+std::string run_name(std::string utc, const std::string& text) {
+  constexpr std::size_t digits = 16;
+  std::erase_if(utc, [](char c) { return c == '-' || c == ':'; });
+  return utc + "-" + sha256_of_text(text).substr(0, digits);
+}
+
+std::optional<double> number_in(const nlohmann::json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_number()) return std::nullopt;
+  return found->get<double>();
+}
+
+/// Of `metrics` or `gates` of session.json; those that stand there already stay.
+void add_figures(const nlohmann::json& metrics, std::vector<CheckedMetric>& figures) {
+  for (const nlohmann::json& metric : metrics) {
+    CheckedMetric figure;
+    figure.name = metric.at("name");
+    const bool known = std::any_of(figures.begin(), figures.end(),
+                                   [&](const auto& other) { return other.name == figure.name; });
+    if (known) continue;
+    figure.unit = metric.value("unit", "");
+    figure.value = number_in(metric, "value");
+    figure.limit = number_in(metric, "limit");
+    const auto kind = metric_kind(figure.name);
+    figure.asked = kind ? kind->asked : Direction::at_most;
+    figures.push_back(std::move(figure));
+  }
+}
+
+}  // namespace
+
+ReprocessedArchive sessions_of_archive(const fs::path& results) {
+  const CsvTable summary(results / "summary.csv");
+  const auto text = [&](std::size_t row, const char* column) {
+    return std::string(summary.text(row, summary.required(column)));
+  };
+  const fs::path named = fs::absolute(results).lexically_normal();
+  const fs::path last = named.has_filename() ? named.filename() : named.parent_path().filename();
+  ReprocessedArchive archive;
+  for (std::size_t row = 0; row < summary.rows(); ++row) {
+    const std::string date = text(row, "date"), verdict = text(row, "verdict");
+    const bool crashed = verdict == "crashed";
+    if (crashed || date.empty()) {
+      ++(crashed ? archive.crashed : archive.undated);
+      continue;
+    }
+    RunRecord run;
+    run.kind = "unit";
+    run.station = last.string();
+    run.camera = text(row, "camera");
+    const std::string session = run.camera + "/" + text(row, "session");
+    run.begun_utc = run.ended_utc = utc_of_date(date);
+    run.run = run_name(run.ended_utc, run.station + "/" + session);
+    run.program = "vlp-calibrate " + text(row, "version");
+    run.config_sha256 = text(row, "key");
+    const bool passed = verdict == "pass" || verdict == "look", failed = verdict == "gate";
+    run.verdict = name_of(passed ? Verdict::pass : failed ? Verdict::fail : Verdict::invalid);
+    if (!passed) run.causes = text(row, "reason") + "\n";
+    archive.sessions.push_back(
+        {std::move(run), results / (passed || failed ? "sessions" : "failed") / session});
+  }
+  std::sort(archive.sessions.begin(), archive.sessions.end(),
+            [](const auto& a, const auto& b) { return a.run.run < b.run.run; });
+  return archive;
+}
+
+RunRecord run_of(const ReprocessedSession& session) {
+  RunRecord run = session.run;
+  const fs::path file = session.folder / "session.json";
+  const fs::path calibration = session.folder / "calibration.yaml";
+  try {
+    const auto document = nlohmann::json::parse(read_text_file(file, kMostBytes));
+    for (const char* part : {"metrics", "gates"}) {
+      if (document.contains(part)) add_figures(document[part], run.figures);
+    }
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(file, fmt::format("is not as vlp-calibrate writes it: {}", error.what()));
+  }
+  if (fs::exists(calibration)) run.calibration = read_text_file(calibration, kMostBytes);
+  return run;
+}
+
+}  // namespace vlp

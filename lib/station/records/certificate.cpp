@@ -1,0 +1,215 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/certificate.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "captures/number_text.h"
+#include "positioning/common_errors.h"
+#include "report/calibration_sections.h"
+#include "report/html.h"
+#include "rig/calibration_error.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "station/records/publish_run.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kCoverage = 2;
+constexpr int kSixDigits = 6;
+
+using Values = std::vector<CertifiedValue>;
+
+/// x and y, with the standard deviations of a covariance.
+template <typename Covariance>
+void add_pair(Values& values, const std::string& name, const std::string& unit,
+              const Eigen::Vector2d& pair, const std::optional<Covariance>& covariance,
+              double scale = 1, Eigen::Index first = 0) {
+  for (const Eigen::Index i : {0, 1}) {
+    std::optional<double> sd;
+    if (covariance) sd = scale * std::sqrt((*covariance)(first + i, first + i));
+    values.push_back({name + (i == 0 ? " x" : " y"), unit, scale * pair(i), sd});
+  }
+}
+
+std::string with_unit(const std::string& text, const std::string& unit) {
+  return unit.empty() ? text : text + "\u00a0" + unit;
+}
+
+std::string verdict_part(const RunRecord& record) {
+  const bool conforms = record.passed();
+  const std::string words = conforms ? "The unit conforms with all requirements below."
+                                     : "The unit does not conform: " + record.first_cause() + ".";
+  return std::string("<div class=\"verdict ") + (conforms ? "pass" : "fail") + "\"><strong>" +
+         html_text(record.verdict) + "</strong>" + html_element("p", words) + "</div>\n";
+}
+
+std::string subject_part(const RunRecord& record, const Calibration& calibration) {
+  const auto used = std::count_if(record.images.begin(), record.images.end(),
+                                  [](const auto& image) { return image.refused.empty(); });
+  const auto& [width_px, height_px] = calibration.camera.imager_px;
+  return html_table({"",
+                     {},
+                     {{"certificate number", record.run},
+                      {"unit", "camera " + record.camera},
+                      {"image", fmt::format("{} x {} px", width_px, height_px)},
+                      {"measured at", record.station},
+                      {"begun (UTC)", record.begun_utc},
+                      {"ended (UTC)", record.ended_utc},
+                      {"procedure",
+                       "lens by views of a board; rotation centre and tilt by a turn; "
+                       "dispersion at one place; check at known points"},
+                      {"program", record.program},
+                      {"libraries", record.libraries},
+                      {"images", fmt::format("{} taken, {} used", record.images.size(), used)}}});
+}
+
+std::string results_part(const Calibration& calibration) {
+  HtmlTable table{"", {"quantity", "value and expanded uncertainty"}, {}};
+  for (const CertifiedValue& value : certified_values(calibration)) {
+    table.rows.push_back({value.name, words_of(value)});
+  }
+  const std::string lens(name_of(calibration.camera.lens_model));
+  return html_table(table) +
+         html_element("p", "Lens model " + lens +
+                               "; all its parameters are in the unit's calibration.yaml. The "
+                               "expanded uncertainty is the standard uncertainty times k = 2, for "
+                               "about 95 % of a normal distribution. It is that of the captures' "
+                               "scatter, for the zenith and the dispersion with the lens's part; "
+                               "the board, the lamp map and the known points are taken as exact.");
+}
+
+/// Of each gate the figure, what is asked for, and whether it conforms, by which rule.
+std::string conformity_part(const RunRecord& record) {
+  HtmlTable table{"", {"requirement", "figure", "limit", "accepted", "conforms", "rule"}, {}};
+  constexpr int digits = 4, of_probability = 3;
+  for (const CheckedMetric& figure : record.figures) {
+    if (!figure.limit) continue;
+    std::string measured = figure.value ? significant(*figure.value, digits) : "none";
+    std::string rule = "simple", outcome = figure.met() ? "yes" : "no";
+    if (const auto& guard = figure.guard) {
+      if (figure.value) {
+        measured =
+            words_of(CertifiedValue{"", figure.unit, *figure.value, guard->standard_uncertainty});
+      }
+      rule = fmt::format("guard band of {:.4g} u", guard->k);
+      if (const auto sure = figure.conformance_probability()) {
+        outcome += ", p = " + significant(*sure, of_probability);
+      }
+    } else if (figure.value) {
+      measured = with_unit(measured, figure.unit);
+    }
+    if (!figure.met()) table.marked.push_back(table.rows.size());
+    table.rows.push_back(
+        {figure.name, measured,
+         words_of(figure.asked) + " " + with_unit(significant(*figure.limit, digits), figure.unit),
+         with_unit(significant(figure.acceptance_limit(), digits), figure.unit), outcome, rule});
+  }
+  return html_table(table) +
+         html_element(
+             "p",
+             "Decision rules: \"simple\" compares the figure with the limit, whatever its "
+             "uncertainty, so that of units at the limit in truth half are accepted; a "
+             "guard band of k u takes k times the standard uncertainty off the limit "
+             "(JCGM 106:2012). p is the probability that the figure is within the limit in "
+             "truth.");
+}
+
+std::string traceability_part(const RunRecord& record, const Calibration& calibration) {
+  return html_element("p",
+                      "Digests (SHA-256) of what the results rest on. \"station\" is the "
+                      "configuration with the camera's type, the board and the lamp map, whose own "
+                      "certificates belong to this one: " +
+                          record.config_sha256 + ".") +
+         history_list(calibration.history);
+}
+
+/// What a record does not have.
+std::string part_to_fill_in() {
+  HtmlTable table{"", {}, {}};
+  for (const char* line : {"laboratory, address", "customer", "temperature, humidity",
+                           "certificates of board and lamp map", "issued by, date", "signature"}) {
+    table.rows.push_back({line, "\u00a0"});
+  }
+  return html_table(table) +
+         html_element("p", "The results relate to this unit as it was measured, and only to it.");
+}
+
+}  // namespace
+
+std::vector<CertifiedValue> certified_values(const Calibration& calibration) {
+  constexpr double millimetres = 1e3, degrees = 180 / std::numbers::pi;
+  const std::vector<double>& k = calibration.camera.intrinsics;
+  const auto& lens = calibration.intrinsics_report;
+  const std::optional<MatrixX> of_lens = lens ? lens->covariance : std::nullopt;
+  Values values;
+  add_pair(values, "focal length", "px", {k[0], k[1]}, of_lens);
+  add_pair(values, "principal point", "px", {k[2], k[3]}, of_lens, 1, 2);
+  if (const auto& center = calibration.rotation_center) {
+    add_pair(values, "rotation centre, undistorted image", "px", center->center_px,
+             center->covariance);
+    add_pair(values, "zenith from the optical axis, 180/pi times its normalized point", "deg",
+             zenith_point(*center), whole_zenith_covariance(calibration), degrees);
+    if (center->lever_arm_m) {
+      add_pair(values, "lever arm", "mm", *center->lever_arm_m, center->lever_arm_covariance,
+               millimetres);
+    }
+  }
+  if (const auto& dispersion = calibration.dispersion) {
+    add_pair(values, "dispersion offset", "px", dispersion->offset_px,
+             whole_offset_covariance(calibration));
+  }
+  return values;
+}
+
+std::string words_of(const CertifiedValue& value) {
+  const double expanded = kCoverage * value.standard_uncertainty.value_or(0);
+  if (!(expanded > 0) || !std::isfinite(expanded)) {
+    return with_unit(significant(value.value, kSixDigits), value.unit) + ", uncertainty not stated";
+  }
+  constexpr double ten = 10, two_digits = 100;
+  constexpr int most = 12;
+  int exponent = static_cast<int>(std::floor(std::log10(expanded)));
+  // 0.0996 is 0.10.
+  if (std::round(expanded * std::pow(ten, 1 - exponent)) >= two_digits) ++exponent;
+  const int places = std::clamp(1 - exponent, 0, most);
+  return with_unit(fixed(value.value, places) + " \u00b1 " + fixed(expanded, places), value.unit);
+}
+
+void check_certifiable(const RunRecord& record) {
+  const auto none = [&](const std::string& why) {
+    return InputError(record.run, why + ": it has no certificate");
+  };
+  if (record.kind != "unit") throw none("is of the golden unit, by which a station is measured");
+  const std::string no_verdict = why_no_verdict(record);
+  if (!no_verdict.empty()) throw none(no_verdict);
+  if (record.invalid()) throw none("was not judged (" + record.first_cause() + ")");
+  if (record.calibration.empty()) throw none("came to no calibration");
+}
+
+std::string certificate(const RunRecord& record, const Calibration& calibration) {
+  check_certifiable(record);
+  return html_page("Calibration certificate: camera " + record.camera,
+                   verdict_part(record) +
+                       html_section("Unit and calibration", subject_part(record, calibration)) +
+                       html_section("Results", results_part(calibration)) +
+                       html_section("Statement of conformity", conformity_part(record)) +
+                       html_section("Traceability", traceability_part(record, calibration)) +
+                       html_section("To be filled in by who issues it", part_to_fill_in()));
+}
+
+std::filesystem::path write_certificate(const RunRecord& record,
+                                        const std::filesystem::path& results) {
+  check_certifiable(record);
+  const std::filesystem::path folder = publish_run(record, {}, results);
+  std::filesystem::path file = folder / "certificate.html";
+  write_file(file, certificate(record, read_calibration(folder / calibration_name(record))));
+  return file;
+}
+
+}  // namespace vlp

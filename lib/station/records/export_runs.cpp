@@ -1,0 +1,119 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/export_runs.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "captures/csv_writer.h"
+#include "captures/number_text.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "station/records/json_number.h"
+#include "station/station_config.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kDigits = 9;
+
+std::string one_line(std::string text) {
+  while (text.ends_with('\n')) text.pop_back();
+  std::string joined;
+  for (const char c : text) joined += c == '\n' ? std::string("; ") : std::string(1, c);
+  return joined;
+}
+
+const CheckedMetric* figure_of(const RunRecord& run, const MetricKind& kind) {
+  const auto figure = std::find_if(run.figures.begin(), run.figures.end(),
+                                   [&](const auto& each) { return each.name == kind.name; });
+  return figure == run.figures.end() ? nullptr : &*figure;
+}
+
+/// unit_metrics(), and what else there is in these runs.
+std::vector<MetricKind> columns_of(const std::vector<RunRecord>& runs) {
+  auto kinds = unit_metrics();
+  for (const MetricKind& kind : metric_kinds({MetricSource::evaluation})) {
+    const bool there = std::any_of(runs.begin(), runs.end(), [&](const RunRecord& run) {
+      return figure_of(run, kind) != nullptr;
+    });
+    if (there) kinds.push_back(kind);
+  }
+  return kinds;
+}
+
+void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
+  const auto kinds = columns_of(runs);
+  std::vector<std::string> header;
+  for (const RunField& field : run_fields()) {
+    if (field.in_csv) header.emplace_back(field.name);
+  }
+  for (const MetricKind& kind : kinds) header.emplace_back(kind.name);
+  CsvWriter csv(file, header);
+  for (const RunRecord& run : runs) {
+    std::vector<std::string> row;
+    for (const RunField& field : run_fields()) {
+      if (field.in_csv) row.push_back(one_line(run.*field.text));
+    }
+    for (const MetricKind& kind : kinds) {
+      const CheckedMetric* figure = figure_of(run, kind);
+      const bool there = figure != nullptr && figure->value;
+      row.push_back(there ? significant(*figure->value, kDigits) : "");
+    }
+    csv.row(row);
+  }
+  csv.save();
+}
+
+nlohmann::ordered_json json_of(const RunRecord& run) {
+  nlohmann::ordered_json figures = nlohmann::ordered_json::object();
+  for (const CheckedMetric& figure : run.figures) {
+    figures[figure.name] = {{"value", number_or_null(figure.value)},
+                            {"unit", figure.unit},
+                            {"gate", number_or_null(figure.limit)},
+                            {"at_least", figure.asked == Direction::at_least},
+                            {"met", figure.met()}};
+    if (!figure.guard) continue;
+    figures[figure.name]["uncertainty"] = figure.guard->standard_uncertainty;
+    figures[figure.name]["guard_k"] = figure.guard->k;
+    figures[figure.name]["conformance_probability"] =
+        number_or_null(figure.conformance_probability());
+  }
+  nlohmann::ordered_json images = nlohmann::ordered_json::array();
+  for (const auto& [step, name, sha256, refused] : run.images) {
+    images.push_back({{"step", step}, {"image", name}, {"sha256", sha256}, {"refused", refused}});
+  }
+  nlohmann::ordered_json json;
+  for (const RunField& field : run_fields()) {
+    json[field.name] = field.in_csv ? one_line(run.*field.text) : run.*field.text;
+  }
+  json["figures"] = std::move(figures);
+  json["images"] = std::move(images);
+  json["events"] = nlohmann::ordered_json::array();
+  for (const RunEvent& event : run.events) {
+    json["events"].push_back(
+        {{"event", event.event}, {"what", event.what}, {"text", event.text}, {"who", event.who}});
+  }
+  return json;
+}
+
+/// Bytes that are no UTF-8 are replaced.
+std::string text_of(const nlohmann::ordered_json& json) {
+  constexpr int indent = 1;
+  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+std::string run_json(const RunRecord& run) { return text_of(json_of(run)); }
+
+void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
+  if (file.extension() == ".csv") return write_csv(file, runs);
+  if (file.extension() != ".json") throw InputError(file, "should end in .csv or .json");
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const RunRecord& run : runs) all.push_back(json_of(run));
+  write_file(file, text_of(all));
+}
+
+}  // namespace vlp

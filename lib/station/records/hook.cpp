@@ -1,0 +1,310 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/hook.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "captures/printable.h"
+#include "station/records/export_runs.h"
+
+namespace vlp {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { close(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  int get() const { return number_; }
+  void close() {
+    if (number_ >= 0) ::close(number_);
+    number_ = -1;
+  }
+
+ private:
+  int number_;
+};
+
+/// The processes whose parent is this one. Where /proc is not to be read there are none.
+std::vector<pid_t> children() {
+  std::vector<pid_t> found;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc", none)) {
+    const std::string name = entry.path().filename().string();
+    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
+    std::string stat;
+    std::getline(std::ifstream(entry.path() / "stat"), stat);
+    // PID (NAME) STATE PARENT, where the name may hold anything.
+    std::istringstream after_name(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
+    std::string state;
+    pid_t parent = 0;
+    if (after_name >> state >> parent && parent == ::getpid()) found.push_back(std::stoi(name));
+  }
+  return found;
+}
+
+/// While it is there, what a process leaves behind comes to this one, and not to init, so that
+/// nothing that a hook has started gets away from its time limit, whatever group or session it
+/// makes for itself.
+class Adoption {
+ public:
+  Adoption() : before_(children()) { ::prctl(PR_SET_CHILD_SUBREAPER, 1); }
+  ~Adoption() { ::prctl(PR_SET_CHILD_SUBREAPER, 0); }
+  Adoption(const Adoption&) = delete;
+  Adoption& operator=(const Adoption&) = delete;
+
+  /// Kills those that came, and what comes when they die.
+  void kill_all() const {
+    constexpr int tries = 100;
+    for (int i = 0; i < tries; ++i) {
+      bool any = false;
+      for (const pid_t child : children()) {
+        if (std::find(before_.begin(), before_.end(), child) != before_.end()) continue;
+        any = true;
+        ::kill(child, SIGKILL);
+        ::waitpid(child, nullptr, WNOHANG);
+      }
+      if (!any) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+
+ private:
+  std::vector<pid_t> before_;
+};
+
+/// What a process of its own group writes, and how it ends.
+struct Process {
+  pid_t id;
+  int output;
+  /// The last of it.
+  std::string written = {};
+  bool closed = false;
+
+  /// No more at once than a pipe holds: one that is always full must not keep from the time limit.
+  void read() {
+    constexpr std::size_t most = 4096;
+    constexpr int parts = 16;
+    std::array<char, most> part{};
+    for (int i = 0; i < parts; ++i) {
+      const ssize_t count = ::read(output, part.data(), part.size());
+      closed = closed || count == 0;
+      if (count <= 0) return;
+      written.append(part.data(), static_cast<std::size_t>(count));
+      if (written.size() > most) written.erase(0, written.size() - most);
+    }
+  }
+  /// Its status; nothing when it had to be killed. Throws std::system_error when it cannot be
+  /// known.
+  std::optional<int> wait(double time_limit_s) {
+    constexpr int often_ms = 10;
+    const auto begun = Clock::now();
+    int status = 0;
+    for (;;) {
+      const pid_t ended = ::waitpid(id, &status, WNOHANG);
+      if (ended == id) break;
+      if (ended < 0 && errno != EINTR) throw std::system_error(errno, std::generic_category());
+      if (std::chrono::duration<double>(Clock::now() - begun).count() > time_limit_s) {
+        ::kill(-id, SIGKILL);
+        ::kill(id, SIGKILL);  // it may have left its group
+        while (::waitpid(id, &status, 0) < 0 && errno == EINTR) continue;
+        return std::nullopt;
+      }
+      pollfd ready{output, POLLIN, 0};
+      if (closed) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(often_ms));
+      } else if (::poll(&ready, 1, often_ms) > 0) {
+        read();
+      }
+    }
+    read();  // not to its end: what it left running may hold the pipe
+    return status;
+  }
+};
+
+/// A file without a name that holds the whole text, open at its beginning; negative, with errno,
+/// when there is no room.
+int file_with(const std::string& text) {
+  const int file = ::memfd_create("run", MFD_CLOEXEC);
+  for (std::size_t at = 0; file >= 0 && at < text.size();) {
+    const ssize_t count = ::write(file, text.data() + at, text.size() - at);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) {
+      const int error = count < 0 ? errno : ENOSPC;
+      ::close(file);
+      errno = error;
+      return -1;
+    }
+    at += static_cast<std::size_t>(count);
+  }
+  if (file >= 0) ::lseek(file, 0, SEEK_SET);
+  return file;
+}
+
+/// Starts it in a group of its own, with no descriptors but the lock's and no signals of this
+/// program; an errno when it could not be.
+int start(const Hook& hook, int input, int output, int lock, pid_t& id) {
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawnattr_init(&attributes);
+  ::posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  ::posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
+  int first_closed = STDERR_FILENO + 1;
+  if (lock >= 0) ::posix_spawn_file_actions_adddup2(&actions, lock, first_closed++);
+  ::posix_spawn_file_actions_addclosefrom_np(&actions, first_closed);
+  ::posix_spawn_file_actions_addchdir_np(&actions, hook.folder.c_str());
+  ::posix_spawnattr_setflags(
+      &attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK);
+  ::posix_spawnattr_setpgroup(&attributes, 0);
+  sigset_t signals;
+  ::sigemptyset(&signals);
+  ::posix_spawnattr_setsigmask(&attributes, &signals);
+  for (const int each : {SIGPIPE, SIGCHLD, SIGINT, SIGHUP}) ::sigaddset(&signals, each);
+  ::posix_spawnattr_setsigdefault(&attributes, &signals);
+  std::vector<char*> arguments;
+  for (const std::string& word : hook.command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  const int error =
+      ::posix_spawnp(&id, arguments[0], &actions, &attributes, arguments.data(), environ);
+  ::posix_spawnattr_destroy(&attributes);
+  ::posix_spawn_file_actions_destroy(&actions);
+  return error;
+}
+
+/// The last line that is not empty, shortened.
+std::string last_line(std::string text) {
+  constexpr std::size_t most = 200;
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) {
+    text.pop_back();
+  }
+  text.erase(0, text.rfind('\n') + 1);  // npos + 1 is 0
+  text = printable(text);
+  std::replace(text.begin(), text.end(), '\t', ' ');
+  return printable(text.substr(0, most));
+}
+
+RunEvent failed(const std::string& why) { return new_event(kHookFailed, why); }
+
+/// How many events it is from the last of a kind to the end; nothing without one.
+std::optional<std::ptrdiff_t> from_end(const RunRecord& record, const char* what) {
+  const auto last = std::find_if(record.events.rbegin(), record.events.rend(),
+                                 [&](const RunEvent& event) { return event.what == what; });
+  if (last == record.events.rend()) return std::nullopt;
+  return last - record.events.rbegin();
+}
+
+/// Whether the file that is open is still the one of that name.
+bool is_that(int descriptor, const std::filesystem::path& file) {
+  struct stat open {
+  }, named{};
+  return ::fstat(descriptor, &open) == 0 && ::stat(file.c_str(), &named) == 0 &&
+         open.st_dev == named.st_dev && open.st_ino == named.st_ino;
+}
+
+}  // namespace
+
+RunEvent hook_wanted(const Hook& hook, const std::string& operator_name) {
+  return new_event(kHookWanted, printable(fmt::format("{}", fmt::join(hook.command, " "))),
+                   operator_name);
+}
+
+RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
+  std::array<int, 2> pipe{};
+  const Descriptor input(file_with(run_json(record)));
+  if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
+    return failed("cannot be started: " + std::generic_category().message(errno));
+  }
+  const Descriptor from(pipe[0]);
+  Descriptor to(pipe[1]);
+  ::fcntl(from.get(), F_SETFL, O_NONBLOCK);
+  Process process{0, from.get()};
+  std::signal(SIGCHLD, SIG_DFL);  // who inherited that it is ignored never hears how it ended
+  const Adoption adoption;
+  if (const int error = start(hook, input.get(), to.get(), lock.descriptor(), process.id);
+      error != 0) {
+    return failed(hook.command.front() +
+                  " cannot be started: " + std::generic_category().message(error));
+  }
+  to.close();
+  std::optional<int> status;
+  try {
+    status = process.wait(hook.time_limit_s);
+  } catch (const std::system_error& error) {
+    return failed("how it ended is not known: " + error.code().message());
+  }
+  if (!status) adoption.kill_all();
+  const std::string line = last_line(process.written);
+  if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return new_event(kHookDone, line);
+  std::string why;
+  if (!status) {
+    why = fmt::format("no end within {:g} s, killed", hook.time_limit_s);
+  } else if (WIFEXITED(*status)) {
+    why = fmt::format("exit code {}", WEXITSTATUS(*status));
+  } else {
+    why = fmt::format("ended by signal {}", WTERMSIG(*status));
+  }
+  return failed(line.empty() ? why : why.append(": ").append(line));
+}
+
+bool hook_is_open(const RunRecord& record) {
+  const auto wanted = from_end(record, kHookWanted), done = from_end(record, kHookDone);
+  return wanted && (!done || *wanted < *done);
+}
+
+std::string hook_problem(const RunRecord& record) {
+  if (!hook_is_open(record)) return "";
+  const auto wanted = from_end(record, kHookWanted), failed = from_end(record, kHookFailed);
+  if (!failed || *wanted < *failed) return "was not run to its end";
+  return "failed: " + record.events[record.events.size() - 1 - std::size_t(*failed)].text;
+}
+
+HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)
+    : file_(spool / (".hook-" + run)) {
+  for (;;) {
+    descriptor_ = ::open(file_.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+    if (descriptor_ < 0) return;
+    // Where the file system has no locks, no other program holds one.
+    held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    // Who held it before may have taken the file away meanwhile.
+    if (!held_ || is_that(descriptor_, file_)) return;
+    ::close(descriptor_);
+  }
+}
+
+HookLock::~HookLock() {
+  if (descriptor_ < 0) return;
+  if (held_) ::unlink(file_.c_str());
+  ::close(descriptor_);
+}
+
+}  // namespace vlp

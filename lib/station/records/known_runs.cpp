@@ -1,0 +1,173 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/known_runs.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+
+#include "captures/printable.h"
+#include "rig/input_error.h"
+#include "station/database_name.h"
+#include "station/records/golden_due.h"
+#include "station/records/hook.h"
+#include "station/records/run_hooks.h"
+
+namespace vlp {
+namespace {
+
+bool passes(const RunRecord& run, const RunFilter& filter) {
+  const auto is = [](const std::string& text, const std::string& wanted) {
+    return wanted.empty() || text == wanted;
+  };
+  return is(run.camera, filter.camera) && is(run.station, filter.station) &&
+         is(run.verdict, filter.verdict) && is(run.kind, filter.kind) &&
+         run.ended_utc >= filter.since && (filter.until.empty() || run.ended_utc < filter.until);
+}
+
+}  // namespace
+
+KnownRuns::KnownRuns(StationConfig station) : station_(std::move(station)) {
+  spool_.emplace(station_->spool, station_->records);
+  spool_->deliver();
+  away_ = spool_->away();  // not waited for twice
+  if (away_.empty()) open(station_->records);
+  if (!away_.empty() && waiting().empty()) throw std::runtime_error(away_);
+}
+
+KnownRuns::KnownRuns(const std::string& records) {
+  open(records);
+  if (!away_.empty()) throw std::runtime_error(away_);
+}
+
+void KnownRuns::open(const std::string& where) {
+  try {
+    if (!is_server(where) && !std::filesystem::exists(where)) {
+      throw InputError(name_of_database(where), "there are no records");
+    }
+    records_.emplace(where);
+  } catch (const InputError& error) {
+    away_ = error.what();
+  }
+}
+
+std::vector<RunRecord> KnownRuns::waiting() {
+  return spool_ ? spool_->waiting() : std::vector<RunRecord>();
+}
+
+Records& KnownRuns::records() {
+  if (!records_) throw std::runtime_error(away_);
+  return *records_;
+}
+
+std::vector<RunSummary> KnownRuns::list(const RunFilter& filter) {
+  std::vector<RunSummary> runs;
+  // First, so that a run that another program brings there meanwhile is in one of the two.
+  const std::vector<RunRecord> waiting = this->waiting();
+  if (records_) runs = records_->list(filter);
+  for (const RunRecord& run : waiting) {
+    const RunEvent* event = voided(run);
+    const auto there = std::find_if(runs.begin(), runs.end(),
+                                    [&](const RunSummary& other) { return other.run == run.run; });
+    if (there != runs.end() && event != nullptr) there->voided = event->text;
+    if (there != runs.end() || !passes(run, filter)) continue;
+    runs.push_back({run.run, run.kind, run.station, run.camera, run.ended_utc, run.verdict,
+                    "(waits here) " + run.causes, event == nullptr ? "" : event->text});
+  }
+  std::stable_sort(runs.begin(), runs.end(), [](const RunSummary& a, const RunSummary& b) {
+    return std::tie(a.ended_utc, a.run) < std::tie(b.ended_utc, b.run);
+  });
+  return last_of(std::move(runs), filter.last);
+}
+
+RunRecord KnownRuns::find(const std::string& run) {
+  for (const RunRecord& waiting : this->waiting()) {
+    if (waiting.run == run) return waiting;
+  }
+  auto record = records().find(run);
+  if (!record) throw std::invalid_argument("there is no run " + run);
+  return *record;
+}
+
+RunRecord KnownRuns::last(const RunFilter& filter) {
+  const auto runs = list(filter);
+  if (runs.empty()) throw std::invalid_argument("there is no such run");
+  return find(runs.back().run);
+}
+
+std::vector<RunRecord> KnownRuns::whole(const RunFilter& filter) {
+  std::vector<RunRecord> runs;
+  for (const RunSummary& run : records().list(filter)) {
+    if (auto record = records().find(run.run)) runs.push_back(std::move(*record));
+  }
+  return runs;
+}
+
+std::vector<std::string> KnownRuns::with_open_hook() {
+  if (spool_) return spool_->with_open_hook(station_->station);
+  return records().with_open_hook("");
+}
+
+std::optional<double> RunCounts::yield() const {
+  if (units_judged == 0) return std::nullopt;
+  return static_cast<double>(units_passed) / static_cast<double>(units_judged);
+}
+
+RunCounts count_runs(std::span<const RunSummary> runs) {
+  RunCounts counts;
+  for (const RunSummary& run : runs) {
+    if (!run.voided.empty()) {
+      ++counts.voided;
+      continue;
+    }
+    const bool passed = run.verdict == name_of(Verdict::pass);
+    const bool failed = run.verdict == name_of(Verdict::fail);
+    if (passed) ++counts.passed;
+    if (failed) ++counts.failed;
+    if (run.verdict == name_of(Verdict::invalid)) ++counts.invalid;
+    if (run.kind != "unit") continue;
+    if (passed) ++counts.units_passed;
+    if (passed || failed) ++counts.units_judged;
+  }
+  return counts;
+}
+
+Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
+                const std::string& reason) {
+  Voided result{known.find(run)};
+  RunRecord& record = result.run;
+  const auto& station = known.station();
+  const bool own = station && record.station == station->station;
+  std::optional<HookLock> lock;
+  if (own && station->hook) {
+    lock.emplace(known.spool()->folder(), record.run);
+    // Its end would be taken for that of the hook that is told of the voiding.
+    if (!lock->held()) {
+      throw InputError(record.run, "its hook is being run: void it when that has ended");
+    }
+    record = known.find(run);  // another may have voided it before the lock was had
+  }
+  if (const RunEvent* event = voided(record)) {
+    throw std::invalid_argument(
+        fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text));
+  }
+  const std::string who = printable(operator_name);
+  record.events.push_back(new_event(kVoided, printable(reason), who));
+  if (!station) {
+    known.records().keep(record);
+    return result;
+  }
+  Spool& spool = *known.spool();
+  if (lock) record.events.push_back(hook_wanted(*station->hook, who));
+  spool.keep(record);
+  if (own && record.kind == "golden") forget_golden(*station, record.run);
+  spool.deliver();
+  if (lock) result.problem = call_hook(*station->hook, record, *lock, spool);
+  return result;
+}
+
+}  // namespace vlp

@@ -1,0 +1,114 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/measuring_digest.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <initializer_list>
+#include <utility>
+
+#include "captures/digest.h"
+#include "rig/calibration_text.h"
+
+namespace vlp {
+namespace {
+
+/// Names and values, a line each: a number as the shortest text that is read as it again, a text
+/// with its length.
+class Lines {
+ public:
+  void add(const char* name, double value) { text_ += fmt::format("{} {}\n", name, value); }
+  void add(const char* name, const std::string& value) {
+    text_ += fmt::format("{} {}:{}\n", name, value.size(), value);
+  }
+  void add(const char* name, const std::optional<double>& value) {
+    if (value) add(name, *value);
+  }
+  void add(std::initializer_list<std::pair<const char*, double>> values) {
+    for (const auto& [name, value] : values) add(name, value);
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+void add_board(const Board& board, Lines& lines) {
+  lines.add("board", board.family);
+  lines.add("id_order", name_of(board.id_order));
+  lines.add({{"kind", static_cast<double>(board.kind)},
+             {"cols", board.cols},
+             {"rows", board.rows},
+             {"tag_size_m", board.tag_size_m},
+             {"tag_spacing", board.tag_spacing},
+             {"border_bits", board.border_bits},
+             {"corner_squares", board.corner_squares ? 1 : 0},
+             {"first_id", board.first_id},
+             {"square_size_m", board.square_size_m},
+             {"top_left_white", board.top_left_white ? 1 : 0}});
+}
+
+void add_lamps(LampMap map, Lines& lines) {
+  std::sort(map.lamps.begin(), map.lamps.end(),
+            [](const Lamp& a, const Lamp& b) { return a.id < b.id; });
+  for (const Lamp& lamp : map.lamps) {
+    lines.add({{"lamp", lamp.id},
+               {"x_m", lamp.position_m.x()},
+               {"y_m", lamp.position_m.y()},
+               {"z_m", lamp.position_m.z()}});
+    lines.add("diameter_m", lamp.diameter_m);
+    lines.add("frequency_hz", lamp.frequency_hz);
+    lines.add("duty", lamp.duty);
+    lines.add("sd_m", lamp.sd_m);
+    if (!lamp.rectangle) continue;
+    lines.add({{"length_m", lamp.rectangle->size_m.x()},
+               {"width_m", lamp.rectangle->size_m.y()},
+               {"yaw_rad", lamp.rectangle->yaw_rad}});
+  }
+}
+
+void add_gates(const std::vector<Gate>& gates, Lines& lines) {
+  for (const Gate& gate : gates) {
+    lines.add("gate", gate.metric);
+    lines.add("limit", gate.limit);
+    if (!gate.guard) continue;
+    lines.add({{"u", gate.guard->standard_uncertainty}, {"k", gate.guard->k}});
+  }
+}
+
+}  // namespace
+
+std::string measuring_digest(const StationConfig& config) {
+  Lines lines;
+  Calibration type;
+  type.camera = config.type;
+  lines.add("camera_type", calibration_text(type));
+  add_board(config.board, lines);
+  add_lamps(config.lamps, lines);
+  if (const auto& place_m = config.dispersion_station_m) {
+    lines.add({{"station_x_m", place_m->x()}, {"station_y_m", place_m->y()}});
+  }
+  const StationEnough& enough = config.enough;
+  lines.add({{"board_views", enough.board_views},
+             {"board_coverage", enough.board_coverage},
+             {"turn_captures", enough.turn_captures},
+             {"turn_heights", enough.turn_heights},
+             {"turn_arc_rad", enough.turn_arc_rad},
+             {"dispersion_captures", enough.dispersion_captures},
+             {"check_captures", enough.check_captures}});
+  const StationRefusal& refuse = config.refuse;
+  lines.add({{"blur_px", refuse.blur_px},
+             {"dark_share", refuse.dark_share},
+             {"same_pose_share", refuse.same_pose_share},
+             {"in_a_row", refuse.in_a_row}});
+  add_gates(config.gates, lines);
+  if (const auto& golden = config.golden) {
+    lines.add("golden", golden->camera_id);
+    lines.add("calibration", calibration_text(golden->calibration));
+    add_gates(golden->gates, lines);
+  }
+  return sha256_of_text(lines.text());
+}
+
+}  // namespace vlp

@@ -1,0 +1,168 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/record_tables.h"
+
+#include <array>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "station/records/run_record.h"
+#include "station/records/trail.h"
+
+namespace vlp {
+namespace {
+
+constexpr const char* kFigures =  // gate: no limit is no gate; guard_k: none is no guard band
+    "CREATE TABLE IF NOT EXISTS figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
+    "place INTEGER NOT NULL, name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, "
+    "gate DOUBLE PRECISION, at_least INTEGER NOT NULL, met INTEGER NOT NULL, "
+    "unit VARCHAR(16) NOT NULL DEFAULT '', uncertainty DOUBLE PRECISION, "
+    "guard_k DOUBLE PRECISION, PRIMARY KEY (run, name))";
+
+constexpr const char* kImages =
+    "CREATE TABLE IF NOT EXISTS images (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
+    "step VARCHAR(16) NOT NULL, image VARCHAR(255) NOT NULL, sha256 TEXT NOT NULL, "
+    "refused TEXT NOT NULL, PRIMARY KEY (run, step, image))";
+
+constexpr const char* kImagesByDigest =
+    "CREATE INDEX IF NOT EXISTS images_by_sha256 ON images (sha256)";
+
+constexpr const char* kEvents =
+    "CREATE TABLE IF NOT EXISTS events (event VARCHAR(64) PRIMARY KEY, "
+    "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
+    "text TEXT NOT NULL, who TEXT NOT NULL DEFAULT '')";
+
+constexpr const char* kEventsByRun = "CREATE INDEX IF NOT EXISTS events_by_run ON events (run)";
+
+/// Refers to no run, so that it tells of one that was removed.
+constexpr const char* kTrail =
+    "CREATE TABLE IF NOT EXISTS trail (number BIGINT PRIMARY KEY, run VARCHAR(64) NOT NULL, "
+    "event VARCHAR(64) NOT NULL, content TEXT NOT NULL, digest TEXT NOT NULL)";
+
+std::vector<std::string> tables() {
+  std::string runs = "CREATE TABLE IF NOT EXISTS runs (run VARCHAR(64) PRIMARY KEY";
+  for (const RunField& field : run_fields().subspan(1)) {
+    runs.append(", ").append(field.name).append(" TEXT NOT NULL");
+  }
+  runs += ")";
+  return {"CREATE TABLE IF NOT EXISTS vlp_schema (version INTEGER PRIMARY KEY)",
+          runs,
+          kFigures,
+          kImages,
+          kEvents,
+          kEventsByRun,
+          kTrail,
+          "CREATE INDEX IF NOT EXISTS runs_by_camera ON runs (camera)",
+          kImagesByDigest};
+}
+
+/// Of the figures of version 1, which did not keep them. It stays as it is, whatever becomes of the
+/// figures.
+constexpr const char* kUnitsOfVersion1 =
+    "UPDATE figures SET unit = CASE "
+    "WHEN name IN ('blur_px', 'center_px', 'nominal_px', 'rms_px', 'uncertainty_px', 'halves_px', "
+    "'rotation_px', 'rotation_spread_px', 'rotation_sd_px', 'dispersion_offset_px', "
+    "'check_residual_px') THEN 'px' "
+    "WHEN name IN ('lever_arm_mm', 'dispersion_mm', 'world_mm', 'check_mean_mm', "
+    "'check_worst_mm', 'check_offset_mm', 'check_height_mm') THEN 'mm' "
+    "WHEN name = 'tilt_deg' THEN 'deg' WHEN name = 'focal_percent' THEN '%' ELSE '' END";
+
+void from_1_to_2(soci::session& sql) {
+  sql << "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT ''";
+  sql << kUnitsOfVersion1;
+}
+
+/// An older program, which counts what is INVALID as failed, is refused from here on.
+void from_2_to_3(soci::session& sql) { sql << kImagesByDigest; }
+
+/// Nor can an older program tell what gates with guard bands say.
+void from_3_to_4(soci::session& sql) {
+  sql << "ALTER TABLE figures ADD COLUMN uncertainty DOUBLE PRECISION";
+  sql << "ALTER TABLE figures ADD COLUMN guard_k DOUBLE PRECISION";
+}
+
+constexpr const char* kEventsOfVersion5 =
+    "CREATE TABLE IF NOT EXISTS events (event VARCHAR(64) PRIMARY KEY, "
+    "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
+    "text TEXT NOT NULL)";
+
+/// An older program would bring runs here without their events, and take them from the spool.
+void from_4_to_5(soci::session& sql) {
+  sql << kEventsOfVersion5;
+  sql << kEventsByRun;
+  sql << "ALTER TABLE runs ADD COLUMN operator_name TEXT NOT NULL DEFAULT ''";
+  sql << "ALTER TABLE runs ADD COLUMN shift TEXT NOT NULL DEFAULT ''";
+}
+
+/// An older program would keep runs without an entry in the trail.
+void from_5_to_6(soci::session& sql) {
+  sql << "ALTER TABLE events ADD COLUMN who TEXT NOT NULL DEFAULT ''";
+  sql << kTrail;
+}
+constexpr int kFirstWithTrail = 6;
+
+/// From each version to the next; the first is of version 1.
+constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4, from_4_to_5, from_5_to_6};
+static_assert(kMigrations.size() + 1 == kSchemaVersion);
+
+bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
+
+/// 0 without tables. Throws for a later version than this program's.
+int version_of(soci::session& sql) {
+  // Not to_regclass(): a connection that looked before remembers that there was no table, and may
+  // go on to say so to who waited for the lock while another made it.
+  const char* const look =
+      is_sqlite(sql)
+          ? "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'vlp_schema'"
+          : "SELECT COUNT(*) FROM pg_tables WHERE tablename = 'vlp_schema' AND "
+            "schemaname = ANY (current_schemas(false))";
+  int tables_there = 0, version = 0;
+  sql << look, soci::into(tables_there);
+  if (tables_there == 0) return 0;
+  sql << "SELECT COALESCE(MAX(version), 0) FROM vlp_schema", soci::into(version);
+  if (version <= kSchemaVersion) return version;
+  throw std::runtime_error("holds records of version " + std::to_string(version) +
+                           ", this program knows those up to " + std::to_string(kSchemaVersion) +
+                           ": use the newer vlp-station that wrote them");
+}
+
+}  // namespace
+
+bool has_record_tables(soci::session& sql) {
+  // Versions only grow. Without a lock, so that who may only read can.
+  return version_of(sql) == kSchemaVersion;
+}
+
+void make_record_tables(soci::session& sql) {
+  soci::transaction transaction(sql);
+  // One at a time, and who waited sees what the other did.
+  if (is_sqlite(sql)) {
+    // As a writer from the start: a reader who goes on to write may not wait for other writers.
+    sql << "COMMIT";
+    sql << "BEGIN IMMEDIATE";
+  } else {
+    // CREATE TABLE IF NOT EXISTS alone fails, in several ways, beside another of the same table.
+    sql << "SELECT pg_advisory_xact_lock(" + std::to_string(kLockOfTables) + ")";
+  }
+  if (version_of(sql) == 0) {
+    for (const std::string& table : tables()) sql << table;
+    sql << "INSERT INTO vlp_schema (version) SELECT CAST(:version AS INTEGER) WHERE NOT EXISTS "
+           "(SELECT 1 FROM vlp_schema)",
+        soci::use(kSchemaVersion);
+  }
+  // Waits for those who write already.
+  lock_trail(sql);
+  const int found = version_of(sql);
+  for (int version = found; version < kSchemaVersion; ++version) {
+    kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
+  }
+  // When all columns are there.
+  if (found < kFirstWithTrail) append_all(sql);
+  if (found < kSchemaVersion) {
+    sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchemaVersion);
+  }
+  transaction.commit();
+}
+
+}  // namespace vlp

@@ -1,0 +1,503 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/records.h"
+
+#include <fcntl.h>
+#include <soci/postgresql/soci-postgresql.h>
+#include <soci/sqlite3/soci-sqlite3.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <initializer_list>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "rig/input_error.h"
+#include "station/database_name.h"
+#include "station/records/record_tables.h"
+#include "station/records/run_rows.h"
+
+namespace vlp {
+namespace {
+
+/// What a connection has to be told each time that it is made.
+void set_up(soci::session& sql, int patience_s) {
+  if (sql.get_backend_name() == "postgresql") {
+    sql << "SET client_min_messages TO warning";
+    // Before this program gives up, so that the server says what it waits for.
+    constexpr int of_patience_ms = 900;
+    sql << "SET lock_timeout TO " + std::to_string(patience_s * of_patience_ms);
+    // One that stands still holds the trail for no longer than others wait for it.
+    sql << "SET idle_in_transaction_session_timeout TO " +
+               std::to_string(patience_s * of_patience_ms);
+    // Who waited for a lock sees what the other did.
+    sql << "SET SESSION CHARACTERISTICS AS TRANSACTION ISOLATION LEVEL READ COMMITTED";
+    // What is committed is on the disk, whatever the server is told to do otherwise.
+    sql << "SET synchronous_commit TO on";
+    return;
+  }
+  // What is committed is on the disk, its folder too: without it a power cut could bring the
+  // journal back and take a run away; a second connection sees runs whole.
+  sql << "PRAGMA synchronous = EXTRA";
+  sql << "PRAGMA foreign_keys = ON";
+}
+
+void open(soci::session& sql, const std::string& where) {
+  if (is_server(where)) {
+    sql.open(soci::postgresql, connection_of(where));
+  } else {
+    sql.open(soci::sqlite3,
+             "dbname=\"" + where + "\" timeout=" + std::to_string(patience_s(where)));
+  }
+}
+
+/// Whether another try may do: another program holds a lock, or the file cannot be opened or read.
+bool may_pass(const soci::soci_error& error) {
+  if (const auto* file = dynamic_cast<const soci::sqlite3_soci_error*>(&error)) {
+    constexpr int without_extension = 0xff;
+    const int result = file->result() & without_extension;
+    return result == SQLITE_BUSY || result == SQLITE_LOCKED || result == SQLITE_CANTOPEN ||
+           result == SQLITE_IOERR;
+  }
+  const auto* server = dynamic_cast<const soci::postgresql_soci_error*>(&error);
+  constexpr const char *lock_not_available = "55P03", *deadlock_detected = "40P01";
+  return server != nullptr &&
+         (server->sqlstate() == lock_not_available || server->sqlstate() == deadlock_detected);
+}
+
+/// Ends a connection on which nothing was heard for so long: libpq waits for the answer of a server
+/// that is frozen for ever, and what limits the server sets itself are frozen with it.
+class Watch {
+ public:
+  Watch(soci::session& sql, int patience_s) : patience_(patience_s) {
+    if (patience_s <= 0 || sql.get_backend_name() != "postgresql") return;
+    const auto* server = static_cast<soci::postgresql_session_backend*>(sql.get_backend());
+    // Of its own: libpq closes its socket when the connection is lost, and another may get the
+    // number.
+    socket_ = ::fcntl(PQsocket(server->conn_), F_DUPFD_CLOEXEC, 0);
+    if (socket_ >= 0) thread_ = std::thread([this] { wait(); });
+  }
+  ~Watch() {
+    if (socket_ < 0) return;
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+    ::close(socket_);
+  }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+
+  /// From now on again.
+  void heard() {
+    const std::lock_guard lock(mutex_);
+    last_ = Clock::now();
+  }
+  bool ended_it() {
+    const std::lock_guard lock(mutex_);
+    return ended_it_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void wait() {
+    std::unique_lock lock(mutex_);
+    while (!over_) {
+      const auto until = last_ + patience_;
+      if (Clock::now() >= until) {
+        ended_it_ = true;
+        ::shutdown(socket_, SHUT_RDWR);
+        return;
+      }
+      changed_.wait_until(lock, until);
+    }
+  }
+
+  std::chrono::seconds patience_;
+  Clock::time_point last_ = Clock::now();
+  bool over_ = false, ended_it_ = false;
+  int socket_ = -1;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::thread thread_;
+};
+
+}  // namespace
+
+struct Records::Database {
+  /// `name` is for messages.
+  std::string where, name;
+  int patience_s = 0;
+  soci::session sql;
+
+  /// Tables are there; from then on a connection that was lost is made again.
+  bool ready = false;
+
+  /// Why there is no connection. A server that took its time is not asked whether it is there.
+  RecordsAway not_connected(std::string what, std::chrono::steady_clock::time_point begun) const {
+    const std::string soci = "Cannot establish connection to the database. ";
+    if (what.starts_with(soci)) what.erase(0, soci.size());
+    constexpr std::chrono::seconds soon(2);
+    const bool refused = std::chrono::steady_clock::now() - begun < soon && answers(where);
+    return {name, (refused ? "the server of the records answers, but refuses 'records' as it is: "
+                           : "the server of the records cannot be reached: ") +
+                      what};
+  }
+
+  /// Errors name the database.
+  template <typename Action>
+  auto named(const Action& action) {
+    const auto begun = std::chrono::steady_clock::now();
+    try {
+      return action();
+    } catch (const InputError&) {
+      throw;
+    } catch (const soci::soci_error& error) {
+      std::string what = error.what();
+      std::replace_if(
+          what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+      if (name.starts_with("postgresql://") && !sql.is_connected())
+        throw not_connected(what, begun);
+      if (may_pass(error)) throw RecordsAway(name, "the records: " + what);
+      throw InputError(name, "the records: " + what);
+    } catch (const std::exception& error) {
+      throw InputError(name, error.what());
+    }
+  }
+
+  /// The action may be done twice. It takes the watch, to tell of what it hears in between.
+  template <typename Action>
+  auto run(const Action& action, int times_the_patience = 1) {
+    return named([&] {
+      try {
+        return watched(action, times_the_patience);
+      } catch (const soci::soci_error&) {
+        if (!ready || sql.is_connected()) throw;
+      }
+      // A unit takes its minutes: meanwhile the server was started anew, or the network fell
+      // asleep.
+      sql.reconnect();
+      return watched(
+          [&](Watch& watch) {
+            set_up(sql, patience_s);
+            watch.heard();
+            return action(watch);
+          },
+          times_the_patience);
+    });
+  }
+
+ private:
+  template <typename Action>
+  auto watched(const Action& action, int times_the_patience) {
+    Watch watch(sql, times_the_patience * patience_s);
+    try {
+      return action(watch);
+    } catch (const soci::soci_error&) {
+      if (!watch.ended_it()) throw;
+      throw RecordsAway(name, "the server of the records has not answered for " +
+                                  std::to_string(times_the_patience * patience_s) + " s");
+    }
+  }
+};
+
+namespace {
+
+/// Times the patience: the server gathers them before it sends the first.
+constexpr int kManyRows = 10;
+/// The same; an hour, where the patience is not said, for an index of all images there are.
+constexpr int kAllTables = 360;
+
+bool same_texts(const RunRecord& a, const RunRecord& b) {
+  const auto fields = run_fields();
+  return std::all_of(fields.begin(), fields.end(),
+                     [&](const RunField& field) { return a.*field.text == b.*field.text; });
+}
+
+void put_figures(soci::session& sql, const RunRecord& record, Watch& watch) {
+  int place = 0;
+  for (const CheckedMetric& figure : record.figures) {
+    const double value = figure.value.value_or(0), gate = figure.limit.value_or(0);
+    soci::indicator has_value = figure.value ? soci::i_ok : soci::i_null;
+    soci::indicator has_gate = figure.limit ? soci::i_ok : soci::i_null;
+    const auto [uncertainty, guard_k] = figure.guard.value_or(GuardBand{});
+    soci::indicator has_guard = figure.guard ? soci::i_ok : soci::i_null;
+    const int at_least = figure.asked == Direction::at_least ? 1 : 0, met = figure.met() ? 1 : 0;
+    ++place;
+    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit, uncertainty, "
+           "guard_k) VALUES (:run, :place, :name, :value, :gate, :at_least, :met, :unit, "
+           ":uncertainty, :guard_k)",
+        soci::use(record.run), soci::use(place), soci::use(figure.name),
+        soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least), soci::use(met),
+        soci::use(figure.unit), soci::use(uncertainty, has_guard), soci::use(guard_k, has_guard);
+    watch.heard();
+  }
+}
+
+void put_images(soci::session& sql, const RunRecord& record, Watch& watch) {
+  for (const auto& [step, name, sha256, refused] : record.images) {
+    sql << "INSERT INTO images (run, step, image, sha256, refused) VALUES (:run, :step, :image, "
+           ":sha256, :refused)",
+        soci::use(record.run), soci::use(step), soci::use(name), soci::use(sha256),
+        soci::use(refused);
+    watch.heard();
+  }
+}
+
+/// Those that are not kept yet; what they add to the trail.
+std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
+  std::vector<TrailContent> added;
+  for (const RunEvent& event : record.events) {
+    soci::statement insert =
+        (sql.prepare << "INSERT INTO events (event, run, what, text, who) VALUES (:event, :run, "
+                        ":what, :text, :who) ON CONFLICT (event) DO NOTHING",
+         soci::use(event.event), soci::use(record.run), soci::use(event.what),
+         soci::use(event.text), soci::use(event.who));
+    insert.execute(true);
+    if (insert.get_affected_rows() > 0) added.push_back(content_of_event(record.run, event));
+    watch.heard();
+  }
+  return added;
+}
+
+/// Of a run of a query.
+const std::string kNotVoided =
+    "NOT EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = 'voided')";
+
+std::string condition(const RunFilter& filter) {
+  std::string text = "WHERE 1 = 1";
+  if (!filter.camera.empty()) text += " AND runs.camera = :camera";
+  if (!filter.station.empty()) text += " AND runs.station = :station";
+  if (!filter.verdict.empty()) text += " AND runs.verdict = :verdict";
+  if (!filter.kind.empty()) text += " AND runs.kind = :kind";
+  if (!filter.since.empty()) text += " AND runs.ended_utc >= :since";
+  if (!filter.until.empty()) text += " AND runs.ended_utc < :until";
+  return text;
+}
+
+void bind(soci::statement& statement, const RunFilter& filter) {
+  for (const std::string* value : {&filter.camera, &filter.station, &filter.verdict, &filter.kind,
+                                   &filter.since, &filter.until}) {
+    if (!value->empty()) statement.exchange(soci::use(*value));
+  }
+}
+
+/// The rows that a query gives, each into the parts of `row`; `figure` is bound after the filter,
+/// unless it is empty.
+template <typename Row>
+std::vector<Row> rows_of(soci::session& sql, const std::string& query, const RunFilter& filter,
+                         const std::string& figure, std::initializer_list<std::string Row::*> texts,
+                         double Row::*value = nullptr) {
+  Row row;
+  std::vector<Row> rows;
+  soci::statement statement(sql);
+  for (std::string Row::*text : texts) statement.exchange(soci::into(row.*text));
+  if (value != nullptr) statement.exchange(soci::into(row.*value));
+  bind(statement, filter);
+  if (!figure.empty()) statement.exchange(soci::use(figure));
+  statement.alloc();
+  statement.prepare(query);
+  statement.define_and_bind();
+  statement.execute();
+  while (statement.fetch()) rows.push_back(row);
+  return last_of(std::move(rows), filter.last);
+}
+
+}  // namespace
+
+std::string utc_problem(const std::string& text) {
+  const std::string form = "0000-00-00T00:00:00Z";
+  constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};
+  bool good = std::find(lengths.begin(), lengths.end(), text.size()) != lengths.end();
+  for (std::size_t i = 0; good && i < text.size(); ++i) {
+    good = form[i] == '0' ? text[i] >= '0' && text[i] <= '9' : text[i] == form[i];
+  }
+  if (good) {
+    const auto at = [&](std::size_t begin) {
+      return static_cast<unsigned>(std::stoul(text.substr(begin, 2)));
+    };
+    constexpr std::size_t month = 5, day = 8, hour = 11, minute = 14, second = 17;
+    const std::chrono::year year(std::stoi(text.substr(0, 4)));
+    const auto below = [&](std::size_t begin, unsigned end) {
+      return text.size() < begin + 2 || at(begin) < end;
+    };
+    good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok() &&
+           below(hour, 24) && below(minute, 60) && below(second, 60);
+  }
+  return good ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
+}
+
+std::vector<double> values_of(std::span<const TrendPoint> points) {
+  std::vector<double> values;
+  values.reserve(points.size());
+  for (const TrendPoint& point : points) values.push_back(point.value);
+  return values;
+}
+
+Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
+  database_->where = where;
+  database_->name = name_of_database(where);
+  database_->patience_s = patience_s(where);
+  database_->named([&] { open(database_->sql, where); });
+  const bool are_there = database_->run([&](Watch& watch) {
+    set_up(database_->sql, database_->patience_s);
+    watch.heard();
+    return has_record_tables(database_->sql);
+  });
+  if (!are_there) database_->run([&](Watch&) { make_record_tables(database_->sql); }, kAllTables);
+  database_->ready = true;
+}
+
+Records::~Records() = default;
+
+void Records::keep(const RunRecord& record) {
+  database_->run([&](Watch& watch) {
+    soci::session& sql = database_->sql;
+    soci::transaction transaction(sql);
+    // Writes first, so that it waits for others before it has read anything.
+    soci::statement insert(sql);
+    std::string columns, places;
+    for (const auto& [name, text, label, in_csv] : run_fields()) {
+      columns.append(columns.empty() ? "" : ", ").append(name);
+      places.append(places.empty() ? ":" : ", :").append(name);
+      insert.exchange(soci::use(record.*text, name));
+    }
+    insert.alloc();
+    insert.prepare("INSERT INTO runs (" + columns + ") VALUES (" + places +
+                   ") ON CONFLICT (run) DO NOTHING");
+    insert.define_and_bind();
+    insert.execute(true);
+    watch.heard();
+    std::vector<TrailContent> added;
+    if (insert.get_affected_rows() > 0) {
+      put_figures(sql, record, watch);
+      put_images(sql, record, watch);
+      added.push_back(content_of_run(sql, record.run));
+    } else if (const auto kept = texts_of_run(sql, record.run);
+               !kept || !same_texts(*kept, record)) {
+      throw InputError(database_->name, "has another run " + record.run);
+    }
+    for (TrailContent& event : put_events(sql, record, watch)) added.push_back(std::move(event));
+    // Last: all stations that share the records wait for it.
+    append_to_trail(sql, added);
+    transaction.commit();
+  });
+}
+
+void Records::check_writable() {
+  database_->run([&](Watch&) {
+    soci::transaction transaction(database_->sql);
+    lock_trail(database_->sql);
+    transaction.rollback();
+  });
+}
+
+std::string Records::owner_of(const std::string& sha256, const std::string& other_than_camera) {
+  return database_->run([&](Watch&) {
+    std::string camera, run;
+    database_->sql << "SELECT runs.camera, runs.run FROM images JOIN runs ON runs.run = images.run "
+                      "WHERE images.sha256 = :sha256 AND images.refused = '' AND runs.camera <> "
+                      ":camera AND " +
+                          kNotVoided + " ORDER BY runs.run LIMIT 1",
+        soci::into(camera), soci::into(run), soci::use(sha256), soci::use(other_than_camera);
+    return run.empty() ? std::string() : "camera " + camera + ": run " + run;
+  });
+}
+
+std::string Records::golden_run_of(const std::string& sha256) {
+  return database_->run([&](Watch&) {
+    std::string run;
+    const std::string invalid = name_of(Verdict::invalid);
+    database_->sql << "SELECT runs.run FROM images JOIN runs ON runs.run = images.run WHERE "
+                      "images.sha256 = :sha256 AND images.refused = '' AND runs.kind = 'golden' "
+                      "AND runs.verdict <> :invalid ORDER BY runs.run LIMIT 1",
+        soci::into(run), soci::use(sha256), soci::use(invalid);
+    return run;
+  });
+}
+
+std::vector<std::string> Records::with_open_hook(const std::string& station) {
+  return database_->run(
+      [&](Watch&) {
+        std::string run;
+        std::vector<std::string> runs;
+        const std::string wanted = kHookWanted, done = kHookDone;
+        soci::statement open =
+            (database_->sql.prepare
+                 << "SELECT DISTINCT events.run FROM events JOIN runs ON runs.run = events.run "
+                    "WHERE events.what = :wanted AND (:station = '' OR runs.station = :of) AND NOT "
+                    "EXISTS (SELECT 1 FROM events ended WHERE ended.run = events.run AND "
+                    "ended.what = :done AND ended.event > events.event) ORDER BY events.run",
+             soci::into(run), soci::use(wanted), soci::use(station), soci::use(station),
+             soci::use(done));
+        open.execute();
+        while (open.fetch()) runs.push_back(run);
+        return runs;
+      },
+      kManyRows);
+}
+
+std::vector<RunSummary> Records::list(const RunFilter& filter) {
+  using Line = RunSummary;
+  const std::string query =
+      "SELECT run, kind, station, camera, ended_utc, verdict, causes, COALESCE((SELECT "
+      "MIN(events.text) FROM events WHERE events.run = runs.run AND events.what = 'voided'), '') "
+      "FROM runs " +
+      condition(filter) + " ORDER BY ended_utc, run";
+  return database_->run(
+      [&](Watch&) {
+        return rows_of<Line>(database_->sql, query, filter, "",
+                             {&Line::run, &Line::kind, &Line::station, &Line::camera,
+                              &Line::ended_utc, &Line::verdict, &Line::causes, &Line::voided});
+      },
+      kManyRows);
+}
+
+std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilter& filter) {
+  using Point = TrendPoint;
+  const std::string query =
+      "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
+      "FROM runs JOIN figures ON figures.run = runs.run " +
+      condition(filter) + " AND " + kNotVoided +
+      " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, runs.run";
+  return database_->run(
+      [&](Watch&) {
+        return rows_of<Point>(
+            database_->sql, query, filter, figure,
+            {&Point::run, &Point::station, &Point::camera, &Point::verdict, &Point::ended_utc},
+            &Point::value);
+      },
+      kManyRows);
+}
+
+std::optional<RunRecord> Records::find(const std::string& run) {
+  return database_->run([&](Watch&) { return rows_of_run(database_->sql, run); });
+}
+
+TrailCheck Records::check(const std::string& noted) {
+  return database_->run(
+      [&](Watch& watch) {
+        soci::session& sql = database_->sql;
+        soci::transaction transaction(sql);
+        // Of one moment, whatever others keep meanwhile; a transaction of SQLite is.
+        if (sql.get_backend_name() == "postgresql") {
+          sql << "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ";
+        }
+        TrailCheck found = check_trail(sql, noted, [&] { watch.heard(); });
+        transaction.rollback();
+        return found;
+      },
+      kManyRows);
+}
+
+}  // namespace vlp

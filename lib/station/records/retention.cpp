@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/retention.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <system_error>
+
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kRunLength = 33;  // of new_run()
+
+bool is_older(const std::string& utc, int days) {
+  constexpr double seconds_per_day = 86'400;
+  return seconds_since(utc) > days * seconds_per_day;  // not for what is no time
+}
+
+std::vector<fs::path> folders_in(const fs::path& folder) {
+  std::vector<fs::path> folders;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    std::error_code gone;
+    if (!entry->is_symlink(gone) && entry->is_directory(gone)) folders.push_back(entry->path());
+  }
+  std::sort(folders.begin(), folders.end());
+  return folders;
+}
+
+std::uintmax_t bytes_in(const fs::path& folder) {
+  std::uintmax_t bytes = 0;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(folder, error);
+       !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
+    std::error_code gone;
+    if (entry->is_symlink(gone) || !entry->is_regular_file(gone)) continue;
+    const auto size = entry->file_size(gone);
+    if (!gone) bytes += size;
+  }
+  return bytes;
+}
+
+/// A folder that is named by this camera and run.
+void add_if_expired(Retained& found, Records& records, const std::string& station,
+                    const fs::path& folder, const std::string& camera, const std::string& run,
+                    const char* what, int days) {
+  if (run.size() != kRunLength || !is_older(begun_utc(run), days)) return;
+  auto record = records.find(run);
+  if (!record || record->camera != camera) {
+    found.without_record.push_back(folder);
+  } else if (record->station == station && is_older(record->ended_utc, days)) {
+    found.expired.push_back({folder, what, days, bytes_in(folder), std::move(*record)});
+  }
+}
+
+void delete_content(const ExpiredFolder& expired) {
+  std::error_code error;
+  std::vector<fs::path> entries;
+  for (fs::directory_iterator entry(expired.folder, error);
+       !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    entries.push_back(entry->path());
+  }
+  for (auto entry = entries.begin(); !error && entry != entries.end(); ++entry) {
+    fs::remove_all(*entry, error);
+  }
+  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
+}
+
+void delete_folder(const ExpiredFolder& expired) {
+  std::error_code error;
+  fs::remove(expired.folder, error);
+  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
+}
+
+}  // namespace
+
+Retained look_for_expired(const StationConfig& config, Records& records) {
+  Retained found;
+  if (const auto& days = config.keep.images_days) {
+    for (const fs::path& folder : folders_in(config.captures)) {
+      const std::string name = folder.filename().string();
+      if (name.size() < kRunLength + 2) continue;
+      const std::size_t dot = name.size() - kRunLength - 1;
+      if (name[dot] != '.') continue;
+      add_if_expired(found, records, config.station, folder, name.substr(0, dot),
+                     name.substr(dot + 1), kImagesDeleted, *days);
+    }
+  }
+  if (const auto& days = config.keep.results_days) {
+    for (const fs::path& camera : folders_in(config.results)) {
+      for (const fs::path& folder : folders_in(camera)) {
+        add_if_expired(found, records, config.station, folder, camera.filename().string(),
+                       folder.filename().string(), kResultsDeleted, *days);
+      }
+    }
+  }
+  return found;
+}
+
+void delete_expired(const ExpiredFolder& expired, Spool& spool) {
+  delete_content(expired);
+  const auto& events = expired.run.events;
+  const bool told = std::any_of(events.begin(), events.end(),
+                                [&](const RunEvent& event) { return event.what == expired.what; });
+  if (!told) {
+    constexpr double megabyte = 1e6;
+    RunRecord run = expired.run;
+    run.events.push_back(new_event(
+        expired.what,
+        fmt::format("kept {} days, {:.1f} MB", expired.days, double(expired.bytes) / megabyte)));
+    spool.keep(run);
+  }
+  delete_folder(expired);
+}
+
+}  // namespace vlp

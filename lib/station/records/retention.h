@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "station/records/records.h"
+#include "station/records/spool.h"
+#include "station/station_config.h"
+
+namespace vlp {
+
+/// A folder of a run that is kept no longer.
+struct ExpiredFolder {
+  std::filesystem::path folder;
+  /// kImagesDeleted or kResultsDeleted, once it is.
+  const char* what;
+  /// As long as it is kept.
+  int days;
+  std::uintmax_t bytes;
+  RunRecord run;
+};
+
+struct Retained {
+  /// By name, images first.
+  std::vector<ExpiredFolder> expired;
+  /// As old, but of no run of the records: left.
+  std::vector<std::filesystem::path> without_record;
+};
+
+/// What of a station's runs is kept no longer, by StationConfig::keep and the end of each run as
+/// the records have it: images that were put away, CAPTURES/CAMERA.RUN, and results,
+/// RESULTS/CAMERA/RUN. What has another name, such as images that still arrive, is not looked at,
+/// nor are runs of other stations and symbolic links.
+Retained look_for_expired(const StationConfig& config, Records& records);
+
+/// Deletes the folder of a run; links are not followed. Its record tells of it as soon as nothing
+/// is in the folder, which goes last, so that a program that is killed before it has told of it
+/// finds the folder again. Throws InputError.
+void delete_expired(const ExpiredFolder& expired, Spool& spool);
+
+}  // namespace vlp

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/run_hooks.h"
+
+#include "rig/input_error.h"
+
+namespace vlp {
+
+std::string call_hook(const Hook& hook, RunRecord& record, const HookLock& lock, Spool& spool) {
+  std::string problem;
+  record.events.push_back(run_hook(hook, record, lock));
+  try {
+    spool.keep(record);
+  } catch (const InputError& error) {
+    problem = std::string("what became of the hook is not recorded: ") + error.what();
+  }
+  spool.deliver();
+  return problem;
+}
+
+HooksRun run_open_hooks(
+    const StationConfig& config, Spool& spool,
+    const std::function<void(const RunRecord& run, const std::string& outcome)>& tell) {
+  const auto runs = spool.with_open_hook(config.station);
+  HooksRun result{runs.size()};
+  for (const std::string& run : runs) {
+    const HookLock lock(spool.folder(), run);
+    auto record = spool.find(run);
+    // Another program may have done it meanwhile.
+    if (!record || !hook_is_open(*record)) continue;
+    if (!lock.held()) {
+      tell(*record, "is being run");
+      continue;
+    }
+    const std::string unrecorded = call_hook(*config.hook, *record, lock, spool);
+    const std::string problem = hook_problem(*record);
+    if (!problem.empty()) ++result.failed;
+    tell(*record, problem.empty() ? "done" : problem);
+    if (!unrecorded.empty()) tell(*record, unrecorded);
+  }
+  return result;
+}
+
+}  // namespace vlp

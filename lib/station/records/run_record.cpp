@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/run_record.h"
+
+#include <ceres/version.h>
+#include <fmt/core.h>
+#include <pwd.h>
+#include <unistd.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <ctime>
+#include <limits>
+#include <opencv2/core/utility.hpp>
+#include <random>
+
+#include "calibration/intrinsics/mrcal_files.h"
+#include "station/database_name.h"
+
+namespace vlp {
+namespace {
+
+std::string utc_of(std::time_t time, const char* format) {
+  std::tm parts{};
+  ::gmtime_r(&time, &parts);
+  char text[32];
+  return {text, std::strftime(text, sizeof text, format, &parts)};
+}
+
+/// By the one clock of this file: std::time() lags behind it by a tick of the kernel.
+std::time_t now_s() {
+  return std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+}
+
+std::string utc(const char* format) { return utc_of(now_s(), format); }
+
+/// The account that runs this program, and its machine.
+std::string account() {
+  const passwd* user = ::getpwuid(::geteuid());
+  return fmt::format("{}@{}", user != nullptr ? user->pw_name : std::to_string(::geteuid()),
+                     name_of_machine());
+}
+
+}  // namespace
+
+void RunRecord::judge(const std::vector<Cause>& why) {
+  verdict = name_of(verdict_of(why));
+  causes.clear();
+  for (const Cause& cause : why) causes.append(cause.text).append("\n");
+}
+
+const RunEvent* voided(const RunRecord& record) {
+  const auto event = std::find_if(record.events.begin(), record.events.end(),
+                                  [](const RunEvent& each) { return each.what == kVoided; });
+  return event == record.events.end() ? nullptr : &*event;
+}
+
+std::string why_no_verdict(const RunRecord& record) {
+  if (const RunEvent* event = voided(record)) {
+    return fmt::format("was voided by {}: {}", event->who, event->text);
+  }
+  if (!record.passed()) return "";
+  constexpr const char* words = "the record says PASS, but {}: it was changed by hand";
+  if (!record.causes.empty()) return fmt::format(words, "names a cause");
+  for (const CheckedMetric& figure : record.figures) {
+    if (figure.limit && !figure.met()) return fmt::format(words, words_of(figure));
+  }
+  return "";
+}
+
+std::string new_run() {
+  std::random_device random;
+  return utc("%Y%m%dT%H%M%SZ-") + fmt::format("{:08x}{:08x}", random(), random());
+}
+
+std::string begun_utc(const std::string& run) {
+  constexpr std::size_t length = 16;  // 20261121T134501Z
+  if (run.size() < length || run[8] != 'T' || run[15] != 'Z') return "";
+  return run.substr(0, 4) + "-" + run.substr(4, 2) + "-" + run.substr(6, 5) + ":" +
+         run.substr(11, 2) + ":" + run.substr(13, 3);
+}
+
+std::string RunEvent::utc() const { return begun_utc(event.substr(0, event.find('.')) + "Z"); }
+
+RunEvent new_event(const std::string& what, const std::string& text,
+                   const std::string& operator_name) {
+  std::random_device random;
+  using std::chrono::microseconds;
+  const auto now = std::chrono::time_point_cast<microseconds>(std::chrono::system_clock::now());
+  constexpr int of_a_second = 1'000'000;
+  const auto part = now.time_since_epoch().count() % of_a_second;
+  return {utc_of(std::chrono::system_clock::to_time_t(now), "%Y%m%dT%H%M%S") +
+              fmt::format(".{:06d}Z-{:08x}", part, random()),
+          what, text,
+          operator_name.empty() ? account() : fmt::format("{} ({})", operator_name, account())};
+}
+
+double seconds_since(const std::string& utc) {
+  std::tm parts{};
+  const char* end = ::strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  if (end == nullptr || *end != '\0') return std::numeric_limits<double>::quiet_NaN();
+  return std::difftime(now_s(), ::timegm(&parts));
+}
+
+std::string now_utc() { return utc("%Y-%m-%dT%H:%M:%SZ"); }
+
+std::string library_versions() {
+  return fmt::format("OpenCV {}, AprilTag {}, mrcal {}, Ceres {}, Eigen {}.{}.{}",
+                     cv::getVersionString(), VLP_APRILTAG_VERSION, mrcal_version(),
+                     CERES_VERSION_STRING, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
+                     EIGEN_MINOR_VERSION);
+}
+
+std::span<const RunField> run_fields() {
+  static constexpr std::array fields{
+      RunField{"run", &RunRecord::run, "run"},
+      RunField{"kind", &RunRecord::kind},
+      RunField{"station", &RunRecord::station, "station"},
+      RunField{"camera", &RunRecord::camera},
+      RunField{"operator_name", &RunRecord::operator_name, "operator"},
+      RunField{"shift", &RunRecord::shift, "shift"},
+      RunField{"begun_utc", &RunRecord::begun_utc, "begun"},
+      RunField{"ended_utc", &RunRecord::ended_utc, "ended"},
+      RunField{"verdict", &RunRecord::verdict},
+      RunField{"causes", &RunRecord::causes},
+      RunField{"program", &RunRecord::program, "program"},
+      RunField{"libraries", &RunRecord::libraries, "libraries", false},
+      RunField{"config_sha256", &RunRecord::config_sha256, "config"},
+      RunField{"calibration", &RunRecord::calibration, nullptr, false}};
+  return fields;
+}
+
+RunRecord new_record(const char* kind, const StationConfig& config, const std::string& camera,
+                     const std::string& run, const ProgramVersion& program) {
+  RunRecord record;
+  record.run = run;
+  record.kind = kind;
+  record.station = config.station;
+  record.camera = camera;
+  record.begun_utc = begun_utc(run);
+  record.ended_utc = now_utc();
+  record.program = program.program + " " + program.version;
+  record.libraries = library_versions();
+  record.config_sha256 = config.sha256;
+  return record;
+}
+
+}  // namespace vlp

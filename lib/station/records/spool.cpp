@@ -1,0 +1,395 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/spool.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "captures/printable.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "station/database_name.h"
+#include "station/records/hook.h"
+#include "station/records/json_number.h"
+#include "station/station_folders.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* kRunFormat = "vlp-run/1";
+constexpr const char* kRunEnding = ".json";
+constexpr std::size_t kMostRunBytes = 64 << 20;
+/// Of a run of hundreds of images, several times over.
+constexpr std::uintmax_t kRoom_bytes = 1'000'000;
+
+std::optional<double> number_if_any(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
+}
+
+std::optional<GuardBand> guard_if_any(const Json& figure) {
+  if (!figure.contains("guard_k")) return std::nullopt;
+  return GuardBand{figure.at("uncertainty").get<double>(), figure.at("guard_k").get<double>()};
+}
+
+SpooledRun run_from(const Json& json) {
+  if (json.at("format").get<std::string>() != kRunFormat)
+    throw std::runtime_error("another format");
+  SpooledRun spooled;
+  json.at("records").get_to(spooled.records);
+  RunRecord& run = spooled.run;
+  for (const RunField& field : run_fields()) {
+    run.*field.text = json.value(field.name, std::string());
+  }
+  if (run.run.empty() || run.verdict.empty()) throw std::runtime_error("no run, or no verdict");
+  for (const Json& figure : json.at("figures")) {
+    run.figures.push_back(
+        {figure.at("name").get<std::string>(), figure.at("unit").get<std::string>(),
+         number_if_any(figure.at("value")), number_if_any(figure.at("gate")),
+         figure.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
+         guard_if_any(figure)});
+  }
+  for (const Json& image : json.at("images")) {
+    run.images.push_back({image.at("step").get<std::string>(), image.at("image").get<std::string>(),
+                          image.at("sha256").get<std::string>(),
+                          image.at("refused").get<std::string>()});
+  }
+  for (const Json& event : json.value("events", Json::array())) {
+    run.events.push_back({event.at("event").get<std::string>(), event.at("what").get<std::string>(),
+                          event.at("text").get<std::string>(), event.value("who", std::string())});
+  }
+  return spooled;
+}
+
+/// With another event another file: programs that bring the one before to the records take away no
+/// other.
+fs::path file_of_run(const fs::path& folder, const RunRecord& run) {
+  const std::string last = run.events.empty() ? "" : "." + run.events.back().event;
+  return folder / (run.run + last + kRunEnding);
+}
+
+/// The run of several files, with the events of all.
+void add_run(std::vector<RunRecord>& runs, const RunRecord& run) {
+  if (runs.empty() || runs.back().run != run.run) {
+    runs.push_back(run);
+    return;
+  }
+  std::vector<RunEvent>& events = runs.back().events;
+  for (const RunEvent& event : run.events) {
+    const auto at =
+        std::lower_bound(events.begin(), events.end(), event,
+                         [](const RunEvent& a, const RunEvent& b) { return a.event < b.event; });
+    if (at == events.end() || at->event != event.event) events.insert(at, event);
+  }
+}
+
+std::vector<fs::path> entries_of(const fs::path& folder, std::error_code& error) {
+  std::vector<fs::path> entries;
+  fs::directory_iterator entry(folder, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    entries.push_back(entry->path());
+  }
+  return entries;
+}
+
+/// Temporary files of programs that were killed, a day ago or longer: nobody writes them any more.
+void remove_left_over(const fs::path& folder) {
+  constexpr std::chrono::hours a_day(24);
+  std::error_code error;
+  for (const fs::path& file : entries_of(folder, error)) {
+    const std::string name = file.filename().string();
+    if (!name.starts_with('.') || name.find(".json.tmp-") == std::string::npos) continue;
+    const auto written = fs::last_write_time(file, error);
+    if (!error && fs::file_time_type::clock::now() - written > a_day) fs::remove(file, error);
+  }
+}
+
+bool uses(const RunRecord& run, const std::string& sha256) {
+  return std::any_of(run.images.begin(), run.images.end(), [&](const RunRecord::Image& image) {
+    return image.sha256 == sha256 && image.refused.empty();
+  });
+}
+
+}  // namespace
+
+std::string text_of_run(const SpooledRun& spooled) {
+  const RunRecord& run = spooled.run;
+  Json json;
+  json["format"] = kRunFormat;
+  json["records"] = printable(spooled.records);
+  for (const RunField& field : run_fields()) json[field.name] = printable(run.*field.text);
+  json["figures"] = Json::array();
+  for (const CheckedMetric& figure : run.figures) {
+    json["figures"].push_back({{"name", figure.name},
+                               {"unit", figure.unit},
+                               {"value", number_or_null(figure.value)},
+                               {"gate", number_or_null(figure.limit)},
+                               {"at_least", figure.asked == Direction::at_least}});
+    if (!figure.guard) continue;
+    json["figures"].back()["uncertainty"] = figure.guard->standard_uncertainty;
+    json["figures"].back()["guard_k"] = figure.guard->k;
+  }
+  json["images"] = Json::array();
+  for (const auto& [step, name, sha256, refused] : run.images) {
+    json["images"].push_back({{"step", step},
+                              {"image", printable(name)},
+                              {"sha256", sha256},
+                              {"refused", printable(refused)}});
+  }
+  json["events"] = Json::array();
+  for (const RunEvent& event : run.events) {
+    json["events"].push_back({{"event", event.event},
+                              {"what", event.what},
+                              {"text", printable(event.text)},
+                              {"who", printable(event.who)}});
+  }
+  constexpr int indent = 1;
+  return json.dump(indent) + "\n";
+}
+
+SpooledRun read_run(const fs::path& file) {
+  const std::string text = read_text_file(file, kMostRunBytes);
+  try {
+    return run_from(Json::parse(text));
+  } catch (const std::exception& error) {
+    throw InputError(file, std::string("is no run of a station: ") + error.what());
+  }
+}
+
+Spool::Spool(fs::path folder, std::string records)
+    : folder_(std::move(folder)),
+      where_(std::move(records)),
+      name_(printable(identity_of_database(where_))) {}
+
+Spool::~Spool() = default;
+
+void Spool::open() {
+  if (records_) return;
+  std::error_code none;
+  if (!is_server(where_) && !fs::exists(where_, none)) {
+    throw RecordsAway(where_, "there are no records");
+  }
+  records_ = std::make_unique<Records>(where_);
+}
+
+/// Why it was not done; empty when it was.
+template <typename Action>
+std::string Spool::ask(const Action& action) {
+  try {
+    open();
+    action(*records_);
+    away_.clear();
+    return "";
+  } catch (const RecordsAway& error) {
+    put_off(error.what());
+    return error.what();
+  } catch (const InputError& error) {
+    if (!records_) {
+      put_off(error.what());
+    } else {
+      away_.clear();
+    }
+    return error.what();
+  }
+}
+
+bool Spool::may_ask() const { return Clock::now() >= ask_again_; }
+
+void Spool::put_off(const std::string& why) {
+  constexpr std::chrono::minutes a_while(1);
+  ask_again_ = Clock::now() + a_while;
+  away_ = why;
+}
+
+void Spool::prepare() {
+  check_room(folder_, kRoom_bytes);
+  remove_left_over(folder_);
+  try {
+    if (!records_) records_ = std::make_unique<Records>(where_);
+  } catch (const RecordsAway& error) {
+    return put_off(error.what());
+  }
+  problem_ = ask([](Records& records) { records.check_writable(); });
+  if (problem_.empty()) deliver();
+}
+
+void Spool::keep(const RunRecord& run) {
+  try {
+    make_folder(folder_);
+    const fs::path file = file_of_run(folder_, run);
+    known_.erase(file);  // another, maybe, of the same name
+    write_file(file, text_of_run({run, name_}));
+  } catch (const InputError& error) {
+    const std::string refused = ask([&](Records& records) { records.keep(run); });
+    if (refused.empty()) return;
+    throw InputError(folder_,
+                     fmt::format("neither here can a run be kept ({}) nor in the records ({})",
+                                 error.what(), refused));
+  }
+}
+
+void Spool::deliver() {
+  constexpr std::chrono::seconds long_enough(10);
+  const auto begun = Clock::now();
+  if (!may_ask()) return;
+  problem_.clear();
+  for (const fs::path& file : files()) {
+    if (Clock::now() - begun > long_enough) {
+      if (problem_.empty()) problem_ = "there are many, the rest goes with the next run";
+      return;
+    }
+    std::error_code gone;
+    SpooledRun spooled;
+    try {
+      spooled = read_run(file);
+    } catch (const InputError&) {  // state() tells of it
+      continue;
+    }
+    if (spooled.records != name_) continue;
+    const std::string refused = ask([&](Records& records) { records.keep(spooled.run); });
+    if (!away_.empty()) return;
+    if (refused.empty()) {
+      fs::remove(file, gone);
+      if (gone) problem_ = file.string() + ": cannot be removed: " + gone.message();
+    } else {
+      problem_ = refused;
+    }
+  }
+}
+
+std::string Spool::state() {
+  read();
+  const std::string& why = away_.empty() ? problem_ : away_;
+  std::set<std::string> waiting, others;
+  std::string other_records;
+  for (const auto& [file, spooled] : known_) {
+    if (spooled.records == name_) {
+      waiting.insert(spooled.run.run);
+    } else {
+      others.insert(spooled.run.run);
+      other_records = spooled.records;
+    }
+  }
+  std::vector<std::string> said;
+  if (!waiting.empty()) {
+    said.push_back(
+        fmt::format("kept here, {} waiting{}{}", waiting.size(), why.empty() ? "" : ": ", why));
+  } else if (!why.empty()) {
+    said.push_back("runs are kept here: " + why);
+  }
+  if (!others.empty()) {
+    said.push_back(
+        fmt::format("{} here for other records, such as {}", others.size(), other_records));
+  }
+  if (!unread_.empty()) said.push_back(unread_);
+  if (not_asked_ > 0) {
+    said.push_back(fmt::format("{} images were not looked up in the records", not_asked_));
+  }
+  return fmt::format("{}", fmt::join(said, "; "));
+}
+
+std::vector<fs::path> Spool::files() {
+  std::error_code error;
+  std::vector<fs::path> files = entries_of(folder_, error);
+  if (error && error != std::errc::no_such_file_or_directory) {
+    problem_ = folder_.string() + ": cannot be read: " + error.message();
+  }
+  std::erase_if(files, [](const fs::path& file) {
+    // Not the temporary file of one that is being written.
+    return file.extension() != kRunEnding || file.filename().string().starts_with('.');
+  });
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+void Spool::read() {
+  const auto files = this->files();
+  std::erase_if(known_, [&](const auto& known) {
+    return !std::binary_search(files.begin(), files.end(), known.first);
+  });
+  unread_.clear();
+  for (const fs::path& file : files) {
+    if (known_.contains(file)) continue;
+    try {
+      known_.emplace(file, read_run(file));
+    } catch (const InputError& error) {
+      // Another program may have brought it to the records.
+      std::error_code gone;
+      if (fs::exists(file, gone)) unread_ = error.what();
+    }
+  }
+}
+
+std::vector<RunRecord> Spool::waiting() {
+  read();
+  std::vector<RunRecord> runs;
+  for (const auto& [file, spooled] : known_) {
+    if (spooled.records == name_) add_run(runs, spooled.run);
+  }
+  return runs;
+}
+
+std::optional<RunRecord> Spool::find(const std::string& run) {
+  read();
+  std::vector<RunRecord> here;
+  for (const auto& [file, spooled] : known_) {
+    if (spooled.run.run == run) add_run(here, spooled.run);
+  }
+  if (!here.empty()) return here.front();
+  std::optional<RunRecord> found;
+  if (may_ask()) ask([&](Records& records) { found = records.find(run); });
+  return found;
+}
+
+std::vector<std::string> Spool::with_open_hook(const std::string& station) {
+  std::vector<std::string> kept;
+  if (may_ask()) ask([&](Records& records) { kept = records.with_open_hook(station); });
+  std::set<std::string> runs(kept.begin(), kept.end());
+  for (const RunRecord& run : waiting()) {
+    if (!station.empty() && run.station != station) continue;
+    // What waits is newer.
+    if (hook_is_open(run)) {
+      runs.insert(run.run);
+    } else {
+      runs.erase(run.run);
+    }
+  }
+  return {runs.begin(), runs.end()};
+}
+
+std::string Spool::owner_of(const std::string& sha256, const std::string& other_than_camera) {
+  read();
+  for (const auto& [file, spooled] : known_) {
+    const RunRecord& run = spooled.run;
+    if (run.camera != other_than_camera && uses(run, sha256) && voided(run) == nullptr) {
+      return "camera " + run.camera + ": run " + run.run;
+    }
+  }
+  std::string owner;
+  const auto look = [&](Records& records) { owner = records.owner_of(sha256, other_than_camera); };
+  if (!may_ask() || !ask(look).empty()) ++not_asked_;
+  return owner;
+}
+
+std::string Spool::golden_run_of(const std::string& sha256) {
+  read();
+  for (const auto& [file, spooled] : known_) {
+    const RunRecord& run = spooled.run;
+    if (run.kind == "golden" && !run.invalid() && uses(run, sha256)) return run.run;
+  }
+  std::string run;
+  const auto look = [&](Records& records) { run = records.golden_run_of(sha256); };
+  if (!may_ask() || !ask(look).empty()) ++not_asked_;
+  return run;
+}
+
+}  // namespace vlp

@@ -1,0 +1,242 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/trail.h"
+
+#include <fmt/format.h>
+#include <soci/soci.h>
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "captures/digest.h"
+#include "station/records/run_rows.h"
+
+namespace vlp {
+namespace {
+
+/// Texts one after another, so that none can be taken for a part of another.
+class Digested {
+ public:
+  void add(std::string_view text) { text_ += fmt::format("{} {}\n", text.size(), text); }
+  /// To the last bit, and in the same digits by every program.
+  void add(double number) { add(fmt::format("{:.17g}", number)); }
+  std::string sha256() const { return sha256_of_text(text_); }
+
+ private:
+  std::string text_;
+};
+
+/// Without its events, which have entries of their own. A text that is empty is left out: one that
+/// a later version of the tables adds changes nothing.
+std::string digest_of(const RunRecord& run) {
+  Digested content;
+  for (const RunField& field : run_fields()) {
+    if ((run.*field.text).empty()) continue;
+    content.add(field.name);
+    content.add(run.*field.text);
+  }
+  for (const CheckedMetric& figure : run.figures) {
+    content.add("figure");
+    content.add(figure.name);
+    content.add(figure.unit);
+    content.add(figure.asked == Direction::at_least ? "at least" : "at most");
+    if (figure.value) content.add(*figure.value);
+    if (figure.limit) {
+      content.add("gate");
+      content.add(*figure.limit);
+    }
+    if (!figure.guard) continue;
+    content.add("guard");
+    content.add(figure.guard->standard_uncertainty);
+    content.add(figure.guard->k);
+  }
+  // Each database sorts names in its own way.
+  auto images = run.images;
+  std::sort(images.begin(), images.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.step, a.name) < std::tie(b.step, b.name);
+  });
+  for (const auto& [step, name, sha256, refused] : images) {
+    content.add("image");
+    for (const std::string* text : {&step, &name, &sha256, &refused}) content.add(*text);
+  }
+  return content.sha256();
+}
+
+std::string digest_of(const std::string& run, const RunEvent& event) {
+  Digested content;
+  for (const std::string* text : {&run, &event.event, &event.what, &event.who, &event.text}) {
+    content.add(*text);
+  }
+  return content.sha256();
+}
+
+struct Entry {
+  long long number = 0;
+  /// `event` is empty where the entry is of the run.
+  std::string run, event, content, digest;
+};
+
+std::string digest_of(const Entry& entry, const std::string& before) {
+  Digested digest;
+  digest.add(std::to_string(entry.number));
+  for (const std::string* text : {&entry.run, &entry.event, &entry.content, &before}) {
+    digest.add(*text);
+  }
+  return digest.sha256();
+}
+
+std::vector<Entry> entries_of(soci::session& sql) {
+  Entry entry;
+  std::vector<Entry> entries;
+  soci::statement all =
+      (sql.prepare << "SELECT number, run, event, content, digest FROM trail ORDER BY number",
+       soci::into(entry.number), soci::into(entry.run), soci::into(entry.event),
+       soci::into(entry.content), soci::into(entry.digest));
+  all.execute();
+  while (all.fetch()) entries.push_back(entry);
+  return entries;
+}
+
+std::vector<std::string> names_of_runs(soci::session& sql) {
+  std::string run;
+  std::vector<std::string> runs;
+  soci::statement all =
+      (sql.prepare << "SELECT run FROM runs ORDER BY ended_utc, run", soci::into(run));
+  all.execute();
+  while (all.fetch()) runs.push_back(run);
+  return runs;
+}
+
+std::string words_for(const std::string& run, const std::string& event) {
+  return event.empty() ? "run " + run : fmt::format("event {} of run {}", event, run);
+}
+
+/// What of the trail itself does not fit.
+void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& problems) {
+  long long next = 1;
+  // As the entry before has it, and as it should be: of two entries only the one that was changed
+  // is named.
+  std::string before, should_be;
+  for (const Entry& entry : entries) {
+    const bool gap = entry.number != next;
+    if (gap) {
+      problems.push_back(
+          entry.number - next == 1
+              ? fmt::format("entry {} of the trail was removed", next)
+              : fmt::format("entries {} to {} of the trail were removed", next, entry.number - 1));
+    }
+    const std::string digest = digest_of(entry, before);
+    if (!gap && digest != entry.digest && digest_of(entry, should_be) != entry.digest) {
+      problems.push_back(fmt::format("entry {} of the trail, of {}, was changed", entry.number,
+                                     words_for(entry.run, entry.event)));
+    }
+    before = entry.digest;
+    should_be = digest;
+    next = entry.number + 1;
+  }
+}
+
+/// The contents that entries tell of, by run and event; what is found is taken out.
+class Contents {
+ public:
+  Contents(const std::vector<Entry>& entries, std::vector<std::string>& problems)
+      : problems_(problems) {
+    for (const Entry& entry : entries) {
+      if (entries_.emplace(std::pair(entry.run, entry.event), entry.content).second) continue;
+      problems_.push_back(fmt::format("entry {} of the trail was added: {} has one already",
+                                      entry.number, words_for(entry.run, entry.event)));
+    }
+  }
+  void check(const std::string& run, const std::string& event, const std::string& content) {
+    const auto entry = entries_.find({run, event});
+    if (entry == entries_.end()) {
+      problems_.push_back(words_for(run, event) +
+                          " has no entry in the trail: it was added by hand");
+      return;
+    }
+    if (entry->second != content) problems_.push_back(words_for(run, event) + " was changed");
+    entries_.erase(entry);
+  }
+  /// Those that were not found.
+  void end() {
+    for (const auto& [name, content] : entries_) {
+      problems_.push_back(words_for(name.first, name.second) + " was removed");
+    }
+  }
+
+ private:
+  std::map<std::pair<std::string, std::string>, std::string> entries_;
+  std::vector<std::string>& problems_;
+};
+
+}  // namespace
+
+void lock_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
+
+TrailContent content_of_run(soci::session& sql, const std::string& run) {
+  // As the database has it: it may keep a number in another way than it was given.
+  return {run, "", digest_of(rows_of_run(sql, run).value())};
+}
+
+TrailContent content_of_event(const std::string& run, const RunEvent& event) {
+  return {run, event.event, digest_of(run, event)};
+}
+
+void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents) {
+  if (contents.empty()) return;
+  lock_trail(sql);
+  Entry last;
+  sql << "SELECT number, digest FROM trail ORDER BY number DESC LIMIT 1", soci::into(last.number),
+      soci::into(last.digest);
+  for (const auto& [run, event, content] : contents) {
+    Entry entry{last.number + 1, run, event, content, ""};
+    entry.digest = digest_of(entry, last.digest);
+    sql << "INSERT INTO trail (number, run, event, content, digest) VALUES (:number, :run, :event, "
+           ":content, :digest)",
+        soci::use(entry.number), soci::use(entry.run), soci::use(entry.event),
+        soci::use(entry.content), soci::use(entry.digest);
+    last = entry;
+  }
+}
+
+void append_all(soci::session& sql) {
+  std::vector<TrailContent> contents;
+  for (const std::string& run : names_of_runs(sql)) {
+    contents.push_back(content_of_run(sql, run));
+    const RunRecord kept = rows_of_run(sql, run).value();
+    for (const RunEvent& event : kept.events) contents.push_back(content_of_event(run, event));
+  }
+  append_to_trail(sql, contents);
+}
+
+TrailCheck check_trail(soci::session& sql, const std::string& noted,
+                       const std::function<void()>& heard) {
+  TrailCheck check;
+  const auto entries = entries_of(sql);
+  check.entries = entries.size();
+  if (!entries.empty()) check.last_digest = entries.back().digest;
+  check_chain(entries, check.problems);
+  heard();
+  Contents contents(entries, check.problems);
+  for (const std::string& name : names_of_runs(sql)) {
+    const RunRecord run = rows_of_run(sql, name).value();
+    ++check.runs;
+    contents.check(name, "", digest_of(run));
+    for (const RunEvent& event : run.events) {
+      contents.check(name, event.event, digest_of(name, event));
+    }
+    heard();
+  }
+  contents.end();
+  const bool there = std::any_of(entries.begin(), entries.end(),
+                                 [&](const Entry& entry) { return entry.digest == noted; });
+  if (!noted.empty() && !there) {
+    check.problems.push_back("the entry that was noted, " + noted +
+                             ", is not in the trail: its end was removed, or all of it is another");
+  }
+  return check;
+}
+
+}  // namespace vlp

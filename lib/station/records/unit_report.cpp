@@ -1,0 +1,69 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/unit_report.h"
+
+#include <algorithm>
+#include <sstream>
+
+#include "captures/number_text.h"
+#include "report/report.h"
+
+namespace vlp {
+namespace {
+
+ReportVerdict box_of(const RunRecord& record) {
+  using Look = ReportVerdict::Look;
+  const std::string no_verdict = why_no_verdict(record);
+  ReportVerdict verdict{record.verdict,
+                        record.passed()    ? Look::pass
+                        : record.invalid() ? Look::none
+                                           : Look::fail,
+                        {}};
+  if (!no_verdict.empty()) verdict = {"NO VERDICT", Look::none, {no_verdict}};
+  std::istringstream causes(record.causes);
+  for (std::string cause; std::getline(causes, cause);) verdict.causes.push_back(cause);
+  return verdict;
+}
+
+std::string meaning_of(const CheckedMetric& figure) {
+  const auto kind = metric_kind(figure.name);
+  return kind ? kind->meaning : "a figure of another version of the program";
+}
+
+}  // namespace
+
+std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration,
+                        const std::vector<ReportPicture>& pictures) {
+  Report report;
+  report.title = "Camera " + record.camera + " on " + record.station;
+  report.verdict = box_of(record);
+  constexpr int digits = 4;
+  for (const CheckedMetric& figure : record.figures) {
+    const std::string name = figure.name + ": " + meaning_of(figure);
+    if (figure.limit) {
+      report.gates.push_back(figure);
+      report.gates.back().name = name;
+    } else if (figure.value) {
+      report.figures.push_back({name, significant(*figure.value, digits), figure.unit, ""});
+    }
+  }
+  for (const auto& [step, image, sha256, refused] : record.images) {
+    if (refused.empty()) continue;
+    std::string where = step;
+    report.refused.push_back({where.append("/").append(image), refused});
+  }
+  const auto used = std::count_if(record.images.begin(), record.images.end(),
+                                  [](const auto& image) { return image.refused.empty(); });
+  std::string who;
+  if (!record.operator_name.empty()) who += ", operator " + record.operator_name;
+  if (!record.shift.empty()) who += ", shift " + record.shift;
+  report.notes.push_back("Run " + record.run + ", ended " + record.ended_utc + who + "; " +
+                         record.program + "; " + record.libraries + "; station configuration " +
+                         record.config_sha256 + "; " + std::to_string(used) + " of " +
+                         std::to_string(record.images.size()) + " images used.");
+  if (!calibration.empty()) report.calibration = read_calibration(calibration);
+  report.pictures = pictures;
+  return report_html(report);
+}
+
+}  // namespace vlp

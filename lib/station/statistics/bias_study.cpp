@@ -1,0 +1,152 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/bias_study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "report/plots/gnuplot.h"
+#include "report/plots/plot_parts.h"
+#include "station/statistics/distributions.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kLevel = 0.05;
+
+/// Sum of (x - mean x) (y - mean y).
+double products_about_means(const std::vector<double>& x, const std::vector<double>& y) {
+  const double of_x = mean_of(x), of_y = mean_of(y);
+  double sum = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - of_x) * (y[i] - of_y);
+  return sum;
+}
+
+TestedEstimate tested(double value, double standard_error, double dof) {
+  TestedEstimate estimate{value, standard_error, dof, 0, 1, value, value};
+  if (standard_error > 0) {
+    estimate.t = value / standard_error;
+    estimate.p = t_two_tails(estimate.t, dof);
+    const double half = t_quantile(kLevel, dof) * standard_error;
+    estimate.low = value - half;
+    estimate.high = value + half;
+  } else if (value != 0) {
+    estimate.t = std::copysign(std::numeric_limits<double>::infinity(), value);
+    estimate.p = 0;
+  }
+  return estimate;
+}
+
+Linearity line_of(const std::vector<double>& references, const std::vector<double>& differences) {
+  Linearity line;
+  line.count = static_cast<double>(references.size());
+  line.mean_reference = mean_of(references);
+  line.squares_of_references = products_about_means(references, references);
+  const double slope = products_about_means(references, differences) / line.squares_of_references,
+               mean = mean_of(differences), intercept = mean - slope * line.mean_reference;
+  double residuals = 0;
+  for (std::size_t i = 0; i < references.size(); ++i) {
+    const double fitted = mean + slope * (references[i] - line.mean_reference);
+    residuals += std::pow(differences[i] - fitted, 2);
+  }
+  const double dof = line.count - 2, all = products_about_means(differences, differences);
+  line.residual_sd = std::sqrt(residuals / dof);
+  line.r_squared = all > 0 ? 1 - residuals / all : 0;
+  line.slope = tested(slope, line.residual_sd / std::sqrt(line.squares_of_references), dof);
+  line.intercept = tested(
+      intercept,
+      line.residual_sd * std::sqrt(1 / line.count + line.mean_reference * line.mean_reference /
+                                                        line.squares_of_references),
+      dof);
+  return line;
+}
+
+}  // namespace
+
+bool TestedEstimate::shows() const { return p < kLevel; }
+
+double Linearity::bias_at(double reference) const {
+  return intercept.value + slope.value * reference;
+}
+
+double Linearity::band_at(double reference) const {
+  const double off = reference - mean_reference;
+  return t_quantile(kLevel, slope.dof) * residual_sd *
+         std::sqrt(1 / count + off * off / squares_of_references);
+}
+
+BiasStudy bias_study(const std::vector<ReferenceValue>& values) {
+  if (values.empty()) throw std::invalid_argument("a bias study needs runs of reference units");
+  std::map<std::pair<double, std::string>, std::vector<double>> by_unit;
+  std::vector<double> references, differences;
+  for (const auto& [unit, reference, value] : values) {
+    by_unit[{reference, unit}].push_back(value);
+    references.push_back(reference);
+    differences.push_back(value - reference);
+  }
+  BiasStudy study;
+  double within = 0;  // squares about the units' means
+  for (const auto& [key, of_unit] : by_unit) {
+    const auto& [reference, unit] = key;
+    if (of_unit.size() < 2) {
+      throw std::invalid_argument(
+          fmt::format("unit {} has one run: a bias study needs two or more of each", unit));
+    }
+    const auto n = static_cast<double>(of_unit.size());
+    const double mean = mean_of(of_unit), squares = products_about_means(of_unit, of_unit),
+                 sd = std::sqrt(squares / (n - 1));
+    within += squares;
+    study.units.push_back({unit, reference, of_unit.size(), mean, sd,
+                           tested(mean - reference, sd / std::sqrt(n), n - 1)});
+  }
+  const auto count = static_cast<double>(values.size());
+  const double dof = count - static_cast<double>(by_unit.size());
+  study.all = tested(mean_of(differences), std::sqrt(within / dof / count), dof);
+  const bool differ = study.units.front().reference < study.units.back().reference;
+  if (differ) study.linearity = line_of(references, differences);
+  return study;
+}
+
+void draw_bias(const std::filesystem::path& picture, const std::string& title,
+               const std::vector<ReferenceValue>& values, const BiasStudy& study) {
+  std::string data, means, line;
+  for (const auto& [unit, reference, value] : values) {
+    data += data_row({reference, value - reference});
+  }
+  for (const UnitBias& unit : study.units) means += data_row({unit.reference, unit.bias.value});
+  std::string commands = data_block("data", data) + data_block("means", means) + plot_settings() +
+                         "set xlabel 'reference'\nset ylabel " +
+                         gnuplot_quoted(title + ", measured - reference") +
+                         " noenhanced\nset offsets graph 0.05, graph 0.05, graph 0.1, graph 0.1\n";
+  const auto colored = [](const char* color) { return std::string(" linecolor rgb '") + color; };
+  std::string plotted;
+  if (study.linearity) {
+    const double first = study.units.front().reference, last = study.units.back().reference;
+    constexpr int parts = 50;
+    for (int i = 0; i <= parts; ++i) {
+      const double at = first + (last - first) * i / parts;
+      const double bias = study.linearity->bias_at(at), band = study.linearity->band_at(at);
+      line += data_row({at, bias, bias - band, bias + band});
+    }
+    commands += data_block("line", line);
+    plotted = ", $line using 1:2 with lines" + colored(plot_colors::green) +
+              "' title 'line', $line using 1:3 with lines dashtype 2" +
+              colored(plot_colors::vermillion) +
+              "' title '95 % band', $line using 1:4 with lines dashtype 2" +
+              colored(plot_colors::vermillion) + "' notitle";
+  }
+  commands += "plot 0 with lines dashtype 3" + colored(plot_colors::purple) +
+              "' title 'no bias', $data using 1:2 with points pointtype 6" +
+              colored(plot_colors::blue) +
+              "' title 'runs', $means using 1:2 with points pointtype 7 pointsize 1.5" +
+              colored(plot_colors::blue) + "' title 'means'" + plotted;
+  draw(picture, {"bias", 1000, 480, commands + "\n"});
+}
+
+}  // namespace vlp

@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/capability.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "station/statistics/control_chart.h"
+#include "station/statistics/distributions.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kBelow = 0.025, kAbove = 0.975, kNormal = 1.959963984540054;
+
+}  // namespace
+
+CapabilityIndex cp_of(double tolerance, double sd, double dof) {
+  const double cp = tolerance / (6 * sd);
+  return {cp, cp * std::sqrt(chi_square_quantile(kBelow, dof) / dof),
+          cp * std::sqrt(chi_square_quantile(kAbove, dof) / dof)};
+}
+
+CapabilityIndex cpk_of(const ToleranceLimits& limits, double mean, double sd, double dof,
+                       std::size_t count) {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  const double room = std::min(limits.upper ? *limits.upper - mean : none,
+                               limits.lower ? mean - *limits.lower : none);
+  const double cpk = room / (3 * sd);
+  const double half =
+      kNormal * std::sqrt(1 / (9 * static_cast<double>(count)) + cpk * cpk / (2 * dof));
+  return {cpk, cpk - half, cpk + half};
+}
+
+std::optional<Capability> capability(std::span<const double> values,
+                                     const ToleranceLimits& limits) {
+  if (values.size() < 2 || (!limits.lower && !limits.upper)) return std::nullopt;
+  const auto count = static_cast<double>(values.size());
+  const ControlChart chart = control_chart(values);
+  double squares = 0;
+  for (const double value : values) squares += (value - chart.mean) * (value - chart.mean);
+  if (squares == 0) return std::nullopt;
+  constexpr double of_moving_range = 0.826;
+  const double dof = count - 1, within_dof = dof / (2 * of_moving_range);
+  Capability result{.count = values.size(),
+                    .mean = chart.mean,
+                    .within_sd = chart.sigma,
+                    .overall_sd = std::sqrt(squares / dof)};
+  result.cpk = cpk_of(limits, result.mean, result.within_sd, within_dof, result.count);
+  result.ppk = cpk_of(limits, result.mean, result.overall_sd, dof, result.count);
+  if (limits.lower && limits.upper) {
+    const double tolerance = *limits.upper - *limits.lower;
+    result.cp = cp_of(tolerance, result.within_sd, within_dof);
+    result.pp = cp_of(tolerance, result.overall_sd, dof);
+  }
+  return result;
+}
+
+}  // namespace vlp

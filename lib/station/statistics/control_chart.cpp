@@ -1,0 +1,201 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/control_chart.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+#include "captures/number_text.h"
+#include "report/plots/gnuplot.h"
+#include "report/plots/plot_parts.h"
+
+#include "station/statistics/distributions.h"
+
+namespace vlp {
+
+namespace {
+
+using Sigmas = std::span<const double>;
+
+/// Of the last `of` values, the last among them, so many are more than so many sigmas away on one
+/// side.
+template <int many, int of, int away>
+bool beyond(Sigmas sigmas) {
+  if (sigmas.size() < many) return false;
+  const Sigmas last = sigmas.last(std::min<std::size_t>(of, sigmas.size()));
+  for (const double side : {1.0, -1.0}) {
+    const auto is_beyond = [&](double value) { return side * value > away; };
+    if (is_beyond(last.back()) && std::count_if(last.begin(), last.end(), is_beyond) >= many) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Each of the last `many` values is higher than the one before, or lower; if `turns`, in turns.
+template <std::size_t many, bool turns>
+bool steps(Sigmas sigmas) {
+  if (sigmas.size() < many) return false;
+  const Sigmas last = sigmas.last(many);
+  for (const double first : {1.0, -1.0}) {
+    bool all = true;
+    double direction = first;
+    for (std::size_t i = 1; i < many; ++i, direction *= turns ? -1 : 1) {
+      all = all && direction * (last[i] - last[i - 1]) > 0;
+    }
+    if (all) return true;
+  }
+  return false;
+}
+
+/// All of the last `many` values are nearer to the mean than a sigma, or all are farther.
+template <std::size_t many, bool nearer>
+bool all_about(Sigmas sigmas) {
+  if (sigmas.size() < many) return false;
+  const Sigmas last = sigmas.last(many);
+  return std::all_of(last.begin(), last.end(), [](double value) {
+    return nearer ? std::abs(value) < 1 : std::abs(value) > 1;
+  });
+}
+
+constexpr const char *kBeyond3 = "more than 3 sigmas from the mean",
+                     *kBeyond2 = "2 of 3 more than 2 sigmas from the mean, on one side",
+                     *kBeyond1 = "4 of 5 more than a sigma from the mean, on one side";
+
+constexpr std::array kRules{
+    ChartRule{"western-electric-1", kBeyond3, beyond<1, 1, 3>},
+    ChartRule{"western-electric-2", kBeyond2, beyond<2, 3, 2>},
+    ChartRule{"western-electric-3", kBeyond1, beyond<4, 5, 1>},
+    ChartRule{"western-electric-4", "8 in a row on one side of the mean", beyond<8, 8, 0>},
+    ChartRule{"nelson-1", kBeyond3, beyond<1, 1, 3>},
+    ChartRule{"nelson-2", "9 in a row on one side of the mean", beyond<9, 9, 0>},
+    ChartRule{"nelson-3", "6 in a row up, or down", steps<6, false>},
+    ChartRule{"nelson-4", "14 in a row up and down in turns", steps<14, true>},
+    ChartRule{"nelson-5", kBeyond2, beyond<2, 3, 2>},
+    ChartRule{"nelson-6", kBeyond1, beyond<4, 5, 1>},
+    ChartRule{"nelson-7", "15 in a row within a sigma of the mean", all_about<15, true>},
+    ChartRule{"nelson-8", "8 in a row more than a sigma from the mean", all_about<8, false>}};
+
+constexpr const char* kEwma = "ewma";
+constexpr double kEwmaWeight = 0.3;
+
+bool is_of(const std::string& rule, const std::string& name) {
+  return rule == name || rule.substr(0, rule.rfind('-')) == name;
+}
+
+/// Throws for a name of no rule.
+void check_rules(const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    const bool known = name == kEwma || std::any_of(kRules.begin(), kRules.end(), [&](auto& rule) {
+                         return is_of(rule.name, name);
+                       });
+    if (known) continue;
+    throw std::invalid_argument("there is no rule " + name +
+                                "; there are western-electric-1 to -4, nelson-1 to -8, ewma, and "
+                                "western-electric and nelson for all of them");
+  }
+}
+
+}  // namespace
+
+ControlChart control_chart(std::span<const double> values) {
+  constexpr double d2 = 1.128;
+  ControlChart chart;
+  if (values.empty()) return chart;
+  const auto count = static_cast<double>(values.size());
+  double ranges = 0;
+  for (std::size_t i = 1; i < values.size(); ++i) ranges += std::abs(values[i] - values[i - 1]);
+  chart.mean = mean_of(values);
+  chart.sigma = values.size() > 1 ? ranges / (count - 1) / d2 : 0;
+  chart.lower = chart.mean - 3 * chart.sigma;
+  chart.upper = chart.mean + 3 * chart.sigma;
+  return chart;
+}
+
+std::span<const ChartRule> chart_rules() { return kRules; }
+
+Ewma ewma(std::span<const double> values, double target, double sigma, double weight,
+          double width) {
+  const double half = width * sigma * std::sqrt(weight / (2 - weight));
+  Ewma result{target - half, target + half, {}};
+  result.averages.reserve(values.size());
+  double average = target;
+  for (const double value : values) {
+    average += weight * (value - average);
+    result.averages.push_back(average);
+  }
+  return result;
+}
+
+std::vector<ChartAlarm> chart_alarms(std::span<const double> values,
+                                     const std::vector<std::string>& rules) {
+  check_rules(rules);
+  const ControlChart chart = control_chart(values);
+  if (chart.sigma <= 0) return {};
+  std::vector<double> sigmas;
+  sigmas.reserve(values.size());
+  for (const double value : values) sigmas.push_back((value - chart.mean) / chart.sigma);
+  const Ewma average = ewma(sigmas, 0, 1, kEwmaWeight);
+  std::vector<ChartAlarm> alarms;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto asked = [&](const std::string& rule) {
+      return std::any_of(rules.begin(), rules.end(),
+                         [&](const std::string& name) { return is_of(rule, name); });
+    };
+    for (const ChartRule& rule : kRules) {
+      if (asked(rule.name) && rule.holds(Sigmas(sigmas).first(i + 1))) {
+        alarms.push_back({rule.name, rule.meaning, i});
+      }
+    }
+    const bool off = average.averages[i] < average.lower || average.averages[i] > average.upper;
+    if (off && asked(kEwma)) {
+      alarms.push_back({kEwma, "the moving average is beyond its limits", i});
+    }
+  }
+  return alarms;
+}
+
+void draw_trend(const std::filesystem::path& picture, const std::string& title,
+                std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
+                std::optional<double> gate) {
+  const std::vector<double> values = values_of(points);
+  const ControlChart chart = control_chart(values);
+  std::vector<bool> alarm(points.size());
+  for (const ChartAlarm& each : alarms) alarm[each.index] = true;
+  std::string data, marked;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::string row = data_row({double(i + 1), values[i]});
+    data += row;
+    if (alarm[i]) marked += row;
+  }
+  const auto level = [](double value, const std::string& look) {
+    return significant(value, 9) + " with lines " + look;
+  };
+  const std::string limits = std::string("dashtype 2 linecolor rgb '") + plot_colors::vermillion;
+  std::string commands = data_block("data", data) + plot_settings();
+  if (!marked.empty()) commands += data_block("marked", marked);
+  commands +=
+      "set xlabel 'runs, in the order of their end'\nset ylabel " + gnuplot_quoted(title) +
+      " noenhanced\nset xrange " + plot_range(0.5, double(points.size()) + 0.5) +
+      "\nset offsets 0, 0, graph 0.1, graph 0.1\nplot " +
+      level(chart.upper, limits + "' title 'limits'") + ", " +
+      level(chart.lower, limits + "' notitle") + ", " +
+      level(chart.mean, std::string("linecolor rgb '") + plot_colors::green + "' title 'mean'") +
+      ", $data using 1:2 with linespoints pointtype 7 linecolor rgb '" + plot_colors::blue +
+      "' title 'runs'";
+  if (gate) {
+    commands += ", " + level(*gate, std::string("dashtype 3 linewidth 2 linecolor rgb '") +
+                                        plot_colors::purple + "' title 'gate'");
+  }
+  if (!marked.empty()) {
+    commands += std::string(
+                    ", $marked using 1:2 with points pointtype 4 pointsize 2 linewidth 2 "
+                    "linecolor rgb '") +
+                plot_colors::vermillion + "' title 'alarms'";
+  }
+  draw(picture, {"trend", 1000, 480, commands + "\n"});
+}
+
+}  // namespace vlp

@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/run_figures.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace vlp {
+
+std::vector<MetricKind> run_figures() {
+  auto kinds = unit_metrics();
+  const auto of_fixes = metric_kinds({MetricSource::evaluation});
+  kinds.insert(kinds.end(), of_fixes.begin(), of_fixes.end());
+  return kinds;
+}
+
+MetricKind run_figure(const std::string& name) {
+  const auto kinds = run_figures();
+  const auto kind = std::find_if(kinds.begin(), kinds.end(),
+                                 [&](const MetricKind& any) { return any.name == name; });
+  if (kind != kinds.end()) return *kind;
+  std::string names;
+  for (const MetricKind& any : kinds) names.append(names.empty() ? "" : ", ").append(any.name);
+  throw std::invalid_argument("there is no figure " + name + "; there are: " + names);
+}
+
+std::vector<TrendPoint> judged_values(Records& records, const std::string& figure,
+                                      RunFilter filter) {
+  if (!filter.verdict.empty()) return records.trend(figure, filter);
+  const int last = std::exchange(filter.last, 0);
+  auto points = records.trend(figure, filter);
+  std::erase_if(points,
+                [](const TrendPoint& point) { return point.verdict == name_of(Verdict::invalid); });
+  return last_of(std::move(points), last);
+}
+
+void check_one_station(const std::vector<TrendPoint>& points) {
+  for (const TrendPoint& point : points) {
+    if (point.station == points.front().station) continue;
+    throw std::invalid_argument(
+        fmt::format("there are runs of {} and of {}: say of which with "
+                    "--of-station, or of all with --of-station any",
+                    points.front().station, point.station));
+  }
+}
+
+std::optional<double> gate_of(const std::string& figure, const StationConfig* station,
+                              Records& records, const std::vector<TrendPoint>& points) {
+  if (station != nullptr) {
+    for (const Gate& gate : station->gates) {
+      if (gate.metric == figure) return gate.limit;
+    }
+    return std::nullopt;
+  }
+  const auto last = points.empty() ? std::nullopt : records.find(points.back().run);
+  if (!last) return std::nullopt;
+  for (const CheckedMetric& any : last->figures) {
+    if (any.name == figure) return any.limit;
+  }
+  return std::nullopt;
+}
+
+ToleranceLimits limits_of(const MetricKind& kind, std::optional<double> gate) {
+  if (kind.asked == Direction::at_least) return {gate, std::nullopt};
+  return {std::nullopt, gate};
+}
+
+std::vector<StudyValue> study_values(const std::vector<TrendPoint>& points,
+                                     const std::vector<std::string>& units) {
+  std::map<std::string, std::size_t> runs;
+  for (const TrendPoint& point : points) ++runs[point.camera];
+  std::string unknown;
+  for (const std::string& unit : units) {
+    if (!runs.contains(unit)) unknown.append(unknown.empty() ? "" : ", ").append(unit);
+  }
+  if (!unknown.empty()) {
+    throw std::invalid_argument("no judged run that has the figure is of: " + unknown);
+  }
+  std::vector<StudyValue> values;
+  for (const TrendPoint& point : points) {
+    const bool named = std::count(units.begin(), units.end(), point.camera) > 0;
+    if (named || (units.empty() && runs[point.camera] > 1)) {
+      values.push_back({point.camera, point.station, point.value});
+    }
+  }
+  return values;
+}
+
+std::vector<ReferenceValue> reference_values(const std::vector<TrendPoint>& points,
+                                             const std::map<std::string, double>& references) {
+  std::vector<std::string> units;
+  units.reserve(references.size());
+  for (const auto& [unit, reference] : references) units.push_back(unit);
+  std::vector<ReferenceValue> values;
+  for (const auto& [unit, station, value] : study_values(points, units)) {
+    values.push_back({unit, references.at(unit), value});
+  }
+  return values;
+}
+
+}  // namespace vlp

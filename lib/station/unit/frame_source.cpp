@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/frame_source.h"
+
+#include <fmt/core.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "rig/file.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+
+std::filesystem::path FrameSource::save_next(const std::filesystem::path& folder) {
+  const auto frame = ended_ ? std::nullopt : video_.next();
+  if (!frame) {
+    if (video_.is_camera()) throw InputError(source_, "the camera gives no frame");
+    ended_ = true;
+    return {};
+  }
+  std::vector<unsigned char> bytes;
+  cv::imencode(".png", frame->image, bytes);
+  std::string content(bytes.begin(), bytes.end());
+  // A run that goes on does not write over the frames that it has.
+  std::filesystem::path file;
+  do {
+    file = folder / fmt::format("frame-{:06}.png", frames_++);
+  } while (std::filesystem::exists(file));
+  write_file(file, content);
+  return file;
+}
+
+}  // namespace vlp

@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/guidance_maps.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <map>
+
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kCols = 8, kRows = 6;
+
+std::string missing_angles(const TurnMap::Height& height) {
+  std::string angles;
+  for (std::size_t part = 0; part < height.parts.size(); ++part) {
+    if (height.parts[part]) continue;
+    angles += fmt::format(" {:.0f}", 360.0 * double(part) / double(height.parts.size()));
+  }
+  return angles;
+}
+
+}  // namespace
+
+std::vector<const UnitImage*> used_images(const UnitStep& step) {
+  std::vector<const UnitImage*> used;
+  for (const auto& [name, image] : step.images) {
+    if (image.refused.empty()) used.push_back(&image);
+  }
+  return used;
+}
+
+std::vector<std::string> board_map(const Unit& unit) {
+  const UnitStep& step = unit.step(StationStep::boards);
+  const auto [width, height] = unit.config().type.imager_px;
+  std::map<std::pair<int, int>, int> corners;
+  for (const UnitImage* image : used_images(step)) {
+    for (const SeenTag& tag : image->view->seen.tags) {
+      for (const auto& corner : tag.corners_px) {
+        ++corners[{static_cast<int>(corner.y() * kRows / height),
+                   static_cast<int>(corner.x() * kCols / width)}];
+      }
+    }
+  }
+  constexpr int many = 20;
+  std::vector<std::string> lines;
+  const std::string edge = "  +-----------------+";
+  lines.push_back(edge);
+  for (int row = 0; row < kRows; ++row) {
+    std::string line = "  |";
+    for (int col = 0; col < kCols; ++col) {
+      const auto found = corners.find({row, col});
+      line += found == corners.end() ? " ." : found->second < many ? " +" : " #";
+    }
+    lines.push_back(line + " |");
+  }
+  lines.push_back(edge);
+  lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
+                          100 * board_coverage(step, unit.config().type.imager_px),
+                          100 * unit.config().enough.board_coverage);
+  lines[3] += "   # many corners   + some   . none";
+  return lines;
+}
+
+TurnMap turn_of(const Unit& unit) {
+  const auto& lens = unit.step(StationStep::boards).result;
+  if (!lens || !lens->ok()) return {};
+  return turn_map(frames_of(unit.step(StationStep::rotation)), unit.config(), lens->calibration);
+}
+
+std::vector<std::string> turn_lines(const Unit& unit) {
+  std::vector<std::string> lines;
+  for (const TurnMap::Height& height : turn_of(unit).heights) {
+    std::string parts;
+    for (const bool there : height.parts) parts += there ? '#' : '.';
+    const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // zero without a sign
+    lines.push_back(fmt::format("  height {:5.2f} m  [{}]  {} captures over {:.0f} degrees", z_m,
+                                parts, height.captures, deg_from_rad(height.arc_rad)));
+    const std::string missing = missing_angles(height);
+    if (!missing.empty()) lines.push_back("    missing, degrees from the first:" + missing);
+  }
+  return lines;
+}
+
+std::string lamps_line(const Unit& unit, const UnitStep& step) {
+  std::map<int, int> seen;
+  for (const UnitImage* image : used_images(step)) {
+    for (const Detection& lamp : image->lamps) ++seen[lamp.lamp];
+  }
+  std::string there, missing;
+  for (const Lamp& lamp : unit.config().lamps.lamps) {
+    (seen.contains(lamp.id) ? there : missing) += fmt::format(" {}", lamp.id);
+  }
+  return "  lamps seen:" + (there.empty() ? " none" : there) +
+         (missing.empty() ? "" : "   not yet:" + missing);
+}
+
+}  // namespace vlp

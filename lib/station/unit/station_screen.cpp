@@ -1,0 +1,169 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/station_screen.h"
+
+#include <fmt/core.h>
+
+#include <array>
+#include <span>
+#include <sstream>
+
+#include "captures/printable.h"
+#include "station/records/hook.h"
+#include "station/unit/guidance.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::size_t kColumns = 80;
+
+/// The text in lines of the screen's width, the first with this label.
+void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const std::string& text,
+                 Tone tone) {
+  std::istringstream words(text);
+  std::string line = fmt::format("{:<9}", label), word;
+  const std::size_t indent = line.size();
+  while (words >> word) {
+    if (line.size() > indent && line.size() + 1 + word.size() > kColumns) {
+      lines.push_back({line, tone});
+      line = std::string(indent, ' ');
+    }
+    line += (line.size() > indent ? " " : "") + word;
+  }
+  lines.push_back({line.substr(0, kColumns), tone});
+}
+
+std::string outcome_of(const UnitImage& image) {
+  return image.refused.empty() ? "taken" : "refused: " + image.refused;
+}
+
+ScreenLine gate_line(const CheckedMetric& figure) {
+  const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
+  const std::string limit = fmt::format(
+      "{} {:.4g}", figure.asked == Direction::at_least ? ">=" : "<=", figure.acceptance_limit());
+  std::string outcome = figure.met() ? "met" : "NOT MET";
+  if (const auto sure = figure.conformance_probability()) {
+    outcome += fmt::format(", p {:.3f}", *sure);
+  }
+  return {
+      fmt::format("{:<24}{:>12}{:>14} {:<4} {}", figure.name, value, limit, figure.unit, outcome),
+      figure.met() ? Tone::plain : Tone::bad};
+}
+
+const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",
+                       "  ####   #####   ###     ###  ", "  #      #   #      #       # ",
+                       "  #      #   #  ####    ####  "};
+const std::array kFail{"  #####    #     #####   #    ", "  #       # #      #     #    ",
+                       "  ####   #####     #     #    ", "  #      #   #     #     #    ",
+                       "  #      #   #   #####   #####"};
+
+const std::array kInvalid{"  ###  #   #  #   #    #    #      ###  #### ",
+                          "   #   ##  #  #   #   # #   #       #   #   #",
+                          "   #   # # #  #   #  #####  #       #   #   #",
+                          "   #   #  ##   # #   #   #  #       #   #   #",
+                          "  ###  #   #    #    #   #  #####  ###  #### "};
+
+}  // namespace
+
+std::vector<ScreenLine> station_screen(const Unit& unit) {
+  std::vector<ScreenLine> lines;
+  lines.push_back(
+      {fmt::format("{}   camera {}", unit.config().station, unit.camera_id()).substr(0, kColumns),
+       Tone::heading});
+  const auto current = unit.current();
+  std::string steps;
+  for (const StationStep step : kStationSteps) {
+    const char* mark = unit.step(step).done() ? "x" : step == current ? ">" : " ";
+    steps += fmt::format("[{}] {} {}   ", mark, name_of(step), count_of(unit, step));
+  }
+  lines.push_back({steps.substr(0, kColumns)});
+  if (!unit.distrusted().empty()) {
+    add_wrapped(lines, "Station", unit.distrusted() + "; no unit passes", Tone::bad);
+  }
+  lines.push_back({""});
+  if (!current) return lines;
+  const UnitStep& state = unit.step(*current);
+  lines.push_back({name_of(*current), Tone::heading});
+  for (std::string& line : progress_of(unit, *current)) {
+    lines.push_back({line.substr(0, kColumns)});
+  }
+  add_wrapped(lines, "Next", next_of(unit, *current), Tone::plain);
+  if (const auto image = state.images.find(state.last); image != state.images.end()) {
+    add_wrapped(lines, "Last", image->first + ": " + outcome_of(image->second),
+                image->second.refused.empty() ? Tone::good : Tone::bad);
+  }
+  for (const CheckedMetric& figure : unit.figures()) {
+    // Blur is of all views so far: a few may mislead.
+    const bool known = figure.value && figure.name != "blur_px";
+    if (known && !figure.met()) add_wrapped(lines, "Fails", cause_of(figure), Tone::bad);
+  }
+  if (state.refused_in_a_row > 1) {
+    add_wrapped(lines, "Refused",
+                fmt::format("{} in a row; after {} the run ends", state.refused_in_a_row,
+                            unit.config().refuse.in_a_row),
+                Tone::bad);
+  }
+  return lines;
+}
+
+std::string last_image_line(const Unit& unit, StationStep step, const std::string& image) {
+  const auto& images = unit.step(step).images;
+  const auto found = images.find(image);
+  const std::string outcome =
+      found == images.end() ? "waits for the step before" : outcome_of(found->second);
+  return fmt::format("{} {}: {} ({})", name_of(step), image, outcome, count_of(unit, step));
+}
+
+std::vector<ScreenLine> spool_lines(const std::string& state) {
+  std::vector<ScreenLine> lines;
+  if (!state.empty()) add_wrapped(lines, "Records", printable(state), Tone::bad);
+  return lines;
+}
+
+std::vector<ScreenLine> hook_lines(const RunRecord& record) {
+  std::vector<ScreenLine> lines;
+  const std::string problem = hook_problem(record);
+  if (problem.empty()) return lines;
+  add_wrapped(lines, "Hook", problem + "; 'vlp-station hook' runs it again", Tone::bad);
+  return lines;
+}
+
+std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
+  const std::string no_verdict = why_no_verdict(record);
+  const bool passed = record.passed() && no_verdict.empty();
+  const Tone tone = passed ? Tone::good : Tone::bad;
+  std::vector<ScreenLine> lines{
+      {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
+  std::string not_reached;
+  for (const CheckedMetric& figure : record.figures) {
+    if (!figure.limit) continue;
+    if (figure.value) {
+      lines.push_back(gate_line(figure));
+    } else {
+      not_reached.append(not_reached.empty() ? "" : ", ").append(figure.name);
+    }
+  }
+  if (!not_reached.empty()) add_wrapped(lines, "Gates", "not reached: " + not_reached, Tone::plain);
+  std::istringstream causes(record.causes);
+  if (!record.causes.empty()) lines.push_back({""});
+  for (std::string cause; std::getline(causes, cause);) {
+    add_wrapped(lines, "Cause", cause, Tone::bad);
+  }
+  if (!no_verdict.empty()) add_wrapped(lines, "Cause", no_verdict, Tone::bad);
+  // Last, so that it stands on a terminal of 24 lines, too.
+  lines.push_back({""});
+  const std::span<const char* const> banner = passed             ? std::span(kPass)
+                                              : record.invalid() ? std::span(kInvalid)
+                                                                 : std::span(kFail);
+  if (no_verdict.empty()) {
+    for (const char* row : banner) lines.push_back({row, tone});
+  }
+  lines.push_back({""});
+  const std::string word = no_verdict.empty() ? record.verdict : "NO VERDICT";
+  lines.push_back(
+      {fmt::format("{}   camera {}   {}", word, record.camera, record.station).substr(0, kColumns),
+       Tone::heading});
+  return lines;
+}
+
+}  // namespace vlp

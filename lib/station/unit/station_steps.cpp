@@ -1,0 +1,176 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/station_steps.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "calibration/intrinsics/projection_difference.h"
+#include "session/dispersion_step.h"
+#include "session/evaluate_step.h"
+#include "session/lens_step.h"
+#include "session/locate_step.h"
+#include "session/rotation_step.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kMillimetres = 1e3;
+
+/// What failed, before why.
+StepResult named(const char* what, StepResult result) {
+  if (!result.ok()) result.why = fmt::format("{}: {}", what, result.why);
+  return result;
+}
+
+/// How far the lens is from the nominal one.
+void compare(const Camera& type, LensResult& result) {
+  constexpr double percent = 100;
+  const auto& found = result.solution.problem.intrinsics;
+  const auto& nominal = type.intrinsics;
+  const double focal =
+      std::max(std::abs(found[0] / nominal[0] - 1), std::abs(found[1] / nominal[1] - 1));
+  result.metrics.push_back({"focal_percent", percent * focal});
+  result.metrics.push_back({"center_px", std::hypot(found[2] - nominal[2], found[3] - nominal[3])});
+  const auto difference =
+      projection_difference(result.solution.lens(), Lens(type.lens_model, nominal), type.imager_px,
+                            [](const Eigen::Vector2d&) { return 1.0; });
+  if (difference) result.metrics.push_back({"nominal_px", difference->worst_px});
+  const auto& report = result.calibration.intrinsics_report;
+  const auto [x_m, y_m] =
+      report ? report->board_warp_m.value_or(std::array{0.0, 0.0}) : std::array{0.0, 0.0};
+  const double bend_m = std::max({std::abs(x_m), std::abs(y_m), std::abs(x_m + y_m)});
+  result.metrics.push_back({"board_bend_mm", kMillimetres * bend_m});
+}
+
+LampCaptures captures_of(const StationConfig& config, const Calibration& calibration,
+                         const std::vector<Frame>& frames) {
+  return {frames, config.lamps, "lamp map", calibration};
+}
+
+/// Why too few of the captures are at known places; empty when as many are as there are, or as are
+/// wanted.
+std::string places_problem(std::size_t known, std::size_t captures, int wanted) {
+  if (known > 0 && known >= std::min(captures, static_cast<std::size_t>(wanted))) return "";
+  return fmt::format(
+      "nothing tells where {} of the {} captures are: captures.csv or truth.csv of the step "
+      "should, with x_m and y_m of each",
+      captures - known, captures);
+}
+
+/// Those at known points, and the points.
+struct KnownPoints {
+  std::vector<Frame> frames;
+  std::vector<TruthRow> truth;
+};
+
+KnownPoints known_points(const std::vector<Frame>& frames, const CapturesTable& places) {
+  KnownPoints known;
+  for (const Frame& frame : frames) {
+    const auto entry = places.find(frame.image);
+    if (entry == places.end() || !entry->second.x_m || !entry->second.y_m) continue;
+    const Capture& place = entry->second;
+    if (place.place == PlaceOf::axis) continue;
+    known.frames.push_back(frame);
+    known.truth.push_back({frame.image, {*place.x_m, *place.y_m}, place.z_m, place.yaw_rad});
+  }
+  return known;
+}
+
+/// Shares of captures with a fix, of lamps seen that fixes rest on, and of the map's lamps seen.
+void add_shares(const LocateResult& located, const std::vector<Frame>& frames, const LampMap& map,
+                StepResult& result) {
+  std::set<int> seen;
+  std::size_t lamps = 0, fitting = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    lamps += frames[i].detections.size();
+    for (const Detection& detection : frames[i].detections) seen.insert(detection.lamp);
+    if (located.fixes[i].ok()) fitting += static_cast<std::size_t>(located.fixes[i].lamps);
+  }
+  const auto share = [](std::size_t part, std::size_t whole) {
+    return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
+  };
+  result.metrics = {{"check_fixes", share(located.summary.fixes, frames.size())},
+                    {"check_lamps", share(fitting, lamps)},
+                    {"check_lamps_seen", share(seen.size(), map.lamps.size())}};
+}
+
+void add_errors(const EvaluationInput& input, const Evaluation& evaluation, StepResult& result) {
+  result.metrics.push_back({"check_mean_mm", kMillimetres * evaluation.horizontal_m.mean});
+  result.metrics.push_back({"check_worst_mm", kMillimetres * evaluation.horizontal_m.max});
+  Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
+  for (const FixError& error : errors_of(input, input.fixes).errors) sum_m += error.horizontal_m;
+  const double offset_m = sum_m.norm() / static_cast<double>(evaluation.fixes);
+  result.metrics.push_back({"check_offset_mm", kMillimetres * offset_m});
+  if (const auto& height_m = evaluation.height_m) {
+    result.metrics.push_back({"check_height_mm", kMillimetres * height_m->sizes.rms});
+  }
+}
+
+}  // namespace
+
+StepResult solve_boards(const StationConfig& config, const std::string& camera_id,
+                        const std::vector<BoardView>& views) {
+  LensInput input{views, config.board, {}, config.type};
+  input.camera.id = camera_id;
+  LensResult result = solve_lens(input, {});
+  if (result.failure == StepFailure::wrong_board) return named("wrong board", std::move(result));
+  if (result.ok()) compare(config.type, result);
+  return result;
+}
+
+StepResult solve_rotation(const StationConfig& config, const Calibration& calibration,
+                          const std::vector<Frame>& frames) {
+  return named("the turn on the spot",
+               solve_rotation(captures_of(config, calibration, frames), RotationMethod::axis, {}));
+}
+
+StepResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
+                            const std::vector<Frame>& frames, const CapturesTable& places) {
+  const KnownPlaces known = at_known_places(frames, places, config.dispersion_station_m);
+  std::string problem =
+      places_problem(known.captures.size(), frames.size(), config.enough.dispersion_captures);
+  if (!problem.empty()) {
+    StepResult result;
+    result.fail(StepFailure::wrong_place, std::move(problem));
+    return result;
+  }
+  return named("the fixes at the station",
+               solve_dispersion(captures_of(config, calibration, frames), known,
+                                DispersionMethod::camera, DispersionCircle::mean, {}));
+}
+
+StepResult check_fixes(const StationConfig& config, const Calibration& calibration,
+                       const std::vector<Frame>& frames, const CapturesTable& places) {
+  StepResult result;
+  KnownPoints known = known_points(frames, places);
+  std::string problem =
+      places_problem(known.frames.size(), frames.size(), config.enough.check_captures);
+  if (!problem.empty()) {
+    result.fail(StepFailure::wrong_place, std::move(problem));
+    return result;
+  }
+  result.calibration = calibration;
+  const LocateResult located = locate_frames({known.frames, config.lamps, calibration, places});
+  add_shares(located, known.frames, config.lamps, result);
+  result.lamps_left_out = located.lamps_left_out;
+  result.warnings = located.warnings;
+  if (!located.ok()) return result;
+  EvaluationInput input;
+  input.fixes = {"check", located.rows};
+  input.truth = {"check", std::move(known.truth)};
+  input.station_m = place_radius_m(calibration);
+  const EvaluateResult errors = evaluate_fixes(input, {});
+  add_errors(input, errors.evaluation, result);
+  if (const auto& typical = located.summary.typical; typical && typical->median_residual_px) {
+    result.metrics.push_back({"check_residual_px", *typical->median_residual_px});
+  }
+  return result;
+}
+
+}  // namespace vlp

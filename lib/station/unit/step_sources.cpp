@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/step_sources.h"
+
+namespace vlp {
+
+StepSources::StepSources(const std::vector<std::string>& sources,
+                         const std::array<int, 2>& imager_px) {
+  std::shared_ptr<FrameSource> others;
+  for (const std::string& source : sources) {
+    bool named = false;
+    for (const StationStep step : kStationSteps) {
+      const std::string prefix = std::string(name_of(step)) + "=";
+      if (!source.starts_with(prefix)) continue;
+      by_step_[step] = std::make_shared<FrameSource>(source.substr(prefix.size()), imager_px);
+      named = true;
+    }
+    if (!named) others = std::make_shared<FrameSource>(source, imager_px);
+  }
+  if (!others) return;
+  for (const StationStep step : kStationSteps) by_step_.emplace(step, others);
+}
+
+void StepSources::feed(const Unit& unit, WatchedRun& run) {
+  if (!last_.empty() && std::filesystem::exists(last_)) {
+    const std::string name = last_.filename().string();
+    const auto& images = unit.step(last_step_).images;
+    const auto image = images.find(name);
+    if (image == images.end()) return;
+    if (!image->second.refused.empty()) run.discard(last_step_, name);
+  }
+  last_.clear();
+  const auto step = unit.current();
+  if (!step || !by_step_.contains(*step)) return;
+  last_ = by_step_.at(*step)->save_next(run.folder() / name_of(*step));
+  last_step_ = *step;
+}
+
+bool StepSources::ended(const Unit& unit) const {
+  const auto step = unit.current();
+  return step && last_.empty() && by_step_.contains(*step) && by_step_.at(*step)->ended();
+}
+
+}  // namespace vlp

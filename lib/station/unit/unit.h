@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "detection/detect_captures.h"
+#include "evaluation/gate.h"
+#include "session/step_history.h"
+#include "station/unit/station_step.h"
+#include "station/unit/unit_step.h"
+#include "station/verdict.h"
+
+namespace vlp {
+
+/// A unit on its way through the station. Images are looked at as they come; a step is solved as
+/// soon as it has enough, and again when its images change, and with it those that rest on it. The
+/// result depends on the images and their names only, not on threads, nor on when they came, unless
+/// more came than enough, or two that show the same: the first of them is taken.
+class Unit {
+ public:
+  /// `config` outlives it.
+  Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads);
+  ~Unit();
+  Unit(const Unit&) = delete;
+  Unit& operator=(const Unit&) = delete;
+
+  /// Images of a step that came, or changed. One that comes when the step is done is not used.
+  /// Nobody knows in which order those were taken that came together: of them, refusals count as in
+  /// a row when none is used. `more_to_come`: others came with them, which the next call has.
+  void add(StationStep step, const std::vector<std::filesystem::path>& files,
+           bool more_to_come = false);
+  /// An image that is there no more. What was refused because of it is taken.
+  void remove(StationStep step, const std::string& name);
+  /// The file of a refused image is there no more, but it was of the unit: the refusal stays, not
+  /// counted as one in a row, because a camera that moves blurs. Without a fault it is forgotten.
+  void discard(StationStep step, const std::string& name);
+  /// The step's captures.csv or truth.csv changed.
+  void reread(StationStep step);
+  /// Solves what has enough; with `all_in`, nothing more comes, and what there is has to do: then,
+  /// a captures.csv that cannot be read throws InputError, and is the step's problem before.
+  void advance(bool all_in);
+  /// Whose an image is already, by its SHA-256, for people; empty when it is nobody's. Those of
+  /// another are refused by this name.
+  void refuse_images_of_others(std::function<std::string(const std::string& sha256)> owner) {
+    owner_ = std::move(owner);
+  }
+  /// Nothing more comes although a step has not enough; `why` for people, as "the operator ended
+  /// the run".
+  void end_early(std::string why) { ended_ = std::move(why); }
+
+  /// No verdict of this unit counts, because of the station: `why`, for people, comes first of its
+  /// causes. Empty: it does.
+  void distrust(std::string why) { distrusted_ = std::move(why); }
+  const std::string& distrusted() const { return distrusted_; }
+
+  const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
+  /// The first step that is not done; nothing when all are.
+  std::optional<StationStep> current() const;
+  /// It is of no use to go on: a step has so many refused images in a row, or enough images that
+  /// lead to nothing because of the lamps.
+  bool hopeless() const;
+
+  /// As far as it came; nothing before the lens is known.
+  std::optional<Calibration> calibration() const;
+  /// All figures, gates among them.
+  std::vector<CheckedMetric> figures() const;
+  /// For the report: of lens, rotation centre and dispersion, as far as it came. Waits for them.
+  std::vector<ReportPicture> pictures() const;
+  /// Why the unit does not pass, the root first; empty when it does. What the station or the
+  /// operator did comes before what was measured with it, so that verdict_of() blames the camera
+  /// for nothing else than what it is.
+  std::vector<Cause> causes() const;
+  const StationConfig& config() const { return config_; }
+  const std::string& camera_id() const { return camera_id_; }
+
+ private:
+  static std::size_t index(StationStep step) { return static_cast<std::size_t>(step); }
+  UnitStep& at(StationStep step) { return steps_[index(step)]; }
+  void look(StationStep step, const std::vector<std::filesystem::path>& files);
+  LevelsOfImages levels_of(StationStep step) const;
+  void look_again(StationStep step);
+  void take(StationStep step, UnitImage image);
+  std::vector<Cause> causes_of_images() const;
+  void count_refusals(StationStep step);
+  std::pair<Superfluous, std::string> superfluity(StationStep step, const UnitImage& image) const;
+  void drop(StationStep step, const std::string& name);
+  void forget_after(StationStep step);
+  bool has_enough(StationStep step) const;
+  StepResult solve(StationStep step, bool all_in) const;
+  std::optional<Calibration> calibration_before(StationStep step) const;
+  HistoryEntry history_of(StationStep step) const;
+
+  const StationConfig& config_;
+  std::string camera_id_;
+  ProgramVersion program_;
+  int threads_;
+  std::string ended_ = {}, distrusted_ = {};
+  std::function<std::string(const std::string&)> owner_ = {};
+  std::unique_ptr<BoardDetector> boards_;
+  std::array<UnitStep, 4> steps_;
+};
+
+}  // namespace vlp

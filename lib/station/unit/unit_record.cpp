@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/unit_record.h"
+
+#include <utility>
+
+#include "captures/digest.h"
+#include "rig/calibration_text.h"
+
+namespace vlp {
+
+RunRecord make_unit_record(const Unit& unit, const std::string& run,
+                           const ProgramVersion& program) {
+  RunRecord record = new_record("unit", unit.config(), unit.camera_id(), run, program);
+  if (const auto calibration = unit.calibration()) {
+    record.calibration = calibration_text(*calibration);
+  }
+  record.figures = unit.figures();
+  record.judge(unit.causes());
+  for (const StationStep step : kStationSteps) {
+    for (const auto& [name, image] : unit.step(step).images) {
+      std::string refused = image.refused;
+      if (image.discarded) refused.append(" (not kept)");
+      record.images.push_back({.step = name_of(step),
+                               .name = name,
+                               .sha256 = image.sha256,
+                               .refused = std::move(refused)});
+    }
+    for (const auto& file : unit.step(step).waiting) {
+      record.images.push_back({.step = name_of(step),
+                               .name = file.filename().string(),
+                               .sha256 = sha256_of_file(file),
+                               .refused = "not looked at: a step before is not done"});
+    }
+  }
+  return record;
+}
+
+}  // namespace vlp

@@ -1,0 +1,15 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "station/records/run_record.h"
+#include "station/unit/unit.h"
+
+namespace vlp {
+
+/// Makes the record of a unit's run that ends now, under the run's name `run`.
+RunRecord make_unit_record(const Unit& unit, const std::string& run, const ProgramVersion& program);
+
+}  // namespace vlp

@@ -1,0 +1,138 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/watched_run.h"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "rig/file.h"
+#include "rig/input_error.h"
+#include "station/records/publish_run.h"
+#include "station/station_folders.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kKept = "kept";
+
+/// Changes when the tables that tell the captures' places do.
+std::string state_of_tables(const fs::path& folder) {
+  std::string state;
+  for (const char* table : {"captures.csv", "truth.csv"}) {
+    std::error_code none;
+    const auto bytes = fs::file_size(folder / table, none);
+    const auto time = fs::last_write_time(folder / table, none);
+    if (!none) state += fmt::format("{} {} {};", table, bytes, time.time_since_epoch().count());
+  }
+  return state;
+}
+
+}  // namespace
+
+WatchedRun::WatchedRun(Unit& unit, Spool& spool)
+    : unit_(unit), folder_(unit.config().captures / unit.camera_id()) {
+  begin(spool);
+  if (finished_) return;
+  for (const StationStep step : kStationSteps) {
+    make_folder(folder_ / name_of(step));
+    steps_.emplace_back(folder_ / name_of(step));
+  }
+  waiting_.resize(steps_.size());
+  tables_.resize(steps_.size());
+}
+
+WatchedRun::~WatchedRun() {
+  if (lock_ >= 0) ::close(lock_);
+}
+
+void WatchedRun::begin(Spool& spool) {
+  make_folder(folder_);
+  const fs::path lock = folder_ / ".lock", state = folder_ / ".run";
+  lock_ = ::open(lock.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+  if (lock_ < 0) throw InputError(lock, "cannot be written");
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    throw InputError(folder_, "another vlp-station works on this camera");
+  }
+  constexpr std::size_t longest = 100;
+  if (fs::exists(state)) {
+    run_ = read_text_file(state, longest);
+    const bool kept = run_.ends_with(fmt::format("\n{}\n", kKept));
+    run_.erase(std::find(run_.begin(), run_.end(), '\n'), run_.end());
+    finished_ = spool.find(run_);
+    if (!finished_ && kept) {
+      throw InputError(
+          folder_,
+          fmt::format("run {} is kept, but its record cannot be read ({}): "
+                      "begin again when it can, or move the folder away",
+                      run_, spool.away().empty() ? "the records do not have it" : spool.away()));
+    }
+    if (!finished_) return;  // goes on
+    publish_run(*finished_, {}, unit_.config().results);
+    put_away();
+    return;
+  }
+  run_ = new_run();
+  write_file(state, run_ + "\n");
+}
+
+std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
+  std::vector<Arrival> arrivals;
+  bool reread = false;
+  for (const StationStep step : kStationSteps) {
+    const auto index = static_cast<std::size_t>(step);
+    auto& waiting = waiting_[index];
+    std::string tables = state_of_tables(steps_[index].folder());
+    if (tables != tables_[index]) {
+      tables_[index] = std::move(tables);
+      unit_.reread(step);
+      reread = true;
+    }
+    const auto changes = steps_[index].look();
+    for (const std::string& name : changes.gone) {
+      std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
+      unit_.remove(step, name);
+      arrivals.push_back({step, name, true});
+    }
+    waiting.insert(waiting.end(), changes.came.begin(), changes.came.end());
+    const auto end = waiting.begin() + static_cast<std::ptrdiff_t>(std::min(most, waiting.size()));
+    const std::vector<fs::path> now(waiting.begin(), end);
+    waiting.erase(waiting.begin(), end);
+    most -= now.size();
+    unit_.add(step, now, !waiting.empty());
+    for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
+  }
+  if (!arrivals.empty() || reread) unit_.advance(false);
+  return arrivals;
+}
+
+void WatchedRun::mark_kept() const {
+  try {
+    write_file(folder_ / ".run", fmt::format("{}\n{}\n", run_, kKept));
+  } catch (const InputError&) {  // put_away() will tell; records refuse a second verdict of a run
+  }
+}
+
+void WatchedRun::discard(StationStep step, const std::string& image) {
+  WatchedFolder& folder = steps_[static_cast<std::size_t>(step)];
+  std::error_code ignored;
+  fs::remove(folder.folder() / image, ignored);
+  folder.forget(image);
+  unit_.discard(step, image);
+}
+
+void put_away(const fs::path& folder, const std::string& run) {
+  const fs::path kept = folder.string() + "." + run;
+  std::error_code error;
+  fs::rename(folder, kept, error);
+  if (error) {
+    throw InputError(folder, "cannot be put away as " + kept.string() + ": " + error.message());
+  }
+}
+
+}  // namespace vlp

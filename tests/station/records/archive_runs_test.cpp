@@ -1,0 +1,122 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/archive_runs.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "station/records/records.h"
+#include "station/statistics/run_figures.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+/// Results of an archive as reprocessing leaves them.
+class ArchiveRunsOf : public testing::Test {
+ protected:
+  ArchiveRunsOf() {
+    row("a,s1,look,2026-03-15,,1.2.3,key");
+    row("a,s2,pass,2026-03-14T09:30:00,,1.2.3,key");
+    row("b,s1,gate,2026-03-16,\"rms_px is 2 px, at most 1 px is asked for\",1.2.3,key");
+    row("b,s2,no result,2026-03-17,rotation: is missing,1.2.3,key");
+    row("b,s3,pass,,,1.2.3,key");
+    row("b,s4,crashed,2026-03-18,vlp-calibrate ended with exit code -9,1.2.3,key");
+    session("sessions/a/s1", 0.1);
+    session("sessions/a/s2", 0.3);
+    session("sessions/b/s1", 2);
+    session("failed/b/s2", {});
+    write("archive/sessions/a/s1/calibration.yaml", "format: vlp-calibration/1\n");
+  }
+  void write(const std::string& file, const std::string& text) const {
+    std::filesystem::create_directories((folder / file).parent_path());
+    std::ofstream(folder / file) << text;
+  }
+  void row(const std::string& line) {
+    summary += line + "\n";
+    write("archive/summary.csv", summary);
+  }
+  void session(const std::string& name, std::optional<double> rms_px) {
+    std::string metrics;
+    if (rms_px) {
+      metrics = R"({"name": "rms_px", "unit": "px", "limit": 1.0, "asked": "at most", "value": )" +
+                std::to_string(*rms_px) + R"(}, {"name": "mean_mm", "unit": "mm", "value": 0.5},)" +
+                R"({"name": "residual_ratio", "value": 1.25})";
+    }
+    write("archive/" + name + "/session.json",
+          R"({"metrics": [)" + metrics +
+              R"(], "gates": [{"name": "coverage", "limit": 0.4, "asked": "at least",)"
+              R"( "value": null, "met": false}]})" +
+              "\n");
+  }
+
+  std::vector<RunRecord> runs() const {
+    std::vector<RunRecord> all;
+    for (const auto& session : sessions_of_archive(folder / "archive").sessions) {
+      all.push_back(run_of(session));
+    }
+    return all;
+  }
+
+  TemporaryFolder folder;
+  std::string summary = "camera,session,verdict,date,reason,version,key\n";
+};
+
+TEST_F(ArchiveRunsOf, AreThoseWithADateInTheirOrder) {
+  const auto archive = sessions_of_archive(folder / "archive");
+  EXPECT_EQ(archive.undated, 1U);
+  EXPECT_EQ(archive.crashed, 1U);
+  const auto runs = this->runs();
+  ASSERT_THAT(runs, SizeIs(4));
+  EXPECT_EQ(runs[0].ended_utc, "2026-03-14T09:30:00Z");
+  EXPECT_EQ(begun_utc(runs[0].run), runs[0].ended_utc);
+  EXPECT_EQ(runs[1].ended_utc, "2026-03-15T00:00:00Z");
+  EXPECT_THAT((std::vector{runs[0].verdict, runs[1].verdict, runs[2].verdict, runs[3].verdict}),
+              ElementsAre("PASS", "PASS", "FAIL", "INVALID"));
+  EXPECT_EQ(runs[0].station, "archive");
+  EXPECT_EQ(sessions_of_archive(folder / "archive/").sessions[0].run.station, "archive");
+  EXPECT_EQ(runs[0].config_sha256, "key");
+  EXPECT_EQ(runs[1].calibration, "format: vlp-calibration/1\n");
+  EXPECT_EQ(runs[2].first_cause(), "rms_px is 2 px, at most 1 px is asked for");
+  EXPECT_EQ(runs[3].program, "vlp-calibrate 1.2.3");
+  ASSERT_THAT(runs[2].figures, SizeIs(4));
+  EXPECT_EQ(runs[2].figures[0].value, 2);
+  EXPECT_FALSE(runs[2].figures[0].met());
+  EXPECT_EQ(runs[2].figures[0].asked, Direction::at_most);
+  EXPECT_EQ(runs[2].figures[2].name, "residual_ratio");
+  EXPECT_FALSE(runs[2].figures[2].limit);
+  EXPECT_EQ(runs[2].figures[3].asked, Direction::at_least);
+  EXPECT_FALSE(runs[2].figures[3].value);
+}
+
+TEST_F(ArchiveRunsOf, AreKeptOnceForTrendsAndCapability) {
+  Records records((folder / "records.db").string());
+  for (int time = 0; time < 2; ++time) {
+    for (const RunRecord& run : runs()) records.keep(run);
+  }
+  EXPECT_THAT(records.list({}), SizeIs(4));
+  EXPECT_THAT(values_of(judged_values(records, "rms_px", {})), ElementsAre(0.3, 0.1, 2));
+  EXPECT_THAT(values_of(judged_values(records, "mean_mm", {})), ElementsAre(0.5, 0.5, 0.5));
+  EXPECT_EQ(gate_of("rms_px", nullptr, records, judged_values(records, "rms_px", {})), 1);
+  EXPECT_STREQ(run_figure("mean_mm").unit, "mm");
+  EXPECT_TRUE(records.check("").problems.empty());
+}
+
+TEST_F(ArchiveRunsOf, OfWhatIsNotWrittenByReprocessingAreRefused) {
+  EXPECT_THAT(refusal_of([&] { sessions_of_archive(folder / "none"); }), HasSubstr("summary.csv"));
+  write("archive/sessions/a/s1/session.json", "{\"metrics\": 1}\n");
+  EXPECT_THAT(refusal_of([&] { runs(); }),
+              HasSubstr("a/s1/session.json: is not as vlp-calibrate writes it"));
+  std::filesystem::remove(folder / "archive/sessions/a/s1/session.json");
+  EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("a/s1/session.json: cannot be opened"));
+}
+
+}  // namespace
+}  // namespace vlp

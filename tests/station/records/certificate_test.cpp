@@ -1,0 +1,143 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/certificate.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "station/station_config.h"
+#include "support/datasets.h"
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+/// The example's, with covariances.
+Calibration measured() {
+  Calibration calibration = read_calibration(kExample + "calibration.yaml");
+  const auto size = static_cast<Eigen::Index>(calibration.camera.intrinsics.size());
+  Eigen::VectorXd sds_px = Eigen::VectorXd::Constant(size, 1e-3);
+  sds_px.head<4>() << 0.01, 0.02, 0.03, 0.04;
+  calibration.intrinsics_report = IntrinsicsReport{36, 4000, 0, 0.1, {}, {}};
+  calibration.intrinsics_report->covariance = MatrixX(sds_px.cwiseAbs2().asDiagonal());
+  RotationCenter& center = *calibration.rotation_center;
+  center.covariance = Matrix2(Eigen::Vector2d(0.05 * 0.05, 0.06 * 0.06).asDiagonal());
+  center.lever_arm_m = Eigen::Vector2d(1e-3, -2e-3);
+  center.lever_arm_covariance = Matrix2(Eigen::Vector2d(1e-8, 4e-8).asDiagonal());
+  calibration.history = {{"camera", "vlp-station", "0", "", {{"station", std::string(64, 'a')}}}};
+  return calibration;
+}
+
+RunRecord certified_run() {
+  RunRecord record;
+  record.run = "20261121T134501Z-0001";
+  record.kind = "unit";
+  record.camera = "<0001>";
+  record.station = "station-1";
+  record.ended_utc = "2026-11-21T13:50:01Z";
+  record.program = "vlp-station 0";
+  record.config_sha256 = std::string(64, 'a');
+  record.calibration = "format: vlp-calibration/1\n";
+  record.verdict = name_of(Verdict::pass);
+  record.figures = check_all({{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
+                             {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, unit_metrics());
+  return record;
+}
+
+TEST(CertifiedValue, HasTwoDigitsOfTheExpandedUncertainty) {
+  const auto words = [](double value, std::optional<double> u) {
+    return words_of(CertifiedValue{"", "px", value, u});
+  };
+  EXPECT_EQ(words(520.12345, 0.006), "520.123 \u00b1 0.012\u00a0px");
+  EXPECT_EQ(words(520.12345, 0.0498), "520.12 \u00b1 0.10\u00a0px");  // not 0.0996, nor 0.100
+  EXPECT_EQ(words(-0.00123, 0.5), "-0.0 \u00b1 1.0\u00a0px");
+  EXPECT_EQ(words(1234.6, 20), "1235 \u00b1 40\u00a0px");
+  EXPECT_EQ(words(520.12345, std::nullopt), "520.123\u00a0px, uncertainty not stated");
+  EXPECT_EQ(words(520.12345, 0), words(520.12345, std::nullopt));
+}
+
+TEST(CertifiedValues, HaveTheUncertaintiesOfTheCalibration) {
+  const Calibration calibration = measured();
+  const auto values = certified_values(calibration);
+  ASSERT_EQ(values.size(), 10u);
+  const std::vector<double> u{0.01, 0.02, 0.03, 0.04, 0.05, 0.06};
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    EXPECT_NEAR(values[i].standard_uncertainty.value(), u[i], 1e-12) << values[i].name;
+  }
+  EXPECT_EQ(values[0].value, 520);
+  EXPECT_EQ(values[3].value, 296);
+  // What the lens does to the zenith is not known.
+  EXPECT_FALSE(values[6].standard_uncertainty);
+  EXPECT_EQ(values[8].name, "lever arm x");
+  EXPECT_NEAR(values[8].value, 1, 1e-12);
+  EXPECT_NEAR(values[9].standard_uncertainty.value(), 0.2, 1e-12);
+  // It is now: nothing, so that the part of the captures is all there is.
+  Calibration known = calibration;
+  const auto lens = static_cast<Eigen::Index>(known.camera.intrinsics.size());
+  known.rotation_center->by_intrinsics = MatrixX::Zero(2, lens);
+  const double zenith_deg = 0.05 / 520 * 180 / std::numbers::pi;
+  EXPECT_NEAR(certified_values(known)[6].standard_uncertainty.value(), zenith_deg, 1e-12);
+  // The zenith moves with the principal point, of which 0.03 px are not known.
+  known.rotation_center->by_intrinsics->operator()(0, 2) = 1 / 520.0;
+  EXPECT_NEAR(certified_values(known)[6].standard_uncertainty.value(),
+              std::hypot(0.05, 0.03) / 520 * 180 / std::numbers::pi, 1e-12);
+  // A calibration that states nothing.
+  for (const CertifiedValue& value :
+       certified_values(read_calibration(kExample + "calibration.yaml"))) {
+    EXPECT_FALSE(value.standard_uncertainty) << value.name;
+  }
+}
+
+TEST(Certificate, HasWhatARecordHas) {
+  const std::string page = certificate(certified_run(), measured());
+  EXPECT_EQ(certificate(certified_run(), measured()), page);
+  EXPECT_THAT(
+      page, AllOf(HasSubstr("Calibration certificate: camera &lt;0001&gt;"), HasSubstr("conforms"),
+                  HasSubstr("20261121T134501Z-0001"), HasSubstr("2026-11-21T13:50:01Z"),
+                  HasSubstr("station-1"), HasSubstr("vlp-station 0"),
+                  HasSubstr(std::string(64, 'a')), HasSubstr("520.000 \u00b1 0.020\u00a0px")));
+  // A gate with a guard band, and one without.
+  EXPECT_THAT(page, HasSubstr("<td>0.960 \u00b1 0.040\u00a0mm</td><td>at most 1\u00a0mm</td>"
+                              "<td>0.9671\u00a0mm</td><td>yes, p = 0.977</td>"
+                              "<td>guard band of 1.645 u</td>"));
+  EXPECT_THAT(page, HasSubstr("<td>0.1235\u00a0px</td><td>at most 0.3\u00a0px</td>"
+                              "<td>0.3\u00a0px</td><td>yes</td><td>simple</td>"));
+  EXPECT_THAT(page, HasSubstr("signature"));
+}
+
+TEST(Certificate, SaysThatAUnitDoesNotConform) {
+  RunRecord record = certified_run();
+  record.figures[0].value = 0.4;
+  record.judge({{"the lens is poor", true}});
+  EXPECT_THAT(certificate(record, measured()),
+              AllOf(HasSubstr("FAIL"), HasSubstr("does not conform: the lens is poor."),
+                    HasSubstr("<td>no</td>"), Not(HasSubstr("conforms with all"))));
+}
+
+TEST(Certificate, IsRefusedWhereThereCanBeNone) {
+  const auto refusal = [](const RunRecord& record) {
+    return refusal_of([&] { certificate(record, measured()); });
+  };
+  RunRecord golden = certified_run();
+  golden.kind = "golden";
+  EXPECT_THAT(refusal(golden), HasSubstr("is of the golden unit"));
+  RunRecord invalid = certified_run();
+  invalid.judge({{"lamp 5 is loose", false}});
+  EXPECT_THAT(refusal(invalid),
+              AllOf(HasSubstr("20261121T134501Z-0001"), HasSubstr("not judged (lamp 5 is loose)")));
+  RunRecord changed = certified_run();
+  changed.figures[0].value = 0.4;
+  EXPECT_THAT(refusal(changed), HasSubstr("it was changed by hand: it has no certificate"));
+  RunRecord without = certified_run();
+  without.calibration.clear();
+  EXPECT_THAT(refusal(without), HasSubstr("came to no calibration"));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,192 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/hook.h"
+
+#include <gmock/gmock.h>
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "station/records/export_runs.h"
+#include "support/child_process.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+RunRecord judged_run() {
+  RunRecord run;
+  run.run = "20261121T134501Z-0123456789abcdef";
+  run.camera = "a";
+  run.verdict = "PASS";
+  run.figures = {{"rms_px", "px", 0.25, 1, Direction::at_most, {}}};
+  // More than a pipe holds.
+  for (int i = 0; i < 2000; ++i) {
+    run.images.push_back({"boards", std::to_string(i) + ".png", std::string(64, 'a'), ""});
+  }
+  return run;
+}
+
+class HookTest : public testing::Test {
+ protected:
+  RunEvent run(const std::string& script, double time_limit_s = 20) {
+    const auto begun = std::chrono::steady_clock::now();
+    RunEvent event = run_hook({{"sh", "-c", script}, folder / ".", time_limit_s}, judged_run(),
+                              HookLock(folder / ".", judged_run().run));
+    took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    return event;
+  }
+  TemporaryFolder folder;
+  double took_s = 0;
+};
+
+TEST_F(HookTest, GetsTheRunInItsFolder) {
+  const RunEvent event = run("cat >seen.json; echo first; echo label 7; echo");
+  EXPECT_EQ(event.what, kHookDone);
+  EXPECT_EQ(event.text, "label 7");
+  const std::string seen = TemporaryFolder::content_of(folder / "seen.json");
+  EXPECT_EQ(seen, run_json(judged_run()));
+  const auto json = nlohmann::json::parse(seen);
+  EXPECT_EQ(json["verdict"], "PASS");
+  EXPECT_EQ(json["figures"]["rms_px"]["met"], true);
+}
+
+TEST_F(HookTest, NeedNotReadNorBeSilent) {
+  EXPECT_EQ(run("exec <&-; head -c 3000000 /dev/zero | tr '\\0' '\\n'; echo end >&2").text, "end");
+  // What it leaves running holds nobody up.
+  EXPECT_EQ(run("sleep 10 & echo printed").text, "printed");
+  EXPECT_LT(took_s, 5);
+  EXPECT_EQ(run("exec >&- 2>&-; sleep 0.1").what, kHookDone);
+}
+
+TEST_F(HookTest, FailsInWords) {
+  EXPECT_EQ(run("echo the printer is out of labels; exit 3").what, kHookFailed);
+  EXPECT_EQ(run("echo the printer is out of labels; exit 3").text,
+            "exit code 3: the printer is out of labels");
+  EXPECT_EQ(run("kill -9 $$").text, "ended by signal 9");
+  EXPECT_EQ(run("printf '\\033[31m\\377'; exit 1").text, "exit code 1: \\x1b[31m\\xff");
+  const RunEvent missing = run_hook({{"/nowhere/label"}, folder / ".", 1}, judged_run(),
+                                    HookLock(folder / ".", judged_run().run));
+  EXPECT_EQ(missing.what, kHookFailed);
+  EXPECT_THAT(missing.text, HasSubstr("/nowhere/label cannot be started: No such file"));
+}
+
+TEST_F(HookTest, IsKilledWithItsChildrenWhenItTakesTooLong) {
+  const RunEvent event = run("sleep 100 & echo $! >child; echo waits; wait", 0.3);
+  EXPECT_EQ(event.what, kHookFailed);
+  EXPECT_EQ(event.text, "no end within 0.3 s, killed: waits");
+  EXPECT_LT(took_s, 5);
+  std::string child = TemporaryFolder::content_of(folder / "child");
+  ASSERT_FALSE(child.empty());
+  child.pop_back();
+  // A dead process that nobody waited for has no command line.
+  const std::string its = "/proc/" + child + "/cmdline";
+  for (int i = 0; i < 100 && !TemporaryFolder::content_of(its).empty(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_EQ(TemporaryFolder::content_of(its), "");
+}
+
+TEST_F(HookTest, IsKilledThoughItWritesWithoutEndAndLeftItsGroup) {
+  EXPECT_EQ(run("exec cat /dev/zero", 0.3).what, kHookFailed);
+  EXPECT_LT(took_s, 5);
+  const RunEvent event =
+      run("exec python3 -c 'import os, time; os.setpgid(0, os.getpgid(os.getppid())); "
+          "time.sleep(100)' || exit 7",
+          1);
+  EXPECT_EQ(event.text, "no end within 1 s, killed");
+  EXPECT_LT(took_s, 5);
+}
+
+TEST_F(HookTest, IsKilledWithWhatMadeASessionOfItsOwn) {
+  const RunEvent event = run(
+      "setsid sh -c 'sleep 100 & echo $! >child'; setsid sleep 100 & echo $! >other; sleep 100", 1);
+  EXPECT_EQ(event.text, "no end within 1 s, killed");
+  EXPECT_LT(took_s, 5);
+  for (const char* name : {"child", "other"}) {
+    std::string process = TemporaryFolder::content_of(folder / name);
+    ASSERT_FALSE(process.empty());
+    process.pop_back();
+    EXPECT_FALSE(std::filesystem::exists("/proc/" + process)) << name;
+  }
+}
+
+/// A station that is killed leaves its hook running: nobody runs it a second time meanwhile.
+TEST_F(HookTest, HoldsItsLockWhenItsStationIsKilled) {
+  const std::string name = judged_run().run;
+  const pid_t station = start_child([&] {
+    run_hook({{"sh", "-c", "touch begun; until [ -e end ]; do sleep 0.02; done"}, folder / ".", 20},
+             judged_run(), HookLock(folder / ".", name));
+  });
+  const auto wait_for = [](const auto& is) {
+    for (int i = 0; i < 1000 && !is(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return is();
+  };
+  ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(folder / "begun"); }));
+  kill_child(station);
+  EXPECT_FALSE(HookLock(folder / ".", name).held());
+  folder.file("end", "");
+  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).held(); }));
+}
+
+/// Whoever started this program may ignore signals, and leave files open.
+TEST_F(HookTest, InheritsNoSignalsAndNoFiles) {
+  std::signal(SIGCHLD, SIG_IGN);
+  EXPECT_EQ(run("exit 3").text, "exit code 3");
+  const auto interrupt = std::signal(SIGINT, SIG_IGN), pipe = std::signal(SIGPIPE, SIG_IGN);
+  const int open = ::open("/dev/null", O_RDONLY), far = ::fcntl(open, F_DUPFD, 57);
+  EXPECT_EQ(run("kill -INT $$").text, "ended by signal 2");
+  EXPECT_EQ(run("kill -PIPE $$").text, "ended by signal 13");
+  EXPECT_EQ(run("test ! -e /proc/self/fd/" + std::to_string(far)).what, kHookDone);
+  ::close(open);
+  ::close(far);
+  std::signal(SIGINT, interrupt);
+  std::signal(SIGPIPE, pipe);
+}
+
+TEST_F(HookTest, IsOpenUntilItIsDone) {
+  RunRecord run = judged_run();
+  EXPECT_FALSE(hook_is_open(run));
+  EXPECT_EQ(hook_problem(run), "");
+  run.events.push_back(hook_wanted({{"label", "it"}, {}, 1}, "Ann"));
+  EXPECT_EQ(run.events.back().text, "label it");
+  EXPECT_THAT(run.events.back().who, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
+  EXPECT_TRUE(hook_is_open(run));
+  EXPECT_EQ(hook_problem(run), "was not run to its end");
+  run.events.push_back(new_event(kHookFailed, "exit code 3"));
+  EXPECT_EQ(hook_problem(run), "failed: exit code 3");
+  run.events.push_back(new_event(kHookDone, ""));
+  EXPECT_FALSE(hook_is_open(run));
+  EXPECT_EQ(hook_problem(run), "");
+  // Wanted again, for a run that was voided.
+  run.events.push_back(new_event(kHookWanted, "label it"));
+  EXPECT_TRUE(hook_is_open(run));
+  EXPECT_EQ(hook_problem(run), "was not run to its end");
+  run.events.push_back(new_event(kHookDone, ""));
+  EXPECT_FALSE(hook_is_open(run));
+}
+
+TEST_F(HookTest, OfARunIsRunByOneProgram) {
+  const std::string name = judged_run().run;
+  {
+    const HookLock one(folder / ".", name), other(folder / ".", name);
+    EXPECT_TRUE(one.held());
+    EXPECT_FALSE(other.held());
+    EXPECT_TRUE(HookLock(folder / ".", "another").held());
+  }
+  EXPECT_TRUE(HookLock(folder / ".", name).held());
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
+}
+
+}  // namespace
+}  // namespace vlp

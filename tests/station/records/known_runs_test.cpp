@@ -1,0 +1,168 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/known_runs.h"
+
+#include <gmock/gmock.h>
+
+#include <stdexcept>
+
+#include "rig/input_error.h"
+#include "station/records/golden_due.h"
+#include "station/records/hook.h"
+#include "station/sample_records.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::Field;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+/// A station with a file of records.
+class KnownRunsTest : public testing::Test {
+ protected:
+  KnownRunsTest() {
+    config.station = "station-1";
+    config.records = (folder / "records.db").string();
+    config.spool = folder / "spool";
+  }
+  std::string keep(int number, double rms_px = 0.1) const {
+    const RunRecord run = sample(run_of(number), "a", rms_px);
+    Records(config.records).keep(run);
+    return run.run;
+  }
+  /// Where no records are that could take it.
+  std::string keep_waiting(int number) const {
+    const RunRecord run = sample(run_of(number), "b", 0.1);
+    Spool(config.spool, config.records).keep(run);
+    return run.run;
+  }
+  static RunFilter only(std::string RunFilter::*text, const std::string& value) {
+    RunFilter filter;
+    filter.*text = value;
+    return filter;
+  }
+  void take_records_away() const {
+    std::filesystem::rename(config.records, folder / "elsewhere.db");
+  }
+
+  TemporaryFolder folder;
+  StationConfig config{};
+};
+
+TEST_F(KnownRunsTest, AreThoseOfTheRecordsAndThoseThatWait) {
+  const std::string kept = keep(1);
+  EXPECT_THAT(KnownRuns(config.records).list({}), ElementsAre(Field(&RunSummary::run, kept)));
+  const std::string waits = keep_waiting(2);
+  {
+    KnownRuns known(config);  // brings it there
+    EXPECT_THAT(known.list({}),
+                ElementsAre(Field(&RunSummary::run, kept),
+                            AllOf(Field(&RunSummary::run, waits), Field(&RunSummary::causes, ""))));
+    EXPECT_THAT(known.whole({}), SizeIs(2));
+    EXPECT_EQ(known.last({}).run, waits);
+    EXPECT_EQ(known.last(only(&RunFilter::camera, "a")).run, kept);
+    EXPECT_EQ(known.find(kept).camera, "a");
+    EXPECT_THROW(known.find("none"), std::invalid_argument);
+    EXPECT_THROW(known.last(only(&RunFilter::camera, "c")), std::invalid_argument);
+  }
+  take_records_away();
+  const std::string alone = keep_waiting(3);
+  KnownRuns known(config);
+  EXPECT_THAT(known.list({}), ElementsAre(AllOf(Field(&RunSummary::run, alone),
+                                                Field(&RunSummary::causes, "(waits here) "))));
+  EXPECT_THAT(known.list(only(&RunFilter::verdict, "FAIL")), IsEmpty());
+  EXPECT_THAT(known.list(only(&RunFilter::until, "2026")), IsEmpty());
+  EXPECT_EQ(known.find(alone).camera, "b");
+  EXPECT_THROW(known.records(), std::runtime_error) << "these are not all";
+  EXPECT_THROW(known.whole({}), std::runtime_error);
+}
+
+TEST_F(KnownRunsTest, AreNoneWithoutRecords) {
+  EXPECT_THROW(KnownRuns{config}, std::runtime_error);
+  EXPECT_THROW(KnownRuns{config.records}, std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(config.records)) << "a station makes them";
+}
+
+TEST(RunCounts, LeaveVoidedRunsOutOfTheYield) {
+  const std::vector<RunSummary> runs{{"1", "unit", "", "", "", "PASS", "", ""},
+                                     {"2", "unit", "", "", "", "PASS", "", ""},
+                                     {"3", "unit", "", "", "", "FAIL", "", ""},
+                                     {"4", "unit", "", "", "", "FAIL", "", "wrong serial"},
+                                     {"5", "unit", "", "", "", "INVALID", "", ""},
+                                     {"6", "golden", "", "", "", "PASS", "", ""}};
+  const RunCounts counts = count_runs(runs);
+  EXPECT_EQ(counts.passed, 3U);
+  EXPECT_EQ(counts.failed, 1U);
+  EXPECT_EQ(counts.invalid, 1U);
+  EXPECT_EQ(counts.voided, 1U);
+  EXPECT_EQ(counts.units_judged, 3U);
+  EXPECT_DOUBLE_EQ(counts.yield().value(), 2.0 / 3);
+  EXPECT_FALSE(count_runs({}).yield());
+}
+
+TEST_F(KnownRunsTest, AreVoidedOnceWithWhoAndWhy) {
+  const std::string run = keep(1);
+  {
+    KnownRuns known(config.records);
+    void_run(known, run, "Ann", "wrong serial");
+    EXPECT_THAT(known.list({}), ElementsAre(Field(&RunSummary::voided, "wrong serial")));
+    EXPECT_THROW(void_run(known, run, "Ann", "again"), std::invalid_argument);
+    EXPECT_THROW(void_run(known, "none", "Ann", "again"), std::invalid_argument);
+  }
+  const auto record = Records(config.records).find(run);
+  ASSERT_THAT(record->events, SizeIs(1));
+  EXPECT_THAT(record->events[0].who, testing::StartsWith("Ann ("));
+}
+
+/// Labels and the factory's system have to hear of it.
+TEST_F(KnownRunsTest, TellTheHookWhatWasVoided) {
+  config.hook = Hook{{"sh", "-c", "cat >told.json; echo taken back"}, folder / ".", 20};
+  const std::string run = keep(1);
+  {
+    KnownRuns known(config);
+    const auto [record, problem] = void_run(known, run, "Ann", "wrong serial");
+    EXPECT_EQ(problem, "");
+    EXPECT_EQ(record.events.back().what, kHookDone);
+    EXPECT_THAT(known.with_open_hook(), IsEmpty());
+  }
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "told.json"),
+              AllOf(HasSubstr(run), HasSubstr("\"voided\""), HasSubstr("wrong serial")));
+  const auto record = Records(config.records).find(run);
+  ASSERT_THAT(record->events, SizeIs(3));
+  EXPECT_EQ(record->events[2].text, "taken back");
+  // One that was done at the verdict is open again when it fails now.
+  config.hook = Hook{{"false"}, folder / ".", 20};
+  RunRecord second = sample(run_of(2), "a", 0.1);
+  second.events = {new_event(kHookWanted, "label"), new_event(kHookDone, "")};
+  Records(config.records).keep(second);
+  KnownRuns known(config);
+  EXPECT_THAT(known.with_open_hook(), IsEmpty());
+  EXPECT_EQ(hook_problem(void_run(known, second.run, "Ann", "again").run), "failed: exit code 1");
+  EXPECT_THAT(known.with_open_hook(), ElementsAre(second.run));
+}
+
+TEST_F(KnownRunsTest, TellNoHookOfAnotherStation) {
+  const std::string run = keep(1);
+  config.station = "station-2";
+  config.hook = Hook{{"touch", "told"}, folder / ".", 20};
+  KnownRuns known(config);
+  EXPECT_THAT(void_run(known, run, "Ann", "wrong serial").run.events, SizeIs(1));
+  EXPECT_FALSE(std::filesystem::exists(folder / "told"));
+}
+
+TEST_F(KnownRunsTest, AreNotVoidedWhileTheirHookIsRun) {
+  config.hook = Hook{{"true"}, folder / ".", 20};
+  const std::string run = keep(1);
+  KnownRuns known(config);
+  std::filesystem::create_directory(config.spool);
+  const HookLock lock(config.spool, run);
+  EXPECT_THROW(void_run(known, run, "Ann", "wrong serial"), InputError);
+  EXPECT_THAT(known.find(run).events, IsEmpty());
+}
+
+}  // namespace
+}  // namespace vlp

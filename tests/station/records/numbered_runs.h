@@ -1,0 +1,62 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <set>
+#include <string>
+
+#include "station/records/records.h"
+#include "station/station_config.h"
+
+namespace vlp {
+
+inline constexpr std::size_t kImagesOfARun = 30;
+
+/// With digests of its own.
+inline RunRecord numbered_run(int number) {
+  RunRecord run;
+  run.run = "20261121T134501Z-" + std::to_string(100000 + number);
+  run.kind = "unit";
+  run.station = "station-1";
+  run.camera = "camera-" + std::to_string(number);
+  run.begun_utc = begun_utc(run.run);
+  run.ended_utc = "2026-11-21T13:50:01Z";
+  run.judge({{"the lens is \"blurred\"", true}, {"second", false}});
+  run.program = "vlp-station 0";
+  run.libraries = "none";
+  run.config_sha256 = std::string(64, 'a');
+  run.calibration = "format: vlp-calibration/1\n";
+  run.figures = check_all({{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
+                          {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, unit_metrics());
+  for (std::size_t i = 0; i < kImagesOfARun; ++i) {
+    run.images.push_back({"boards", std::to_string(1000 + i) + ".png",
+                          "digest-" + std::to_string(number) + "-" + std::to_string(i), ""});
+  }
+  return run;
+}
+
+/// The names of all runs in the records; each is whole.
+inline std::set<std::string> whole_runs(const std::string& where) {
+  Records records(where);
+  std::set<std::string> names;
+  for (const RunSummary& run : records.list({})) {
+    const auto kept = records.find(run.run);
+    EXPECT_THAT(kept->images, testing::SizeIs(kImagesOfARun));
+    EXPECT_THAT(kept->figures, testing::SizeIs(3));
+    EXPECT_TRUE(names.insert(run.run).second);
+  }
+  return names;
+}
+
+inline double seconds_of(const std::function<void()>& action) {
+  const auto begun = std::chrono::steady_clock::now();
+  action();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+}
+
+}  // namespace vlp

@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/publish_run.h"
+
+#include <gmock/gmock.h>
+
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+RunRecord passed() {
+  RunRecord record;
+  record.run = "20261121T134501Z-0001";
+  record.camera = "0001";
+  record.station = "station-1";
+  record.verdict = name_of(Verdict::pass);
+  record.calibration =
+      TemporaryFolder::content_of(fs::path(VLP_SOURCE_DIR) / "datasets/example/calibration.yaml");
+  return record;
+}
+
+TEST(PublishRun, WritesWhatIsMissing) {
+  const TemporaryFolder folder;
+  const RunRecord record = passed();
+  const fs::path results = publish_run(record, {}, folder / "results");
+  const std::string report = TemporaryFolder::content_of(results / "report.html");
+  EXPECT_EQ(TemporaryFolder::content_of(results / "calibration.yaml"), record.calibration);
+  // The one is written again, the other stays.
+  fs::remove(results / "calibration.yaml");
+  folder.file((results / "report.html").string(), "with pictures");
+  publish_run(record, {}, folder / "results");
+  EXPECT_EQ(TemporaryFolder::content_of(results / "calibration.yaml"), record.calibration);
+  EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), "with pictures");
+  fs::remove(results / "report.html");
+  publish_run(record, {}, folder / "results");
+  EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), report);
+}
+
+TEST(PublishRun, LeavesAnotherCalibrationAlone) {
+  const TemporaryFolder folder;
+  const RunRecord record = passed();
+  const fs::path results = publish_run(record, {}, folder / "results");
+  folder.file((results / "calibration.yaml").string(), "another\n");
+  EXPECT_THAT(refusal_of([&] { publish_run(record, {}, folder / "results"); }),
+              HasSubstr("calibration.yaml: is not what the record has"));
+}
+
+TEST(PublishRun, NamesACalibrationByItsVerdict) {
+  const TemporaryFolder folder;
+  RunRecord record = passed();
+  record.judge({{"the lens is decentred", true}});
+  EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "failed-calibration.yaml"));
+  record.judge({{"lamp 5 is loose", false}});
+  EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "b") / "invalid-calibration.yaml"));
+}
+
+TEST(CheckResults, RefusesAFolderThatCannotBeOne) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(refusal_of([&] { check_results(folder / "results", "0001"); }), "");
+  EXPECT_TRUE(fs::is_empty(folder / "results/0001"));
+  EXPECT_THAT(refusal_of([&] { check_results(folder.file("file", ""), "0001"); }),
+              HasSubstr("file/0001: cannot be made"));
+}
+
+}  // namespace
+}  // namespace vlp

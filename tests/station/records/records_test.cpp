@@ -1,0 +1,532 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/records.h"
+#include "station/records/spool.h"
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <future>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "station/records/export_runs.h"
+#include "station/records/record_tables.h"
+#include "station/sample_records.h"
+#include "station/station_config.h"
+#include "support/child_process.h"
+#include "support/postgres_server.h"
+#include "support/refused.h"
+#include "support/schema.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::SizeIs;
+using testing::StartsWith;
+
+/// A record with another text in each of its fields.
+RunRecord with_all_texts() {
+  RunRecord record = sample(run_of(7), "a", 0.5);
+  for (const RunField& field : run_fields()) {
+    record.*field.text = std::string("the '") + field.name + "' of \"it\"\n";
+  }
+  return record;
+}
+
+void check_all_texts(Records& records) {
+  const RunRecord kept = with_all_texts();
+  records.keep(kept);
+  const auto found = records.find(kept.run);
+  ASSERT_TRUE(found);
+  for (const RunField& field : run_fields()) {
+    EXPECT_EQ((*found).*field.text, kept.*field.text) << field.name;
+  }
+}
+
+/// Events come to a run that is kept, once each, and stay.
+void check_events(Records& records) {
+  RunRecord run = sample(run_of(8), "e", 0.5), other = sample(run_of(6), "e", 0.5);
+  run.events = {new_event(kHookWanted, "label 'x'")};
+  other.events = {new_event(kHookWanted, "label"), new_event(kHookDone, "")};
+  for (const RunRecord& each : {run, other, run}) records.keep(each);
+  EXPECT_THAT(records.with_open_hook("station-1"), ElementsAre(run.run));
+  EXPECT_THAT(records.with_open_hook(""), ElementsAre(run.run));
+  EXPECT_THAT(records.with_open_hook("another"), IsEmpty());
+  const RunEvent wanted = run.events.front();
+  run.events.push_back(new_event(kHookFailed, "exit code 3"));
+  records.keep(run);
+  EXPECT_THAT(records.with_open_hook("station-1"), ElementsAre(run.run));
+  run.events = {new_event(kHookDone, "")};  // by a program that knows nothing of the others
+  records.keep(run);
+  EXPECT_THAT(records.with_open_hook("station-1"), IsEmpty());
+  const auto found = records.find(run.run);
+  ASSERT_TRUE(found);
+  ASSERT_THAT(found->events, SizeIs(3));
+  EXPECT_EQ(found->events[0].event, wanted.event);
+  EXPECT_EQ(found->events[0].text, "label 'x'");
+  EXPECT_EQ(found->events[0].who, wanted.who);
+  EXPECT_THAT(wanted.who, HasSubstr("@"));
+  EXPECT_EQ(found->events[1].text, "exit code 3");
+  EXPECT_EQ(found->events[2].what, kHookDone);
+}
+
+/// A run that is voided stays, and counts in nothing. Of check_records().
+void check_voided(Records& records) {
+  const std::size_t before = records.trend("rms_px", {}).size();
+  RunRecord run = sample(run_of(0), "a", 0);
+  run.events = {new_event(kVoided, "wrong serial", "Ann")};
+  records.keep(run);
+  const auto found = records.find(run.run);
+  ASSERT_TRUE(found);
+  EXPECT_THAT(why_no_verdict(*found),
+              testing::MatchesRegex("was voided by Ann [(].*@.*: wrong serial"));
+  EXPECT_THAT(records.trend("rms_px", {}), SizeIs(before - 1));
+  EXPECT_EQ(records.list({})[0].run, run.run);
+  EXPECT_EQ(records.list({})[0].voided, "wrong serial");
+  EXPECT_EQ(records.list({})[1].voided, "");
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), "camera a: run " + run_of(1));
+}
+
+/// What holds in every database.
+void check_records(const std::string& where) {
+  Records records(where);
+  for (int i = 0; i < 4; ++i) {
+    records.keep(sample(run_of(i), i == 2 ? "b" : "a", i == 3 ? 1.5 : 0.1 * i));
+  }
+  // Kept once; another of its name is refused.
+  records.keep(sample(run_of(0), "a", 0));
+  EXPECT_THAT(refusal_of([&] { records.keep(sample(run_of(0), "other", 0.7)); }),
+              HasSubstr("has another run " + run_of(0)));
+  const auto all = records.list({});
+  ASSERT_THAT(all, SizeIs(4));
+  EXPECT_EQ(all[0].camera, "a");
+  EXPECT_EQ(all[3].verdict, "FAIL");
+  EXPECT_EQ(all[3].station, "station-1");
+  EXPECT_THAT(all[3].causes, StartsWith("it's \"blurred\""));
+  // Whose an image is: of the first run that uses it, and of no run of the camera itself.
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), "camera a: run " + run_of(0));
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "a"), "camera b: run " + run_of(2));
+  EXPECT_EQ(records.owner_of(std::string(64, 'c'), "b"), "") << "it was refused there";
+  EXPECT_EQ(refusal_of([&] { records.check_writable(); }), "");
+  RunFilter filter;
+  filter.camera = "a";
+  EXPECT_THAT(records.list(filter), SizeIs(3));
+  filter.verdict = "PASS";
+  filter.last = 1;
+  ASSERT_THAT(records.list(filter), SizeIs(1));
+  EXPECT_EQ(records.list(filter)[0].run, run_of(1));
+
+  EXPECT_FALSE(records.find("another"));
+  const auto found = records.find(run_of(3));
+  ASSERT_TRUE(found);
+  const RunRecord expected = sample(run_of(3), "a", 1.5);
+  EXPECT_EQ(found->causes, expected.causes);
+  EXPECT_EQ(found->calibration, expected.calibration);
+  ASSERT_THAT(found->figures, SizeIs(3));
+  EXPECT_EQ(found->figures[0].value, 1.5);
+  EXPECT_FALSE(found->figures[0].met());
+  EXPECT_EQ(found->figures[0].unit, "px");
+  ASSERT_TRUE(found->figures[0].guard);
+  EXPECT_EQ(found->figures[0].guard->standard_uncertainty, 0.1 + 0.2);  // to the last bit
+  EXPECT_EQ(found->figures[0].guard->k, 1.5);
+  EXPECT_FALSE(found->figures[1].guard);
+  EXPECT_FALSE(found->figures[1].limit);
+  EXPECT_EQ(found->figures[1].asked, Direction::at_least);
+  EXPECT_FALSE(found->figures[2].value);
+  ASSERT_THAT(found->images, SizeIs(2));
+  EXPECT_EQ(found->images[1].refused, "too dark");
+
+  RunFilter of_a;
+  of_a.camera = "a";
+  const auto trend = records.trend("rms_px", of_a);
+  ASSERT_THAT(trend, SizeIs(3));
+  EXPECT_DOUBLE_EQ(trend[2].value, 1.5);
+  EXPECT_THAT(records.trend("tilt_deg", {}), IsEmpty());
+  check_all_texts(records);
+  check_events(records);
+  check_voided(records);
+  const TrailCheck trail = records.check("");
+  EXPECT_THAT(trail.problems, IsEmpty());
+  EXPECT_EQ(trail.runs, 7U);
+  EXPECT_EQ(trail.entries, 7U + 6U) << "runs and events";
+}
+
+/// Two programs that write at the same time, the first also makes the tables.
+void check_two_writers(const std::string& where) {
+  constexpr int each = 25;
+  std::vector<pid_t> children;
+  for (int writer = 0; writer < 2; ++writer) {
+    children.push_back(start_child([&] {
+      Records records(where);
+      for (int i = 0; i < each; ++i) {
+        records.keep(sample(run_of(100 * (writer + 1) + i), writer == 0 ? "a" : "b", 0.1));
+      }
+    }));
+  }
+  EXPECT_TRUE(end_well(children));
+  Records records(where);
+  const auto runs = records.list({});
+  EXPECT_THAT(runs, SizeIs(2 * each));
+  const TrailCheck trail = records.check("");
+  EXPECT_THAT(trail.problems, IsEmpty());
+  EXPECT_EQ(trail.entries, 2U * each);
+  for (const RunSummary& run : runs) EXPECT_THAT(records.find(run.run)->images, SizeIs(2));
+}
+
+/// Records as version 1 of their tables kept them.
+const std::string kVersion1 =
+    R"(CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);
+INSERT INTO vlp_schema (version) VALUES (1);
+CREATE TABLE runs (run VARCHAR(64) PRIMARY KEY, kind TEXT NOT NULL, station TEXT NOT NULL, )"
+    R"(camera TEXT NOT NULL, begun_utc TEXT NOT NULL, ended_utc TEXT NOT NULL, )"
+    R"(verdict TEXT NOT NULL, causes TEXT NOT NULL, program TEXT NOT NULL, )"
+    R"(libraries TEXT NOT NULL, config_sha256 TEXT NOT NULL, calibration TEXT NOT NULL);
+CREATE TABLE figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), place INTEGER NOT NULL, )"
+    R"(name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, gate DOUBLE PRECISION, )"
+    R"(at_least INTEGER NOT NULL, met INTEGER NOT NULL, PRIMARY KEY (run, name));
+CREATE TABLE images (run VARCHAR(64) NOT NULL REFERENCES runs (run), step VARCHAR(16) NOT NULL, )"
+    R"(image VARCHAR(255) NOT NULL, sha256 TEXT NOT NULL, refused TEXT NOT NULL, )"
+    R"(PRIMARY KEY (run, step, image));
+CREATE INDEX runs_by_camera ON runs (camera);
+INSERT INTO runs VALUES ('20261121T134501Z-0001', 'unit', 'station-1', 'a', )"
+    R"('2026-11-21T13:45:01Z', '2026-11-21T13:55:01Z', 'FAIL', 'blurred', 'vlp-station 0.1.0', )"
+    R"('none', 'aa', 'format: vlp-calibration/1');
+INSERT INTO figures VALUES ('20261121T134501Z-0001', 1, 'rms_px', 1.5, 1, 0, 0);
+INSERT INTO figures VALUES ('20261121T134501Z-0001', 2, 'coverage', NULL, 0.7, 1, 0);
+INSERT INTO figures VALUES ('20261121T134501Z-0001', 3, 'tilt_deg', 1, NULL, 0, 1);
+INSERT INTO figures VALUES ('20261121T134501Z-0001', 4, 'world_mm', 1, NULL, 0, 1);
+INSERT INTO figures VALUES ('20261121T134501Z-0001', 5, 'focal_percent', 1, NULL, 0, 1);
+INSERT INTO images VALUES ('20261121T134501Z-0001', 'boards', '0000.png', 'bb', '');
+)";
+
+/// Tables, their columns, the version and the figures.
+std::string state_of(const std::string& where) {
+  const bool is_server = where.starts_with("postgresql://");
+  return answer_of(where,
+                   std::string(is_server ? "SELECT table_name, column_name, data_type FROM "
+                                           "information_schema.columns WHERE table_schema = "
+                                           "'public' ORDER BY table_name, ordinal_position;"
+                                         : "SELECT sql FROM sqlite_master ORDER BY name;") +
+                       "\nSELECT * FROM vlp_schema;\nSELECT * FROM figures ORDER BY place;\n");
+}
+
+/// Of a database that holds kVersion1.
+void check_migration(const std::string& where) {
+  Records records(where);
+  const auto found = records.find("20261121T134501Z-0001");
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->station, "station-1");
+  EXPECT_EQ(found->operator_name, "");
+  EXPECT_EQ(found->begun_utc, "2026-11-21T13:45:01Z");
+  EXPECT_EQ(found->calibration, "format: vlp-calibration/1");
+  ASSERT_THAT(found->figures, SizeIs(5));
+  EXPECT_EQ(words_of(found->figures[0]), "rms_px is 1.5 px, at most 1 px is asked for");
+  EXPECT_EQ(words_of(found->figures[1]), "coverage is not known, at least 0.7 is asked for");
+  EXPECT_EQ(found->figures[2].unit, "deg");
+  EXPECT_EQ(found->figures[3].unit, "mm");
+  EXPECT_EQ(found->figures[4].unit, "%");
+  EXPECT_FALSE(found->figures[0].guard);
+  EXPECT_THAT(found->images, SizeIs(1));
+  records.keep(sample(run_of(5), "b", 0.1));
+  EXPECT_THAT(records.list({}), SizeIs(2));
+  EXPECT_EQ(records.find(run_of(5))->figures[0].unit, "px");
+  EXPECT_TRUE(records.find(run_of(5))->figures[0].guard);
+  EXPECT_THAT(found->events, IsEmpty());
+  check_events(records);
+  EXPECT_THAT(records.check("").problems, IsEmpty());
+}
+
+/// Of a database that holds kVersion1, which another program is about to bring up to date.
+void check_migration_by_another(const std::string& where) {
+  const TemporaryFolder folder;
+  const auto halfway = folder / "halfway";
+  const bool is_server = where.starts_with("postgresql://");
+  const std::string other = std::string(is_server ? "BEGIN;\n" : "BEGIN IMMEDIATE;\n") +
+                            "UPDATE vlp_schema SET version = version;\n"
+                            "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT '';\n"
+                            "UPDATE figures SET unit = 'by another';\n"
+                            "\\! touch '" +
+                            halfway.string() +
+                            "'; sleep 0.5\n"
+                            "UPDATE vlp_schema SET version = 2;\nCOMMIT;\n";
+  auto done = std::async(std::launch::async, [&] { return answer_of(where, other); });
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!std::filesystem::exists(halfway) && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(refusal_of([&] { Records records(where); }), "");
+  done.get();
+  EXPECT_EQ(Records(where).find("20261121T134501Z-0001")->figures[0].unit, "by another");
+}
+
+/// Of a database that holds kVersion1 and stops what changes its figures.
+void check_stopped_migration(const std::string& where) {
+  const std::string before = state_of(where);
+  EXPECT_THAT(refusal_of([&] { Records records(where); }), HasSubstr("stopped"));
+  EXPECT_EQ(state_of(where), before);
+}
+
+/// Of a database that holds kVersion1.
+void check_later_version(const std::string& where) {
+  answer_of(where, "UPDATE vlp_schema SET version = 99;\n");
+  const std::string before = state_of(where);
+  EXPECT_THAT(
+      refusal_of([&] { Records records(where); }),
+      HasSubstr(": holds records of version 99, this program knows those up to " +
+                std::to_string(kSchemaVersion) + ": use the newer vlp-station that wrote them"));
+  EXPECT_EQ(state_of(where), before);
+}
+
+TEST(Utc, OfAFilterIsADayOrAnInstantThatThereIs) {
+  for (const char* good : {"2026-11-21", "2024-02-29", "2026-11-21T13:45", "2026-11-21T13:45:01",
+                           "2026-11-21T13:45:01Z"}) {
+    EXPECT_EQ(utc_problem(good), "");
+  }
+  for (const char* bad : {"", "2026", "2026-02-29", "2026-13-01", "2026-11-21T24:00",
+                          "2026-11-21T13:60", "2026-11-21T13:45:60", "2026-11-21 13:45"}) {
+    EXPECT_THAT(utc_problem(bad), StartsWith("should be a UTC as ")) << bad;
+  }
+}
+
+TEST(Records, OfVersion1InAFileAreBroughtUpToDate) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  answer_of(file, kVersion1);
+  check_migration(file);
+}
+
+TEST(Records, OfVersion1InAFileAreBroughtUpToDateOnce) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  answer_of(file, kVersion1);
+  check_migration_by_another(file);
+}
+
+TEST(Records, ThatCannotBeWrittenAreNoticedBefore) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  { const Records made(file); }
+  answer_of(file,
+            "CREATE TRIGGER stop BEFORE UPDATE ON vlp_schema BEGIN SELECT RAISE(ABORT, 'stopped'); "
+            "END;\n");
+  Records records(file);
+  EXPECT_THAT(refusal_of([&] { records.check_writable(); }), HasSubstr("stopped"));
+}
+
+TEST(Records, OfVersion1InAFileStayAsTheyAreWhenItFails) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  answer_of(file, kVersion1 +
+                      "CREATE TRIGGER stop BEFORE UPDATE ON figures BEGIN SELECT RAISE(ABORT, "
+                      "'stopped'); END;\n");
+  check_stopped_migration(file);
+}
+
+TEST(Records, OfALaterVersionInAFileAreLeftAlone) {
+  const TemporaryFolder folder;
+  const std::string file = (folder / "records.db").string();
+  answer_of(file, kVersion1);
+  check_later_version(file);
+}
+
+TEST(Records, OfOtherVersionsInPostgresAreTreatedAlike) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  answer_of(server.uri(), kVersion1);
+  check_migration(server.uri());
+  answer_of(server.uri(), kDropAll + kVersion1);
+  check_migration_by_another(server.uri());
+  answer_of(server.uri(), kDropAll + kVersion1 +
+                              "CREATE FUNCTION stop() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN "
+                              "RAISE EXCEPTION ''stopped''; END';\n"
+                              "CREATE TRIGGER stop BEFORE UPDATE ON figures FOR EACH ROW EXECUTE "
+                              "FUNCTION stop();\n");
+  check_stopped_migration(server.uri());
+  answer_of(server.uri(), kDropAll + kVersion1);
+  check_later_version(server.uri());
+}
+
+TEST(Records, AreKeptInAFile) {
+  const TemporaryFolder folder;
+  check_records((folder / "records.db").string());
+}
+
+TEST(Records, OfTwoStationsInOneFileLoseNothing) {
+  const TemporaryFolder folder;
+  check_two_writers((folder / "records.db").string());
+}
+
+TEST(Records, AreKeptInPostgres) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  check_two_writers(server.uri());
+  // A connection string without a parameter, as psql takes it.
+  EXPECT_THAT(Records(server.plain_uri()).list({}), SizeIs(50));
+  answer_of(server.uri(), kDropAll);
+  check_records(server.uri());
+
+  // The server ends the connection, as one that is started anew does.
+  Records records(server.uri());
+  answer_of(server.uri(),
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> "
+            "pg_backend_pid() AND backend_type = 'client backend';\n");
+  records.keep(sample(run_of(9), "c", 0.1));
+  EXPECT_TRUE(records.find(run_of(9)));
+}
+
+/// Who waited makes nothing beside what it finds then, of which there is one table here: indices of
+/// tables in use would lock their users out.
+TEST(Records, AreMadeByOneAtATimeInPostgres) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  const TemporaryFolder folder;
+  const auto begun = folder / "begun", go_on = folder / "go_on";
+  const std::string lock = std::to_string(kLockOfTables);
+  auto another = std::async(std::launch::async, [&] {
+    answer_of(server.uri(), "BEGIN;\nSELECT pg_advisory_xact_lock(" + lock + ");\n\\! touch " +
+                                begun.string() + "; while [ ! -e " + go_on.string() +
+                                " ]; do sleep 0.01; done\n"
+                                "CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);\n"
+                                "INSERT INTO vlp_schema VALUES (" +
+                                std::to_string(kSchemaVersion) + ");\nCOMMIT;\n");
+  });
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!std::filesystem::exists(begun) && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  auto made = std::async(std::launch::async, [&] { return Records(server.uri()).list({}).size(); });
+  EXPECT_EQ(made.wait_for(std::chrono::milliseconds(500)), std::future_status::timeout);
+  folder.file("go_on", "");
+  another.get();
+  EXPECT_THAT(refusal_of([&] { made.get(); }), HasSubstr("relation \"runs\" does not exist"));
+  EXPECT_THAT(answer_of(server.uri(), "SELECT COUNT(to_regclass('runs'));"), Not(HasSubstr("1")));
+}
+
+TEST(Records, RefuseAFileThatIsNoDatabase) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("records.db", std::string(5000, 'x'));
+  EXPECT_THAT(refusal_of([&] { Records records(file.string()); }),
+              testing::AllOf(HasSubstr("records.db"), HasSubstr("not a database")));
+}
+
+TEST(Records, DoNotTellThePasswordOfAServer) {
+  for (const char* where : {"postgresql://vlp:secret@/postgres?host=/nowhere",
+                            "postgresql://vlp@/postgres?password=secret&host=/nowhere",
+                            "postgresql://vlp@/postgres?host=/nowhere&password=a@secret"}) {
+    EXPECT_THAT(
+        refusal_of([&] { Records records(where); }),
+        testing::AllOf(
+            StartsWith("postgresql:///nowhere/postgres: the server of the records cannot be "
+                       "reached"),
+            Not(HasSubstr("secret"))));
+  }
+  for (const char* where :
+       {"postgresql://vlp@/postgres?secret", "mysql://vlp:secret@/records",
+        // where libpq takes a part of the password for the host, the port or the database
+        "postgresql://vlp:a@secret@/postgres", "postgresql://vlp:a/secret@nowhere/postgres",
+        "postgresql://vlp:secret/postgres"}) {
+    EXPECT_THAT(refusal_of([&] { Records records(where); }),
+                testing::AllOf(HasSubstr("://...: is not of the form postgresql://USER@HOST/NAME"),
+                               Not(HasSubstr("secret"))));
+  }
+}
+
+TEST(Records, DoNotTellThePasswordOfKeywords) {
+  EXPECT_THAT(refusal_of([&] { Records records("host=/nowhere user=vlp password=secret"); }),
+              AllOf(HasSubstr("is not of the form postgresql://"), Not(HasSubstr("secret"))));
+}
+
+/// The part of a text up to the end of its first line.
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+TEST(ExportRuns, WritesCsv) {
+  const TemporaryFolder folder;
+  const auto file = folder / "runs.csv";
+  write_runs(file, {sample(run_of(1), "a", 0.25), sample(run_of(2), "b", 1.5), with_all_texts()});
+  const std::string csv = TemporaryFolder::content_of(file);
+  EXPECT_EQ(
+      first_line(csv),
+      "run,kind,station,camera,operator_name,shift,begun_utc,ended_utc,verdict,causes,program,"
+      "config_sha256,"
+      "blur_px,focal_percent,center_px,nominal_px,board_bend_mm,rms_px,uncertainty_px,halves_px,"
+      "coverage,"
+      "views,board_tilt_deg,rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_"
+      "mm,dispersion_mm,"
+      "dispersion_offset_px,world_mm,check_fixes,check_lamps,check_lamps_seen,check_mean_mm,"
+      "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
+  EXPECT_THAT(csv, HasSubstr("2026-11-21T13:45:01Z,2026-11-21T13:45:01Z,PASS"));
+  EXPECT_THAT(csv, HasSubstr("; second"));
+  for (const RunField& field : run_fields()) {
+    const std::string text = std::string("the '") + field.name + "' of ";
+    EXPECT_EQ(csv.find(text) != std::string::npos, field.in_csv) << field.name;
+  }
+  EXPECT_THAT(refusal_of([&] { write_runs(folder / "runs.txt", {}); }), HasSubstr(".csv"));
+}
+
+std::vector<std::string> keys_of(const nlohmann::ordered_json& json) {
+  std::vector<std::string> keys;
+  for (const auto& item : json.items()) keys.push_back(item.key());
+  return keys;
+}
+
+TEST(ExportRuns, WritesJson) {
+  const TemporaryFolder folder;
+  const auto file = folder / "runs.json";
+  const RunRecord all = with_all_texts();
+  write_runs(file, {sample(run_of(1), "a", 0.25), all});
+  const auto runs = nlohmann::ordered_json::parse(TemporaryFolder::content_of(file));
+  ASSERT_THAT(runs, SizeIs(2));
+  EXPECT_THAT(keys_of(runs[0]),
+              ElementsAre("run", "kind", "station", "camera", "operator_name", "shift", "begun_utc",
+                          "ended_utc", "verdict", "causes", "program", "libraries", "config_sha256",
+                          "calibration", "figures", "images", "events"));
+  const auto& figures = runs[0]["figures"];
+  EXPECT_THAT(keys_of(figures), ElementsAre("rms_px", "coverage", "tilt_deg"));
+  EXPECT_THAT(keys_of(figures["tilt_deg"]),
+              ElementsAre("value", "unit", "gate", "at_least", "met"));
+  EXPECT_THAT(keys_of(figures["rms_px"]),
+              ElementsAre("value", "unit", "gate", "at_least", "met", "uncertainty", "guard_k",
+                          "conformance_probability"));
+  EXPECT_NEAR(figures["rms_px"]["conformance_probability"].get<double>(), 0.99379, 5e-6);
+  EXPECT_EQ(figures["rms_px"]["value"], 0.25);
+  EXPECT_EQ(figures["rms_px"]["unit"], "px");
+  EXPECT_TRUE(figures["tilt_deg"]["value"].is_null());
+  EXPECT_TRUE(figures["coverage"]["gate"].is_null());
+  EXPECT_THAT(keys_of(runs[0]["images"][1]), ElementsAre("step", "image", "sha256", "refused"));
+  EXPECT_EQ(runs[0]["images"][1]["refused"], "too dark");
+  for (const RunField& field : run_fields()) {
+    EXPECT_THAT(runs[1][field.name].get<std::string>(),
+                StartsWith(std::string("the '") + field.name + "' of "));
+  }
+}
+
+TEST(ExportRuns, AndTheSpoolAreAsTheirSchemasSay) {
+  const TemporaryFolder folder;
+  const auto file = folder / "runs.json";
+  RunRecord golden = sample(run_of(2), "b", 1.5);
+  golden.kind = "golden";
+  RunRecord invalid = sample(run_of(3), "c", 1.5);
+  invalid.verdict = name_of(Verdict::invalid);
+  write_runs(file, {sample(run_of(1), "a", 0.25), golden, invalid});
+  EXPECT_EQ(problems_by_schema("runs", {file}), "");
+  std::vector<std::filesystem::path> waiting;
+  for (const RunRecord& run : {sample(run_of(1), "a", 0.25), golden, invalid}) {
+    waiting.push_back(folder.file(run.camera + ".json", text_of_run({run, "records.db"})));
+  }
+  EXPECT_EQ(problems_by_schema("run", waiting), "");
+}
+
+}  // namespace
+}  // namespace vlp

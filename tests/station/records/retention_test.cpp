@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/retention.h"
+
+#include <gmock/gmock.h>
+
+#include "rig/input_error.h"
+#include "station/records/spool.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+const std::string kOld = "20200101T000000Z-0123456789abcdef";
+
+class RetentionTest : public testing::Test {
+ protected:
+  RetentionTest() {
+    config.captures = folder / "captures";
+    config.results = folder / "results";
+    config.keep = {90, 730};
+    config.station = "hall";
+  }
+  void keep(const std::string& run, const std::string& camera, const std::string& ended_utc,
+            const std::string& station = "hall") {
+    RunRecord record;
+    record.run = run;
+    record.station = station;
+    record.camera = camera;
+    record.verdict = "PASS";
+    record.ended_utc = ended_utc;
+    records.keep(record);
+  }
+  fs::path with_file(const std::string& name) const {
+    fs::create_directories(folder / name / "check");
+    folder.file(name + "/check/0.png", std::string(1000, 'x'));
+    return folder / name;
+  }
+  TemporaryFolder folder;
+  Records records{(folder / "records.db").string()};
+  StationConfig config{};
+};
+
+TEST_F(RetentionTest, FindsWhatIsOlderThanItIsKept) {
+  keep(kOld, "a.b", "2020-01-01T01:00:00Z");
+  const std::string now = new_run(), resumed = "20200101T000000Z-fedcba9876543210";
+  keep(now, "a.b", now_utc());
+  keep(resumed, "c", now_utc());  // begun long ago, ended now
+  const fs::path images = with_file("captures/a.b." + kOld),
+                 results = with_file("results/a.b/" + kOld);
+  for (const std::string& left :
+       {"captures/a.b." + now, "captures/c." + resumed, "results/a.b/" + now,
+        std::string("captures/a.b"), std::string("captures/notes"),
+        std::string("results/a.b/notes"), "captures/a.b" + kOld, "captures/" + kOld}) {
+    with_file(left);
+  }
+  const fs::path of_nobody = with_file("captures/d." + kOld);  // the record is of another camera
+  const Retained found = look_for_expired(config, records);
+  ASSERT_THAT(found.expired, SizeIs(2));
+  EXPECT_EQ(found.expired[0].folder, images);
+  EXPECT_STREQ(found.expired[0].what, kImagesDeleted);
+  EXPECT_EQ(found.expired[0].bytes, 1000U);
+  EXPECT_EQ(found.expired[1].folder, results);
+  EXPECT_STREQ(found.expired[1].what, kResultsDeleted);
+  EXPECT_THAT(found.without_record, ElementsAre(of_nobody));
+  config.keep = {std::nullopt, 30'000};
+  EXPECT_THAT(look_for_expired(config, records).expired, IsEmpty());
+}
+
+/// Stations may share folders and records.
+TEST_F(RetentionTest, LeavesOtherStationsRunsAndLinks) {
+  const std::string other = "20200101T000000Z-fedcba9876543210";
+  keep(kOld, "a", "2020-01-01T01:00:00Z");
+  keep(other, "a", "2020-01-01T01:00:00Z", "attic");
+  with_file("captures/a." + other);
+  with_file("results/a/" + other);
+  fs::create_directory_symlink(with_file("elsewhere"), folder / "captures" / ("a." + kOld));
+  fs::create_directory_symlink(folder / "nowhere", folder / "results" / "a" / kOld);
+  const Retained found = look_for_expired(config, records);
+  EXPECT_THAT(found.expired, IsEmpty());
+  EXPECT_THAT(found.without_record, IsEmpty());
+}
+
+TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
+  keep(kOld, "a", "2020-01-01T01:00:00Z");
+  const fs::path images = with_file("captures/a." + kOld), elsewhere = with_file("elsewhere");
+  fs::create_directory_symlink(elsewhere, images / "link");
+  const Retained found = look_for_expired(config, records);
+  ASSERT_THAT(found.expired, SizeIs(1));
+  EXPECT_EQ(found.expired[0].bytes, 1000U);
+  Spool spool(folder / "spool", (folder / "records.db").string());
+  delete_expired(found.expired[0], spool);
+  EXPECT_FALSE(fs::exists(images));
+  EXPECT_TRUE(fs::exists(elsewhere / "check/0.png"));
+  spool.deliver();
+  const auto told = records.find(kOld);
+  ASSERT_TRUE(told);
+  ASSERT_THAT(told->events, SizeIs(1));
+  EXPECT_EQ(told->events[0].what, kImagesDeleted);
+  EXPECT_EQ(told->events[0].text, "kept 90 days, 0.0 MB");
+  EXPECT_THROW(delete_expired(found.expired[0], spool), InputError) << "it is not there";
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,323 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Of the spool: programs that are killed, records that are locked, full, away or of many stations.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "numbered_runs.h"
+#include "station/records/spool.h"
+#include "support/child_process.h"
+#include "support/postgres_server.h"
+#include "support/random.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::SizeIs;
+using testing::StartsWith;
+
+TEST(Spool, WaitsForALockedFileNotLong) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  { const Records made(where); }
+  const auto locked = folder / "locked", done = folder / "done";
+  const auto client = folder.file("lock.py",
+                                  "import os, sqlite3, sys, time\n"
+                                  "database = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+                                  "database.execute('BEGIN EXCLUSIVE')\n"
+                                  "open(sys.argv[2], 'w')\n"
+                                  "for i in range(600):\n"
+                                  "    if os.path.exists(sys.argv[3]): break\n"
+                                  "    time.sleep(0.05)\n");
+  const std::string command =
+      "python3 " + client.string() + " " + where + " " + locked.string() + " " + done.string();
+  std::thread other([&] { EXPECT_EQ(std::system(command.c_str()), 0); });
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!fs::exists(locked) && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(fs::exists(locked));
+  Spool spool(folder / "spool", where);
+  spool.keep(numbered_run(1));
+  EXPECT_LT(seconds_of([&] { spool.deliver(); }), 15);
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), HasSubstr("locked")));
+  folder.file("done", "");
+  other.join();
+  Spool(folder / "spool", where).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+}
+
+/// Unmounts, whatever becomes of the test.
+struct SmallDisk {
+  fs::path folder;
+  ~SmallDisk() { ::umount2(folder.c_str(), MNT_DETACH); }
+};
+
+TEST(Spool, OutlastsAFullDisk) {
+  const TemporaryFolder folder;
+  const auto small = folder / "small";
+  fs::create_directory(small);
+  if (::mount("none", small.c_str(), "tmpfs", 0, "size=128k") != 0) {
+    GTEST_SKIP() << "no small file system can be mounted here";
+  }
+  const SmallDisk disk{small};
+  const std::string where = (small / "records.db").string();
+  {
+    Spool spool(folder / "spool", where);
+    spool.prepare();
+    for (int i = 0; i < 40; ++i) spool.keep(numbered_run(i));
+    spool.deliver();
+    const std::size_t there = whole_runs(where).size();
+    EXPECT_LT(there, 40u);
+    EXPECT_THAT(spool.waiting(), SizeIs(40 - there));
+    EXPECT_THAT(spool.state(), HasSubstr("full"));
+    // Records that are full are read all the same.
+    EXPECT_EQ(spool.owner_of("digest-0-1", "b"), "camera camera-0: run " + numbered_run(0).run);
+  }
+  ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
+  Spool(folder / "spool", where).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(40));
+}
+
+/// A program that keeps one run after another is killed at random moments, as often as
+/// VLP_STATION_KILLS says.
+void kill_while_keeping(const TemporaryFolder& folder, const std::string& where, int kills) {
+  const auto log = folder / "kept";
+  if (const char* text = std::getenv("VLP_STATION_KILLS")) kills = std::atoi(text);
+  Random random(7);
+  for (int i = 0; i < kills; ++i) {
+    const pid_t child = start_child([&] {
+      Spool spool(folder / "spool", where);
+      spool.prepare();
+      const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+      for (int run = 1000 * i; run < 1000 * i + 1000; ++run) {
+        spool.keep(numbered_run(run));
+        const std::string line = numbered_run(run).run + "\n";  // kept, as far as anybody is told
+        if (::write(file, line.data(), line.size()) < 0) std::abort();
+        spool.deliver();
+      }
+    });
+    const int wait_us = static_cast<int>(1e6 * random.uniform(0, 0.25));
+    std::this_thread::sleep_for(std::chrono::microseconds(wait_us));
+    kill_child(child);
+  }
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  EXPECT_EQ(spool.state(), "");
+  const auto runs = whole_runs(where);
+  std::istringstream kept(TemporaryFolder::content_of(log));
+  int count = 0;
+  for (std::string run; std::getline(kept, run); ++count) EXPECT_TRUE(runs.contains(run)) << run;
+  EXPECT_GT(count, 0);
+  // What was killed between keeping and telling may be there, too.
+  EXPECT_LE(runs.size(), static_cast<std::size_t>(count + kills));
+}
+
+TEST(Spool, LosesNothingWhenItIsKilled) {
+  const TemporaryFolder folder;
+  kill_while_keeping(folder, (folder / "records.db").string(), 15);
+}
+
+/// A server that refuses is not away, and somebody has to do something about it; runs are kept.
+TEST(Spool, TellsARefusalFromAServerThatIsAway) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const TemporaryFolder folder;
+  const PostgresServer server("right");
+  ASSERT_NE(server.uri(), "");
+  const auto state_with = [&](const std::string& password, const std::string& database, int run) {
+    Spool spool(folder / "spool",
+                "postgresql://vlp:" + password + "@" + server.address() + "/" + database);
+    spool.prepare();
+    spool.keep(numbered_run(run));
+    spool.deliver();
+    return spool.state();
+  };
+  const std::string refuses = "the server of the records answers, but refuses 'records' as it is: ";
+  const std::string wrong_password = state_with("wrong", "postgres", 1);
+  EXPECT_THAT(wrong_password, AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr(refuses),
+                                    HasSubstr("password authentication failed for user \"vlp\""),
+                                    Not(HasSubstr("wrong")), Not(HasSubstr("\n"))));
+  EXPECT_THAT(state_with("right", "nowhere", 2),
+              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr(refuses),
+                    HasSubstr("database \"nowhere\" does not exist")));
+  EXPECT_THAT(state_with("right", "postgres?sslmode=require", 3),
+              AllOf(StartsWith("kept here, 2 waiting: "), HasSubstr(refuses),
+                    HasSubstr("server does not support SSL, but SSL was required")));
+  // What waited goes there with the right password.
+  EXPECT_THAT(state_with("right", "postgres", 4), StartsWith("1 here for other records"));
+  EXPECT_THAT(whole_runs(server.uri()), SizeIs(3));
+  server.stop();
+  EXPECT_THAT(state_with("right", "postgres", 5),
+              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("cannot be reached")));
+}
+
+/// A server that takes nothing but TLS, with a certificate of its own.
+TEST(Spool, GoesToAServerThroughTls) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const TemporaryFolder folder;
+  const PostgresServer server("right", PostgresServer::Tls::required);
+  ASSERT_NE(server.uri(), "");
+  int run = 0;
+  const auto state_with = [&](const std::string& options) {
+    Spool spool(folder / "spool",
+                "postgresql://vlp:right@localhost:" + server.port() + "/postgres?" + options);
+    spool.prepare();
+    spool.keep(numbered_run(++run));
+    spool.deliver();
+    return spool.state();
+  };
+  EXPECT_EQ(state_with("sslmode=require"), "");
+  EXPECT_EQ(state_with("sslmode=verify-full&sslrootcert=" + server.certificate().string()), "");
+  EXPECT_THAT(whole_runs(server.uri()), SizeIs(2));
+  const std::string refuses = "answers, but refuses 'records' as it is: ";
+  EXPECT_THAT(state_with("sslmode=disable"), AllOf(StartsWith("kept here, 1 waiting: "),
+                                                   HasSubstr(refuses), HasSubstr("no encryption")));
+  // Another's certificate.
+  const PostgresServer other("right", PostgresServer::Tls::required);
+  ASSERT_NE(other.uri(), "");
+  EXPECT_THAT(state_with("sslmode=verify-full&sslrootcert=" + other.certificate().string()),
+              AllOf(StartsWith("kept here, 2 waiting: "), HasSubstr(refuses),
+                    HasSubstr("certificate verify failed")));
+  EXPECT_EQ(state_with("sslmode=require"), "");
+  EXPECT_THAT(whole_runs(server.uri()), SizeIs(5));
+}
+
+/// Each with a spool of its own, all at once: as many runs as VLP_STATION_RUNS says, each with a
+/// hook.
+TEST(Spool, OfEightStationsOnOneServerLosesNothing) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  constexpr int stations = 8;
+  int each = 5;
+  if (const char* text = std::getenv("VLP_STATION_RUNS")) {
+    each = (std::atoi(text) + stations - 1) / stations;
+  }
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  const TemporaryFolder folder;
+  const auto spool_of = [&](int station) {
+    return Spool(folder / ("spool-" + std::to_string(station)), server.uri());
+  };
+  std::vector<pid_t> children;
+  for (int station = 0; station < stations; ++station) {
+    children.push_back(start_child([&, station] {
+      Spool spool = spool_of(station);
+      spool.prepare();  // one of them makes the tables
+      for (int i = 0; i < each; ++i) {
+        RunRecord run = numbered_run(1000 * station + i);
+        run.station = "station-" + std::to_string(station);
+        run.events = {new_event(kHookWanted, "label")};
+        spool.keep(run);
+        spool.deliver();
+        run.events.push_back(new_event(kHookDone, ""));
+        spool.keep(run);
+        spool.deliver();
+      }
+    }));
+  }
+  EXPECT_TRUE(end_well(children));
+  for (int station = 0; station < stations; ++station) {
+    // Nobody had to wait longer than it may, unless this machine has much else to do.
+    Spool spool = spool_of(station);
+    std::cout << "station-" << station << ": " << spool.waiting().size() << " waited\n";
+    spool.deliver();
+    EXPECT_EQ(spool.state(), "");
+  }
+  EXPECT_THAT(Records(server.uri()).with_open_hook(""), IsEmpty());
+  const auto count = static_cast<std::size_t>(stations * each);
+  EXPECT_THAT(whole_runs(server.uri()), SizeIs(count));
+  const TrailCheck trail = Records(server.uri()).check("");
+  EXPECT_THAT(trail.problems, IsEmpty());
+  EXPECT_EQ(trail.entries, 3 * count) << "of each run and its two events, once";
+  EXPECT_THAT(server.log(), Not(HasSubstr("deadlock")));
+}
+
+TEST(Spool, OutlastsItsServer) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const PostgresServer server;
+  ASSERT_NE(server.uri(), "");
+  const TemporaryFolder folder;
+  const std::string where = server.uri() + "&connect_timeout=2";
+  const auto spool = [&] { return Spool(folder / "spool", where); };
+  kill_while_keeping(folder, where, 5);
+  const std::size_t before = whole_runs(where).size();
+  const auto deliver_to = [&](std::size_t count) {
+    Spool(spool()).deliver();
+    EXPECT_THAT(whole_runs(where), SizeIs(before + count));
+  };
+
+  // Stopped before the record; new units begin.
+  Spool running = spool();
+  running.prepare();
+  server.stop();
+  running.keep(numbered_run(-1));
+  running.deliver();
+  EXPECT_THAT(running.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+                                     HasSubstr("server of the records cannot be reached")));
+  Spool begun = spool();
+  begun.prepare();
+  begun.keep(numbered_run(-2));
+  begun.deliver();
+  EXPECT_THAT(begun.state(), StartsWith("kept here, 2 waiting: "));
+  server.start();
+  deliver_to(2);
+
+  // Frozen, with a connection and without: nobody waits for it without a word, nor twice.
+  Spool connected = spool();
+  connected.prepare();
+  EXPECT_EQ(connected.state(), "");
+  server.freeze();
+  EXPECT_LT(seconds_of([&] { EXPECT_EQ(connected.owner_of("digest-1-1", "b"), ""); }), 8);
+  connected.keep(numbered_run(-3));
+  EXPECT_LT(seconds_of([&] { connected.deliver(); }), 1);
+  EXPECT_FALSE(connected.find("another"));
+  EXPECT_THAT(connected.away(), HasSubstr("has not answered for 2 s"));
+  EXPECT_THAT(connected.state(),
+              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("has not answered for 2 s")));
+  Spool fresh = spool();
+  EXPECT_LT(seconds_of([&] { fresh.prepare(); }), 8);
+  EXPECT_THAT(fresh.state(), StartsWith("kept here, 1 waiting: "));
+  server.thaw();
+  deliver_to(3);
+  // Once, too, while several wait.
+  Spool several = spool();
+  several.prepare();
+  server.freeze();
+  for (int i = 4; i < 10; ++i) several.keep(numbered_run(-i));
+  EXPECT_LT(seconds_of([&] { several.deliver(); }), 5);
+  EXPECT_THAT(several.state(),
+              AllOf(StartsWith("kept here, 6 waiting: "), HasSubstr("has not answered for 2 s")));
+  server.thaw();
+  deliver_to(9);
+
+  // Killed in the middle of many.
+  for (int i = 0; i < 200; ++i) fresh.keep(numbered_run(1'000'000 + i));
+  std::thread power([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));
+    server.stop();
+  });
+  Spool(spool()).deliver();
+  power.join();
+  const std::size_t waiting = fresh.waiting().size();
+  server.start();
+  EXPECT_GT(waiting, 0u) << "the server was stopped too late for this machine";
+  for (int i = 0; i < 5 && !fresh.waiting().empty(); ++i) Spool(spool()).deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(before + 209));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,331 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/spool.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "numbered_runs.h"
+#include "station/database_name.h"
+#include "station/station_config.h"
+#include "support/child_process.h"
+#include "support/postgres_server.h"
+#include "support/random.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::SizeIs;
+using testing::StartsWith;
+
+TEST(SpooledRun, IsReadAsItWasWritten) {
+  const TemporaryFolder folder;
+  RunRecord run = numbered_run(1);
+  for (const RunField& field : run_fields()) run.*field.text += "\n\"\\ \xc3\xbc\t{}\n";
+  run.images[1].refused = "too dark";
+  const auto [read, records] = read_run(folder.file("run.json", text_of_run({run, "records.db"})));
+  EXPECT_EQ(records, "records.db");
+  for (const RunField& field : run_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
+  ASSERT_THAT(read.figures, SizeIs(run.figures.size()));
+  for (std::size_t i = 0; i < run.figures.size(); ++i) {
+    EXPECT_EQ(read.figures[i].name, run.figures[i].name);
+    EXPECT_EQ(read.figures[i].unit, run.figures[i].unit);
+    EXPECT_EQ(read.figures[i].value, run.figures[i].value);  // to the last bit
+    EXPECT_EQ(read.figures[i].limit, run.figures[i].limit);
+    EXPECT_EQ(read.figures[i].asked, run.figures[i].asked);
+    ASSERT_EQ(read.figures[i].guard.has_value(), i == 0);
+    if (!read.figures[i].guard) continue;
+    EXPECT_EQ(read.figures[i].guard->standard_uncertainty, 0.01);
+    EXPECT_EQ(read.figures[i].guard->k, 1.645);
+  }
+  ASSERT_THAT(read.images, SizeIs(run.images.size()));
+  EXPECT_EQ(read.images[1].refused, "too dark");
+  EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
+}
+
+TEST(SpooledRun, MayHaveNamesThatAreNoText) {
+  const TemporaryFolder folder;
+  RunRecord run = numbered_run(1);
+  run.images[0].name = "\xff\x1b[31m.png";
+  EXPECT_EQ(read_run(folder.file("run.json", text_of_run({run, "records.db"}))).run.images[0].name,
+            "\\xff\\x1b[31m.png");
+}
+
+TEST(SpooledRun, IsRefusedWithItsFile) {
+  const TemporaryFolder folder;
+  const std::string text = text_of_run({numbered_run(1), "records.db"});
+  for (const std::string& bad :
+       {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
+        std::string(text).replace(text.find("vlp-run/1"), 9, "vlp-run/2"),
+        std::string(text).replace(text.find("\"figures\""), 9, "\"figurer\"")}) {
+    EXPECT_THAT(refusal_of([&] { read_run(folder.file("bad.json", bad)); }),
+                HasSubstr("bad.json: is no run of a station"));
+  }
+}
+
+TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "away/records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are kept here: "), HasSubstr("records.db")));
+  for (int i = 0; i < 3; ++i) spool.keep(numbered_run(i));
+  spool.deliver();
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 3 waiting: "), HasSubstr("records.db")));
+  EXPECT_EQ(spool.find(numbered_run(1).run)->camera, "camera-1");
+  EXPECT_FALSE(spool.find("another"));
+  // Guards go on with what is known here.
+  EXPECT_EQ(spool.owner_of("digest-2-7", "camera-1"),
+            "camera camera-2: run " + numbered_run(2).run);
+  EXPECT_EQ(spool.owner_of("digest-2-7", "camera-2"), "");
+  EXPECT_THAT(spool.state(), HasSubstr("; 1 images were not looked up in the records"));
+
+  fs::create_directory(folder / "away");
+  Spool later(folder / "spool", where);
+  later.prepare();
+  EXPECT_EQ(later.state(), "");
+  EXPECT_THAT(later.waiting(), IsEmpty());
+  EXPECT_THAT(whole_runs(where), SizeIs(3));
+  EXPECT_EQ(Records(where).find(numbered_run(1).run)->figures[0].value, 0.1 + 0.2);
+  EXPECT_EQ(later.owner_of("digest-2-7", "camera-1"),
+            "camera camera-2: run " + numbered_run(2).run);
+}
+
+TEST(Spool, KnowsWhichGoldenRunUsedAnImage) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  RunRecord golden = numbered_run(1), invalid = numbered_run(2);
+  golden.kind = invalid.kind = "golden";
+  invalid.verdict = "INVALID";
+  for (const RunRecord& run : {numbered_run(0), golden, invalid}) spool.keep(run);
+  for (const std::string state : {"here", "in the records"}) {
+    EXPECT_EQ(spool.golden_run_of("digest-1-7"), golden.run) << state;
+    EXPECT_EQ(spool.golden_run_of("digest-0-7"), "") << "of a unit, " << state;
+    EXPECT_EQ(spool.golden_run_of("digest-2-7"), "") << "not judged, " << state;
+    spool.deliver();
+  }
+  EXPECT_TRUE(fs::is_empty(folder / "spool"));
+}
+
+/// A run that waits, whatever happened to it since, is one run.
+TEST(Spool, KeepsWhatBecameOfARun) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "away/records.db").string();
+  Spool spool(folder / "spool", where);
+  RunRecord run = numbered_run(1);
+  run.events = {new_event(kHookWanted, "label")};
+  spool.keep(run);
+  EXPECT_THAT(spool.with_open_hook("station-1"), testing::ElementsAre(run.run));
+  EXPECT_THAT(spool.with_open_hook("another"), IsEmpty());
+  const RunRecord before = run;
+  run.events.push_back(new_event(kHookFailed, "\"exit\" code 3"));
+  spool.keep(run);
+  run.events = {before.events[0], new_event(kHookDone, "")};
+  spool.keep(run);
+  EXPECT_THAT(spool.with_open_hook("station-1"), IsEmpty());
+  spool.deliver();
+  EXPECT_THAT(spool.state(), StartsWith("kept here, 1 waiting"));
+  ASSERT_THAT(spool.waiting(), SizeIs(1));
+  EXPECT_THAT(spool.waiting()[0].events, SizeIs(3));
+  EXPECT_THAT(spool.find(run.run)->events, SizeIs(3));
+
+  fs::create_directory(folder / "away");
+  Spool later(folder / "spool", where);
+  later.prepare();
+  EXPECT_EQ(later.state(), "");
+  EXPECT_TRUE(fs::is_empty(folder / "spool"));
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+  const auto kept = later.find(run.run);
+  ASSERT_THAT(kept->events, SizeIs(3));
+  EXPECT_EQ(kept->events[1].text, "\"exit\" code 3");
+  EXPECT_THAT(later.with_open_hook("station-1"), IsEmpty());
+}
+
+TEST(Spool, IsNotHeldUpByWhatIsNoRun) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  spool.keep(numbered_run(1));
+  folder.file("spool/0.json", "{}\n");
+  folder.file("spool/.1.json.tmp-1-0", "{");
+  spool.deliver();
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+  EXPECT_THAT(spool.state(), AllOf(HasSubstr("0.json: is no run"), Not(HasSubstr("waiting"))));
+  fs::remove(where);  // away
+  Spool other(folder / "spool", where);
+  other.keep(numbered_run(2));
+  other.deliver();
+  EXPECT_THAT(other.state(), AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("records.db"),
+                                   HasSubstr("; "), HasSubstr("0.json: is no run")));
+}
+
+TEST(Spool, ReadsAFileAgainThatCouldNotBeRead) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "away/records.db").string();
+  Spool spool(folder / "spool", where);
+  const std::string text = text_of_run({numbered_run(1), identity_of_database(where)});
+  fs::create_directory(folder / "spool");
+  folder.file("spool/1.json", text.substr(0, text.size() / 2));
+  EXPECT_THAT(spool.waiting(), IsEmpty());
+  EXPECT_THAT(spool.state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
+  folder.file("spool/1.json", text);
+  EXPECT_THAT(spool.waiting(), SizeIs(1));
+  EXPECT_EQ(spool.owner_of("digest-1-7", "b"), "camera camera-1: run " + numbered_run(1).run);
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), Not(HasSubstr("1.json"))));
+}
+
+TEST(Spool, ThatCannotBeWrittenPassesRunsOn) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder.file("spool", ""), where);
+  EXPECT_THAT(refusal_of([&] { spool.prepare(); }), HasSubstr("spool: cannot be made"));
+  { const Records made(where); }
+  spool.keep(numbered_run(1));
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+  Spool neither(folder / "spool", (folder / "away/records.db").string());
+  EXPECT_THAT(
+      refusal_of([&] { neither.keep(numbered_run(2)); }),
+      AllOf(HasSubstr("spool: neither here can a run be kept"), HasSubstr("away/records.db")));
+}
+
+TEST(Spool, BringsRunsToTheRecordsTheyAreFor) {
+  const TemporaryFolder folder;
+  const std::string a = (folder / "a.db").string(), b = (folder / "b.db").string();
+  { const Records made_a(a), made_b(b); }
+  Spool of_a(folder / "spool", a), of_b(folder / "spool", b);
+  of_a.keep(numbered_run(1));
+  of_b.prepare();
+  EXPECT_THAT(whole_runs(b), IsEmpty());
+  EXPECT_THAT(of_b.state(), AllOf(StartsWith("1 here for other records"), HasSubstr("a.db")));
+  EXPECT_THAT(of_b.waiting(), IsEmpty());
+  EXPECT_TRUE(of_b.find(numbered_run(1).run)) << "a run is not judged twice for that";
+  EXPECT_EQ(of_b.owner_of("digest-1-7", "b"), "camera camera-1: run " + numbered_run(1).run);
+  of_b.keep(numbered_run(2));
+  of_b.deliver();
+  EXPECT_THAT(whole_runs(b), SizeIs(1));
+  // The same records, by another name of the file.
+  Spool(folder / "spool", (folder / "spool/../a.db").string()).deliver();
+  EXPECT_EQ(whole_runs(a), std::set<std::string>{numbered_run(1).run});
+  EXPECT_EQ(of_b.state(), "");
+}
+
+/// Does `action` on a machine of another name; whether there can be one here.
+template <typename Action>
+bool on_another_machine(const Action& action) {
+  constexpr int not_permitted = 3;
+  const std::string name = "another";
+  const pid_t child = start_child([&] {
+    // The name of this process alone, or none.
+    if (::unshare(CLONE_NEWUTS) != 0) ::_exit(not_permitted);
+    if (::sethostname(name.data(), name.size()) != 0) ::_exit(not_permitted);
+    action();
+  });
+  const int status = status_of(child);
+  const bool permitted = WEXITSTATUS(status) != not_permitted;
+  EXPECT_TRUE(!permitted || status == 0);
+  return permitted;
+}
+
+/// Two machines that share the folder, and have records of their own at the same path.
+TEST(Spool, BringsRunsToNoRecordsOfAnotherMachine) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  { const Records made(where); }
+  const bool permitted =
+      on_another_machine([&] { Spool(folder / "spool", where).keep(numbered_run(1)); });
+  if (!permitted) GTEST_SKIP() << "a process cannot have a machine's name of its own here";
+  Spool here(folder / "spool", where);
+  here.prepare();
+  EXPECT_THAT(whole_runs(where), IsEmpty());
+  EXPECT_EQ(here.state(), "1 here for other records, such as another:" + where);
+  on_another_machine([&] { Spool(folder / "spool", where).deliver(); });
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+  EXPECT_EQ(here.state(), "");
+}
+
+TEST(Spool, LosesNoSecondVerdictOfARun) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  spool.keep(numbered_run(1));
+  spool.deliver();
+  spool.keep(numbered_run(1));  // the same, as after a kill before its file was removed
+  spool.deliver();
+  EXPECT_EQ(spool.state(), "");
+  RunRecord again = numbered_run(1);
+  again.ended_utc = "2026-11-21T14:50:01Z";
+  spool.keep(again);
+  spool.keep(numbered_run(2));
+  spool.deliver();
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+                                   HasSubstr("has another run " + again.run)));
+  EXPECT_THAT(whole_runs(where), SizeIs(2));
+  EXPECT_EQ(Records(where).find(again.run)->ended_utc, numbered_run(1).ended_utc);
+}
+
+/// What is not there may be on a share that is not mounted.
+TEST(Spool, MakesADatabaseBeforeAUnitOnly) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.keep(numbered_run(1));
+  spool.deliver();
+  EXPECT_FALSE(spool.find("another"));
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+                                   HasSubstr("records.db: there are no records")));
+  EXPECT_FALSE(fs::exists(where));
+  Spool(folder / "spool", where).prepare();
+  EXPECT_THAT(whole_runs(where), SizeIs(1));
+}
+
+TEST(Spool, RefusesWhatIsNoConnectionString) {
+  EXPECT_THAT(refusal_of([&] { Spool("spool", "postgresql://vlp:a@b@/c"); }),
+              HasSubstr("is not of the form"));
+}
+
+TEST(Spool, OfSeveralProgramsLosesNothing) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  for (int i = 0; i < 25; ++i) spool.keep(numbered_run(i));
+  std::vector<pid_t> children;
+  for (int program = 1; program <= 3; ++program) {
+    children.push_back(start_child([&, program] {
+      Spool own(folder / "spool", where);
+      for (int i = 0; i < 5; ++i) {
+        own.keep(numbered_run(100 * program + i));
+        own.deliver();
+      }
+    }));
+  }
+  EXPECT_TRUE(end_well(children));
+  spool.deliver();
+  EXPECT_EQ(spool.state(), "");
+  EXPECT_THAT(whole_runs(where), SizeIs(40));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,222 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/bias_study.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "support/random.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+std::vector<ReferenceValue> values_of_unit(const std::string& unit, double reference,
+                                           const std::vector<double>& values) {
+  std::vector<ReferenceValue> all;
+  all.reserve(values.size());
+  for (const double value : values) all.push_back({unit, reference, value});
+  return all;
+}
+
+/// AIAG, Measurement Systems Analysis, the linearity example: 5 parts, 12 readings each.
+std::vector<ReferenceValue> linearity_example() {
+  const std::vector<std::vector<double>> readings{
+      {2.7, 2.5, 2.4, 2.5, 2.7, 2.3, 2.5, 2.5, 2.4, 2.4, 2.6, 2.4},
+      {5.1, 3.9, 4.2, 5.0, 3.8, 3.9, 3.9, 3.9, 3.9, 4.0, 4.1, 3.8},
+      {5.8, 5.7, 5.9, 5.9, 6.0, 6.1, 6.0, 6.1, 6.4, 6.3, 6.0, 6.1},
+      {7.6, 7.7, 7.8, 7.7, 7.8, 7.8, 7.8, 7.7, 7.8, 7.5, 7.6, 7.7},
+      {9.1, 9.3, 9.5, 9.3, 9.4, 9.5, 9.5, 9.5, 9.6, 9.2, 9.3, 9.4}};
+  std::vector<ReferenceValue> all;
+  for (std::size_t part = 0; part < readings.size(); ++part) {
+    const auto of_part = values_of_unit("part " + std::to_string(part + 1),
+                                        2 * (static_cast<double>(part) + 1), readings[part]);
+    all.insert(all.end(), of_part.begin(), of_part.end());
+  }
+  return all;
+}
+
+/// The regression of the manual and of SPC for Excel's worked example of it ("Linearity and Bias
+/// Study", its biases with the sample's standard deviation), to their printed digits.
+TEST(BiasStudy, HasTheManualsLinearity) {
+  const BiasStudy study = bias_study(linearity_example());
+  ASSERT_TRUE(study.linearity);
+  const Linearity& line = *study.linearity;
+  EXPECT_NEAR(line.slope.value, -0.131667, 5e-7);
+  EXPECT_NEAR(line.intercept.value, 0.737, 5e-4);
+  EXPECT_NEAR(line.slope.standard_error, 0.0109, 5e-5);
+  EXPECT_NEAR(line.intercept.standard_error, 0.0725, 5e-5);
+  EXPECT_NEAR(line.slope.t, -12.04, 0.005);
+  EXPECT_NEAR(line.intercept.t, 10.16, 0.005);
+  EXPECT_NEAR(line.slope.low, -0.154, 5e-4);
+  EXPECT_NEAR(line.slope.high, -0.110, 5e-4);
+  EXPECT_NEAR(line.intercept.low, 0.591, 5e-4);
+  EXPECT_NEAR(line.intercept.high, 0.882, 5e-4);
+  EXPECT_LT(line.slope.p, 5e-4);
+  EXPECT_TRUE(line.slope.shows());
+  EXPECT_NEAR(line.residual_sd, 0.240, 5e-4);
+  EXPECT_NEAR(100 * line.r_squared, 71.43, 0.005);
+  EXPECT_EQ(line.slope.dof, 58);
+
+  struct Printed {
+    double bias, standard_error, t, p;
+  };
+  const std::vector<Printed> printed{{0.492, 0.0358, 13.73, 0.000},
+                                     {0.125, 0.129, 0.968, 0.354},
+                                     {0.0250, 0.0566, 0.442, 0.667},
+                                     {-0.292, 0.0288, -10.14, 0.000},
+                                     {-0.617, 0.0423, -14.56, 0.000}};
+  ASSERT_THAT(study.units, SizeIs(printed.size()));
+  for (std::size_t i = 0; i < printed.size(); ++i) {
+    const TestedEstimate& bias = study.units[i].bias;
+    EXPECT_NEAR(bias.value, printed[i].bias, 5e-4);
+    EXPECT_NEAR(bias.standard_error, printed[i].standard_error,
+                printed[i].standard_error > 0.1 ? 5e-4 : 5e-5);
+    EXPECT_NEAR(bias.t, printed[i].t, std::abs(printed[i].t) < 1 ? 5e-4 : 0.005);
+    EXPECT_NEAR(bias.p, printed[i].p, 5e-4);
+    EXPECT_EQ(bias.shows(), printed[i].p < 0.05);
+    EXPECT_EQ(study.units[i].reference, 2 * (static_cast<double>(i) + 1));
+    EXPECT_EQ(study.units[i].count, 12U);
+  }
+  // And of all together; its interval is that of JMP's documentation on the same data.
+  EXPECT_NEAR(study.all.value, -0.0533, 5e-5);
+  EXPECT_NEAR(study.all.standard_error, 0.0308, 5e-5);
+  EXPECT_NEAR(study.all.t, -1.729, 2e-3);
+  EXPECT_NEAR(study.all.p, 0.089, 5e-4);
+  EXPECT_NEAR(study.all.low, -0.1152, 1e-4);
+  EXPECT_NEAR(study.all.high, 0.0085, 1e-4);
+  EXPECT_FALSE(study.all.shows());
+  // Narrowest in the middle, and there without the 0 as the manual's picture has it at both ends.
+  EXPECT_LT(line.band_at(6), line.band_at(2));
+  EXPECT_NEAR(line.band_at(2), line.band_at(10), 1e-12);
+  EXPECT_GT(line.bias_at(2), line.band_at(2));
+  EXPECT_LT(line.bias_at(10), -line.band_at(10));
+}
+
+/// AIAG, Measurement Systems Analysis, 4th ed., the independent sample method: 15 readings of a
+/// part of 6.00.
+TEST(BiasStudy, HasTheManualsBias) {
+  const BiasStudy study = bias_study(values_of_unit(
+      "part", 6, {5.8, 5.7, 5.9, 5.9, 6.0, 6.1, 6.0, 6.1, 6.4, 6.3, 6.0, 6.1, 6.2, 5.6, 6.0}));
+  ASSERT_THAT(study.units, SizeIs(1));
+  const UnitBias& part = study.units[0];
+  EXPECT_NEAR(part.mean, 6.0067, 5e-5);
+  EXPECT_NEAR(part.bias.value, 0.0067, 5e-5);
+  EXPECT_EQ(part.bias.dof, 14);
+  EXPECT_NEAR(part.sd, 0.2120, 5e-5);
+  EXPECT_NEAR(part.bias.standard_error, 0.0547, 5e-5);
+  EXPECT_NEAR(part.bias.t, 0.1218, 5e-5);
+  EXPECT_NEAR(part.bias.low, -0.1107, 1e-4);
+  EXPECT_NEAR(part.bias.high, 0.1241, 5e-5);
+  EXPECT_FALSE(part.bias.shows());
+  EXPECT_FALSE(study.linearity) << "of one reference";
+}
+
+/// NIST, Statistical Reference Datasets, Norris: ozone monitors against NIST's own, with certified
+/// values of the straight line. Here the line is of the differences, one less steep.
+TEST(BiasStudy, HasNistsCertifiedLine) {
+  const std::vector<double> reference{0.2,   337.4, 118.2, 884.6, 10.1,  226.5, 666.3, 996.3, 448.6,
+                                      777.0, 558.2, 0.4,   0.6,   775.5, 666.9, 338.0, 447.5, 11.6,
+                                      556.0, 228.1, 995.8, 887.6, 120.2, 0.3,   0.3,   556.8, 339.1,
+                                      887.2, 999.0, 779.0, 11.1,  118.3, 229.2, 669.1, 448.9, 0.5};
+  const std::vector<double> measured{0.1,   338.8, 118.1, 888.0, 9.2,   228.1, 668.5, 998.5, 449.1,
+                                     778.9, 559.2, 0.3,   0.1,   778.1, 668.8, 339.3, 448.9, 10.8,
+                                     557.7, 228.3, 998.0, 888.8, 119.6, 0.3,   0.6,   557.6, 339.3,
+                                     888.0, 998.5, 778.9, 10.2,  117.6, 228.9, 668.4, 449.2, 0.2};
+  ASSERT_EQ(reference.size(), measured.size());
+  std::vector<ReferenceValue> values;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    values.push_back({"unit", reference[i], measured[i]});
+  }
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { bias_study(values); }),
+              HasSubstr("unit unit has one run"));
+  auto twice = values;
+  twice.insert(twice.end(), values.begin(), values.end());
+  const BiasStudy study = bias_study(twice);
+  // The same line of twice as many: errors are smaller by sqrt(2 (n - 2) / (2 n - 2)).
+  const Linearity& line = study.linearity.value();
+  constexpr double n = 36;
+  const double of_errors = std::sqrt((2 * n - 2) / (n - 2)),
+               of_sd = std::sqrt((2 * n - 2) / (2 * n - 4));
+  EXPECT_NEAR(line.slope.value, 1.00211681802045 - 1, 1e-13);
+  EXPECT_NEAR(line.intercept.value, -0.262323073774029, 1e-11);
+  EXPECT_NEAR(line.residual_sd * of_sd, 0.884796396144373, 1e-12);
+  EXPECT_NEAR(line.slope.standard_error * of_errors, 0.429796848199937e-03, 1e-14);
+  EXPECT_NEAR(line.intercept.standard_error * of_errors, 0.232818234301152, 1e-12);
+}
+
+/// Of stations without bias 5 in 100 show one; of one with bias the intervals hold it.
+TEST(BiasStudy, IsRightAsOftenAsItSays) {
+  Random random(5);
+  constexpr int studies = 2000;
+  int shown = 0, sloped = 0, held = 0, in_band = 0;
+  for (int i = 0; i < studies; ++i) {
+    std::vector<ReferenceValue> without, with;
+    for (const double reference : {1.0, 2.0, 4.0}) {
+      for (int run = 0; run < 5; ++run) {
+        without.push_back(
+            {std::to_string(reference), reference, reference + 0.1 * random.normal()});
+        with.push_back({std::to_string(reference), reference,
+                        reference + 0.3 - 0.2 * reference + 0.1 * random.normal()});
+      }
+    }
+    const BiasStudy none = bias_study(without), some = bias_study(with);
+    shown += none.all.shows() ? 1 : 0;
+    sloped += none.linearity->slope.shows() ? 1 : 0;
+    held += some.linearity->slope.low < -0.2 && some.linearity->slope.high > -0.2 ? 1 : 0;
+    in_band += std::abs(some.linearity->bias_at(3) + 0.3) < some.linearity->band_at(3) ? 1 : 0;
+  }
+  // Standard error of each share: 0.5 %.
+  EXPECT_NEAR(double(shown) / studies, 0.05, 0.02);
+  EXPECT_NEAR(double(sloped) / studies, 0.05, 0.02);
+  EXPECT_NEAR(double(held) / studies, 0.95, 0.02);
+  EXPECT_NEAR(double(in_band) / studies, 0.95, 0.02);
+}
+
+TEST(BiasStudy, OfValuesWithoutScatterIsCertain) {
+  const BiasStudy study = bias_study(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
+  EXPECT_EQ(study.all.p, 0);
+  EXPECT_EQ(study.all.t, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(study.all.low, 0.5);
+  EXPECT_TRUE(study.all.shows());
+  // Ten times 0.9 does not sum to 9.
+  const BiasStudy none = bias_study(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
+  EXPECT_EQ(none.units[0].bias.value, 0);
+  EXPECT_EQ(none.units[0].bias.p, 1);
+  EXPECT_EQ(none.all.p, 1);
+}
+
+TEST(BiasStudy, SaysWhatIsMissing) {
+  EXPECT_THAT(refusal_of<std::invalid_argument>([] { bias_study({}); }),
+              HasSubstr("needs runs of reference units"));
+  EXPECT_THAT(refusal_of<std::invalid_argument>([] {
+                bias_study({{"a", 1, 1}, {"a", 1, 2}, {"b", 2, 2}});
+              }),
+              HasSubstr("unit b has one run: a bias study needs two or more of each"));
+}
+
+TEST(BiasStudy, IsDrawn) {
+  const TemporaryFolder folder;
+  const auto values = linearity_example();
+  draw_bias(folder / "bias.svg", "tilt_deg", values, bias_study(values));
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "bias.svg"),
+              AllOf(HasSubstr("<svg"), HasSubstr("95 % band"), HasSubstr("no bias"),
+                    HasSubstr("tilt_deg, measured - reference")));
+  const auto one = values_of_unit("a", 1, {1.5, 1.4});
+  draw_bias(folder / "one.svg", "tilt_deg", one, bias_study(one));
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "one.svg"), testing::Not(HasSubstr("band")));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,84 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/capability.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+/// Montgomery, Introduction to Statistical Quality Control, interval of Cp: limits 38 and 62, s
+/// = 1.75 of 20 units; from the 2.29 that is printed before.
+TEST(Capability, HasThePublishedIntervalOfCp) {
+  EXPECT_NEAR(cp_of(62 - 38, 1.75, 19).value, 2.29, 0.005);
+  const CapabilityIndex cp = cp_of(2.29 * 6, 1, 19);
+  EXPECT_NEAR(cp.low, 1.57, 0.005);
+  EXPECT_NEAR(cp.high, 3.01, 0.005);
+}
+
+/// NIST/SEMATECH e-Handbook of Statistical Methods, 6.1.6: limits 8 and 20, mean 16, s = 2.
+TEST(Capability, HasThePublishedIndices) {
+  EXPECT_NEAR(cp_of(20 - 8, 2, 49).value, 1.0, 1e-12);
+  EXPECT_NEAR(cpk_of({8, 20}, 16, 2, 49, 50).value, 0.6667, 5e-5);
+  EXPECT_NEAR(cpk_of({std::nullopt, 20}, 16, 2, 49, 50).value, 0.6667, 5e-5);
+  EXPECT_NEAR(cpk_of({8, std::nullopt}, 16, 2, 49, 50).value, 1.3333, 5e-5);
+}
+
+/// By hand: 1 / (9 * 100) + 1 / (2 * 450) = 1 / 450.
+TEST(Capability, HasBissellsInterval) {
+  const CapabilityIndex cpk = cpk_of({std::nullopt, 3}, 0, 1, 450, 100);
+  EXPECT_NEAR(cpk.value, 1, 1e-15);
+  EXPECT_NEAR(cpk.high - cpk.value, 1.959964 / std::sqrt(450), 1e-7);
+  EXPECT_NEAR(cpk.value - cpk.low, 1.959964 / std::sqrt(450), 1e-7);
+}
+
+TEST(Capability, TellsADriftFromScatter) {
+  std::vector<double> values;
+  for (int i = 0; i < 40; ++i) values.push_back((i % 2 == 0 ? 0.9 : 1.1) + 0.05 * i);
+  const auto found = capability(values, {std::nullopt, 5});
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->cp);
+  EXPECT_NEAR(found->mean, 1 + 0.05 * 19.5, 1e-12);
+  // Moving ranges 0.25 and 0.15, 20 and 19 times.
+  EXPECT_NEAR(found->within_sd, (20 * 0.25 + 19 * 0.15) / 39 / 1.128, 1e-12);
+  EXPECT_GT(found->cpk.value, 3 * found->ppk.value);
+  const auto two = capability(values, {-1, 5});
+  ASSERT_TRUE(two->pp);
+  EXPECT_NEAR(two->pp->value, 6 / (6 * two->overall_sd), 1e-12);
+}
+
+TEST(Capability, NeedsValuesThatDifferAndALimit) {
+  EXPECT_FALSE(capability(std::vector<double>{1}, {0, 2}));
+  EXPECT_FALSE(capability(std::vector<double>{1, 1, 1}, {0, 2}));
+  EXPECT_FALSE(capability(std::vector<double>{1, 2}, {}));
+}
+
+/// The true index is in the interval as often as it says; limits at 4 sigmas above, 6 below.
+TEST(Capability, HasIntervalsThatHold) {
+  Random random(11);
+  constexpr int trials = 2000;
+  constexpr std::size_t count = 50;
+  int cpk = 0, ppk = 0, cp = 0, pp = 0;
+  const auto holds = [](const CapabilityIndex& index, double truth) {
+    return index.low <= truth && truth <= index.high ? 1 : 0;
+  };
+  for (int trial = 0; trial < trials; ++trial) {
+    std::vector<double> values(count);
+    for (double& value : values) value = 10 + 0.5 * random.normal();
+    const auto found = capability(values, {7, 12});
+    cpk += holds(found->cpk, 4.0 / 3);
+    ppk += holds(found->ppk, 4.0 / 3);
+    cp += holds(*found->cp, 5.0 / 3);
+    pp += holds(*found->pp, 5.0 / 3);
+  }
+  // The standard error is 0.5 %.
+  for (const int held : {cpk, ppk, cp, pp}) EXPECT_NEAR(held / double(trials), 0.95, 0.02);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,216 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/control_chart.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+
+#include "support/random.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::vector<std::size_t> places_of(const std::vector<ChartAlarm>& alarms) {
+  std::vector<std::size_t> places;
+  for (const ChartAlarm& alarm : alarms) places.push_back(alarm.index);
+  return places;
+}
+
+bool holds(const std::string& name, const std::vector<double>& sigmas) {
+  for (const ChartRule& rule : chart_rules()) {
+    if (rule.name == name) return rule.holds(sigmas);
+  }
+  ADD_FAILURE() << "no rule " << name;
+  return false;
+}
+
+/// `count` times one value.
+std::vector<double> times(std::size_t count, double value) {
+  return std::vector<double>(count, value);
+}
+std::vector<double> in_turns(std::size_t count, double size) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < count; ++i) values.push_back(i % 2 == 0 ? size : -size);
+  return values;
+}
+std::vector<double> with(std::vector<double> values, std::size_t place, double value) {
+  values[place] = value;
+  return values;
+}
+
+TEST(ControlChart, HasLimitsFromTheMovingRange) {
+  const ControlChart chart = control_chart(std::vector<double>{1, 3, 2, 5});
+  const double sigma = (2 + 1 + 3) / 3.0 / 1.128, mean = 11 / 4.0;
+  EXPECT_DOUBLE_EQ(chart.mean, mean);
+  EXPECT_DOUBLE_EQ(chart.sigma, sigma);
+  EXPECT_DOUBLE_EQ(chart.upper, mean + 3 * sigma);
+  EXPECT_DOUBLE_EQ(chart.lower, mean - 3 * sigma);
+}
+
+/// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2: flow rates of ten batches.
+TEST(ControlChart, IsThatOfThePublishedIndividuals) {
+  const std::vector<double> flow{49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
+  const ControlChart chart = control_chart(flow);
+  constexpr double printed = 5e-5;
+  EXPECT_NEAR(chart.mean, 50.81, printed);
+  EXPECT_NEAR(chart.sigma * 1.128, 1.8778, printed);
+  EXPECT_NEAR(chart.upper, 55.8041, printed);
+  EXPECT_NEAR(chart.lower, 45.8159, printed);
+  EXPECT_THAT(chart_alarms(flow, {"western-electric-1"}), IsEmpty());
+}
+
+/// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.4.
+TEST(ControlChart, HasThePublishedMovingAverage) {
+  const std::vector<double> values{52.0, 47.0, 53.0, 49.3, 50.1, 47.0, 51.0, 50.1, 51.2, 50.5,
+                                   49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
+  const Ewma average = ewma(values, 50, 2.0539, 0.3);
+  EXPECT_NEAR(average.upper, 52.5884, 5e-5);
+  EXPECT_NEAR(average.lower, 47.4115, 1e-4);  // printed as 47.4115, cut off
+  const std::vector<double> printed{50.60, 49.52, 50.56, 50.18, 50.16, 49.21, 49.75,
+                                    49.85, 50.26, 50.33, 50.11, 49.36, 49.52, 50.05,
+                                    49.38, 49.92, 50.73, 51.23, 51.94, 51.99};
+  ASSERT_EQ(average.averages.size(), printed.size());
+  for (std::size_t i = 0; i < printed.size(); ++i) {
+    EXPECT_NEAR(average.averages[i], printed[i], 0.00501) << i;
+  }
+}
+
+struct RuleCase {
+  const char* rule;
+  std::vector<double> holds, fails;
+};
+
+TEST(ControlChart, HasTheRulesToTheirLastValue) {
+  const std::vector<double> up{-0.4, -0.2, 0, 0.1, 0.2, 0.3};
+  const std::vector<RuleCase> cases{
+      {"western-electric-1", {3.01}, {3}},
+      {"western-electric-1", {0, -3.01}, {-3.01, 0}},
+      {"western-electric-2", {2.01, 0, 2.01}, {2.01, 0, -2.01}},
+      {"western-electric-2", {-2.01, -2.01}, {2.01, 0, 0, 2.01}},
+      {"western-electric-2", {0, 2.01, 2.01}, {2.01, 2.01, 0}},
+      {"western-electric-3", {1.01, 1.01, -2, 1.01, 1.01}, {1.01, 1.01, 0, 0, 1.01, 1.01}},
+      {"western-electric-3", times(4, -1.01), times(4, -1)},
+      {"western-electric-4", times(8, 0.1), times(7, 0.1)},
+      {"western-electric-4", times(8, -0.1), with(times(8, 0.1), 3, 0)},
+      {"nelson-1", {-3.01}, {2.99}},
+      {"nelson-2", times(9, -0.1), times(8, -0.1)},
+      {"nelson-3", up, {up.begin() + 1, up.end()}},
+      {"nelson-3", {up.rbegin(), up.rend()}, with(up, 3, 0)},
+      {"nelson-4", in_turns(14, 0.5), in_turns(13, 0.5)},
+      {"nelson-4", in_turns(14, -0.5), with(in_turns(14, 0.5), 6, -0.5)},
+      {"nelson-5", {0, -2.01, -2.01}, {-2, -2.01, 0}},
+      {"nelson-6", times(4, 1.01), times(3, 1.01)},
+      {"nelson-7", in_turns(15, 0.99), in_turns(14, 0.99)},
+      {"nelson-7", times(15, 0), with(times(15, 0), 14, 1)},
+      {"nelson-8", in_turns(8, 1.01), in_turns(7, 1.01)},
+      {"nelson-8", times(8, 1.01), with(in_turns(8, 1.01), 4, 1)},
+  };
+  for (const RuleCase& each : cases) {
+    EXPECT_TRUE(holds(each.rule, each.holds)) << each.rule << testing::PrintToString(each.holds);
+    EXPECT_FALSE(holds(each.rule, each.fails)) << each.rule << testing::PrintToString(each.fails);
+  }
+}
+
+/// Mean values until the first false alarm, of known mean and sigma: Champ and Woodall 1987,
+/// Technometrics 29, 393-399, table 1.
+TEST(ControlChart, HasThePublishedRunLengths) {
+  const std::vector<std::pair<std::string, double>> published{
+      {"1", 370.40}, {"12", 225.44}, {"13", 166.05}, {"14", 152.73}, {"1234", 91.75}};
+  Random random(5);
+  for (const auto& [numbers, expected] : published) {
+    std::vector<ChartRule> rules;
+    for (const char number : numbers) {
+      rules.push_back(chart_rules()[static_cast<std::size_t>(number - '1')]);
+    }
+    constexpr int trials = 3000;
+    double total = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      std::vector<double> sigmas;
+      do {
+        sigmas.push_back(random.normal());
+      } while (std::none_of(rules.begin(), rules.end(),
+                            [&](const ChartRule& rule) { return rule.holds(sigmas); }));
+      total += static_cast<double>(sigmas.size());
+    }
+    // Of a length that is as good as geometric, the standard error is 1.8 %.
+    EXPECT_NEAR(total / trials / expected, 1, 0.06) << numbers;
+  }
+}
+
+TEST(ControlChart, NamesWhatIsOutside) {
+  std::vector<double> values;
+  for (int i = 0; i < 20; ++i) values.push_back(i % 2 == 0 ? 1.0 : 1.1);
+  values[13] = 3;
+  EXPECT_THAT(places_of(chart_alarms(values, {"western-electric-1"})), ElementsAre(13));
+  EXPECT_THAT(places_of(chart_alarms(values, {"nelson-1"})), ElementsAre(13));
+}
+
+TEST(ControlChart, NamesADriftBeforeItIsOutside) {
+  std::vector<double> values;
+  for (int i = 0; i < 24; ++i) values.push_back((i % 2 == 0 ? 1.0 : 1.1) + (i < 12 ? 0 : 0.3));
+  EXPECT_THAT(chart_alarms(values, {"western-electric-1"}), IsEmpty());
+  // Of the first twelve values the eighth and on are the eighth in a row below the mean, too.
+  EXPECT_THAT(places_of(chart_alarms(values, {"western-electric-4"})),
+              ElementsAre(7, 8, 9, 10, 11, 19, 20, 21, 22, 23));
+  const auto by_average = chart_alarms(values, {"ewma"});
+  ASSERT_FALSE(by_average.empty());
+  EXPECT_EQ(by_average.back().index, 23u);
+}
+
+TEST(ControlChart, TakesAllRulesOfASet) {
+  const std::vector<double> values{0, 0.1, 0, 0.1, 0, 0.1, 0, 0.1, 5};
+  std::vector<std::string> names;
+  for (const ChartAlarm& alarm : chart_alarms(values, {"western-electric", "nelson-1", "ewma"})) {
+    if (alarm.index == 8) names.push_back(alarm.rule);
+  }
+  EXPECT_THAT(names, ElementsAre("western-electric-1", "nelson-1", "ewma"));
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { chart_alarms(values, {"western"}); }),
+              HasSubstr("there is no rule western; there are western-electric-1 to -4"));
+}
+
+TEST(ControlChart, OfEqualValuesHasNoAlarm) {
+  for (const double value : {1.0, 0.1, 0.3, 1e-7}) {
+    const std::vector<double> values(20, value);  // more than any rule looks back
+    EXPECT_EQ(control_chart(values).mean, value);
+    EXPECT_THAT(chart_alarms(values, {"western-electric", "nelson", "ewma"}), IsEmpty());
+  }
+}
+
+TEST(ControlChart, CountsAValueAtTheMeanOnNeitherSide) {
+  // Mean 1: seven below it, one at it, seven above.
+  std::vector<double> values(7, 0.5);
+  values.push_back(1);
+  values.insert(values.end(), 7, 1.5);
+  EXPECT_EQ(control_chart(values).mean, 1);
+  EXPECT_THAT(chart_alarms(values, {"western-electric-4"}), IsEmpty());
+}
+
+TEST(ControlChart, DrawsAPicture) {
+  const TemporaryFolder folder;
+  std::vector<TrendPoint> points;
+  std::vector<double> values;
+  for (int i = 0; i < 10; ++i) {
+    values.push_back(i == 5 ? 9.0 : 1.0);
+    points.push_back({"run", "station", "camera", "PASS", "2026-11-21T13:45:01Z", values.back()});
+  }
+  const std::vector<ChartAlarm> alarms{{"nelson-1", "far", 5}};
+  draw_trend(folder / "trend.svg", "rms_px", points, alarms, 4.0);
+  const std::string svg = TemporaryFolder::content_of(folder / "trend.svg");
+  EXPECT_THAT(svg, testing::AllOf(HasSubstr("alarms"), HasSubstr("gate"), HasSubstr("rms_px")));
+  draw_trend(folder / "plain.svg", "rms_px", points, {}, std::nullopt);
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "plain.svg"),
+              testing::Not(testing::AnyOf(HasSubstr("alarms"), HasSubstr("gate"))));
+}
+
+}  // namespace
+}  // namespace vlp

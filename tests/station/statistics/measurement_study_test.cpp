@@ -1,0 +1,175 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/measurement_study.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "support/random.h"
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+/// Values by unit, then station, then repeat.
+std::vector<StudyValue> crossed(std::size_t stations, std::size_t repeats,
+                                const std::vector<double>& values) {
+  std::vector<StudyValue> all;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    all.push_back({std::to_string(100 + i / (stations * repeats)),
+                   std::to_string(i / repeats % stations), values[i]});
+  }
+  return all;
+}
+
+/// AIAG, Measurement Systems Analysis, 4th ed., tables III-B 6 (values), A 3 (analysis of variance)
+/// and A 4 (parts of the variation): 10 parts, 3 appraisers, 3 trials.
+TEST(MeasurementStudy, HasTheManualsResults) {
+  const MeasurementStudy study = measurement_study(
+      crossed(3, 3, {0.29,  0.41,  0.64,  0.08,  0.25,  0.07,  0.04,  -0.11, -0.15,     // 1
+                     -0.56, -0.68, -0.58, -0.47, -1.22, -0.68, -1.38, -1.13, -0.96,     // 2
+                     1.34,  1.17,  1.27,  1.19,  0.94,  1.34,  0.88,  1.09,  0.67,      // 3
+                     0.47,  0.50,  0.64,  0.01,  1.03,  0.20,  0.14,  0.20,  0.11,      // 4
+                     -0.80, -0.92, -0.84, -0.56, -1.20, -1.28, -1.46, -1.07, -1.45,     // 5
+                     0.02,  -0.11, -0.21, -0.20, 0.22,  0.06,  -0.29, -0.67, -0.49,     // 6
+                     0.59,  0.75,  0.66,  0.47,  0.55,  0.83,  0.02,  0.01,  0.21,      // 7
+                     -0.31, -0.20, -0.17, -0.63, 0.08,  -0.34, -0.46, -0.56, -0.49,     // 8
+                     2.26,  1.99,  2.01,  1.80,  2.12,  2.19,  1.77,  1.45,  1.87,      // 9
+                     -1.36, -1.25, -1.31, -1.68, -1.62, -1.50, -1.49, -1.77, -2.16}));  // 10
+  constexpr double printed = 5e-5;
+  EXPECT_NEAR(study.station.sum_of_squares, 3.1673, printed);
+  EXPECT_NEAR(study.unit.sum_of_squares, 88.3619, printed);
+  EXPECT_NEAR(study.both.sum_of_squares, 0.3590, printed);
+  EXPECT_NEAR(study.error.sum_of_squares, 2.7589, printed);
+  EXPECT_EQ(study.station.dof, 2);
+  EXPECT_EQ(study.unit.dof, 9);
+  EXPECT_EQ(study.both.dof, 18);
+  EXPECT_EQ(study.error.dof, 60);
+  EXPECT_NEAR(study.station.mean_square() / study.error.mean_square(), 34.44, 0.005);
+  EXPECT_NEAR(study.unit.mean_square() / study.error.mean_square(), 213.52, 0.005);
+  EXPECT_NEAR(study.both.mean_square() / study.error.mean_square(), 0.434, 5e-4);
+  EXPECT_TRUE(study.pooled);
+  constexpr double last_digit = 1.5e-6;  // the manual's own rounding on the way
+  EXPECT_NEAR(study.repeatability, 0.199933, last_digit);
+  EXPECT_NEAR(study.of_station, 0.226838, last_digit);
+  EXPECT_EQ(study.of_both, 0);
+  EXPECT_NEAR(study.measuring, 0.302373, 2 * last_digit);
+  EXPECT_NEAR(study.of_unit, 1.042327, last_digit);
+  EXPECT_NEAR(study.total, 1.085, 5e-4);
+  EXPECT_NEAR(study.percent_of_total(), 27.9, 0.05);
+  EXPECT_NEAR(100 * study.repeatability / study.total, 18.4, 0.05);
+  EXPECT_NEAR(100 * study.of_station / study.total, 20.9, 0.05);
+  EXPECT_NEAR(100 * study.of_unit / study.total, 96.0, 0.05);
+  EXPECT_EQ(study.distinct_categories(), 4);
+}
+
+/// Montgomery, Design and Analysis of Experiments, gauge study of 20 parts, 3 operators, 2
+/// measurements: the analysis of variance, and the parts of the reduced model.
+TEST(MeasurementStudy, HasTheTextbooksResults) {
+  const MeasurementStudy study = measurement_study(crossed(
+      3, 2, {21, 20, 20, 20, 19, 21, 24, 23, 24, 24, 23, 24, 20, 21, 19, 21, 20, 22, 27, 27,
+             28, 26, 27, 28, 19, 18, 19, 18, 18, 21, 23, 21, 24, 21, 23, 22, 22, 21, 22, 24,
+             22, 20, 19, 17, 18, 20, 19, 18, 24, 23, 25, 23, 24, 24, 25, 23, 26, 25, 24, 25,
+             21, 20, 20, 20, 21, 20, 18, 19, 17, 19, 18, 19, 23, 25, 25, 25, 25, 25, 24, 24,
+             23, 25, 24, 25, 29, 30, 30, 28, 31, 30, 26, 26, 25, 26, 25, 27, 20, 20, 19, 20,
+             20, 20, 19, 21, 19, 19, 21, 23, 25, 26, 25, 24, 25, 25, 19, 19, 18, 17, 19, 17}));
+  EXPECT_NEAR(study.unit.sum_of_squares, 1185.43, 0.0051);
+  EXPECT_NEAR(study.station.sum_of_squares, 2.62, 0.005);
+  EXPECT_NEAR(study.both.sum_of_squares, 27.05, 0.005);
+  EXPECT_NEAR(study.error.sum_of_squares, 59.50, 0.005);
+  EXPECT_NEAR(study.unit.mean_square(), 62.39, 0.005);
+  EXPECT_NEAR(study.station.mean_square(), 1.31, 0.005);
+  EXPECT_NEAR(study.both.mean_square(), 0.71, 0.005);
+  EXPECT_NEAR(study.error.mean_square(), 0.99, 0.005);
+  ASSERT_TRUE(study.interaction_p);
+  EXPECT_NEAR(*study.interaction_p, 0.861, 5e-4);
+  EXPECT_NEAR(std::pow(study.repeatability, 2), 0.88, 0.005);
+  EXPECT_NEAR(std::pow(study.of_station, 2), 0.0106, 5e-5);
+  EXPECT_NEAR(std::pow(study.of_unit, 2), 10.25, 0.005);
+  EXPECT_NEAR(std::pow(study.measuring, 2), 0.89, 0.005);
+}
+
+/// No published values: those of the same equations in NumPy and SciPy.
+TEST(MeasurementStudy, KeepsAnInteractionThatShows) {
+  const MeasurementStudy study = measurement_study(
+      crossed(2, 2, {10, 10.2, 12, 12.2, 11, 11.4, 10, 10.4, 15, 15.2, 14, 14.6}));
+  EXPECT_FALSE(study.pooled);
+  EXPECT_NEAR(*study.interaction_p, 0.0002923805372109052, 1e-12);
+  EXPECT_NEAR(std::pow(study.repeatability, 2), 0.06666666666666661, 1e-12);
+  EXPECT_NEAR(std::pow(study.of_both, 2), 1.3733333333333282, 1e-12);
+  EXPECT_EQ(study.of_station, 0) << "-0.467 is none";
+  EXPECT_NEAR(std::pow(study.of_unit, 2), 4.150000000000005, 1e-12);
+  EXPECT_NEAR(std::pow(study.measuring, 2), 0.06666666666666661 + 1.3733333333333282, 1e-12);
+}
+
+/// By hand: two units at 0 and 10, each measured twice, 1 apart: MS_e = 0.5, MS_unit = 100.
+TEST(MeasurementStudy, OfOneStationKnowsItsRepeatability) {
+  const MeasurementStudy study = measurement_study(crossed(1, 2, {-0.5, 0.5, 9.5, 10.5}));
+  EXPECT_EQ(study.stations, 1u);
+  EXPECT_FALSE(study.interaction_p);
+  EXPECT_DOUBLE_EQ(study.repeatability, std::sqrt(0.5));
+  EXPECT_EQ(study.of_station, 0);
+  EXPECT_DOUBLE_EQ(study.of_unit, std::sqrt((100 - 0.5) / 2));
+  EXPECT_EQ(study.distinct_categories(), static_cast<int>(1.41 * std::sqrt(99.5)));
+  const double sd = std::sqrt(0.5);
+  EXPECT_FALSE(study.percent_of_tolerance({}));
+  EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({0, 20}), 100 * 6 * sd / 20);
+  EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({std::nullopt, 11}), 100 * 3 * sd / 6);
+  EXPECT_DOUBLE_EQ(*study.percent_of_tolerance({1, std::nullopt}), 100 * 3 * sd / 4);
+  // The mean, 5, is at the one limit or beyond it.
+  EXPECT_FALSE(study.percent_of_tolerance({std::nullopt, 5}));
+  EXPECT_FALSE(study.percent_of_tolerance({std::nullopt, 1}));
+  EXPECT_FALSE(study.percent_of_tolerance({5, std::nullopt}));
+  EXPECT_FALSE(study.percent_of_tolerance({11, std::nullopt}));
+}
+
+TEST(MeasurementStudy, FindsWhatWasPutIn) {
+  Random random(3);
+  constexpr int studies = 400;
+  constexpr std::size_t units = 10, stations = 3, repeats = 3;
+  double error = 0, unit = 0, station = 0;
+  for (int i = 0; i < studies; ++i) {
+    std::vector<double> of_station(stations), values;
+    for (double& value : of_station) value = 2 * random.normal();
+    for (std::size_t u = 0; u < units; ++u) {
+      const double of_unit = 3 * random.normal();
+      for (const double of : of_station) {
+        for (std::size_t r = 0; r < repeats; ++r) values.push_back(of_unit + of + random.normal());
+      }
+    }
+    const MeasurementStudy study = measurement_study(crossed(stations, repeats, values));
+    error += std::pow(study.repeatability, 2) / studies;
+    unit += std::pow(study.of_unit, 2) / studies;
+    station += std::pow(study.of_station, 2) / studies;
+  }
+  // Standard errors: sqrt(2 / dof / studies) of each mean square, 0.8 %, 2.4 %, 5 %.
+  EXPECT_NEAR(error, 1, 0.03);
+  EXPECT_NEAR(unit, 9, 9 * 0.08);
+  EXPECT_NEAR(station, 4, 4 * 0.16);
+}
+
+TEST(MeasurementStudy, SaysWhatIsMissing) {
+  EXPECT_THAT(refusal_of<std::invalid_argument>([] { measurement_study({}); }),
+              HasSubstr("two units"));
+  EXPECT_THAT(refusal_of<std::invalid_argument>([] {
+                measurement_study(crossed(1, 1, {1, 2}));
+              }),
+              HasSubstr("two or more"));
+  auto values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
+  values.pop_back();
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { measurement_study(values); }),
+              HasSubstr("unit 101 has 1 runs on 1, 100 has 2 on 0"));
+  values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
+  values.erase(values.begin(), values.begin() + 2);
+  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { measurement_study(values); }),
+              HasSubstr("unit 100 has 0 runs on 0, 100 has 2 on 1"));
+}
+
+}  // namespace
+}  // namespace vlp

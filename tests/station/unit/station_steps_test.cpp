@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+
+#include "station/unit/station_steps.h"
+#include "support/datasets.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+/// The example: 36 captures at known points.
+struct StationSteps : testing::Test {
+  StationSteps() {
+    config.lamps = read_lamp_map(kExample + "lamps.yaml");
+    config.enough.check_captures = 36;
+    config.enough.dispersion_captures = 36;
+  }
+  StationConfig config{};
+  Calibration calibration = read_calibration(kExample + "calibration.yaml");
+  std::vector<Frame> frames = read_detections(kExample + "detections.csv");
+  CapturesTable places = read_captures(kExample + "truth.csv");
+};
+
+TEST_F(StationSteps, CheckTheFixesAtKnownPoints) {
+  const StepResult result = check_fixes(config, calibration, frames, places);
+  EXPECT_TRUE(result.ok()) << result.why;
+  EXPECT_EQ(result.metrics[0].name, "check_fixes");
+  EXPECT_EQ(result.metrics[0].value, 1);
+}
+
+TEST_F(StationSteps, WantAsManyPlacesAsTheStationWantsCaptures) {
+  places.erase(places.begin());
+  EXPECT_THAT(check_fixes(config, calibration, frames, places).why,
+              HasSubstr("1 of the 36 captures"));
+  EXPECT_THAT(solve_dispersion(config, calibration, frames, places).why,
+              HasSubstr("1 of the 36 captures"));
+  config.enough.check_captures = 35;
+  EXPECT_TRUE(check_fixes(config, calibration, frames, places).ok());
+  EXPECT_THAT(check_fixes(config, calibration, {}, places).why, HasSubstr("nothing tells"));
+}
+
+/// Lamps that hang lower than their map says: places are right, heights are not.
+TEST_F(StationSteps, TellTheHeightError) {
+  const auto height_mm = [&] {
+    const StepResult result = check_fixes(config, calibration, frames, places);
+    for (const auto& [name, value] : result.metrics) {
+      if (name == "check_height_mm") return value;
+    }
+    return -1.0;
+  };
+  const double as_mapped_mm = height_mm();
+  EXPECT_GE(as_mapped_mm, 0);
+  EXPECT_LT(as_mapped_mm, 1);
+  for (Lamp& lamp : config.lamps.lamps) lamp.position_m.z() += 0.1;
+  EXPECT_NEAR(height_mm(), 100, 1);
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/turn_map.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "support/datasets.h"
+
+namespace vlp {
+namespace {
+
+using testing::Each;
+using testing::SizeIs;
+
+/// The example's turn: 12 captures at each of two heights, 30 degrees apart.
+struct TurnMapTest : testing::Test {
+  TurnMapTest() {
+    config.lamps = read_lamp_map(kExample + "lamps.yaml");
+    config.enough.turn_captures = 12;
+    config.enough.turn_heights = 2;
+  }
+  StationConfig config{};
+  Calibration calibration = read_calibration(kExample + "calibration.yaml");
+  std::vector<Frame> frames = read_detections(kExample + "turning.csv");
+};
+
+TEST_F(TurnMapTest, IsWhole) {
+  const TurnMap map = turn_map(frames, config, calibration);
+  ASSERT_THAT(map.heights, SizeIs(2));
+  for (const auto& height : map.heights) {
+    EXPECT_EQ(height.captures, 12);
+    EXPECT_THAT(height.parts, Each(true));
+    EXPECT_GT(height.arc_rad, 1.6 * std::numbers::pi);
+  }
+  EXPECT_TRUE(map.enough);
+}
+
+TEST_F(TurnMapTest, ShowsTheAnglesThatAreMissing) {
+  frames.erase(frames.begin() + 4, frames.begin() + 7);
+  const TurnMap map = turn_map(frames, config, calibration);
+  ASSERT_THAT(map.heights, SizeIs(2));
+  const auto& parts = map.heights[0].captures == 9 ? map.heights[0].parts : map.heights[1].parts;
+  EXPECT_EQ(std::count(parts.begin(), parts.end(), false), 3);
+  EXPECT_FALSE(map.enough);
+}
+
+// Not from the lowest, which hangs on the fixes' last micrometres.
+TEST_F(TurnMapTest, CountsFromTheCaptureThatCameFirst) {
+  frames.resize(3);
+  const auto forwards = turn_map(frames, config, calibration).heights.at(0).parts;
+  std::reverse(frames.begin(), frames.end());
+  const auto backwards = turn_map(frames, config, calibration).heights.at(0).parts;
+  EXPECT_EQ(std::count(forwards.begin(), forwards.end(), true), 3);
+  EXPECT_TRUE(forwards[0] && backwards[0]);
+  EXPECT_NE(forwards[1], backwards[1]);
+  EXPECT_NE(forwards[11], backwards[11]);
+}
+
+TEST_F(TurnMapTest, HasAsManyHeightsAsThereAre) {
+  frames.erase(frames.begin() + 12, frames.end());
+  EXPECT_THAT(turn_map(frames, config, calibration).heights, SizeIs(1));
+  EXPECT_FALSE(turn_map(frames, config, calibration).enough);
+  config.enough.turn_heights = 1;
+  EXPECT_TRUE(turn_map(frames, config, calibration).enough);
+  EXPECT_THAT(turn_map({}, config, calibration).heights, SizeIs(0));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,86 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Images that come, are overwritten and are taken away again.
+#include <gmock/gmock.h>
+
+#include "station/unit/unit.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// One view is enough for the boards, though not for a lens.
+struct UnitImages : testing::Test {
+  UnitImages() {
+    config.enough.board_views = 1;
+    config.enough.board_coverage = 0;
+  }
+  /// The one view there is, or no image, under this name.
+  void come(const std::string& name, bool good) {
+    const auto file = folder / name;
+    if (good) {
+      fs::copy_file(VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png", file,
+                    fs::copy_options::overwrite_existing);
+    } else {
+      folder.file(name, "no image");
+    }
+    unit.add(StationStep::boards, {file});
+  }
+  const UnitStep& boards() const { return unit.step(StationStep::boards); }
+  const std::string& refusal(const std::string& name) const {
+    return boards().images.at(name).refused;
+  }
+
+  StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
+  TemporaryFolder folder;
+  Unit unit{config, "unit", {"test", "0"}, 1};
+};
+
+TEST_F(UnitImages, ThatShowTheSameGetTheirTurnWhenTheFirstGoes) {
+  come("a.png", true);
+  come("b.png", true);
+  EXPECT_EQ(refusal("a.png"), "");
+  EXPECT_EQ(refusal("b.png"), "same image as a.png");
+  unit.remove(StationStep::boards, "a.png");
+  EXPECT_EQ(refusal("b.png"), "");
+  come("a.png", true);
+  EXPECT_EQ(refusal("a.png"), "same image as b.png");
+}
+
+TEST_F(UnitImages, ThatAreOverwrittenCountNoMore) {
+  come("a.png", true);
+  unit.advance(false);
+  ASSERT_TRUE(boards().result);  // a problem: one view makes no lens
+  come("b.png", true);
+  EXPECT_TRUE(boards().result) << "an image that is not used changes nothing";
+  come("a.png", false);
+  EXPECT_FALSE(boards().result);
+  EXPECT_THAT(refusal("a.png"), HasSubstr("cannot be read"));
+  EXPECT_EQ(refusal("b.png"), "");
+}
+
+TEST_F(UnitImages, OfACameraThatAreRefusedStayAsRefusals) {
+  come("a.png", true);
+  for (const char* name : {"b.png", "c.png"}) {
+    come(name, false);
+    fs::remove(folder / name);
+    unit.discard(StationStep::boards, name);
+  }
+  EXPECT_EQ(boards().refused_in_a_row, 0);
+  come("d.png", true);
+  unit.discard(StationStep::boards, "d.png");  // same pose: no fault
+  EXPECT_FALSE(boards().images.contains("d.png"));
+  unit.remove(StationStep::boards, "a.png");
+  unit.advance(true);
+  EXPECT_THAT(unit.causes(),
+              ElementsAre(testing::Field(&Cause::text, AllOf(HasSubstr("boards (0/1)"),
+                                                             HasSubstr("2 of 2 images refused")))));
+}
+
+}  // namespace
+}  // namespace vlp

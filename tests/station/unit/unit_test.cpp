@@ -1,0 +1,172 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/unit.h"
+
+#include <gmock/gmock.h>
+
+#include "station/records/unit_report.h"
+#include "station/unit/station_screen.h"
+#include "station/unit/unit_record.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::Field;
+using testing::HasSubstr;
+using testing::Not;
+
+namespace fs = std::filesystem;
+constexpr const char* kView = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png";
+
+/// A unit of the station in datasets/station, without images at first.
+struct UnitTest : testing::Test {
+  StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
+  TemporaryFolder folder;
+  Unit unit{config, std::string(64, 'x'), {"test", "0"}, 1};
+
+  void add_bad(int number) {
+    const auto file = folder.file(std::to_string(100 + number) + ".png", "no image");
+    unit.add(StationStep::boards, {file});
+  }
+};
+
+TEST_F(UnitTest, BeginsWithTheBoards) {
+  EXPECT_EQ(unit.current(), StationStep::boards);
+  EXPECT_FALSE(unit.calibration());
+  EXPECT_THAT(unit.causes(),
+              ElementsAre(Field(&Cause::text, HasSubstr("boards: not enough images"))));
+  EXPECT_EQ(verdict_of(unit.causes()), Verdict::invalid);
+}
+
+TEST_F(UnitTest, IsHopelessAfterSoManyBadImagesInARow) {
+  for (int i = 0; i < config.refuse.in_a_row; ++i) {
+    EXPECT_FALSE(unit.hopeless()) << i;
+    add_bad(i);
+  }
+  EXPECT_TRUE(unit.hopeless());
+  EXPECT_EQ(unit.step(StationStep::boards).used(), 0);
+  unit.advance(true);
+  EXPECT_THAT(
+      unit.causes(),
+      ElementsAre(Field(&Cause::text, HasSubstr("12 of 12 images refused: 12 cannot be read"))));
+  EXPECT_EQ(verdict_of(unit.causes()), Verdict::invalid)
+      << "images that cannot be read are no fault";
+  unit.remove(StationStep::boards, "100.png");
+  EXPECT_FALSE(unit.hopeless());
+}
+
+/// As when a program that was killed goes on: all that is there comes at once, by name.
+TEST_F(UnitTest, IsNotHopelessForTheOrderOfNames) {
+  const auto good = folder / "000.png";
+  fs::copy_file(kView, good);
+  std::vector<fs::path> together{good};
+  for (int i = 0; i < config.refuse.in_a_row + 1; ++i) {
+    together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
+  }
+  // In two parts, as the station takes them.
+  unit.add(StationStep::boards, std::vector<fs::path>(together.begin(), together.end() - 1), true);
+  EXPECT_FALSE(unit.hopeless());
+  unit.add(StationStep::boards, {together.back()});
+  EXPECT_FALSE(unit.hopeless());
+  EXPECT_EQ(unit.step(StationStep::boards).refused_in_a_row, 0);
+  // One by one their order is known.
+  for (int i = 0; i < config.refuse.in_a_row; ++i) add_bad(100 + i);
+  EXPECT_TRUE(unit.hopeless());
+}
+
+TEST_F(UnitTest, IsHopelessWhenAllThatIsThereIsBad) {
+  std::vector<fs::path> together;
+  for (int i = 0; i < config.refuse.in_a_row; ++i) {
+    together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
+  }
+  unit.add(StationStep::boards, together);
+  EXPECT_TRUE(unit.hopeless());
+}
+
+TEST_F(UnitTest, IsNotJudgedWhenItEndsEarly) {
+  unit.end_early("the operator ended the run");
+  EXPECT_THAT(
+      unit.causes(),
+      ElementsAre(Field(&Cause::text,
+                        "boards: the operator ended the run before there was enough (0/36)")));
+  const RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
+  EXPECT_EQ(record.verdict, "INVALID");
+  EXPECT_TRUE(record.invalid());
+  std::string screen;
+  for (const ScreenLine& line : verdict_screen(record)) screen += line.text + "\n";
+  EXPECT_THAT(screen,
+              AllOf(HasSubstr("INVALID   camera"), HasSubstr("Gates    not reached: blur_px"),
+                    HasSubstr("Cause    boards: the operator ended"), Not(HasSubstr("NOT MET"))));
+}
+
+TEST_F(UnitTest, TakesNoImageOfAnother) {
+  unit.refuse_images_of_others([](const std::string&) { return "camera 0001: run R"; });
+  fs::copy_file(kView, folder / "0.png");
+  unit.add(StationStep::boards, {folder / "0.png"});
+  EXPECT_EQ(unit.step(StationStep::boards).images.at("0.png").refused,
+            "already of camera 0001: run R");
+  unit.advance(true);
+  EXPECT_THAT(unit.causes(),
+              ElementsAre(Field(&Cause::text, HasSubstr("1 already of camera 0001"))));
+  EXPECT_EQ(verdict_of(unit.causes()), Verdict::invalid);
+}
+
+TEST(VerdictOf, IsDecidedByTheFirstCause) {
+  EXPECT_EQ(verdict_of({}), Verdict::pass);
+  EXPECT_EQ(verdict_of({{"decentred", true}, {"the operator left"}}), Verdict::fail);
+  EXPECT_EQ(verdict_of({{"lamp 5 is loose"}, {"the fixes are off", true}}), Verdict::invalid);
+}
+
+TEST_F(UnitTest, KeepsLaterImagesUntilTheStepBeforeIsDone) {
+  const auto file = folder.file("0.png", "no image");
+  unit.add(StationStep::check, {file});
+  unit.advance(false);
+  EXPECT_EQ(unit.step(StationStep::check).waiting.size(), 1u);
+  unit.remove(StationStep::check, "0.png");
+  EXPECT_TRUE(unit.step(StationStep::check).waiting.empty());
+}
+
+TEST_F(UnitTest, IsShownIn80Columns) {
+  add_bad(1);
+  add_bad(2);
+  for (const ScreenLine& line : station_screen(unit)) EXPECT_LE(line.text.size(), 80u) << line.text;
+  const RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
+  EXPECT_FALSE(record.passed());
+  for (const ScreenLine& line : verdict_screen(record)) {
+    EXPECT_LE(line.text.size(), 80u) << line.text;
+  }
+}
+
+TEST_F(UnitTest, HasAReportOfItsVerdict) {
+  RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
+  EXPECT_THAT(unit_report(record, "", {}),
+              AllOf(HasSubstr("<strong>INVALID</strong><p>boards: not enough"),
+                    HasSubstr("not\u00a0reached"), Not(HasSubstr("NOT\u00a0MET"))));
+  record.images = {{"boards", "7.png", "", "too dark"}};
+  EXPECT_THAT(unit_report(record, "", {}), AllOf(HasSubstr("boards/7.png"), HasSubstr("too dark")));
+  record.figures =
+      check_gates({{"coverage", 0.7}, {"rms_px", 0.3}}, {{"coverage", 0.75}, {"rms_px", 0.1}});
+  record.causes.clear();
+  record.verdict = "PASS";
+  EXPECT_THAT(unit_report(record, "", {}),
+              AllOf(HasSubstr("<strong>PASS"), HasSubstr("at least\u00a00.7"), HasSubstr("0.75"),
+                    Not(HasSubstr("is not met")), Not(HasSubstr("confidence interval"))));
+  // Once: with its meaning, among the gates.
+  const std::string page = unit_report(record, "", {});
+  EXPECT_EQ(page.find("coverage: share"), page.rfind("coverage: share"));
+  // Changed in the database by hand.
+  record.figures[1].value = 0.5;
+  EXPECT_THAT(why_no_verdict(record), HasSubstr("rms_px is 0.5 px, at most 0.3 px is asked for"));
+  EXPECT_THAT(unit_report(record, "", {}),
+              AllOf(HasSubstr("NO VERDICT</strong><p>the record says PASS, but rms_px"),
+                    Not(HasSubstr("<strong>PASS"))));
+  for (const ScreenLine& line : verdict_screen(record)) {
+    EXPECT_THAT(line.text, Not(testing::StartsWith("PASS")));
+  }
+}
+
+}  // namespace
+}  // namespace vlp
