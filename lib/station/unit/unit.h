@@ -16,7 +16,6 @@
 #include "session/step_history.h"
 #include "station/unit/station_step.h"
 #include "station/unit/unit_step.h"
-#include "station/verdict.h"
 
 namespace vlp {
 
@@ -55,6 +54,8 @@ class Unit {
   /// Nothing more comes although a step has not enough; `why` for people, as "the operator ended
   /// the run".
   void end_early(std::string why) { ended_ = std::move(why); }
+  /// The reason given to end_early(); empty if the unit was not ended early.
+  const std::string& ended() const { return ended_; }
 
   /// No verdict of this unit counts, because of the station: `why`, for people, comes first of its
   /// causes. Empty: it does.
@@ -74,10 +75,6 @@ class Unit {
   std::vector<CheckedMetric> figures() const;
   /// For the report: of lens, rotation centre and dispersion, as far as it came. Waits for them.
   std::vector<ReportPicture> pictures() const;
-  /// Why the unit does not pass, the root first; empty when it does. What the station or the
-  /// operator did comes before what was measured with it, so that verdict_of() blames the camera
-  /// for nothing else than what it is.
-  std::vector<Cause> causes() const;
   const StationConfig& config() const { return config_; }
   const std::string& camera_id() const { return camera_id_; }
 
@@ -88,7 +85,6 @@ class Unit {
   LevelsOfImages levels_of(StationStep step) const;
   void look_again(StationStep step);
   void take(StationStep step, UnitImage image);
-  std::vector<Cause> causes_of_images() const;
   void count_refusals(StationStep step);
   std::pair<Superfluous, std::string> superfluity(StationStep step, const UnitImage& image) const;
   void drop(StationStep step, const std::string& name);

@@ -6,6 +6,7 @@
 
 #include "captures/digest.h"
 #include "rig/calibration_text.h"
+#include "station/unit/unit_verdict.h"
 
 namespace vlp {
 
@@ -16,7 +17,7 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
     record.calibration = calibration_text(*calibration);
   }
   record.figures = unit.figures();
-  record.judge(unit.causes());
+  record.judge(find_causes(unit));
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
       std::string refused = image.refused;

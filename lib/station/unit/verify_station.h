@@ -5,8 +5,11 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
+#include "report/report_picture.h"
 #include "station/records/run_record.h"
+#include "station/station_config.h"
 
 namespace vlp {
 

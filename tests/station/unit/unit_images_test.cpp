@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "station/unit/unit.h"
+#include "station/unit/unit_verdict.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -77,7 +78,7 @@ TEST_F(UnitImages, OfACameraThatAreRefusedStayAsRefusals) {
   EXPECT_FALSE(boards().images.contains("d.png"));
   unit.remove(StationStep::boards, "a.png");
   unit.advance(true);
-  EXPECT_THAT(unit.causes(),
+  EXPECT_THAT(find_causes(unit),
               ElementsAre(testing::Field(&Cause::text, AllOf(HasSubstr("boards (0/1)"),
                                                              HasSubstr("2 of 2 images refused")))));
 }

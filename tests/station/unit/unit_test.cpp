@@ -7,6 +7,7 @@
 #include "station/records/unit_report.h"
 #include "station/unit/station_screen.h"
 #include "station/unit/unit_record.h"
+#include "station/unit/unit_verdict.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -36,9 +37,9 @@ struct UnitTest : testing::Test {
 TEST_F(UnitTest, BeginsWithTheBoards) {
   EXPECT_EQ(unit.current(), StationStep::boards);
   EXPECT_FALSE(unit.calibration());
-  EXPECT_THAT(unit.causes(),
+  EXPECT_THAT(find_causes(unit),
               ElementsAre(Field(&Cause::text, HasSubstr("boards: not enough images"))));
-  EXPECT_EQ(verdict_of(unit.causes()), Verdict::invalid);
+  EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
 }
 
 TEST_F(UnitTest, IsHopelessAfterSoManyBadImagesInARow) {
@@ -50,9 +51,9 @@ TEST_F(UnitTest, IsHopelessAfterSoManyBadImagesInARow) {
   EXPECT_EQ(unit.step(StationStep::boards).used(), 0);
   unit.advance(true);
   EXPECT_THAT(
-      unit.causes(),
+      find_causes(unit),
       ElementsAre(Field(&Cause::text, HasSubstr("12 of 12 images refused: 12 cannot be read"))));
-  EXPECT_EQ(verdict_of(unit.causes()), Verdict::invalid)
+  EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid)
       << "images that cannot be read are no fault";
   unit.remove(StationStep::boards, "100.png");
   EXPECT_FALSE(unit.hopeless());
@@ -89,7 +90,7 @@ TEST_F(UnitTest, IsHopelessWhenAllThatIsThereIsBad) {
 TEST_F(UnitTest, IsNotJudgedWhenItEndsEarly) {
   unit.end_early("the operator ended the run");
   EXPECT_THAT(
-      unit.causes(),
+      find_causes(unit),
       ElementsAre(Field(&Cause::text,
                         "boards: the operator ended the run before there was enough (0/36)")));
   const RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
@@ -109,9 +110,9 @@ TEST_F(UnitTest, TakesNoImageOfAnother) {
   EXPECT_EQ(unit.step(StationStep::boards).images.at("0.png").refused,
             "already of camera 0001: run R");
   unit.advance(true);
-  EXPECT_THAT(unit.causes(),
+  EXPECT_THAT(find_causes(unit),
               ElementsAre(Field(&Cause::text, HasSubstr("1 already of camera 0001"))));
-  EXPECT_EQ(verdict_of(unit.causes()), Verdict::invalid);
+  EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
 }
 
 TEST(VerdictOf, IsDecidedByTheFirstCause) {

@@ -1,0 +1,232 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/unit_verdict.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <map>
+#include <string>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "session/session_folder.h"
+#include "station/unit/guidance.h"
+#include "station/unit/lamp_faults.h"
+#include "station/unit/lens_fault.h"
+
+namespace vlp {
+namespace {
+
+/// Steps whose images show lamps, in their order.
+constexpr std::array kLampSteps{StationStep::rotation, StationStep::dispersion, StationStep::check};
+
+void append(std::vector<Cause>& causes, std::vector<Cause> more) {
+  std::move(more.begin(), more.end(), std::back_inserter(causes));
+}
+
+bool is_solved(const UnitStep& state) { return state.result && state.result->ok(); }
+
+/// A reason in the plural, without figures and names.
+std::string kind_of(const UnitImage& image) {
+  if (image.superfluous == Superfluous::same_pose) return "the same pose again";
+  return image.refused.substr(0, image.refused.find(':'));
+}
+
+/// What became of the images of a step that did not come to its end.
+struct Refusals {
+  /// "12 of 36 images refused: 10 blurred, 2 too dark"; empty when most are used.
+  std::string text = {};
+  /// More are blurred than all else, so many that it is not a shaky hand.
+  bool blurred = false;
+};
+
+/// Returns the number of images from which on a fault is the camera's; fewer may be an accident.
+int min_images_to_blame(const StationConfig& config) {
+  return std::min(config.refuse.in_a_row, (config.enough.board_views + 1) / 2);
+}
+
+Refusals refusals(const UnitStep& state, const StationConfig& config) {
+  std::map<std::string, int> reasons;
+  int refused = 0;
+  for (const auto& [name, image] : state.images) {
+    if (image.refused.empty() || image.superfluous == Superfluous::enough) continue;
+    ++refused;
+    ++reasons[kind_of(image)];
+  }
+  if (refused == 0 || refused < state.used()) return {};
+  std::string text;
+  for (const auto& [reason, count] : reasons) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, reason);
+  }
+  const int blurred = reasons.contains("blurred") ? reasons.at("blurred") : 0;
+  const auto most = [&](const char* reason) {
+    return reasons.contains(reason) && 2 * reasons.at(reason) > refused;
+  };
+  if (most("too dark")) text += ": more exposure, gain or light";
+  if (most("overexposed")) text += ": less exposure, gain or light";
+  return {fmt::format("{} of {} images refused: {}", refused, state.images.size(), text),
+          2 * blurred > refused && blurred >= min_images_to_blame(config)};
+}
+
+/// Returns that the lights of refused images are the lamps with another row time; empty otherwise.
+std::string find_row_time_fault(const UnitStep& state, const StationConfig& config) {
+  std::vector<double> frequencies_hz;
+  for (const auto& [name, image] : state.images) {
+    if (image.refused.empty()) continue;
+    frequencies_hz.insert(frequencies_hz.end(), image.unknown_hz.begin(), image.unknown_hz.end());
+  }
+  constexpr std::size_t min_lights = 6;
+  if (frequencies_hz.size() < min_lights) return "";
+  const double row_time_s = config.type.row_time_s.value_or(0);
+  const auto found_s = row_time_that_fits(frequencies_hz, config.lamps, row_time_s);
+  if (!found_s) return "";
+  constexpr double microseconds = 1e6;
+  return fmt::format(
+      "the row time of the camera's type, {:.2f} us, is not this camera's: with {:.2f} us its "
+      "lights are the lamps of the map",
+      microseconds * row_time_s, microseconds * *found_s);
+}
+
+/// Returns what keeps a step from ending well.
+std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
+  const UnitStep& state = unit.step(step);
+  if (state.done()) return {};
+  std::vector<Cause> causes;
+  if (std::string fault = find_row_time_fault(state, unit.config()); !fault.empty()) {
+    causes.push_back({std::move(fault)});
+  }
+  const std::string count = count_of(unit, step);
+  const Refusals refused = refusals(state, unit.config());
+  if (!refused.text.empty()) {
+    causes.push_back(
+        {fmt::format("{} ({}): {}", name_of(step), count, refused.text), refused.blurred});
+  }
+  const bool failed = state.result && !state.result->ok() && state.used() > 0;
+  if (failed) causes.push_back({fmt::format("{}: {}", name_of(step), state.result->why)});
+  const bool is_explained = failed || !refused.text.empty();
+  if (state.enough || (is_explained && unit.ended().empty())) return causes;
+  causes.push_back(
+      {unit.ended().empty()
+           ? fmt::format("{}: not enough images, or too much alike ({})", name_of(step), count)
+           : fmt::format("{}: {} before there was enough ({})", name_of(step), unit.ended(),
+                         count)});
+  return causes;
+}
+
+/// Returns the gates that figures of a step miss, those of the station before those of the camera.
+std::vector<Cause> find_missed_gates(const UnitStep& state,
+                                     const std::vector<CheckedMetric>& figures) {
+  std::vector<Cause> causes;
+  if (!is_solved(state)) return causes;
+  for (const bool of_camera : {false, true}) {
+    for (const CheckedMetric& figure : figures) {
+      const bool missed = value_of(state.result->metrics, figure.name) && !figure.met();
+      if (missed && metric_kind(figure.name)->of_camera == of_camera) {
+        causes.push_back({cause_of(figure), of_camera});
+      }
+    }
+  }
+  return causes;
+}
+
+std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
+                                    const std::vector<CheckedMetric>& figures) {
+  std::vector<Cause> causes = find_problems(unit, step);
+  append(causes, find_missed_gates(unit.step(step), figures));
+  return causes;
+}
+
+/// Returns true if most of the board images show another board.
+bool is_other_board(const UnitStep& boards) {
+  const auto other = std::count_if(boards.images.begin(), boards.images.end(), [](const auto& i) {
+    return i.second.view && !i.second.view->seen.foreign.empty();
+  });
+  return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
+}
+
+/// Returns true if there are enough views to distinguish blur from a shaky hand.
+bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
+  return boards.enough ||
+         std::count_if(boards.images.begin(), boards.images.end(), [](const auto& image) {
+           return image.second.blur_px.has_value();
+         }) >= min_images_to_blame(config);
+}
+
+/// Returns the causes that the board images show: another board, blur, and those of the lens.
+std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<CheckedMetric>& figures) {
+  std::vector<Cause> causes;
+  const UnitStep& boards = unit.step(StationStep::boards);
+  if (is_other_board(boards)) causes.push_back({"wrong board: the tags have other ids"});
+  for (const CheckedMetric& figure : figures) {
+    const bool blur = figure.name == "blur_px" && figure.value && !figure.met();
+    if (blur && is_blur_known(boards, unit.config())) causes.push_back({cause_of(figure), true});
+  }
+  append(causes, find_step_causes(unit, StationStep::boards, figures));
+  return causes;
+}
+
+/// Returns the causes of the steps with lamps, as far as the step before is solved.
+std::vector<Cause> find_lamp_step_causes(const Unit& unit,
+                                         const std::vector<CheckedMetric>& figures) {
+  std::vector<Cause> causes;
+  StationStep before = StationStep::boards;
+  for (const StationStep step : kLampSteps) {
+    if (!is_solved(unit.step(std::exchange(before, step)))) break;
+    append(causes, find_step_causes(unit, step, figures));
+  }
+  return causes;
+}
+
+/// Returns the gates without a figure of a unit whose steps are all done.
+std::vector<Cause> find_missing_figures(const Unit& unit,
+                                        const std::vector<CheckedMetric>& figures) {
+  std::vector<Cause> causes;
+  if (unit.current()) return causes;
+  for (const CheckedMetric& figure : figures) {
+    if (!figure.value) causes.push_back({cause_of(figure)});
+  }
+  return causes;
+}
+
+/// Returns faults of the lamps and of the lens that saw them, by the captures of all steps; without
+/// these, faults of the known points, by the captures of the check.
+std::vector<std::string> find_station_faults(const Unit& unit) {
+  const auto known = unit.calibration();
+  if (!known) return {};
+  std::vector<Frame> frames;
+  for (const StationStep step : kLampSteps) {
+    for (Frame& frame : frames_of(unit.step(step))) frames.push_back(std::move(frame));
+  }
+  auto faults = lamp_faults(frames, unit.config().lamps, *known);
+  auto unseen = unseen_lamps(frames, unit.config().lamps);
+  std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
+  if (!faults.empty()) return faults;
+  if (std::string fault = lens_fault(frames, unit.config().lamps, *known); !fault.empty()) {
+    return {std::move(fault)};
+  }
+  const UnitStep& check = unit.step(StationStep::check);
+  if (!check.result || !check.result->ok()) return {};
+  return place_faults(frames_of(check), unit.config().lamps, *known, captures_in(check.folder));
+}
+
+}  // namespace
+
+std::vector<Cause> find_causes(const Unit& unit) {
+  const std::vector<CheckedMetric> figures = unit.figures();
+  const std::vector<Cause> of_boards = find_board_causes(unit, figures);
+  std::vector<Cause> of_lamps = find_lamp_step_causes(unit, figures);
+  append(of_lamps, find_missing_figures(unit, figures));
+
+  std::vector<Cause> causes;
+  if (!unit.distrusted().empty()) causes.push_back({unit.distrusted()});
+  append(causes, of_boards);  // before faults of the lamps: the lens was measured without them
+  if (!of_boards.empty() || !of_lamps.empty()) {
+    for (std::string& fault : find_station_faults(unit)) causes.push_back({std::move(fault)});
+  }
+  append(causes, std::move(of_lamps));
+  return causes;
+}
+
+}  // namespace vlp
