@@ -18,6 +18,7 @@
 #include "camera/spline_surface.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
+#include "geometry/polygon.h"
 #include "report/plots/calibration_plots.h"
 #include "rig/stage.h"
 #include "session/skipped_images.h"
@@ -246,7 +247,7 @@ bool fits_as_well(const IntrinsicsSolution& one, const IntrinsicsSolution& other
 void state_how_far_apart(const Lens& lens, const Lens& other, CalibrationReport& report,
                          const std::array<int, 2>& imager_px) {
   std::vector<Eigen::Vector2d> pixels = pixel_grid(imager_px);
-  std::erase_if(pixels, [&](const auto& pixel) { return !lies_in(report.region, pixel); });
+  std::erase_if(pixels, [&](const auto& pixel) { return !polygon_contains(report.region, pixel); });
   const auto lens_from_other = b_from_a(other, lens, pixels);
   if (!lens_from_other) return;
   for (const Eigen::Vector2d& pixel : pixels) {

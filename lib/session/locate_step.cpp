@@ -10,10 +10,10 @@
 #include <set>
 #include <stdexcept>
 
-#include "calibration/intrinsics/known_region.h"
 #include "camera/lens.h"
 #include "captures/outside_image.h"
 #include "geometry/median.h"
+#include "geometry/polygon.h"
 #include "positioning/correction.h"
 #include "positioning/inclination_rotation.h"
 #include "positioning/known_motion.h"
@@ -191,7 +191,7 @@ void mark_outside_region(LocateResult& result, const LocateInput& input) {
     const auto& rejected = result.rows[i].rejected;
     auto& marked = result.rows[i].outside_region;
     for (const Detection& one : detections) {
-      if (lies_in(report->region_px, one.pixel)) continue;
+      if (polygon_contains(report->region_px, one.pixel)) continue;
       if (find_lamp(input.lamps.lamps, one.lamp) == nullptr) continue;
       if (std::find(rejected.begin(), rejected.end(), one.lamp) != rejected.end()) continue;
       marked.push_back(one.lamp);

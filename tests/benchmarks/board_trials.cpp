@@ -18,6 +18,7 @@
 #include "calibration/intrinsics/projection_difference.h"
 #include "captures/in_parallel.h"
 #include "geometry/median.h"
+#include "geometry/polygon.h"
 #include "session/lens_step.h"
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
@@ -93,7 +94,7 @@ double worst_within(const ImageRegion& region, const Lens& truth, const Lens& le
   double worst_px = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = truth.unproject(pixel);
-    if (!turned || !ray || !lies_in(region, pixel)) continue;
+    if (!turned || !ray || !polygon_contains(region, pixel)) continue;
     const auto seen = lens.project(*turned * ray->direction);
     worst_px = std::max(worst_px, seen ? (*seen - pixel).norm() : INFINITY);
   }

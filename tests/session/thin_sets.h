@@ -12,6 +12,7 @@
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "geometry/polygon.h"
 #include "session/lens_step.h"
 
 namespace vlp {
@@ -129,7 +130,7 @@ inline std::optional<double> error_over_stated(const ThinSet& set) {
   const auto difference =
       projection_difference(set.lens, result.solution.lens(), result.solution.problem.imager_px,
                             [&](const Eigen::Vector2d& pixel) {
-                              return lies_in(result.report.region, pixel) ? 1.0 : INFINITY;
+                              return polygon_contains(result.report.region, pixel) ? 1.0 : INFINITY;
                             });
   return difference ? difference->worst_px / result.report.uncertainty_worst_px : INFINITY;
 }

@@ -5,6 +5,7 @@
 
 #include "calibration/intrinsics/wide_views.h"
 #include "geometry/angles.h"
+#include "geometry/polygon.h"
 #include "session/lens_step.h"
 
 namespace vlp {
@@ -63,7 +64,7 @@ TEST_P(WideLens, IsToldAndStatedWhereTheModelHardlyHasRays) {
     if (!words_of_missed(check_gates(lens_gates(), result.metrics)).empty()) continue;
     const auto difference = projection_difference(
         wide_lens(), result.solution.lens(), kWideImager, [&](const Eigen::Vector2d& pixel) {
-          return lies_in(result.report.region, pixel) ? 1.0 : INFINITY;
+          return polygon_contains(result.report.region, pixel) ? 1.0 : INFINITY;
         });
     ASSERT_TRUE(difference);
     EXPECT_LE(difference->worst_px, sigmas * result.report.uncertainty_worst_px) << reach_deg;

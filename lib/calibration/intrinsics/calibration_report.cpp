@@ -17,6 +17,7 @@
 #include "calibration/intrinsics/view_jackknife.h"
 #include "calibration/intrinsics/view_pose.h"
 #include "camera/spline_grid.h"
+#include "geometry/polygon.h"
 
 namespace vlp {
 
@@ -47,7 +48,7 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
     const bool ends = lens.model() == LensModel::fisheye || is_splined(lens.model());
     if (ends && !lens.unproject(pixel)) continue;
     const double sigma_px = uncertainty.worst_px(pixel);
-    if (!lies_in(report.region, pixel)) {
+    if (!polygon_contains(report.region, pixel)) {
       report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
       continue;
     }
@@ -77,7 +78,7 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   report.halves = projection_difference(
       even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         const double sigma_px = uncertainty.worst_px(pixel);
-        const bool told = lies_in(report.region, pixel) &&
+        const bool told = polygon_contains(report.region, pixel) &&
                           std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
                             return half.worst_px(pixel) > hole * sigma_px;
                           });

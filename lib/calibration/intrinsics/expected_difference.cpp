@@ -14,6 +14,7 @@
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/rotation_vector.h"
+#include "geometry/polygon.h"
 
 namespace vlp {
 namespace {
@@ -28,7 +29,7 @@ std::vector<Place> places_of(const Lens& lens, const std::array<int, 2>& imager_
                              const ImageRegion& region) {
   std::vector<Place> places;
   for (const Eigen::Vector2d& pixel : pixel_grid(imager_px)) {
-    if (!region.empty() && !lies_in(region, pixel)) continue;
+    if (!region.empty() && !polygon_contains(region, pixel)) continue;
     const auto seen = lens.unproject(pixel);
     if (!seen) continue;
     const Eigen::Vector3d ray = seen->direction.normalized();

@@ -3,9 +3,9 @@
 #include "calibration/intrinsics/known_region.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "camera/spline_grid.h"
+#include "geometry/polygon.h"
 
 namespace vlp {
 namespace {
@@ -80,28 +80,8 @@ ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
   return {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
 }
 
-bool lies_in(const ImageRegion& region, const Eigen::Vector2d& pixel) {
-  constexpr double rounding_px = 1e-8;
-  if (region.size() < 3) return false;
-  bool inside = false;  // of the edges to the right of it an odd number
-  for (std::size_t i = 0; i < region.size(); ++i) {
-    const Eigen::Vector2d &from = region[i], along = region[(i + 1) % region.size()] - from;
-    const Eigen::Vector2d here = pixel - from;
-    const double share = std::clamp(here.dot(along) / along.squaredNorm(), 0.0, 1.0);
-    if ((here - share * along).norm() <= rounding_px) return true;
-    const bool crossed = (here.y() < 0) != (here.y() < along.y());
-    const bool right = (here.x() * along.y() < here.y() * along.x()) == (along.y() > 0);
-    if (crossed && right) inside = !inside;
-  }
-  return inside;
-}
-
 double share_of_image(const ImageRegion& region, const std::array<int, 2>& imager_px) {
-  double twice = 0;
-  for (std::size_t i = 0; i < region.size(); ++i) {
-    twice += side({0, 0}, region[i], region[(i + 1) % region.size()]);
-  }
-  return std::abs(twice) / 2 / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
+  return compute_polygon_area(region) / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
 }
 
 }  // namespace vlp

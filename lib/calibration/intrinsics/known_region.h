@@ -23,10 +23,8 @@ ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
                          const std::array<int, 2>& imager_px, LensModel model,
                          bool another_fits = false);
 
-/// Whether a pixel lies in it or on its edge.
-bool lies_in(const ImageRegion& region, const Eigen::Vector2d& pixel);
-
-/// Its area as a share of the image's, from the centre of its first pixel to that of its last.
+/// Computes the area of a region as a share of the image's, which reaches from the centre of its
+/// first pixel to that of its last.
 double share_of_image(const ImageRegion& region, const std::array<int, 2>& imager_px);
 
 }  // namespace vlp

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "geometry/polygon.h"
 #include "lamps/shape/rectangle.h"
 
 namespace vlp {
 namespace {
 
 bool covers(const Light& light, const Eigen::Vector2d& pixel) {
-  if (is_rectangle(light)) return contains(light.face, pixel);
+  if (is_rectangle(light)) return polygon_contains(light.face, pixel);
   return (light.pixel - pixel).norm() < light.radius_px;
 }
 

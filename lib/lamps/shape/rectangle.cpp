@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "geometry/angles.h"
+#include "geometry/polygon.h"
 #include "geometry/symmetric.h"
 #include "lamps/shape/straight_edge.h"
 #include "rig/detection.h"
@@ -367,15 +368,6 @@ std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovarianc
   return slope * ends * slope.transpose();
 }
 
-/// By the cross products of its corners, one after the other.
-double area_of(const std::vector<Eigen::Vector2d>& polygon) {
-  double twice = 0;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    twice += cross_of(polygon[i], polygon[(i + 1) % polygon.size()]);
-  }
-  return std::abs(twice) / 2;
-}
-
 /// Whether the outline reaches into the corners, as no disc's does: (2 u / length)^2 +
 /// (2 v / width)^2 is 1 on an ellipse within the sides, and up to 2 on the sides.
 bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
@@ -421,7 +413,7 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
     light.low = light.low.cwiseMin(at);
     light.high = light.high.cwiseMax(at);
   }
-  light.radius_px = std::sqrt(area_of(around) / std::numbers::pi);
+  light.radius_px = std::sqrt(compute_polygon_area(around) / std::numbers::pi);
   double bow_px = 0, end_sd_px = 0;
   light.roundness = 1;
   for (StraightEdge& edge : edges) {
@@ -622,17 +614,6 @@ std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, cons
     if (end - begin >= min_px) chords.push_back({row, begin, end});
   }
   return chords;
-}
-
-bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point) {
-  bool left = false, right = false;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
-    const double side = cross_of(b - a, point - a);
-    left = left || side > 0;
-    right = right || side < 0;
-  }
-  return !(left && right);
 }
 
 std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,

@@ -47,7 +47,4 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
 /// The pixels inside a convex polygon, (column, row), on each line of an image of that size.
 std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const ImageSize& size);
 
-/// Whether a point is in a convex polygon.
-bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point);
-
 }  // namespace vlp

@@ -1,0 +1,19 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace vlp {
+
+/// Computes the area of a polygon from its corners in turn, in either direction.
+double compute_polygon_area(const std::vector<Eigen::Vector2d>& polygon);
+
+/// Returns true if a point lies in a polygon or on its edge, to 1e-8 of the unit of its corners.
+/// The polygon may be concave. Returns false for fewer than three corners.
+///
+/// A ray from the point crosses an odd number of edges (Shimrat 1962).
+bool polygon_contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point);
+
+}  // namespace vlp
