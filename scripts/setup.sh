@@ -17,7 +17,8 @@ build=(
   libopencv-dev libapriltag-dev libceres-dev libssl-dev
   nlohmann-json3-dev libpugixml-dev
   libmrcal-dev libsuitesparse-dev libcairo2-dev
-  libsoci-dev libboost-dev libsqlite3-dev libpq-dev  # SOCI's headers include Boost's since Debian 13
+  libsoci-dev libsqlite3-dev libpq-dev
+  libboost-dev  # Boost.Math; SOCI's headers include Boost's since Debian 13
   gnuplot-nox fonts-dejavu-core
   dpkg-dev file  # of scripts/packages.sh
 )
