@@ -24,7 +24,8 @@ std::optional<Number> parsed(std::string_view text) {
 
 }  // namespace
 
-/// libcsv calls back for each field and each row; fed line by line, a row knows where it stands.
+/// Parser of a table by libcsv, which calls back for each field and each row. It is fed line by
+/// line, so that a row has its line number.
 struct CsvParsing {
   CsvTable& table;
   csv_parser parser{};
@@ -67,43 +68,6 @@ struct CsvParsing {
     in_header = false;
   }
 
-  /// Without quotes, blanks that would be trimmed, and line ends other than LF and CRLF, the fields
-  /// are what stands between the commas.
-  static bool is_plain(std::string_view content) {
-    bool plain = true;
-    for (const char character : content) {
-      plain &= character != '"' && character != ' ' && character != '\t';
-    }
-    for (auto at = content.find('\r'); plain && at != content.npos;
-         at = content.find('\r', at + 1)) {
-      plain = at + 1 < content.size() && content[at + 1] == '\n';
-    }
-    return plain;
-  }
-
-  /// parse() for plain text, without libcsv.
-  void split(std::string_view content) {
-    const auto lines = static_cast<std::size_t>(std::count(content.begin(), content.end(), '\n'));
-    const auto commas = static_cast<std::size_t>(std::count(content.begin(), content.end(), ','));
-    table.fields_.reserve(content.size());
-    table.ends_.reserve(lines + commas);
-    table.lines_.reserve(lines);
-    while (!content.empty() && !error) {
-      std::string_view text = content.substr(0, content.find('\n'));
-      content.remove_prefix(std::min(text.size() + 1, content.size()));
-      ++line;
-      if (text.ends_with('\r')) text.remove_suffix(1);
-      if (text.empty()) continue;
-      for (std::size_t comma = text.find(','); comma != text.npos; comma = text.find(',')) {
-        field(text.substr(0, comma));
-        text.remove_prefix(comma + 1);
-      }
-      field(text);
-      row();
-    }
-    if (error) throw *error;
-  }
-
   void parse(std::string_view content) {
     while (!content.empty() && !error) {
       const std::string_view text = content.substr(0, content.find('\n') + 1);
@@ -127,12 +91,8 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
   const std::string content = read_text_file(file, max_bytes);
   std::string_view text = content;
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
-  CsvParsing parsing(*this);
-  if (CsvParsing::is_plain(text)) {
-    parsing.split(text);
-  } else {
-    parsing.parse(text);
-  }
+  fields_.reserve(text.size());
+  CsvParsing(*this).parse(text);
   for (auto name = header_.begin(); name != header_.end(); ++name) {
     if (std::find(header_.begin(), name, *name) != name) {
       throw InputError(file_, 1, *name, "this column stands twice");

@@ -85,29 +85,6 @@ TEST_F(Csv, NamesLineAndColumnOfWhatIsNoNumber) {
               HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
 }
 
-/// Tables without quotes and blanks do not go through libcsv; one quoted name sends them there.
-TEST_F(Csv, ReadsPlainTablesAsLibcsvDoes) {
-  for (const std::string rows :
-       {"1,2\n3,4\n", "1,2\r\n3,4\r\n", "\n\n1,2\n\r\n,\n", ",2\n1,\n", "1,2\r3,4\n",
-        "1,2\r\r\n3,4\n", "1, 2 \n\t3,4\n", "1\n", "1,2\n1,2,3\n", ""}) {
-    const auto content = [&](const std::string& header) {
-      std::string all;
-      const std::string refusal = refusal_of([&] {
-        const CsvTable table = read(header + "\n" + rows);
-        for (std::size_t row = 0; row < table.rows(); ++row) {
-          all += std::to_string(table.line(row));
-          for (const char* name : {"a", "b"}) {
-            all += "|" + std::string(table.text(row, table.required(name)));
-          }
-          all += "\n";
-        }
-      });
-      return all + refusal;
-    };
-    EXPECT_EQ(content("a,b"), content("a,\"b\"")) << rows;
-  }
-}
-
 TEST_F(Csv, WritesWhatItReads) {
   const std::vector<std::string> fields{"plain", "a,b", "say \"hi\"", "two\nlines", " spaces ", ""};
   CsvWriter writer(folder / "b.csv", {"one", "two"});
