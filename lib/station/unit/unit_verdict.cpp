@@ -207,7 +207,7 @@ std::vector<std::string> find_station_faults(const Unit& unit) {
     return {std::move(fault)};
   }
   const UnitStep& check = unit.step(StationStep::check);
-  if (!check.result || !check.result->ok()) return {};
+  if (!is_solved(check)) return {};
   return place_faults(frames_of(check), unit.config().lamps, *known, captures_in(check.folder));
 }
 
