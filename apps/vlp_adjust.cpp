@@ -44,7 +44,7 @@ AdjustSet read_set(const Options& options, const std::string& set, bool turn, co
   if (folder) {
     CaptureOptions images = options.images;
     images.images = set;
-    read.frames = see_lamps(images, lamps, calibration).frames;
+    read.frames = kept_frames(observe_captures(images, ImageUse::fixes, lamps, calibration).images);
     read.captures = options.place_sd_m ? captures_in(path) : captures_table(path);
   } else {
     read.frames = read_detections(path);
@@ -55,7 +55,8 @@ AdjustSet read_set(const Options& options, const std::string& set, bool turn, co
 
 void run(const CLI::App& app, const Options& options) {
   const CaptureOptions& images = options.images;
-  std::vector<std::string> inputs{images.lamps, images.calibration, images.classifier};
+  std::vector<std::string> inputs{images.lamps, images.calibration,
+                                  images.frontend.classifier.string()};
   for (const auto* sets : {&options.sets, &options.turns}) {
     for (const std::string& set : *sets) {
       inputs.push_back(set);

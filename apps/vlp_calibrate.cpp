@@ -66,7 +66,7 @@ int calibrate(int argc, char** argv) {
       kName);
   Options options;
   auto& how = options.how;
-  how.threads = all_cores();
+  how.frontend = default_frontend();
   app.add_option("session", options.session, "Folder of the captures")->required();
   app.add_option("-o,--output", options.results,
                  "Folder for calibration.yaml, check-fixes.csv, evaluation.json, report.html, "
@@ -74,10 +74,11 @@ int calibrate(int argc, char** argv) {
       ->required();
   app.add_option("--camera-id", how.camera_id, "Name of the camera (default: camera)");
   add_lens_option(app, options.lens);
-  app.add_option("--row-time-s", how.row_time_s,
+  app.add_option("--row-time-s", how.frontend.row_time_s,
                  "Time from one row of the read-out to the next (default: found from rotation)")
       ->check(CLI::Range(1e-8, 1e-3));
-  add_readout_option(app, how.readout);
+  add_readout_option(app, how.frontend.readout);
+  add_board_limit_options(app, how.frontend);
   app.add_option("--gates", how.gates_file,
                  "Gates, vlp-gates/1, for a session that has no gates.yaml; of the lens there are "
                  "some in any case");
@@ -85,7 +86,7 @@ int calibrate(int argc, char** argv) {
                "Draw pictures and write report.html (default), or not");
   app.add_option("--redo", how.redo, "Run a step again though nothing has changed")
       ->option_text("STEP ...");
-  add_threads_option(app, how.threads);
+  add_threads_option(app, how.frontend.threads);
   app.add_flag(
       "--each", [](std::int64_t) { throw CLI::ValidationError("--each", "stands alone"); },
       "Alone: do what stdin says, a line of JSON for each session; see apps/README.md");

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -12,43 +13,53 @@
 
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
-#include "detection/lights_table.h"
-#include "detection/video.h"
+#include "frontend/lights_table.h"
+#include "frontend/video.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"
 
 namespace vlp {
 namespace {
 
+/// Returns the times of the frames of a video, by name.
+std::map<std::string, double> frame_times(const std::vector<Observation>& images) {
+  std::map<std::string, double> times_s;
+  for (const Observation& image : images) {
+    if (image.is_kept() && image.time_s) times_s.emplace(image.name(), *image.time_s);
+  }
+  return times_s;
+}
+
 void run(const CaptureOptions& options, const std::string& captures) {
-  const std::vector<std::string> inputs{options.images, options.lamps, options.calibration,
-                                        options.classifier};
+  const std::vector<std::string> inputs = inputs_of(options);
   check_outputs(
       {{"--output", options.output}, {"--lights", options.lights}, {"--captures", captures}},
       inputs);
-  check_every(options.every, {options.images});
+  check_every(options.frontend.every, {options.images});
   if (!captures.empty() && !is_video_name(options.images)) {
     throw std::invalid_argument("--captures is for a video, whose frames have times");
   }
   std::optional<Calibration> calibration;
   if (!options.calibration.empty()) {
     calibration = read_calibration(options.calibration);
-  } else if (!options.row_time_s && options.classifier.empty()) {
+  } else if (!options.frontend.row_time_s && options.frontend.classifier.empty()) {
     throw std::invalid_argument("--calibration, --row-time-s or --classifier has to tell lamps");
   }
-  const SeenLamps found = see_lamps(options, read_lamp_map(options.lamps), calibration);
-  write_detections(options.output, found.frames);
-  if (!captures.empty()) write_times(captures, found.times_s);
-  const auto empty = std::count_if(found.frames.begin(), found.frames.end(),
+  const Observations found =
+      observe_captures(options, ImageUse::fixes, read_lamp_map(options.lamps), calibration);
+  const std::vector<Frame> frames = kept_frames(found.images);
+  write_detections(options.output, frames);
+  if (!captures.empty()) write_times(captures, frame_times(found.images));
+  const auto empty = std::count_if(frames.begin(), frames.end(),
                                    [](const Frame& frame) { return frame.detections.empty(); });
-  const auto count = [&](LightKind kind) { return count_of(found.lights, kind); };
-  fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images, found.skipped.size(),
-             empty);
+  const auto count = [&](LightKind kind) { return count_of(found.images, kind); };
+  fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images.size(),
+             found.images.size() - frames.size(), empty);
   fmt::print("lamps       {}\n", count(LightKind::lamp));
   fmt::print("left out    {} cut by the image's edge, {} unknown, {} steady, {} without form\n",
              count(LightKind::cut), count(LightKind::unknown), count(LightKind::steady),
              count(LightKind::formless));
-  for (const auto& [kind, reason, lights] : reasons_of(found.lights)) {
+  for (const auto& [kind, reason, lights] : reasons_of(found.images)) {
     fmt::print("  {:<8}  {}, {}: {}\n", lights, name_of(kind), name_of(reason),
                explanation_of(reason));
   }
@@ -79,7 +90,8 @@ int main(int argc, char** argv) {
   app.add_option("--calibration", options.calibration,
                  "Calibration: the camera with its row time, and its tilt when known; without it "
                  "centres are those of ellipses in the image");
-  app.add_option("--row-time-s", options.row_time_s, "Row time of a camera without a calibration")
+  app.add_option("--row-time-s", options.frontend.row_time_s,
+                 "Row time of a camera without a calibration")
       ->check(vlp::finite_positive())
       ->excludes("--calibration");
   app.add_option("-o,--output", options.output, "Where to write detections.csv")->required();
@@ -89,7 +101,7 @@ int main(int argc, char** argv) {
   std::string captures;
   app.add_option("--captures", captures,
                  "Where to write captures.csv of a video: its frames and when they were taken");
-  vlp::add_every_option(app, options.every);
+  vlp::add_every_option(app, options.frontend.every);
   vlp::add_detect_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options, captures); });
 }

@@ -84,7 +84,7 @@ void run(const CLI::App& app, Options options) {
   check_outputs({{"--output", options.images.output}, {"--plot", options.plot}}, inputs);
   const CapturesTable captures = captures_of(options);
   options.images.captures = captures;
-  const LampCaptures input = read_captures_of(options.images);
+  const LampCaptures input = read_captures_of(options.images, ImageUse::places);
   check_lamps(input.frames, input.lamps, input.lamps_file);
   const KnownPlaces places = places_of(options, input.frames, captures);
   const DispersionResult found =

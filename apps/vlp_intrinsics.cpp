@@ -20,6 +20,7 @@
 #include "calibration/intrinsics/mrcal_files.h"
 #include "detection/boards/corner_table.h"
 #include "evaluation/gate.h"
+#include "frontend/board_intake.h"
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"
@@ -27,7 +28,6 @@
 #include "program/steps/print_intrinsics.h"
 #include "program/steps/step_outcome.h"
 #include "rig/file.h"
-#include "session/board_images.h"
 #include "session/lens_step.h"
 
 namespace vlp {
@@ -35,16 +35,13 @@ namespace {
 
 struct Options {
   std::vector<std::string> images;
-  std::string board, output, cache, corners, ros, kalibr, opencv, plot;
+  std::string board, output, corners, ros, kalibr, opencv, plot;
   std::optional<std::array<int, 2>> imager_px;
   std::string camera_id = "camera", lens = "LENSMODEL_OPENCV8";
-  std::optional<Readout> readout;
-  std::optional<double> row_time_s, pixel_pitch_m;
-  int threads = all_cores();
+  FrontendOptions frontend = default_frontend();
+  std::optional<double> pixel_pitch_m;
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
-  double max_mpx = kUsualMaxMpx;
-  int every = 1;
   std::vector<std::string> gates;
 };
 
@@ -54,8 +51,8 @@ Camera known_camera(const Options& options) {
   // One that is chosen takes its place.
   camera.lens_model = lens_model_from_name(options.lens).value_or(LensModel::opencv8);
   camera.pixel_pitch_m = options.pixel_pitch_m;
-  camera.row_time_s = options.row_time_s;
-  camera.readout = options.readout;
+  camera.row_time_s = options.frontend.row_time_s;
+  camera.readout = options.frontend.readout;
   return camera;
 }
 
@@ -79,7 +76,8 @@ std::string corner_file(const CLI::App& app, const Options& options) {
     throw std::invalid_argument(
         *found + " holds corners, but not the size of their images: --imager-px has to tell it");
   }
-  for (const char* of_images : {"--cache", "--threads", "--max-mpx", "--every"}) {
+  for (const char* of_images :
+       {"--cache", "--threads", "--max-mpx", "--max-blur-px", "--max-white-fraction", "--every"}) {
     if (app.count(of_images) == 0) continue;
     throw std::invalid_argument(std::string(of_images) + " is for images: " + *found +
                                 " holds corners");
@@ -87,13 +85,14 @@ std::string corner_file(const CLI::App& app, const Options& options) {
   return *found;
 }
 
-SeenBoards boards_in(const std::vector<std::filesystem::path>& images, const Board& board,
+Observations observe(const std::vector<std::filesystem::path>& images, const Board& board,
                      const std::string& corners, const Options& options) {
-  if (!corners.empty()) return see_corners({corners, board, options.board, *options.imager_px});
+  if (!corners.empty()) {
+    return read_board_views(corners, board, options.board, *options.imager_px, options.frontend);
+  }
   Progress progress("images");
-  return see_boards({images, board, options.board, options.threads, options.cache, options.max_mpx,
-                     options.every},
-                    [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+  return observe_boards(images, board, options.board, options.frontend,
+                        [&](std::size_t done, std::size_t total) { progress.update(done, total); });
 }
 
 /// camera.yaml and ".cameramodel" to camera.cameramodel.
@@ -146,8 +145,8 @@ void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = gates_of(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
   const std::string corners = corner_file(app, options);
-  check_every(options.every, options.images);
-  const auto images = corners.empty() ? image_files(options.images)
+  check_every(options.frontend.every, options.images);
+  const auto images = corners.empty() ? expand_folders(options.images)
                                       : std::vector<std::filesystem::path>{options.images.front()};
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
@@ -163,29 +162,30 @@ void run(const CLI::App& app, const Options& options) {
   if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
   possible_warp(board, options.warp);  // refused before the images are looked at
-  const SeenBoards seen = boards_in(images, board, corners, options);
-  tell(seen);
-  require(seen);
-  if (!options.corners.empty()) write_corner_table(options.corners, seen.views, board);
-  const LensResult lens = solve_lens({seen.views, board, options.board, known_camera(options),
-                                      options.held_out, options.warp, chooses_lens(options)},
-                                     history_entry(app, inputs));
-  tell(lens);
-  require(lens);
-  check_exports(options, lens.calibration.camera);  // of a lens that was chosen
-  write_calibration(options.output, lens.calibration);
-  if (has_mrcal(lens.calibration.camera.lens_model)) {
+  const LensResult result =
+      solve_lens({observe(images, board, corners, options), board, options.board,
+                  known_camera(options), options.held_out, options.warp, chooses_lens(options)},
+                 history_entry(app, inputs));
+  tell(result);
+  const LensEstimate& lens = result.lens;
+  if (!options.corners.empty() && !lens.views.empty()) {
+    write_corner_table(options.corners, lens.views, board);
+  }
+  require(result);
+  check_exports(options, result.calibration.camera);  // of a lens that was chosen
+  write_calibration(options.output, result.calibration);
+  if (has_mrcal(result.calibration.camera.lens_model)) {
     write_cameramodel(beside(options.output, ".cameramodel"), lens.solution);
   } else {
     // One of an earlier run would be of another lens.
     std::filesystem::remove(beside(options.output, ".cameramodel"));
   }
   write_corners(beside(options.output, ".corners.vnl"), lens.solution, lens.images);
-  write_exports(options, lens.calibration.camera);
-  if (!options.plot.empty()) draw(options.plot, lens.drawing());
+  write_exports(options, result.calibration.camera);
+  if (!options.plot.empty()) draw(options.plot, result.drawing());
   if (lens.choice) fmt::print("lens model    {}\n", words_of(*lens.choice));
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
-  const auto checked = check_gates(gates, lens.metrics);
+  const auto checked = check_gates(gates, result.metrics);
   const std::string failed = words_of_missed(checked);
   if (failed.empty()) return;
   if (lens.better_model && fits_badly(checked)) {
@@ -214,11 +214,11 @@ void add_options(CLI::App& app, Options& options) {
       ->required();
   app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
   add_lens_option(app, options.lens);
-  app.add_option("--row-time-s", options.row_time_s,
+  app.add_option("--row-time-s", options.frontend.row_time_s,
                  "Time from one row of the read-out to the next, which every program that finds "
                  "lamps needs; vlp-train --row-time finds it, too")
       ->check(CLI::Range(1e-8, 1e-3));
-  add_readout_option(app, options.readout);
+  add_readout_option(app, options.frontend.readout);
   app.add_option("--imager-px", options.imager_px,
                  "Width and height of the images that a file of corners is of")
       ->check(CLI::Range(16, 100000))
@@ -257,11 +257,12 @@ void add_options(CLI::App& app, Options& options) {
                  "Draw the corners, their residuals and the uncertainty over the image, .png or "
                  ".svg")
       ->check(is_picture());
-  app.add_option("--cache", options.cache,
+  app.add_option("--cache", options.frontend.corner_cache,
                  "Folder to keep the corners of each image in, for the next time");
-  add_every_option(app, options.every);
-  add_max_mpx_option(app, options.max_mpx);
-  add_threads_option(app, options.threads);
+  add_every_option(app, options.frontend.every);
+  add_max_mpx_option(app, options.frontend.max_mpx);
+  add_board_limit_options(app, options.frontend);
+  add_threads_option(app, options.frontend.threads);
 }
 
 }  // namespace

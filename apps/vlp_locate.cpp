@@ -1,8 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-locate: identified lamps in images -> positions.
-#include <spdlog/spdlog.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -16,11 +14,12 @@
 
 #include "geometry/angles.h"
 #include "program/app.h"
+#include "program/progress.h"
 #include "program/steps/capture_options.h"
 #include "program/steps/print_fixes.h"
 #include "program/steps/step_outcome.h"
 #include "rig/detection.h"
-#include "session/leaning_captures.h"
+#include "session/locate_images.h"
 #include "session/locate_step.h"
 #include "session/session_folder.h"
 
@@ -46,12 +45,6 @@ struct Options {
   std::optional<double> lean_sd_deg, height_sd_m;
   int frames_together = 1;
 };
-
-void set_sigma(std::vector<Frame>& frames, double sigma_px) {
-  for (Frame& frame : frames) {
-    for (Detection& detection : frame.detections) detection.sigma_px = sigma_px;
-  }
-}
 
 /// Of the file that is named, or of the folder of images.
 CapturesTable captures_of(const Options& options) {
@@ -85,10 +78,13 @@ CapturesTable captures_of(const Options& options) {
   return captures;
 }
 
-LocateInput input_of(const Options& options, const CapturesTable& captures, LampCaptures seen) {
-  LocateInput input{std::move(seen.frames), std::move(seen.lamps), std::move(seen.calibration),
+/// Returns everything that the options state except the frames.
+LocateInput make_input(const Options& options, const CapturesTable& captures) {
+  LocateInput input{{},
+                    read_lamp_map(options.images.lamps),
+                    read_calibration(options.images.calibration),
                     captures};
-  if (options.sigma_px) set_sigma(input.frames, *options.sigma_px);
+  input.sigma_px = options.sigma_px;
   input.how.correction = kCorrections.at(options.correction);
   if (const auto& mount = options.camera_on_robot) {
     input.how.mount =
@@ -104,52 +100,40 @@ LocateInput input_of(const Options& options, const CapturesTable& captures, Lamp
   return input;
 }
 
-/// The lamps in images, of cameras that lean in the planes that are level by their fixes.
-LocateInput see_leaning(const Options& options, const CapturesTable& captures) {
-  const LampMap lamps = read_lamp_map(options.images.lamps);
-  const Calibration calibration = read_calibration(options.images.calibration);
-  const SeenLamps first = look_for_lamps(options.images, lamps, calibration);
-  LocateInput input =
-      input_of(options, captures, {first.frames, lamps, options.images.lamps, calibration});
-  LampImages images = lamp_images(options.images, lamps, calibration);
-  images.annotate.clear();
-  const LevelsOfImages levels = look_at_leaning(input, [&](const LevelsOfImages& some) {
-    std::vector<Frame> seen = see_lamps_again(images, some).frames;
-    if (options.sigma_px) set_sigma(seen, *options.sigma_px);
-    return seen;
-  });
-  const bool seen_some = std::any_of(input.frames.begin(), input.frames.end(),
-                                     [](const Frame& one) { return !one.detections.empty(); });
-  if (!seen_some) require(first);
-  const bool shown = !options.images.annotate.empty() || spdlog::should_log(spdlog::level::debug);
-  if (shown && !levels.empty()) {
-    images.annotate = options.images.annotate;
-    tell_of_lights(see_lamps_again(images, levels).lights);
+LocateResult locate_in_images(const Options& options, LocateInput input) {
+  check_image_outputs(options.images);
+  const LampImages images = lamp_images(options.images, input.lamps, input.calibration);
+  LocatedImages found;
+  {
+    Progress progress("images");
+    found =
+        locate_images(images, ImageUse::fixes, std::move(input), options.images.frontend,
+                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
-  return input;
+  print_lights(found.seen);
+  return std::move(found.located);
 }
 
-LocateInput read_input(Options options) {
-  const bool images = std::filesystem::is_directory(options.images.images);
-  const bool leans =
-      options.lean_sd_deg.value_or(0) > 0 || options.inclination_sigma_deg.value_or(0) > 0;
+void run(Options options) {
+  std::vector<std::string> inputs = inputs_of(options.images);
+  inputs.push_back(options.captures);
+  check_output(options.images.output, inputs);
   const CapturesTable captures = captures_of(options);
   options.images.captures = captures;
   if (const auto& mount = options.camera_on_robot) {
     options.images.yaw_in_robot_rad = rad_from_deg((*mount)[3]);
   }
-  if (images && leans) return see_leaning(options, captures);
-  return input_of(options, captures, read_captures_of(options.images));
-}
-
-void run(const Options& options) {
-  std::vector<std::string> inputs = inputs_of(options.images);
-  inputs.push_back(options.captures);
-  check_output(options.images.output, inputs);
-  const LocateInput input = read_input(options);
-  const LocateResult found = locate_frames(input);
-  write_fixes(options.images.output, found.rows);
+  LocateInput input = make_input(options, captures);
+  LocateResult found;
+  if (std::filesystem::is_directory(options.images.images)) {
+    found = locate_in_images(options, std::move(input));
+  } else {
+    input.frames = read_detections_of(options.images);
+    found = locate_frames(input);
+  }
   tell(found);
+  if (found.rows.empty()) require(found);
+  write_fixes(options.images.output, found.rows);
   print_fixes(found.summary);
   require(found);
 }

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
-#include "detection/image_file.h"
+#include "frontend/image_file.h"
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"
@@ -28,9 +28,8 @@ namespace fs = std::filesystem;
 struct Options {
   std::vector<std::string> folders;
   std::string lamps, calibration, labels, output;
-  std::optional<Readout> readout;
   bool row_time = false;
-  int threads = all_cores();
+  FrontendOptions frontend = default_frontend();
 };
 
 /// What the options name, read.
@@ -67,10 +66,12 @@ Inputs read_inputs(const Options& options) {
     Progress progress("images");
     inputs.seen =
         see_lights({options.folders.begin(), options.folders.end()}, inputs.lamps,
-                   inputs.calibration, options.readout, !options.row_time, options.threads,
+                   inputs.calibration, !options.row_time, options.frontend,
                    [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
-  tell(inputs.seen);
+  StepResult remarks;
+  add_remarks(inputs.seen, remarks);
+  tell(remarks);
   return inputs;
 }
 
@@ -78,10 +79,10 @@ void train(const Options& options) {
   const Inputs inputs = read_inputs(options);
   const TrainStepResult result =
       train_lamps(inputs.seen, inputs.labels, inputs.lamps, options.folders.front());
+  tell(result);
   require(result);
   write_lamp_classifier(options.output, result.classifier);
   print_training(result);
-  tell(result);
 }
 
 void train_row_time(const CLI::App& app, const Options& options) {
@@ -134,8 +135,8 @@ int main(int argc, char** argv) {
                  "Table in each folder: image, lamp, u_px, v_px (default: detections.csv or "
                  "true_detections.csv; with --row-time none)")
       ->option_text("NAME");
-  vlp::add_readout_option(app, options.readout);
-  vlp::add_threads_option(app, options.threads);
+  vlp::add_readout_option(app, options.frontend.readout);
+  vlp::add_threads_option(app, options.frontend.threads);
   return vlp::run_app(app, argc, argv, [&] {
     if (row_time->count() == 0 && output->count() == 0) throw CLI::RequiredError("--output");
     if (options.row_time) {

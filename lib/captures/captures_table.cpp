@@ -90,6 +90,11 @@ CapturesTable read_captures(const std::filesystem::path& file) {
   return table;
 }
 
+CapturesTable captures_table(const std::filesystem::path& folder) {
+  const auto file = folder / "captures.csv";
+  return std::filesystem::exists(file) ? read_captures(file) : CapturesTable{};
+}
+
 void write_times(const std::filesystem::path& file, const std::map<std::string, double>& times_s) {
   constexpr int digits = 6;
   CsvWriter csv(file, {"image", "time_s"});

@@ -43,6 +43,9 @@ using CapturesTable = std::map<std::string, Capture>;
 /// camera nor axis; a standard deviation that is negative or of no velocity.
 CapturesTable read_captures(const std::filesystem::path& file);
 
+/// Reads the captures.csv of a folder; returns an empty table if there is none. Throws InputError.
+CapturesTable captures_table(const std::filesystem::path& folder);
+
 /// Writes a `captures.csv` that tells when each image was taken. Throws InputError.
 void write_times(const std::filesystem::path& file, const std::map<std::string, double>& times_s);
 

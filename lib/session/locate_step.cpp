@@ -115,6 +115,15 @@ void check_motion(const LocateInput& input) {
   if (motion) check_row_time(input.calibration.camera);
 }
 
+/// Returns the input with the stated noise in all detections.
+LocateInput with_sigma(LocateInput input) {
+  for (Frame& frame : input.frames) {
+    for (Detection& detection : frame.detections) detection.sigma_px = input.sigma_px;
+  }
+  input.sigma_px.reset();
+  return input;
+}
+
 bool states_sigma(const Frame& frame) {
   return std::all_of(frame.detections.begin(), frame.detections.end(),
                      [](const Detection& detection) { return detection.sigma_px.has_value(); });
@@ -329,6 +338,7 @@ std::string words_of_lamps_elsewhere(int lamps) {
 }
 
 LocateResult locate_frames(const LocateInput& input) {
+  if (input.sigma_px) return locate_frames(with_sigma(input));
   check_motion(input);
   LocateResult result;
   PositionerOptions how = input.how;

@@ -23,6 +23,8 @@ struct LocateInput {
   /// What is known of them besides their images; inclinations count, wherever there are some.
   CapturesTable captures = {};
   PositionerOptions how = {};
+  /// Standard deviation of the lamps' pixels; overrides that of the detections.
+  std::optional<double> sigma_px = {};
   /// Standard deviation of the inclination's angles; 0 leaves it out.
   double inclination_sigma_rad = 0;
   /// Where one lamp is seen, take height and yaw from `captures`.

@@ -19,7 +19,6 @@
 #include "rig/calibration_error.h"
 #include "rig/stage.h"
 #include "session/capture_motion.h"
-#include "session/lamp_images.h"
 
 namespace vlp {
 namespace {

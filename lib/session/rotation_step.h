@@ -2,26 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <filesystem>
-#include <vector>
-
 #include "calibration/levelling/levelling.h"
 #include "calibration/rotation/circle_center.h"
-#include "captures/detections_table.h"
-#include "rig/lamp_map.h"
+#include "session/lamp_captures.h"
 #include "session/step_result.h"
 
 namespace vlp {
-
-/// Captures of lamps, and what is known of both.
-struct LampCaptures {
-  std::vector<Frame> frames;
-  LampMap lamps;
-  std::filesystem::path lamps_file;
-  Calibration calibration;
-  /// How the camera moves in each of the frames; empty: it stands.
-  std::vector<KnownMotion> motions = {};
-};
 
 /// Without rotation centre and dispersion.
 Calibration camera_alone(const Calibration& calibration);

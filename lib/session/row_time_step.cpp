@@ -8,9 +8,8 @@
 #include <map>
 #include <utility>
 
-#include "detection/image_file.h"
-#include "rig/input_error.h"
-#include "session/lamp_images.h"
+#include "frontend/image_file.h"
+#include "frontend/lamp_intake.h"
 #include "session/position_cost.h"
 #include "session/skipped_images.h"
 
@@ -28,13 +27,11 @@ struct PeriodsOfImages {
 
   PeriodsOfImages(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels) {
     for (std::size_t i = 0; i < seen.folders.size(); ++i) {
-      for (LightPeriod light : measured_periods(seen.folders[i], labels[i])) {
+      for (LightPeriod light : measured_periods(seen.folders[i].images, labels[i])) {
         light.image += sizes_px.size();
         lights.push_back(std::move(light));
       }
-      for (const ImageLights& image : seen.folders[i]) {
-        sizes_px.push_back({image.size.width, image.size.height});
-      }
+      for (const Observation& image : seen.folders[i].images) sizes_px.push_back(image.size_px);
     }
   }
 
@@ -69,21 +66,32 @@ RowTimeResult choose_by_places(const SeenLights& seen,
   return choose_row_time(found, compute_position_costs(found, images, lamps, seen.camera.lens));
 }
 
+/// Collects the images of all folders, without their lights.
+std::vector<Observation> collect_images(const SeenLights& seen) {
+  std::vector<Observation> images;
+  for (const Observations& folder : seen.folders) {
+    for (const Observation& image : folder.images) {
+      images.push_back({image.file});
+      images.back().rejection = image.rejection;
+    }
+  }
+  return images;
+}
+
 }  // namespace
 
 SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps,
-                      const std::optional<Calibration>& calibration,
-                      const std::optional<Readout>& readout, bool with_row_time, int threads,
-                      const StepProgress& progress) {
+                      const std::optional<Calibration>& calibration, bool with_row_time,
+                      const FrontendOptions& options, const IntakeProgress& progress) {
   SeenLights seen;
   std::optional<std::array<int, 2>> imager_px;
-  std::optional<Readout> stated = readout;
+  std::optional<Readout> readout = options.readout;
   if (calibration) {
     seen.camera = detector_camera(*calibration);
     imager_px = calibration->camera.imager_px;
-    if (!stated) stated = calibration->camera.readout;
+    if (!readout) readout = calibration->camera.readout;
   }
-  // What is looked for is not to depend on what is known of it.
+  // The estimate must not depend on the row time that is stated.
   if (!with_row_time) seen.camera.row_time_s.reset();
   std::vector<std::vector<fs::path>> images;
   std::vector<fs::path> all;
@@ -91,25 +99,31 @@ SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps
     images.push_back(images_in(folder));
     all.insert(all.end(), images.back().begin(), images.back().end());
   }
-  seen.camera.readout = readout_of(all, stated, seen);
-  const LightDetector detector(lamps, seen.camera);
+  Observations remarks;
+  seen.camera.readout = find_readout(all, readout, options, imager_px, remarks);
+  const LampIntake intake(LightDetector(lamps, seen.camera), ImageUse::fixes, options, imager_px);
   std::size_t before = 0;
-  for (const auto& folder : images) {
-    seen.folders.push_back(
-        detect_lights(detector, folder, imager_px, threads, [&](std::size_t done) {
-          if (progress) progress(before + done, all.size());
-        }));
-    before += folder.size();
+  for (const auto& files : images) {
+    seen.folders.push_back(intake.observe_all(files, [&](std::size_t done, std::size_t) {
+      if (progress) progress(before + done, all.size());
+    }));
+    before += files.size();
   }
-  std::vector<std::string> refused;
-  for (const auto& folder : seen.folders) {
-    for (const ImageLights& image : folder) {
-      if (!image.refused.empty()) refused.push_back(image.refused);
-    }
-  }
-  seen.skipped = skipped_images(all, refused);
-  if (refused.size() == all.size()) throw nothing_usable(folders.front(), all.size(), seen);
+  auto& first = seen.folders.front();
+  first.notes.insert(first.notes.begin(), remarks.notes.begin(), remarks.notes.end());
+  first.warnings.insert(first.warnings.begin(), remarks.warnings.begin(), remarks.warnings.end());
+  check_any_readable(folders.front(), collect_images(seen));
   return seen;
+}
+
+void add_remarks(const SeenLights& seen, StepResult& result) {
+  Observations all;
+  all.images = collect_images(seen);
+  for (const Observations& folder : seen.folders) {
+    all.notes.insert(all.notes.end(), folder.notes.begin(), folder.notes.end());
+    all.warnings.insert(all.warnings.end(), folder.warnings.begin(), folder.warnings.end());
+  }
+  add_remarks(all, result);
 }
 
 RowTimeStepResult find_row_time(const SeenLights& seen,

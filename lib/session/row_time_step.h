@@ -6,7 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "detection/labelled_lights.h"
+#include "frontend/labelled_lights.h"
+#include "frontend/lamp_intake.h"
+#include "frontend/options.h"
 #include "lamps/signal/row_time.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
@@ -14,19 +16,22 @@
 
 namespace vlp {
 
-/// The lights that flicker in folders of images.
-struct SeenLights : StepResult {
-  /// As many as folders.
-  std::vector<std::vector<ImageLights>> folders;
+/// The lights in folders of images, whatever their lamps.
+struct SeenLights {
+  /// The observations of each folder.
+  std::vector<Observations> folders;
   DetectorCamera camera;
 };
 
-/// The lights of each folder's images, whatever their lamps. `calibration` gives lens and read-out
-/// where they are known; `readout` goes before it. Throws InputError when no image can be used.
+/// Detects the lights in the images of each folder without identifying lamps. `calibration`
+/// supplies the lens and the readout direction if it has them. If `with_row_time` is false, its row
+/// time is ignored. Throws InputError if no image can be read.
 SeenLights see_lights(const std::vector<std::filesystem::path>& folders, const LampMap& lamps,
-                      const std::optional<Calibration>& calibration,
-                      const std::optional<Readout>& readout, bool with_row_time, int threads,
-                      const StepProgress& progress = {});
+                      const std::optional<Calibration>& calibration, bool with_row_time,
+                      const FrontendOptions& options, const IntakeProgress& progress = {});
+
+/// Adds the remarks of all folders to the result of a step, see add_remarks().
+void add_remarks(const SeenLights& seen, StepResult& result);
 
 struct RowTimeStepResult : StepResult {
   RowTime found{};

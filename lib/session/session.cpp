@@ -13,18 +13,20 @@
 #include "calibration/intrinsics/mrcal_files.h"
 #include "captures/digest.h"
 #include "evaluation/evaluation_files.h"
+#include "frontend/board_intake.h"
+#include "frontend/lamp_intake.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
-#include "session/board_images.h"
 #include "session/dispersion_step.h"
 #include "session/evaluate_step.h"
-#include "session/lamp_images.h"
 #include "session/lens_step.h"
+#include "session/locate_images.h"
 #include "session/locate_step.h"
 #include "session/rotation_step.h"
 #include "session/row_time_step.h"
 #include "session/session_file.h"
 #include "session/session_results.h"
+#include "session/skipped_images.h"
 
 namespace vlp {
 namespace {
@@ -250,9 +252,18 @@ class SessionRun {
   /// How the camera's options stand in the history.
   std::string camera_options() const {
     std::string text = "--camera-id " + options_.camera_id;
-    if (options_.row_time_s) text += fmt::format(" --row-time-s {}", *options_.row_time_s);
-    if (options_.readout) {
-      text += options_.readout == Readout::rows ? " --readout rows" : " --readout columns";
+    if (options_.frontend.row_time_s)
+      text += fmt::format(" --row-time-s {}", *options_.frontend.row_time_s);
+    if (options_.frontend.readout) {
+      text += options_.frontend.readout == Readout::rows ? " --readout rows" : " --readout columns";
+    }
+    const FrontendOptions defaults;
+    const FrontendOptions& limits = options_.frontend;
+    if (limits.max_blur_px != defaults.max_blur_px) {
+      text += fmt::format(" --max-blur-px {}", limits.max_blur_px);
+    }
+    if (limits.max_white_fraction != defaults.max_white_fraction) {
+      text += fmt::format(" --max-white-fraction {}", limits.max_white_fraction);
     }
     text += " --lens ";
     return text.append(options_.choose_lens_model ? "auto" : name_of(options_.lens_model));
@@ -261,26 +272,24 @@ class SessionRun {
   bool find_lens() {
     const std::string settings = fmt::format("{} {}", camera_options(), options_.report);
     return step("lens", {session_.boards(), session_.board()}, settings, [&] {
-      const Board board = read_board(session_.board());
-      const auto images = image_files({session_.boards().string()});
-      SeenBoards seen =
-          see_boards({images, board, session_.board(), options_.threads, results_.corners()},
-                     observer_.progress);
-      if (!seen.ok()) return Work{seen};
-      Camera camera;
-      camera.id = options_.camera_id;
-      camera.lens_model = options_.lens_model;
-      camera.row_time_s = options_.row_time_s;
-      camera.readout = options_.readout;
-      LensInput input{std::move(seen.views), board, session_.board(), camera};
+      LensInput input;
+      input.board = read_board(session_.board());
+      input.board_file = session_.board();
+      FrontendOptions options = options_.frontend;
+      options.corner_cache = results_.corners();
+      input.seen = observe_boards(images_in(session_.boards()), input.board, session_.board(),
+                                  options, observer_.progress);
+      input.camera.id = options_.camera_id;
+      input.camera.lens_model = options_.lens_model;
+      input.camera.row_time_s = options_.frontend.row_time_s;
+      input.camera.readout = options_.frontend.readout;
       input.choose_lens_model = options_.choose_lens_model;
-      LensResult lens =
-          solve_lens(input, history(camera_options(), {session_.board(), session_.boards()}));
-      if (lens.choice) lens.notes.push_back("lens model: " + words_of(*lens.choice));
-      lens.skipped.insert(lens.skipped.begin(), seen.skipped.begin(), seen.skipped.end());
+      LensResult lens = solve_lens(
+          std::move(input), history(camera_options(), {session_.board(), session_.boards()}));
+      if (lens.lens.choice) lens.notes.push_back("lens model: " + words_of(*lens.lens.choice));
       return Work{lens, [this, lens] {
                     if (has_mrcal(lens.calibration.camera.lens_model)) {
-                      write_cameramodel(out("lens.cameramodel"), lens.solution);
+                      write_cameramodel(out("lens.cameramodel"), lens.lens.solution);
                     }
                     write_picture(lens, "lens.svg");
                     write_calibration(out("lens.yaml"), lens.calibration);
@@ -292,36 +301,47 @@ class SessionRun {
     return step("row-time", {session_.rotation(), lamps_file(), camera_file}, "", [&] {
       const LampMap lamps = read_lamp_map(lamps_file());
       const Calibration camera = read_calibration(camera_file);
-      const SeenLights seen = see_lights({session_.rotation()}, lamps, camera, {}, false,
-                                         options_.threads, observer_.progress);
+      FrontendOptions options = options_.frontend;
+      options.readout.reset();
+      const SeenLights seen =
+          see_lights({session_.rotation()}, lamps, camera, false, options, observer_.progress);
       RowTimeStepResult found =
           vlp::find_row_time(seen, {{}}, lamps, lamps_file(), camera,
                              history("--row-time", {session_.rotation(), lamps_file()}));
-      found.skipped = seen.skipped;
-      found.notes = seen.notes;
-      found.warnings.insert(found.warnings.begin(), seen.warnings.begin(), seen.warnings.end());
+      add_remarks(seen, found);
       return Work{found,
                   [this, found] { write_calibration(out("camera.yaml"), found.calibration); }};
     });
   }
 
-  /// captures: as LampImages have them.
-  SeenLamps see(const fs::path& folder, const LampMap& lamps, const Calibration& calibration,
-                const fs::path& calibration_file,
-                const std::optional<CapturesTable>& captures = std::nullopt) const {
-    LampImages images{folder, lamps, lamps_file(), calibration, calibration_file};
-    images.captures = captures;
-    if (const auto classifier = session_.classifier()) images.classifier_file = *classifier;
-    images.threads = options_.threads;
-    return see_lamps(images, observer_.progress);
+  FrontendOptions lamp_options() const {
+    FrontendOptions options = options_.frontend;
+    options.readout.reset();  // part of the calibration by now
+    if (const auto classifier = session_.classifier()) options.classifier = *classifier;
+    return options;
   }
 
-  /// What looking for the lamps had to say goes with what came of them.
+  /// Detects the lamps in the captures of a step. Returns false, with the failure in `result`, if
+  /// none can be used.
+  bool observe(const fs::path& folder, ImageUse use, LampCaptures& captures,
+               const fs::path& calibration_file, StepResult& result,
+               const std::optional<CapturesTable>& table = std::nullopt) const {
+    LampImages images{folder, captures.lamps, captures.lamps_file, captures.calibration,
+                      calibration_file};
+    images.captures = table;
+    const Observations seen = observe_lamps(images, use, lamp_options(), observer_.progress);
+    captures.frames = kept_frames(seen.images);
+    add_remarks(seen, result);
+    return result.ok();
+  }
+
+  /// Adds the remarks on the images to the result of a step.
   template <typename Result>
-  static void take_over(const SeenLamps& seen, Result& result) {
-    result.skipped = seen.skipped;
-    result.notes.insert(result.notes.begin(), seen.notes.begin(), seen.notes.end());
-    result.warnings.insert(result.warnings.begin(), seen.warnings.begin(), seen.warnings.end());
+  static void add(const StepResult& remarks, Result& result) {
+    result.skipped = remarks.skipped;
+    result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
+    result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(),
+                           remarks.warnings.end());
   }
 
   std::vector<fs::path> lamp_inputs(const fs::path& folder, const fs::path& calibration) const {
@@ -335,13 +355,14 @@ class SessionRun {
     return step("rotation", inputs, picture_setting(), [&] {
       LampCaptures captures{
           {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(camera_file)};
-      // Whatever is told of its inclination: the axis that is found is level.
-      SeenLamps seen = see(session_.rotation(), captures.lamps, captures.calibration, camera_file,
-                           CapturesTable());
-      if (!seen.ok()) return Work{seen};
-      captures.frames = std::move(seen.frames);
+      StepResult remarks;
+      // Inclinations are ignored: the axis is level.
+      if (!observe(session_.rotation(), ImageUse::turn, captures, camera_file, remarks,
+                   CapturesTable())) {
+        return Work{remarks};
+      }
       RotationResult found = solve_rotation(captures, RotationMethod::axis, history("", inputs));
-      take_over(seen, found);
+      add(remarks, found);
       return Work{found, [this, found] {
                     write_picture(found, "rotation.svg");
                     write_calibration(out("rotated.yaml"), found.calibration);
@@ -355,9 +376,8 @@ class SessionRun {
     return step("dispersion", inputs, picture_setting(), [&] {
       LampCaptures captures{
           {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(rotated)};
-      SeenLamps seen = see(folder, captures.lamps, captures.calibration, rotated);
-      if (!seen.ok()) return Work{seen};
-      captures.frames = std::move(seen.frames);
+      StepResult remarks;
+      if (!observe(folder, ImageUse::places, captures, rotated, remarks)) return Work{remarks};
       const KnownPlaces places = at_known_places(captures.frames, captures_in(folder));
       if (places.captures.empty()) {
         throw InputError(folder,
@@ -367,7 +387,7 @@ class SessionRun {
       DispersionResult found =
           solve_dispersion(captures, places, DispersionMethod::camera, DispersionCircle::mean,
                            history("", with_tables(inputs, folder)));
-      take_over(seen, found);
+      add(remarks, found);
       if (places.without > 0) {
         found.warnings.push_back(
             fmt::format("{} of {} captures left out: nothing tells their place", places.without,
@@ -443,8 +463,12 @@ class SessionRun {
     };
     add(options_.camera_id != unstated.camera_id, "name");
     add(options_.choose_lens_model || options_.lens_model != unstated.lens_model, "lens model");
-    add(options_.row_time_s.has_value(), "row time");
-    add(options_.readout.has_value(), "read-out");
+    add(options_.frontend.row_time_s.has_value(), "row time");
+    add(options_.frontend.readout.has_value(), "read-out");
+    const FrontendOptions &limits = options_.frontend, &defaults = unstated.frontend;
+    add(limits.max_blur_px != defaults.max_blur_px ||
+            limits.max_white_fraction != defaults.max_white_fraction,
+        "limits of board images");
     return stated;
   }
 
@@ -462,12 +486,12 @@ class SessionRun {
     return step(name, lamp_inputs(folder, calibration), "", [&] {
       LocateInput input{
           {}, read_lamp_map(lamps_file()), read_calibration(calibration), captures_table(folder)};
-      SeenLamps seen = see(folder, input.lamps, input.calibration, calibration);
-      if (!seen.ok()) return Work{seen};
-      input.frames = std::move(seen.frames);
       input.lamp_offsets = session_.check() == folder;
-      LocateResult found = locate_frames(input);
-      take_over(seen, found);
+      const LampImages images{folder, input.lamps, lamps_file(), input.calibration, calibration};
+      LocateResult found =
+          locate_images(images, session_.check() == folder ? ImageUse::places : ImageUse::fixes,
+                        std::move(input), lamp_options(), observer_.progress)
+              .located;
       return Work{found,
                   [this, name, found] { write_fixes(out(name + "-fixes.csv"), found.rows); }};
     });
@@ -507,7 +531,7 @@ class SessionRun {
     input->fixes = {out("check-fixes.csv"), read_fixes(out("check-fixes.csv"))};
     input->truth = {truth, truth_in(truth.parent_path())};
     input->station_m = place_radius_m(*result_.calibration);
-    input->threads = options_.threads;
+    input->threads = options_.frontend.threads;
     EvaluateResult found = evaluate_fixes(*input, gates);
     std::vector<Drive> drives;
     for (const fs::path& line : lines()) {

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "evaluation/gate.h"
+#include "frontend/observation.h"
+#include "frontend/options.h"
 #include "session/session_folder.h"
 #include "session/step_history.h"
 #include "session/step_result.h"
@@ -33,14 +35,13 @@ struct SessionOptions {
   LensModel lens_model = LensModel::opencv8;
   /// Takes the model that the views call for instead (calibration/intrinsics/lens_choice.h).
   bool choose_lens_model = false;
-  std::optional<double> row_time_s = {};
-  std::optional<Readout> readout = {};
+  /// Threads, limits of the images, and the camera's row time and readout direction.
+  FrontendOptions frontend = {};
   /// vlp-gates/1 of session_metrics(), for a session that has no gates.yaml of its own; may be
   /// empty. They hold beside lens_gates(), and in their place where they are of the same metric.
   std::filesystem::path gates_file = {};
   /// Pictures, drives along lines and report.html, which take longer than the rest.
   bool report = true;
-  int threads = 1;
   /// Steps to run even if nothing has changed.
   std::vector<std::string> redo = {};
 };
@@ -78,7 +79,7 @@ struct SessionResult {
 /// What gets to know how far a run is.
 struct SessionObserver {
   std::function<void(const std::string& step)> begins = {};
-  StepProgress progress = {};
+  IntakeProgress progress = {};
   std::function<void(const SessionStep& step)> ends = {};
 };
 

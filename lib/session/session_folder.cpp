@@ -10,11 +10,6 @@ namespace vlp {
 
 namespace fs = std::filesystem;
 
-CapturesTable captures_table(const fs::path& folder) {
-  const fs::path file = folder / "captures.csv";
-  return fs::exists(file) ? read_captures(file) : CapturesTable{};
-}
-
 CapturesTable captures_in(const fs::path& folder) {
   CapturesTable captures = captures_table(folder);
   if (!fs::exists(folder / "truth.csv")) return captures;

@@ -21,8 +21,6 @@ namespace vlp {
 ///
 /// Each throws InputError for a table that cannot be read.
 
-/// captures.csv alone; empty without.
-CapturesTable captures_table(const std::filesystem::path& folder);
 /// captures.csv, with the places of truth.csv; empty without either.
 CapturesTable captures_in(const std::filesystem::path& folder);
 /// The table that fixes of the folder are held against: truth.csv, or captures.csv when that tells

@@ -5,65 +5,69 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <string>
 
-#include "detection/video.h"
+#include "frontend/video.h"
 
 namespace vlp {
+namespace {
 
-std::vector<SkippedImage> skipped_images(const std::vector<std::filesystem::path>& images,
-                                         const std::vector<std::string>& refused) {
-  std::vector<SkippedImage> skipped;
-  const bool one_folder = std::all_of(images.begin(), images.end(), [&](const auto& other) {
-    return other.parent_path() == images.front().parent_path();
+/// Rejected frames of one video for one reason.
+struct SkippedFrames {
+  std::string video;
+  RejectionReason reason;
+  int count;
+};
+
+void prepend(const std::vector<std::string>& remarks, std::vector<std::string>& all) {
+  all.insert(all.begin(), remarks.begin(), remarks.end());
+}
+
+}  // namespace
+
+std::vector<SkippedImage> skipped_images(const std::vector<Observation>& images) {
+  const bool is_one_folder = std::all_of(images.begin(), images.end(), [&](const auto& other) {
+    return other.file.parent_path() == images.front().file.parent_path();
   });
-  auto image = images.begin();
-  for (const std::string& line : refused) {  // in the order of the images
-    while (image != images.end() && !line.starts_with(image->string() + ": ")) ++image;
-    if (image == images.end()) {
-      skipped.push_back({"", line});
-      image = images.begin();
+  std::vector<SkippedImage> skipped;
+  std::vector<SkippedFrames> frames;
+  for (const Observation& image : images) {
+    if (image.is_kept()) continue;
+    const std::string name = is_one_folder ? image.name() : image.file.string();
+    const auto video = video_of_frame(name);
+    if (!video) {
+      skipped.push_back({name, image.rejection->message});
       continue;
     }
-    const auto name = one_folder ? image->filename() : *image;
-    skipped.push_back({name.string(), line.substr(image->string().size() + 2)});
-    ++image;
+    const RejectionReason reason = image.rejection->reason;
+    const auto same = std::find_if(frames.begin(), frames.end(), [&](const SkippedFrames& other) {
+      return other.video == *video && other.reason == reason;
+    });
+    if (same == frames.end()) {
+      frames.push_back({*video, reason, 1});
+    } else {
+      ++same->count;
+    }
+  }
+  for (const auto& [video, reason, count] : frames) {
+    skipped.push_back({video, fmt::format("{} of its frames: {}", count, name_of(reason))});
   }
   return skipped;
 }
 
-void SkippedViews::add(const std::string& image, const std::string& reason, const char* of_frames) {
-  const auto video = video_of_frame(image);
-  if (!video) {
-    alone_.push_back({image, reason});
-    return;
+void add_remarks(const Observations& seen, StepResult& result) {
+  const auto skipped = skipped_images(seen.images);
+  result.skipped.insert(result.skipped.begin(), skipped.begin(), skipped.end());
+  prepend(seen.warnings, result.warnings);
+  prepend(seen.notes, result.notes);
+  prepend(seen.details, result.details);
+  for (const Observation& image : seen.images) {
+    if (image.is_kept() || !video_of_frame(image.name())) continue;
+    result.details.push_back(image.name() + ": " + image.rejection->message);
   }
-  details_.push_back(image + ": " + reason);
-  const auto same = std::find_if(together_.begin(), together_.end(), [&](const Together& other) {
-    return other.video == *video && other.of_frames == of_frames;
-  });
-  if (same == together_.end()) {
-    together_.push_back({*video, of_frames, 1});
-  } else {
-    ++same->count;
-  }
-}
-
-void SkippedViews::tell(StepResult& result) const {
-  result.skipped.insert(result.skipped.end(), alone_.begin(), alone_.end());
-  for (const auto& [video, of_frames, count] : together_) {
-    result.skipped.push_back({video, fmt::format("{} of its frames {}", count, of_frames)});
-  }
-  result.details.insert(result.details.end(), details_.begin(), details_.end());
-}
-
-InputError nothing_usable(const std::filesystem::path& where, std::size_t images,
-                          const StepResult& result) {
-  std::string words = fmt::format("none of its {} images can be used", images);
-  if (!result.skipped.empty()) {
-    const auto& [image, reason] = result.skipped.front();
-    words += "; the first, " + image + ": " + reason;
-  }
-  return {where, words};
+  if (!seen.failure) return;
+  const auto& [is_wrong_file, message, file] = *seen.failure;
+  result.fail(is_wrong_file ? StepFailure::wrong_board : StepFailure::undetermined, message, file);
 }
 
 }  // namespace vlp

@@ -78,9 +78,6 @@ struct StepResult {
   }
 };
 
-/// How far a step is: images done, of so many. May be empty.
-using StepProgress = std::function<void(std::size_t done, std::size_t total)>;
-
 /// The enumerator as a word, for example "wrong_map", and back.
 std::string_view name_of(StepFailure failure);
 std::optional<StepFailure> step_failure_from_name(std::string_view name);

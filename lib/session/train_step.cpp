@@ -82,7 +82,7 @@ TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vecto
   TrainStepResult result;
   Labelled& labelled = result.labelled;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    add_labelled(seen.folders[i], labels[i], labelled);
+    add_labelled(seen.folders[i].images, labels[i], labelled);
   }
   if (labelled.labels == 0) {
     throw InputError(first_folder,

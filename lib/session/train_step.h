@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "detection/labelled_lights.h"
+#include "frontend/labelled_lights.h"
 #include "lamps/signal/confusion.h"
 #include "session/row_time_step.h"
 

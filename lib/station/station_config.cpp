@@ -47,15 +47,15 @@ StationEnough read_enough(YamlMap map) {
   return enough;
 }
 
-StationRefusal read_refusal(YamlMap map) {
-  StationRefusal refuse;
-  constexpr double most_px = 100;
-  read_into(map, "blur_px", refuse.blur_px, most_px, "px");
-  read_into(map, "dark_share", refuse.dark_share, 1, "(share)");
-  read_into(map, "same_pose_share", refuse.same_pose_share, 1, "(share)");
-  read_into(map, "in_a_row", refuse.in_a_row);
+void read_refusal(YamlMap map, StationConfig& config) {
+  constexpr double max_px = 100;
+  FrontendOptions& limits = config.frontend;
+  read_into(map, "blur_px", limits.max_blur_px, max_px, "px");
+  read_into(map, "dark_share", limits.min_bright_fraction, 1, "(share)");
+  read_into(map, "white_share", limits.max_white_fraction, 1, "(share)");
+  read_into(map, "same_pose_share", limits.same_view_fraction, 1, "(share)");
+  read_into(map, "in_a_row", config.max_rejected_in_a_row);
   map.finish();
-  return refuse;
 }
 
 /// Reads the files that a station names, and keeps their digests.
@@ -225,7 +225,7 @@ StationConfig read_station(const fs::path& file) {
     config.dispersion_station_m = Eigen::Vector2d(place->numbers(2).data());
   }
   if (const auto enough = document.optional("enough")) config.enough = read_enough(enough->map());
-  if (const auto refuse = document.optional("refuse")) config.refuse = read_refusal(refuse->map());
+  if (const auto refuse = document.optional("refuse")) read_refusal(refuse->map(), config);
   config.gates = read_gates(document.required("gates"), unit_metrics());
   if (const auto guard = document.optional("guard_bands")) {
     read_guard_bands(guard->map(), config.gates);

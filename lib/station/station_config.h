@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "evaluation/gate.h"
+#include "frontend/options.h"
 #include "rig/board.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
@@ -25,17 +26,6 @@ struct StationEnough {
   double turn_arc_rad = 5.2;
   int dispersion_captures = 40;
   int check_captures = 36;
-};
-
-/// When an image is refused, and after how many of them in a row a step is given up.
-struct StationRefusal {
-  /// Sigma of the blur of a board's edges.
-  double blur_px = 2;
-  /// Grey level, as a share of the full scale, that 1 % of the pixels reach.
-  double dark_share = 0.1;
-  /// Views of a board whose corners are all closer together, as a share of the image's width.
-  double same_pose_share = 0.01;
-  int in_a_row = 12;
 };
 
 /// The reference camera of `verify`.
@@ -79,7 +69,10 @@ struct StationConfig {
   /// Where the camera is in the step `dispersion` unless its captures.csv says it.
   std::optional<Eigen::Vector2d> dispersion_station_m;
   StationEnough enough;
-  StationRefusal refuse;
+  /// Limits of the images.
+  FrontendOptions frontend;
+  /// Number of images rejected in a row after which a step is given up.
+  int max_rejected_in_a_row = 12;
   /// With guard bands where `guard_bands` states standard uncertainties.
   std::vector<Gate> gates;
   std::optional<GoldenUnit> golden;

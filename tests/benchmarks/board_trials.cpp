@@ -14,7 +14,6 @@
 #include <string>
 #include <thread>
 
-#include "calibration/intrinsics/common_curve.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "captures/in_parallel.h"
 #include "geometry/median.h"
@@ -23,6 +22,7 @@
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
 #include "simulation/picture.h"
+#include "support/observed_view.h"
 
 namespace vlp {
 namespace {
@@ -107,7 +107,7 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   LensInput input;
   input.board = scene.board->print;
   input.camera = scene.camera;
-  input.views.resize(electrons.size());
+  input.seen.images.resize(electrons.size());
   const auto threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const double holds_e =
       std::min(scene.sensor.full_well_e,
@@ -119,14 +119,18 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
     cv::Mat1f lit;
     electrons[i].convertTo(lit, CV_32F, exposures);
     const cv::Mat image = developed(scene, lit, shot.noise_seed, development.picture);
-    input.views[i] = {shot.image, {image.cols, image.rows}, detector.detect(image)};
+    input.seen.images[i] = observed({shot.image, {image.cols, image.rows}, detector.detect(image)});
   });
   std::size_t tags = 0, usable = 0;
-  for (const BoardView& view : input.views) {
+  for (const BoardView& view : kept_views(input.seen.images)) {
     usable += view.seen.tags.size();
     tags += view.seen.tags.size() + static_cast<std::size_t>(view.seen.unusable);
   }
-  const double gamma = take_common_curve(input.views, input.board);
+  const BoardLattice lattice(input.board);
+  for (Observation& image : input.seen.images) {
+    if (lattice.enough(image.board->seen)) continue;
+    image.reject(RejectionReason::too_few_corners, "shows too little of the board");
+  }
   const LensResult result = solve_lens(input, {});
   const std::string share =
       fmt::format("{:.1f}", 100 * static_cast<double>(usable) / static_cast<double>(tags));
@@ -135,7 +139,7 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
     return;
   }
   const Camera& camera = scene.camera;
-  const Lens truth(camera.lens_model, camera.intrinsics), lens = result.solution.lens();
+  const Lens truth(camera.lens_model, camera.intrinsics), lens = result.lens.solution.lens();
   const auto even = [](const Eigen::Vector2d&) { return 1; };
   const auto difference = projection_difference(truth, lens, camera.imager_px, even);
   fmt::print(
@@ -143,11 +147,11 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
       "{:.3f} "
       "in the region; left {:.4f}, edges {:+.3f} px, gamma {:.2f}, {} % of {} tags\n",
       development.name, difference->mean_px, difference->worst_px,
-      worst_within(result.report.region, truth, lens, camera.imager_px),
-      difference->rms_px / result.report.expected_rms_px,
-      std::max(result.report.uncertainty_worst_px, result.report.uncertainty_beyond_px),
-      result.report.uncertainty_worst_px, result.solution.rms_px,
-      upper_median(result.solution.edge_shifts_px), gamma, share, tags);
+      worst_within(result.lens.report.region, truth, lens, camera.imager_px),
+      difference->rms_px / result.lens.report.expected_rms_px,
+      std::max(result.lens.report.uncertainty_worst_px, result.lens.report.uncertainty_beyond_px),
+      result.lens.report.uncertainty_worst_px, result.lens.solution.rms_px,
+      upper_median(result.lens.solution.edge_shifts_px), result.lens.gamma, share, tags);
 }
 
 void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wanted) {

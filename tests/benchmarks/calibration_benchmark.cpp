@@ -5,7 +5,7 @@
 
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/synthetic_views.h"
-#include "detection/image_file.h"
+#include "frontend/image_file.h"
 
 namespace vlp {
 namespace {

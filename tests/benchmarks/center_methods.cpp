@@ -13,8 +13,8 @@
 #include <map>
 
 #include "captures/csv_reader.h"
-#include "detection/image_file.h"
-#include "detection/mat_view.h"
+#include "frontend/image_file.h"
+#include "frontend/mat_view.h"
 #include "lamps/image/background.h"
 #include "lamps/light_detector.h"
 

@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/image/background.h"
 #include "lamps/light_detector.h"
 #include "simulation/exposure.h"

@@ -24,7 +24,7 @@
 #include <string>
 #include <vector>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "geometry/angles.h"
 #include "lamps/light_detector.h"
 #include "positioning/body_limit.h"

@@ -25,8 +25,8 @@
 #include <string>
 
 #include "camera/lens.h"
-#include "detection/lights_table.h"
-#include "detection/mat_view.h"
+#include "frontend/lights_table.h"
+#include "frontend/mat_view.h"
 #include "geometry/frames.h"
 #include "lamps/light_detector.h"
 #include "simulation/downlight.h"

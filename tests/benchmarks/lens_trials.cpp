@@ -56,7 +56,11 @@ void try_set(int set, Counts& counts) {
     return;
   }
   const CalibrationReport report = report_on(solution, input);
-  const auto metrics = lens_metrics(solution, report, coverage_of(solution, input));
+  LensEstimate lens;
+  lens.solution = solution;
+  lens.report = report;
+  lens.coverage = coverage_of(solution, input);
+  const auto metrics = lens_metrics(lens);
   if (!words_of_missed(check_gates(lens_gates(), metrics)).empty()) {
     ++counts.refused;
     return;

@@ -291,7 +291,7 @@ kinds() {
   (cd "$work/unit/boards" && for image in 00[0-3]?.png; do
     cp "000$((10#${image%.png} % 4)).png" double.png && echo "$image" >>double.png && mv double.png "$image"
   done)
-  tried double-images "$seed" 'the same pose again'
+  tried double-images "$seed" 'the same image again'
   unit_again
   rm -f "$work"/unit/boards/00[123]?.png
   tried few-boards "$seed" 'boards: not enough images'

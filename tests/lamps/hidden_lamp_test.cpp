@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "lamps/light_detector.h"
 

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "detection/image_file.h"
-#include "detection/mat_view.h"
+#include "frontend/image_file.h"
+#include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "positioning/vlp.h"
 #include "support/random.h"

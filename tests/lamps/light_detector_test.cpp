@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The detector on rendered captures, whose truth is known.
 #include "lamps/light_detector.h"
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/drawn_lamp.h"
 
 #include <gtest/gtest.h>

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/rendered_captures.h"
 #include "positioning/positioner.h"
 #include "rig/find_lamp.h"

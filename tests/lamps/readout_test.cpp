@@ -6,8 +6,8 @@
 
 #include <array>
 
-#include "detection/image_file.h"
-#include "detection/mat_view.h"
+#include "frontend/image_file.h"
+#include "frontend/mat_view.h"
 
 namespace vlp {
 namespace {

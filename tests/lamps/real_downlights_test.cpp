@@ -14,9 +14,8 @@
 #include <vector>
 
 #include "captures/csv_reader.h"
-#include "detection/detect_lights.h"
-#include "detection/image_file.h"
-#include "detection/mat_view.h"
+#include "frontend/image_file.h"
+#include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "lamps/readout.h"
 #include "lamps/signal/row_time.h"

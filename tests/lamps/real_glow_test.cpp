@@ -7,8 +7,8 @@
 #include <opencv2/calib3d.hpp>
 #include <vector>
 
-#include "detection/image_file.h"
-#include "detection/mat_view.h"
+#include "frontend/image_file.h"
+#include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "positioning/positioner.h"
 #include "support/real_data.h"

@@ -3,8 +3,8 @@
 /// A real lamp, dim and with a hole, as a rolling-shutter camera saw it.
 #include <gtest/gtest.h>
 
-#include "detection/image_file.h"
-#include "detection/mat_view.h"
+#include "frontend/image_file.h"
+#include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "support/real_data.h"
 

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <utility>
 
-#include "detection/image_file.h"
-#include "detection/mat_view.h"
+#include "frontend/image_file.h"
+#include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "support/real_data.h"
 

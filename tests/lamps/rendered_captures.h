@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "simulation/exposure.h"
 #include "simulation/picture.h"

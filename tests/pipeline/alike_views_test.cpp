@@ -64,9 +64,8 @@ TEST_F(AlikeViews, InOneCornerCountAsOne) {
   }
   const auto result = calibrate_them();
   EXPECT_EQ(result.exit_code, 3) << result.output;
-  EXPECT_THAT(
-      result.errors,
-      HasSubstr("39.png: shows the board where 10.png does: the two count as one; skipped"));
+  EXPECT_THAT(result.errors,
+              HasSubstr("39.png: shows the same view as 10.png: views count once; skipped"));
   EXPECT_THAT(result.errors, HasSubstr("1 views with the board: fewer than three"));
 }
 
@@ -77,7 +76,7 @@ TEST_F(AlikeViews, SavedAgainAsJpegCountAsOne) {
   const auto result = calibrate_them();
   EXPECT_EQ(result.exit_code, 3) << result.output;
   EXPECT_THAT(result.errors,
-              HasSubstr("1.jpg: shows the board where 0.png does: the two count as one; skipped"));
+              HasSubstr("1.jpg: shows the same view as 0.png: views count once; skipped"));
   EXPECT_THAT(result.errors, HasSubstr("1 views with the board: fewer than three"));
 }
 
@@ -94,7 +93,7 @@ TEST_F(AlikeViews, LeaveAFailureAFailureWhenEveryFileIsCopied) {
   const auto twice = calibrate_them();
   EXPECT_EQ(twice.exit_code, 1);
   EXPECT_EQ(twice.output, once.output);
-  EXPECT_THAT(twice.errors, HasSubstr("copy-of-0004.png: is the same picture as 0004.png"));
+  EXPECT_THAT(twice.errors, HasSubstr("copy-of-0004.png: is the same image as 0004.png"));
   const auto gates_of = [](const std::string& errors) {
     return errors.substr(errors.find("views is"));
   };

@@ -195,7 +195,7 @@ TEST_F(Detect, SkipsAndCountsImagesThatItCannotUse) {
   EXPECT_THAT(result.errors, HasSubstr("half.PNG: cannot be read as an image: it is cut short"));
   EXPECT_THAT(result.errors, testing::Not(HasSubstr("libpng")));
   EXPECT_THAT(result.errors, HasSubstr("text.png: cannot be read as an image; skipped"));
-  EXPECT_THAT(result.errors, HasSubstr("the calibration's camera has 800 x 600 px; skipped"));
+  EXPECT_THAT(result.errors, HasSubstr("the camera's images are 800 x 600 px; skipped"));
   EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
 }
 

@@ -42,7 +42,7 @@ TEST_F(IntrinsicsRefusals, RefusesOneViewAndViewsAllAlike) {
   }
   const auto alike = calibrate((folder / "images").string(), board);
   EXPECT_EQ(alike.exit_code, 3);
-  EXPECT_THAT(alike.errors, HasSubstr("1.png: is the same picture as 0.png; skipped"));
+  EXPECT_THAT(alike.errors, HasSubstr("1.png: is the same image as 0.png; skipped"));
   EXPECT_THAT(alike.errors, HasSubstr("1 views with the board: fewer than three"));
   EXPECT_FALSE(fs::exists(folder / "camera.yaml"));
 }
@@ -130,7 +130,7 @@ TEST_F(IntrinsicsRefusals, NamesTheOrderOfASquareKalibrBoard) {
   }
 }
 
-TEST_F(IntrinsicsRefusals, RefusesMixedSizesAndSkipsWhatIsNoImage) {
+TEST_F(IntrinsicsRefusals, SkipsImagesOfAnotherSizeAndWhatIsNoImage) {
   const std::string images = copies({"0.png", "1.png"});
   folder.file("images/2.png", "no image\n");
   const auto bad = calibrate(images, kRig + "/board.yaml");
@@ -142,8 +142,9 @@ TEST_F(IntrinsicsRefusals, RefusesMixedSizesAndSkipsWhatIsNoImage) {
   const cv::Mat image = cv::imread(kRig + "/sample-boards/0000.png", cv::IMREAD_GRAYSCALE);
   cv::imwrite((folder / "images/2.png").string(), image(cv::Rect(0, 0, 640, 480)));
   const auto mixed = calibrate(images, kRig + "/board.yaml");
-  EXPECT_EQ(mixed.exit_code, 2);
-  EXPECT_THAT(mixed.errors, HasSubstr("2.png: is 640 x 480, but 0.png is 800 x 600 px"));
+  EXPECT_EQ(mixed.exit_code, 3) << "one view is left";
+  EXPECT_THAT(mixed.errors,
+              HasSubstr("2.png: is 640 x 480 px, the camera's images are 800 x 600 px; skipped"));
 }
 
 TEST_F(IntrinsicsRefusals, RefusesAFormatWithoutTheLensBeforeItSolves) {
@@ -197,7 +198,7 @@ TEST_F(IntrinsicsRefusals, SaysThatBurntOutBoardsAreOverexposed) {
     EXPECT_EQ(result.exit_code, 3);
     const std::string error = result.errors.substr(result.errors.find("error: "));
     EXPECT_THAT(error, HasSubstr("overexposed"));
-    EXPECT_THAT(error, HasSubstr("expose shorter"));
+    EXPECT_THAT(error, testing::AnyOf(HasSubstr("expose shorter"), HasSubstr("less exposure")));
     EXPECT_THAT(result.errors, Not(HasSubstr("border_bits")));
   }
 }

@@ -140,7 +140,7 @@ TEST_F(IntrinsicsProgram, SaysThatViewsFromTheFrontDoNotFixTheFocalLength) {
   EXPECT_THAT(result.errors, HasSubstr("uncertainty_px is "));
   const auto report = read_calibration(folder / "camera.yaml").intrinsics_report;
   ASSERT_TRUE(report);
-  EXPECT_EQ(report->views, 16);
+  EXPECT_EQ(report->views, 15) << "one is blurred by more than 2 px";
   EXPECT_LT(report->rms_px, 0.32);  // Kalibr's own, per axis: 0.38 and 0.32
 }
 

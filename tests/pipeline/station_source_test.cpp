@@ -40,7 +40,7 @@ TEST_F(StationSource, TakesAVideo) {
   }
   const auto result = run_program(run("a", "--idle-s 60 --source boards=" + video));
   EXPECT_EQ(result.exit_code, 0) << result.output << result.errors;
-  EXPECT_THAT(result.errors, HasSubstr("refused: same image as frame-000000.png"));
+  EXPECT_THAT(result.errors, HasSubstr("refused: is the same image as frame-000000.png"));
   EXPECT_THAT(records("show").output, HasSubstr("images     48, 48 used"));
 }
 
@@ -94,7 +94,7 @@ TEST_F(StationSource, SurvivesAFullDisk) {
   EXPECT_GT(frames, 0);
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=20m"), 0);
   const auto rest = run_program(command);
-  EXPECT_THAT(rest.errors, AllOf(HasSubstr("refused: same image as frame-000000.png"),
+  EXPECT_THAT(rest.errors, AllOf(HasSubstr("refused: is the same image as frame-000000.png"),
                                  HasSubstr("boards is done")));
   EXPECT_THAT(records("show").output, HasSubstr("images     8, 8 used"));
   ::umount2(small.c_str(), MNT_DETACH);

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "captures/captures_table.h"
-#include "detection/image_file.h"
+#include "frontend/image_file.h"
 #include "pipeline/intrinsics_program.h"
 #include "support/datasets.h"
 #include "support/write_video.h"
@@ -126,8 +126,8 @@ TEST_F(FilmOfABoard, GivesTheLensOfItsImages) {
   const std::string corners = content("camera.corners.vnl");
   const auto of_film = calibrate(film, board);
   EXPECT_EQ(of_film.exit_code, of_images.exit_code) << of_film.errors;
-  EXPECT_THAT(of_film.errors, HasSubstr("vlp-intrinsics: warning: boards.avi: 12 of its frames are "
-                                        "the same pictures as others; skipped\n"));
+  EXPECT_THAT(of_film.errors, HasSubstr("vlp-intrinsics: warning: boards.avi: 12 of its frames: "
+                                        "the same image again; skipped\n"));
   std::string names = content("camera.corners.vnl");
   for (int i = 0; i < 12; ++i) {
     const auto number = [](int n) { return (n < 10 ? "0" : "") + std::to_string(n); };

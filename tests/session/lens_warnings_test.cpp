@@ -5,6 +5,7 @@
 
 #include "calibration/intrinsics/synthetic_views.h"
 #include "session/lens_step.h"
+#include "support/observed_view.h"
 
 namespace vlp {
 namespace {
@@ -22,7 +23,7 @@ LensInput views_with_edges(double shift_px) {
   for (int i = 0; i < 20; ++i) {
     SeenBoard seen = views.random_view(random, 0.05);
     for (SeenTag& tag : seen.tags) tag = shrunk(tag, shift_px);
-    input.views.push_back({std::to_string(i), views.imager_px, seen});
+    input.seen.images.push_back(observed({std::to_string(i), views.imager_px, seen}));
   }
   return input;
 }

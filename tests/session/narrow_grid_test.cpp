@@ -6,6 +6,7 @@
 #include "calibration/intrinsics/wide_views.h"
 #include "camera/spline_grid.h"
 #include "session/lens_step.h"
+#include "support/observed_view.h"
 
 namespace vlp {
 namespace {
@@ -20,10 +21,11 @@ LensResult solved_with(const SplineGrid& grid) {
   const BoardLattice lattice(views.board);
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
   input.camera.lens_model = splined_lens(grid);
-  while (input.views.size() < count) {
+  while (input.seen.images.size() < count) {
     const SeenBoard seen = wide_view(views, random, noise_px);
     if (!enough_of(seen, lattice)) continue;
-    input.views.push_back({std::to_string(input.views.size()) + ".png", kWideImager, seen});
+    input.seen.images.push_back(
+        observed({std::to_string(input.seen.images.size()) + ".png", kWideImager, seen}));
   }
   return solve_lens(input, {});
 }
@@ -54,10 +56,11 @@ TEST(WideGrid, IsRefusedWithTheGridToTake) {
                        {LensModel::pinhole, std::array{4600.0, 4600.0, 395.0, 301.0}}};
   const BoardLattice lattice(views.board);
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
-  while (input.views.size() < count) {
+  while (input.seen.images.size() < count) {
     const SeenBoard seen = views.random_view(random, noise_px);
     if (!lattice.enough(seen)) continue;
-    input.views.push_back({std::to_string(input.views.size()) + ".png", views.imager_px, seen});
+    input.seen.images.push_back(
+        observed({std::to_string(input.seen.images.size()) + ".png", views.imager_px, seen}));
   }
   input.camera.lens_model = splined_lens({3, 10, 10, 350});
   const LensResult result = solve_lens(input, {});

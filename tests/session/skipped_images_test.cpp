@@ -7,45 +7,63 @@
 namespace vlp {
 namespace {
 
-TEST(SkippedImages, AreNamedWithoutTheirFolder) {
-  const auto skipped = skipped_images({"f/a.png", "f/b.png", "f/c.png"},
-                                      {"f/b.png: is empty", "f/c.png: is 3: large"});
-  ASSERT_EQ(skipped.size(), 2u);
-  EXPECT_EQ(skipped[0].image, "b.png");
-  EXPECT_EQ(skipped[0].reason, "is empty");
-  EXPECT_EQ(skipped[1].reason, "is 3: large");
+using testing::ElementsAre;
+
+Observation rejected(const char* file, RejectionReason reason, const char* message) {
+  Observation image{file};
+  image.reject(reason, message);
+  return image;
 }
 
-TEST(SkippedImages, OfSeveralFoldersKeepTheirs) {
-  const auto skipped = skipped_images({"f/a.png", "g/a.png"}, {"g/a.png: is empty"});
-  EXPECT_EQ(skipped[0].image, "g/a.png");
-}
-
-TEST(SkippedViews, TellOfTheFramesOfAVideoTogether) {
-  SkippedViews skipped;
-  skipped.add("a.png", "shows 1 tag", "show too little");
-  for (const char* frame : {"b.avi#000000", "b.avi#000003", "c.avi#000000"}) {
-    skipped.add(frame, "shows 2 tags", "show too little");
-  }
-  skipped.add("b.avi#000004", "is as #000003", "are alike");
-  StepResult result;
-  skipped.tell(result);
+std::vector<std::string> lines(const std::vector<SkippedImage>& skipped) {
   std::vector<std::string> lines;
-  for (const auto& [image, reason] : result.skipped) lines.push_back(image + ": " + reason);
-  EXPECT_THAT(lines,
-              testing::ElementsAre("a.png: shows 1 tag", "b.avi: 2 of its frames show too little",
-                                   "c.avi: 1 of its frames show too little",
-                                   "b.avi: 1 of its frames are alike"));
-  EXPECT_THAT(result.details,
-              testing::ElementsAre("b.avi#000000: shows 2 tags", "b.avi#000003: shows 2 tags",
-                                   "c.avi#000000: shows 2 tags", "b.avi#000004: is as #000003"));
+  for (const auto& [image, reason] : skipped) lines.push_back(image + ": " + reason);
+  return lines;
 }
 
-TEST(NothingUsable, TellsTheFirstReason) {
+TEST(SkippedImages, NamesImagesWithoutTheirFolder) {
+  EXPECT_THAT(lines(skipped_images({Observation{"f/a.png"},
+                                    rejected("f/b.png", RejectionReason::unreadable, "is empty"),
+                                    rejected("f/c.png", RejectionReason::blurred, "is 3: large")})),
+              ElementsAre("b.png: is empty", "c.png: is 3: large"));
+}
+
+TEST(SkippedImages, NamesTheFoldersIfThereAreSeveral) {
+  EXPECT_THAT(lines(skipped_images({Observation{"f/a.png"},
+                                    rejected("g/a.png", RejectionReason::unreadable, "is empty")})),
+              ElementsAre("g/a.png: is empty"));
+}
+
+TEST(AddRemarks, CombinesTheFramesOfAVideo) {
+  Observations seen;
+  seen.images = {rejected("a.png", RejectionReason::too_few_corners, "shows 1 tag"),
+                 rejected("b.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
+                 rejected("b.avi#000003", RejectionReason::too_few_corners, "shows 3 tags"),
+                 rejected("c.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
+                 rejected("b.avi#000004", RejectionReason::same_view, "is as #000003")};
   StepResult result;
-  result.skipped = {{"a.png", "is cut short"}, {"b.png", "is empty"}};
-  EXPECT_STREQ(nothing_usable("f", 2, result).what(),
-               "f: none of its 2 images can be used; the first, a.png: is cut short");
+  add_remarks(seen, result);
+  EXPECT_TRUE(result.ok());
+  EXPECT_THAT(
+      lines(result.skipped),
+      ElementsAre("a.png: shows 1 tag", "b.avi: 2 of its frames: with too little of the board",
+                  "c.avi: 1 of its frames: with too little of the board",
+                  "b.avi: 1 of its frames: the same view again"));
+  EXPECT_THAT(result.details,
+              ElementsAre("b.avi#000000: shows 2 tags", "b.avi#000003: shows 3 tags",
+                          "c.avi#000000: shows 2 tags", "b.avi#000004: is as #000003"));
+}
+
+TEST(AddRemarks, FailsIfNoImageCanBeUsed) {
+  Observations seen;
+  seen.warnings = {"dark"};
+  seen.failure = {true, "shows another board", "board.yaml"};
+  StepResult result;
+  result.warnings = {"later"};
+  add_remarks(seen, result);
+  EXPECT_EQ(result.failure, StepFailure::wrong_board);
+  EXPECT_EQ(result.subject, "board.yaml");
+  EXPECT_THAT(result.warnings, ElementsAre("dark", "later"));
 }
 
 }  // namespace

@@ -12,8 +12,10 @@
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "frontend/selection.h"
 #include "geometry/polygon.h"
 #include "session/lens_step.h"
+#include "support/observed_view.h"
 
 namespace vlp {
 
@@ -113,10 +115,11 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
       for (SeenTag& tag : seen.tags) tag = shrunk(tag, shift_px);
       std::string name = std::to_string(place);
       name.append("-").append(std::to_string(copy)).append(".png");
-      input.views.push_back({name, views.imager_px, seen});
+      input.seen.images.push_back(observed({name, views.imager_px, seen}));
     }
     if (any) ++place;
   }
+  reject_repeated(input.seen.images, ImageUse::boards, {});
   return {std::move(input), lens};
 }
 
@@ -127,12 +130,12 @@ inline std::optional<double> error_over_stated(const ThinSet& set) {
   if (!result.ok() || !words_of_missed(check_gates(lens_gates(), result.metrics)).empty()) {
     return {};
   }
-  const auto difference =
-      projection_difference(set.lens, result.solution.lens(), result.solution.problem.imager_px,
-                            [&](const Eigen::Vector2d& pixel) {
-                              return polygon_contains(result.report.region, pixel) ? 1.0 : INFINITY;
-                            });
-  return difference ? difference->worst_px / result.report.uncertainty_worst_px : INFINITY;
+  const auto difference = projection_difference(
+      set.lens, result.lens.solution.lens(), result.lens.solution.problem.imager_px,
+      [&](const Eigen::Vector2d& pixel) {
+        return polygon_contains(result.lens.report.region, pixel) ? 1.0 : INFINITY;
+      });
+  return difference ? difference->worst_px / result.lens.report.uncertainty_worst_px : INFINITY;
 }
 
 }  // namespace vlp

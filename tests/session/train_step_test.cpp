@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "detection/image_file.h"
+#include "frontend/image_file.h"
 #include "support/refused.h"
 
 namespace vlp {
@@ -21,7 +21,9 @@ struct Training {
   std::vector<std::vector<Frame>> labels;
 
   explicit Training(std::size_t folders) {
-    const SeenLights one = see_lights({kSample}, lamps, {}, Readout::rows, false, 1);
+    FrontendOptions options;
+    options.readout = Readout::rows;
+    const SeenLights one = see_lights({kSample}, lamps, {}, false, options);
     seen.folders.assign(folders, one.folders[0]);
     labels.assign(folders, read_detections(kSample + "/true_detections.csv"));
   }

@@ -7,6 +7,7 @@
 #include "geometry/angles.h"
 #include "geometry/polygon.h"
 #include "session/lens_step.h"
+#include "support/observed_view.h"
 
 namespace vlp {
 namespace {
@@ -27,10 +28,11 @@ LensInput wide_set(double reach_deg, LensModel model) {
   Random random(71);
   WideBoards boards;
   boards.reach_rad = rad_from_deg(reach_deg);
-  while (input.views.size() < count) {
+  while (input.seen.images.size() < count) {
     const SeenBoard seen = wide_view(views, random, noise_px, boards);
     if (!enough_of(seen, lattice)) continue;
-    input.views.push_back({std::to_string(input.views.size()), views.imager_px, seen});
+    input.seen.images.push_back(
+        observed({std::to_string(input.seen.images.size()), views.imager_px, seen}));
   }
   return input;
 }
@@ -59,15 +61,15 @@ TEST_P(WideLens, IsToldAndStatedWhereTheModelHardlyHasRays) {
     }
     if (reach_deg > 60) {
       EXPECT_THAT(result.warnings, Contains(HasSubstr("take --lens OPENCV_FISHEYE")));
-      EXPECT_EQ(result.better_model, LensModel::fisheye);
+      EXPECT_EQ(result.lens.better_model, LensModel::fisheye);
     }
     if (!words_of_missed(check_gates(lens_gates(), result.metrics)).empty()) continue;
     const auto difference = projection_difference(
-        wide_lens(), result.solution.lens(), kWideImager, [&](const Eigen::Vector2d& pixel) {
-          return polygon_contains(result.report.region, pixel) ? 1.0 : INFINITY;
+        wide_lens(), result.lens.solution.lens(), kWideImager, [&](const Eigen::Vector2d& pixel) {
+          return polygon_contains(result.lens.report.region, pixel) ? 1.0 : INFINITY;
         });
     ASSERT_TRUE(difference);
-    EXPECT_LE(difference->worst_px, sigmas * result.report.uncertainty_worst_px) << reach_deg;
+    EXPECT_LE(difference->worst_px, sigmas * result.lens.report.uncertainty_worst_px) << reach_deg;
     ++compared;
   }
   if (GetParam() == LensModel::opencv8) {
@@ -96,14 +98,15 @@ TEST(LensThatIsNotWide, OfItsOwnModelKeepsTheMarginAroundItsCorners) {
   input.camera.lens_model = LensModel::opencv8;
   Random random(5);
   for (int i = 0; i < count; ++i) {
-    input.views.push_back({std::to_string(i), views.imager_px, views.random_view(random, 0.05)});
+    input.seen.images.push_back(
+        observed({std::to_string(i), views.imager_px, views.random_view(random, 0.05)}));
   }
   const LensResult result = solve_lens(input, {});
   ASSERT_TRUE(result.ok()) << result.why;
-  EXPECT_FALSE(result.solution.another_fits);
-  EXPECT_FALSE(result.better_model);
+  EXPECT_FALSE(result.lens.solution.another_fits);
+  EXPECT_FALSE(result.lens.better_model);
   EXPECT_THAT(result.warnings, testing::IsEmpty());
-  EXPECT_GT(result.report.region_share, 0.95);
+  EXPECT_GT(result.lens.report.region_share, 0.95);
 }
 
 }  // namespace

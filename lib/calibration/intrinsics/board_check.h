@@ -7,7 +7,7 @@
 #include <string>
 
 #include "camera/lens.h"
-#include "detection/boards/detect_boards.h"
+#include "detection/boards/board_view.h"
 
 namespace vlp {
 

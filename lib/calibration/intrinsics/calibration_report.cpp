@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -13,6 +12,7 @@
 #include "calibration/intrinsics/edge_bow.h"
 #include "calibration/intrinsics/edge_shift.h"
 #include "calibration/intrinsics/expected_difference.h"
+#include "calibration/intrinsics/image_coverage.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/view_jackknife.h"
 #include "calibration/intrinsics/view_pose.h"
@@ -120,28 +120,19 @@ HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& 
   return fit;
 }
 
-namespace {
-
-std::size_t part_of(double pixel, int size_px, int parts) {
-  const int part = static_cast<int>(pixel / size_px * parts);
-  return static_cast<std::size_t>(std::clamp(part, 0, parts - 1));
-}
-
-}  // namespace
-
 ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
-  constexpr int cols = 8, rows = 6;
   const auto [width, height] = input.imager_px;
   ViewCoverage coverage;
-  std::set<std::size_t> covered;
+  ImageCoverage parts(input.imager_px);
   for (const std::size_t view : solution.views) {
     for (const auto& corner : input.views[view]) {
       const double u = corner.pixel.x(), v = corner.pixel.y();
-      ++coverage.corners[part_of(v, height, 3) * 3 + part_of(u, width, 3)];
-      covered.insert(part_of(v, height, rows) * cols + part_of(u, width, cols));
+      ++coverage.corners[static_cast<std::size_t>(ImageCoverage::part(v, height, 3) * 3 +
+                                                  ImageCoverage::part(u, width, 3))];
+      parts.add(corner.pixel);
     }
   }
-  coverage.share = static_cast<double>(covered.size()) / (cols * rows);
+  coverage.share = parts.fraction();
   std::vector<Eigen::Vector3d> normals;
   for (const BoardPose& pose : solution.problem.poses) {
     // Away from the camera; where it leans to, the board is nearer.

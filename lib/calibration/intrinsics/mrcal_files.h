@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
-#include "detection/boards/detect_boards.h"
+#include "detection/boards/board_view.h"
 #include "rig/board.h"
 
 namespace vlp {

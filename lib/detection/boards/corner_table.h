@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "detection/boards/detect_boards.h"
+#include "detection/boards/board_view.h"
 #include "rig/board.h"
 
 namespace vlp {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "detection/boards/detect_boards.h"
+#include "detection/boards/board_view.h"
 
 namespace vlp {
 

@@ -41,7 +41,7 @@ bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bo
   return std::any_of(arrivals.begin(), arrivals.end(), [&](const WatchedRun::Arrival& arrival) {
     const auto& images = unit.step(arrival.step).images;
     const auto image = images.find(arrival.image);
-    return !of_source || image == images.end() || image->second.refused.empty();
+    return !of_source || image == images.end() || image->second.is_used();
   });
 }
 

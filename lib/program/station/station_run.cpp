@@ -11,7 +11,7 @@
 #include <stdexcept>
 
 #include "captures/printable.h"
-#include "detection/image_file.h"
+#include "frontend/image_file.h"
 #include "program/app.h"
 #include "program/station/station_guide.h"
 #include "rig/input_error.h"

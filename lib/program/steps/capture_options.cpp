@@ -13,14 +13,21 @@
 #include <utility>
 
 #include "camera/lens_model.h"
-#include "detection/image_file.h"
-#include "detection/lights_table.h"
-#include "detection/video.h"
+#include "frontend/image_file.h"
+#include "frontend/lights_table.h"
+#include "frontend/video.h"
 #include "geometry/angles.h"
 #include "program/progress.h"
 #include "program/steps/step_outcome.h"
+#include "session/skipped_images.h"
 
 namespace vlp {
+
+FrontendOptions default_frontend() {
+  FrontendOptions options;
+  options.threads = all_cores();
+  return options;
+}
 
 void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTexts& texts) {
   app.add_option("images", options.images, texts.images)->required();
@@ -69,17 +76,28 @@ void add_max_mpx_option(CLI::App& app, double& max_mpx) {
       ->check(CLI::Range(0.001, 1e6));
 }
 
+void add_board_limit_options(CLI::App& app, FrontendOptions& options) {
+  constexpr double max_limit_px = 100;
+  app.add_option("--max-blur-px", options.max_blur_px,
+                 "Skip images of the board whose sharpest edges are blurred by more (sigma, "
+                 "default: 2)")
+      ->check(CLI::Range(0.1, max_limit_px));
+  app.add_option("--max-white-fraction", options.max_white_fraction,
+                 "Skip images of the board with more of it at full scale (default: 0.25)")
+      ->check(CLI::Range(0.0, 1.0));
+}
+
 void add_detect_options(CLI::App& app, CaptureOptions& options) {
-  app.add_option("--classifier", options.classifier,
+  app.add_option("--classifier", options.frontend.classifier,
                  "Lamp classifier by vlp-train, instead of the map's frequencies");
-  app.add_option("--annotate", options.annotate,
+  app.add_option("--annotate", options.frontend.annotate,
                  "Folder for pictures of the lights found, with outlines, centres and lamps");
-  add_readout_option(app, options.readout);
-  app.add_option("--exposure-s", options.exposure_s,
+  add_readout_option(app, options.frontend.readout);
+  app.add_option("--exposure-s", options.frontend.exposure_s,
                  "Exposure of the images, for the check of the lamp map (default: short)")
       ->check(finite_positive());
-  add_max_mpx_option(app, options.max_mpx);
-  add_threads_option(app, options.threads);
+  add_max_mpx_option(app, options.frontend.max_mpx);
+  add_threads_option(app, options.frontend.threads);
 }
 
 std::optional<KnownMotion> MotionOptions::motion() const {
@@ -104,79 +122,79 @@ void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_de
 }
 
 std::vector<std::string> inputs_of(const CaptureOptions& options) {
-  return {options.images, options.lamps, options.calibration, options.classifier};
+  return {options.images, options.lamps, options.calibration, options.frontend.classifier.string()};
 }
 
 LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
                        const std::optional<Calibration>& calibration) {
   return {options.images,          lamps,
           options.lamps,           calibration,
-          options.calibration,     options.row_time_s,
-          options.classifier,      options.readout,
-          options.exposure_s,      options.annotate,
-          options.threads,         options.max_mpx,
-          options.every,           options.captures,
+          options.calibration,     options.captures,
           options.yaw_in_robot_rad};
 }
 
-void tell_of_lights(const std::vector<LightsOfImage>& lights) {
-  if (!spdlog::should_log(spdlog::level::debug)) return;
-  for (const auto& [image, of_image] : lights) {
-    for (const Light& light : of_image) spdlog::debug("{}: {}", image, line_of(light));
+void check_image_outputs(const CaptureOptions& options) {
+  if (is_video_name(options.images)) return;
+  for (const auto& image : images_in(options.images)) {
+    check_output(options.output, {image.string()});
+    if (!options.lights.empty()) check_output(options.lights, {image.string()});
   }
 }
 
-SeenLamps look_for_lamps(const CaptureOptions& options, const LampMap& lamps,
-                         const std::optional<Calibration>& calibration) {
-  if (!is_video_name(options.images)) {
-    for (const auto& image : images_in(options.images)) {
-      check_output(options.output, {image.string()});
-      if (!options.lights.empty()) check_output(options.lights, {image.string()});
-    }
+void print_lights(const Observations& seen) {
+  if (!spdlog::should_log(spdlog::level::debug)) return;
+  for (const Observation& image : seen.images) {
+    for (const Light& light : image.lights) spdlog::debug("{}: {}", image.name(), line_of(light));
   }
-  SeenLamps seen;
+}
+
+Observations observe_captures(const CaptureOptions& options, ImageUse use, const LampMap& lamps,
+                              const std::optional<Calibration>& calibration) {
+  check_image_outputs(options);
+  Observations seen;
   {
     Progress progress("images");
-    seen = see_lamps(lamp_images(options, lamps, calibration),
-                     [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+    seen =
+        observe_lamps(lamp_images(options, lamps, calibration), use, options.frontend,
+                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
-  tell(seen);
-  tell_of_lights(seen.lights);
-  if (!options.lights.empty()) write_lights(options.lights, seen.lights);
+  StepResult remarks;
+  add_remarks(seen, remarks);
+  tell(remarks);
+  print_lights(seen);
+  if (!options.lights.empty()) write_lights(options.lights, seen.images);
+  require(remarks);
   return seen;
 }
 
-SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
-                    const std::optional<Calibration>& calibration) {
-  SeenLamps seen = look_for_lamps(options, lamps, calibration);
-  require(seen);
-  return seen;
-}
-
-LampCaptures read_captures_of(const CaptureOptions& options) {
+LampCaptures read_captures_of(const CaptureOptions& options, ImageUse use) {
   LampCaptures captures{
       {}, read_lamp_map(options.lamps), options.lamps, read_calibration(options.calibration)};
-  if (std::filesystem::is_directory(options.images)) {
-    captures.frames = std::move(see_lamps(options, captures.lamps, captures.calibration).frames);
-    return captures;
-  }
+  captures.frames =
+      std::filesystem::is_directory(options.images)
+          ? kept_frames(observe_captures(options, use, captures.lamps, captures.calibration).images)
+          : read_detections_of(options);
+  return captures;
+}
+
+std::vector<Frame> read_detections_of(const CaptureOptions& options) {
   if (is_video_name(options.images)) {
     throw std::invalid_argument(
         options.images +
         " is a video: vlp-detect finds the lamps in it, and with --captures "
         "the times of its frames");
   }
-  const std::array<std::pair<const char*, bool>, 4> of_images{
-      {{"--classifier", !options.classifier.empty()},
-       {"--annotate", !options.annotate.empty()},
-       {"--readout", options.readout.has_value()},
-       {"--exposure-s", options.exposure_s.has_value()}}};
-  for (const auto& [name, given] : of_images) {
-    if (!given) continue;
+  const FrontendOptions& frontend = options.frontend;
+  const std::array<std::pair<const char*, bool>, 4> image_options{
+      {{"--classifier", !frontend.classifier.empty()},
+       {"--annotate", !frontend.annotate.empty()},
+       {"--readout", frontend.readout.has_value()},
+       {"--exposure-s", frontend.exposure_s.has_value()}}};
+  for (const auto& [name, is_given] : image_options) {
+    if (!is_given) continue;
     throw std::invalid_argument(fmt::format("{}: {} is no folder of images", name, options.images));
   }
-  captures.frames = read_detections(options.images);
-  return captures;
+  return read_detections(options.images);
 }
 
 }  // namespace vlp

@@ -7,33 +7,25 @@
 #include <string>
 #include <vector>
 
+#include "frontend/lamp_intake.h"
 #include "positioning/positioner.h"
 #include "program/app.h"
-#include "session/lamp_images.h"
-#include "session/rotation_step.h"
+#include "session/lamp_captures.h"
 
 namespace vlp {
 
-/// How to find the lamps in captures. Names of files are for messages, too.
+/// Returns the defaults of a program: all cores.
+FrontendOptions default_frontend();
+
+/// Captures of lamps as the command line names them. Names of files are for messages, too.
 struct CaptureOptions {
   /// A folder of images, a video, or a detections.csv.
   std::string images;
   std::string lamps, calibration, output;
-  /// Empty: lamps are told apart by the map's frequencies.
-  std::string classifier;
-  /// Where pictures of what was found go; empty: none are made.
-  std::string annotate;
-  /// Where lights.csv goes; empty: nowhere.
+  /// File for lights.csv; empty: none.
   std::string lights;
-  std::optional<Readout> readout;
-  /// Of a camera without a calibration.
-  std::optional<double> row_time_s;
-  std::optional<double> exposure_s;
-  int threads = all_cores();
-  double max_mpx = kUsualMaxMpx;
-  /// Of a video every so many-th frame.
-  int every = 1;
-  /// As LampImages have them.
+  FrontendOptions frontend = default_frontend();
+  /// As in LampImages.
   std::optional<CapturesTable> captures;
   double yaw_in_robot_rad = 0;
 };
@@ -66,6 +58,9 @@ void check_every(int every, const std::vector<std::string>& files);
 /// Adds --max-mpx.
 void add_max_mpx_option(CLI::App& app, double& max_mpx);
 
+/// Adds --max-blur-px and --max-white-fraction, the limits of board images.
+void add_board_limit_options(CLI::App& app, FrontendOptions& options);
+
 /// Adds --classifier, --annotate, --readout, --exposure-s, --max-mpx and --threads.
 void add_detect_options(CLI::App& app, CaptureOptions& options);
 
@@ -87,26 +82,28 @@ void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_de
 /// input that was not given.
 std::vector<std::string> inputs_of(const CaptureOptions& options);
 
-/// For see_lamps() of the session.
+/// Returns the images with lamp map and calibration for observe_lamps().
 LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
                        const std::optional<Calibration>& calibration);
 
-/// Each light, for --verbose.
-void tell_of_lights(const std::vector<LightsOfImage>& lights);
+/// Throws std::invalid_argument if `output` or `lights` is one of the images.
+void check_image_outputs(const CaptureOptions& options);
 
-/// The lamps in a folder of images, or in a video, with progress, and with what there is to say of
-/// it, and with `lights` written; whether there are some is not required. Neither `output` nor
-/// `lights` may be one of the images. Throws as see_lamps().
-SeenLamps look_for_lamps(const CaptureOptions& options, const LampMap& lamps,
-                         const std::optional<Calibration>& calibration);
+/// Prints each light if --verbose is given.
+void print_lights(const Observations& seen);
 
-/// The same, and throws when it fails.
-SeenLamps see_lamps(const CaptureOptions& options, const LampMap& lamps,
-                    const std::optional<Calibration>& calibration);
+/// Detects the lamps in a folder of images or a video, with progress, and prints the remarks.
+/// Throws as observe_lamps(), and if no lamp is identified.
+Observations observe_captures(const CaptureOptions& options, ImageUse use, const LampMap& lamps,
+                              const std::optional<Calibration>& calibration);
 
-/// Lamp map, calibration, and the captures of a detections.csv or of a folder of images. Throws
-/// what see_lamps() and the files' readers throw, and std::invalid_argument when options for images
-/// are given with a table.
-LampCaptures read_captures_of(const CaptureOptions& options);
+/// Reads lamp map, calibration, and the captures of a detections.csv or of a folder of images.
+/// Throws as observe_captures() and the readers of the files do, and std::invalid_argument if
+/// options for images are given with a table.
+LampCaptures read_captures_of(const CaptureOptions& options, ImageUse use);
+
+/// Reads the captures of a detections.csv. Throws std::invalid_argument for a video, and for
+/// options that are for images.
+std::vector<Frame> read_detections_of(const CaptureOptions& options);
 
 }  // namespace vlp

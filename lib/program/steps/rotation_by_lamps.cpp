@@ -56,7 +56,7 @@ void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOpti
   inputs.push_back(captures.string());
   check_outputs({{"--output", images.output}, {"--refine-map", refined_map}}, inputs);
   images.captures.emplace();  // level is what is found
-  LampCaptures input = read_captures_of(images);
+  LampCaptures input = read_captures_of(images, ImageUse::fixes);
   check_lamps(input.frames, input.lamps, input.lamps_file);
   input.motions =
       motions_of(input.frames, captures.empty() ? CapturesTable() : read_captures(captures),

@@ -25,7 +25,7 @@ void rotate_on_spot(const CLI::App& app, CaptureOptions images, const std::strin
   const std::vector<std::string> inputs = inputs_of(images);
   check_outputs({{"--output", images.output}, {"--plot", plot}}, inputs);
   images.captures.emplace();  // the axis that is found is level
-  const LampCaptures input = read_captures_of(images);
+  const LampCaptures input = read_captures_of(images, ImageUse::turn);
   const RotationResult found =
       solve_rotation(input, kMethods.at(method), history_entry(app, inputs));
   tell(found);

@@ -97,11 +97,15 @@ std::string measuring_digest(const StationConfig& config) {
              {"turn_arc_rad", enough.turn_arc_rad},
              {"dispersion_captures", enough.dispersion_captures},
              {"check_captures", enough.check_captures}});
-  const StationRefusal& refuse = config.refuse;
-  lines.add({{"blur_px", refuse.blur_px},
-             {"dark_share", refuse.dark_share},
-             {"same_pose_share", refuse.same_pose_share},
-             {"in_a_row", refuse.in_a_row}});
+  const FrontendOptions& limits = config.frontend;
+  lines.add({{"blur_px", limits.max_blur_px},
+             {"dark_share", limits.min_bright_fraction},
+             {"same_pose_share", limits.same_view_fraction},
+             {"in_a_row", config.max_rejected_in_a_row}});
+  // Stations without the key keep their digest.
+  if (limits.max_white_fraction != FrontendOptions().max_white_fraction) {
+    lines.add("white_share", limits.max_white_fraction);
+  }
   add_gates(config.gates, lines);
   if (const auto& golden = config.golden) {
     lines.add("golden", golden->camera_id);

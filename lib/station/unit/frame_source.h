@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "detection/video.h"
+#include "frontend/video.h"
 
 namespace vlp {
 

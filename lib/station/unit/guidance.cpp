@@ -21,9 +21,8 @@ ViewCoverage coverage_so_far(const Unit& unit) {
       BoardLattice(config.board), {}, config.type.imager_px, config.type.lens_model};
   IntrinsicsSolution poses{};
   for (const UnitImage* image : used_images(unit.step(StationStep::boards))) {
-    if (!input.lattice.enough(image->view->seen)) continue;
     poses.views.push_back(input.views.size());
-    input.views.push_back(input.lattice.corners(image->view->seen));
+    input.views.push_back(input.lattice.corners(image->seen.board->seen));
     const auto pose = view_pose(input.views.back(), nominal);
     if (pose) poses.problem.poses.push_back(pose->camera_from_board);
   }

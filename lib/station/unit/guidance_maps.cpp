@@ -12,8 +12,6 @@
 namespace vlp {
 namespace {
 
-constexpr int kCols = 8, kRows = 6;
-
 std::string missing_angles(const TurnMap::Height& height) {
   std::string angles;
   for (std::size_t part = 0; part < height.parts.size(); ++part) {
@@ -25,42 +23,24 @@ std::string missing_angles(const TurnMap::Height& height) {
 
 }  // namespace
 
-std::vector<const UnitImage*> used_images(const UnitStep& step) {
-  std::vector<const UnitImage*> used;
-  for (const auto& [name, image] : step.images) {
-    if (image.refused.empty()) used.push_back(&image);
-  }
-  return used;
-}
-
 std::vector<std::string> board_map(const Unit& unit) {
-  const UnitStep& step = unit.step(StationStep::boards);
-  const auto [width, height] = unit.config().type.imager_px;
-  std::map<std::pair<int, int>, int> corners;
-  for (const UnitImage* image : used_images(step)) {
-    for (const SeenTag& tag : image->view->seen.tags) {
-      for (const auto& corner : tag.corners_px) {
-        ++corners[{static_cast<int>(corner.y() * kRows / height),
-                   static_cast<int>(corner.x() * kCols / width)}];
-      }
-    }
-  }
+  const ImageCoverage coverage =
+      board_coverage(unit.step(StationStep::boards), unit.config().type.imager_px);
   constexpr int many = 20;
   std::vector<std::string> lines;
   const std::string edge = "  +-----------------+";
   lines.push_back(edge);
-  for (int row = 0; row < kRows; ++row) {
+  for (int row = 0; row < ImageCoverage::kRows; ++row) {
     std::string line = "  |";
-    for (int col = 0; col < kCols; ++col) {
-      const auto found = corners.find({row, col});
-      line += found == corners.end() ? " ." : found->second < many ? " +" : " #";
+    for (int col = 0; col < ImageCoverage::kCols; ++col) {
+      const int corners = coverage.corners(col, row);
+      line += corners == 0 ? " ." : corners < many ? " +" : " #";
     }
     lines.push_back(line + " |");
   }
   lines.push_back(edge);
   lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
-                          100 * board_coverage(step, unit.config().type.imager_px),
-                          100 * unit.config().enough.board_coverage);
+                          100 * coverage.fraction(), 100 * unit.config().enough.board_coverage);
   lines[3] += "   # many corners   + some   . none";
   return lines;
 }
@@ -88,7 +68,7 @@ std::vector<std::string> turn_lines(const Unit& unit) {
 std::string lamps_line(const Unit& unit, const UnitStep& step) {
   std::map<int, int> seen;
   for (const UnitImage* image : used_images(step)) {
-    for (const Detection& lamp : image->lamps) ++seen[lamp.lamp];
+    for (const Detection& lamp : lamps_in(image->seen)) ++seen[lamp.lamp];
   }
   std::string there, missing;
   for (const Lamp& lamp : unit.config().lamps.lamps) {

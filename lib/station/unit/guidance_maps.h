@@ -10,9 +10,6 @@
 
 namespace vlp {
 
-/// The images of a step that are used, by name.
-std::vector<const UnitImage*> used_images(const UnitStep& step);
-
 /// Corners over the image: '#' many, '+' some, '.' none.
 std::vector<std::string> board_map(const Unit& unit);
 

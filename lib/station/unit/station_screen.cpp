@@ -34,7 +34,7 @@ void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const
 }
 
 std::string outcome_of(const UnitImage& image) {
-  return image.refused.empty() ? "taken" : "refused: " + image.refused;
+  return image.is_used() ? "taken" : "refused: " + image.refusal();
 }
 
 ScreenLine gate_line(const CheckedMetric& figure) {
@@ -90,7 +90,7 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
   add_wrapped(lines, "Next", next_of(unit, *current), Tone::plain);
   if (const auto image = state.images.find(state.last); image != state.images.end()) {
     add_wrapped(lines, "Last", image->first + ": " + outcome_of(image->second),
-                image->second.refused.empty() ? Tone::good : Tone::bad);
+                image->second.is_used() ? Tone::good : Tone::bad);
   }
   for (const CheckedMetric& figure : unit.figures()) {
     // Blur is of all views so far: a few may mislead.
@@ -100,7 +100,7 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
   if (state.refused_in_a_row > 1) {
     add_wrapped(lines, "Refused",
                 fmt::format("{} in a row; after {} the run ends", state.refused_in_a_row,
-                            unit.config().refuse.in_a_row),
+                            unit.config().max_rejected_in_a_row),
                 Tone::bad);
   }
   return lines;

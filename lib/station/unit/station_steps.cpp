@@ -31,15 +31,15 @@ StepResult named(const char* what, StepResult result) {
 /// How far the lens is from the nominal one.
 void compare(const Camera& type, LensResult& result) {
   constexpr double percent = 100;
-  const auto& found = result.solution.problem.intrinsics;
+  const auto& found = result.lens.solution.problem.intrinsics;
   const auto& nominal = type.intrinsics;
   const double focal =
       std::max(std::abs(found[0] / nominal[0] - 1), std::abs(found[1] / nominal[1] - 1));
   result.metrics.push_back({"focal_percent", percent * focal});
   result.metrics.push_back({"center_px", std::hypot(found[2] - nominal[2], found[3] - nominal[3])});
   const auto difference =
-      projection_difference(result.solution.lens(), Lens(type.lens_model, nominal), type.imager_px,
-                            [](const Eigen::Vector2d&) { return 1.0; });
+      projection_difference(result.lens.solution.lens(), Lens(type.lens_model, nominal),
+                            type.imager_px, [](const Eigen::Vector2d&) { return 1.0; });
   if (difference) result.metrics.push_back({"nominal_px", difference->worst_px});
   const auto& report = result.calibration.intrinsics_report;
   const auto [x_m, y_m] =
@@ -115,10 +115,11 @@ void add_errors(const EvaluationInput& input, const Evaluation& evaluation, Step
 }  // namespace
 
 StepResult solve_boards(const StationConfig& config, const std::string& camera_id,
-                        const std::vector<BoardView>& views) {
-  LensInput input{views, config.board, {}, config.type};
+                        Observations seen) {
+  LensInput input{std::move(seen), config.board, {}, config.type};
   input.camera.id = camera_id;
-  LensResult result = solve_lens(input, {});
+  LensResult result = solve_lens(std::move(input), {});
+  result.skipped.clear();  // the station reports images itself
   if (result.failure == StepFailure::wrong_board) return named("wrong board", std::move(result));
   if (result.ok()) compare(config.type, result);
   return result;

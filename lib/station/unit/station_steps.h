@@ -7,7 +7,7 @@
 
 #include "captures/captures_table.h"
 #include "captures/detections_table.h"
-#include "detection/boards/detect_boards.h"
+#include "frontend/observation.h"
 #include "rig/calibration.h"
 #include "session/step_result.h"
 #include "station/station_config.h"
@@ -19,7 +19,7 @@ namespace vlp {
 
 /// The lens; metrics, too: focal_percent, center_px, nominal_px, against the type's, board_bend_mm.
 StepResult solve_boards(const StationConfig& config, const std::string& camera_id,
-                        const std::vector<BoardView>& views);
+                        Observations seen);
 
 StepResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                           const std::vector<Frame>& frames);

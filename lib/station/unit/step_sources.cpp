@@ -27,7 +27,7 @@ void StepSources::feed(const Unit& unit, WatchedRun& run) {
     const auto& images = unit.step(last_step_).images;
     const auto image = images.find(name);
     if (image == images.end()) return;
-    if (!image->second.refused.empty()) run.discard(last_step_, name);
+    if (!image->second.is_used()) run.discard(last_step_, name);
   }
   last_.clear();
   const auto step = unit.current();

@@ -3,15 +3,13 @@
 #include "station/unit/unit.h"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
 #include <fmt/core.h>
 
 #include "captures/digest.h"
-#include "detection/images_in_parallel.h"
+#include "frontend/images_in_parallel.h"
 #include "rig/input_error.h"
-#include "session/leaning_captures.h"
 #include "session/session_folder.h"
 #include "station/unit/lamp_faults.h"
 #include "station/unit/station_steps.h"
@@ -24,9 +22,15 @@ namespace {
 namespace fs = std::filesystem;
 
 /// As UnitImage has it.
-Eigen::Matrix3d level_in(const LevelsOfImages& levels, const std::string& image) {
+Eigen::Matrix3d level_in(const LevelRotations& levels, const std::string& image) {
   const auto level = levels.find(image);
   return level == levels.end() ? Eigen::Matrix3d::Zero().eval() : level->second.value();
+}
+
+/// Returns the use of the images of a step.
+ImageUse use_of(StationStep step) {
+  if (step == StationStep::boards) return ImageUse::boards;
+  return step == StationStep::rotation ? ImageUse::turn : ImageUse::places;
 }
 
 }  // namespace
@@ -36,8 +40,7 @@ Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion pr
       camera_id_(std::move(camera_id)),
       program_(std::move(program)),
       threads_(threads),
-      boards_(std::make_unique<BoardDetector>(config.board)) {}
-Unit::~Unit() = default;
+      boards_(config.board, config.frontend, config.type.imager_px) {}
 
 void Unit::reread(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
@@ -48,11 +51,11 @@ void Unit::reread(StationStep step) {
 
 /// At the images whose inclination is told otherwise by now. They were counted when they came.
 void Unit::look_again(StationStep step) {
-  const LevelsOfImages levels = levels_of(step);
+  const LevelRotations levels = levels_of(step);
   UnitStep& state = at(step);
   std::vector<fs::path> again;
   for (const auto& [name, image] : state.images) {
-    if (!image.discarded && level_in(levels, name) != image.level) again.push_back(image.file);
+    if (!image.discarded && level_in(levels, name) != image.level) again.push_back(image.seen.file);
   }
   if (again.empty() || !calibration_before(step)) return;
   const int refused = state.refused_together;
@@ -107,7 +110,7 @@ bool Unit::hopeless() const {
   const auto step = current();
   if (!step) return false;
   const UnitStep& state = this->step(*step);
-  if (state.refused_in_a_row >= config_.refuse.in_a_row) return true;
+  if (state.refused_in_a_row >= config_.max_rejected_in_a_row) return true;
   const bool stuck = state.enough && state.result && !state.result->ok();
   if (!stuck || *step == StationStep::boards) return false;
   const auto frames = frames_of(state);
@@ -138,12 +141,12 @@ void Unit::count_refusals(StationStep step) {
 }
 
 /// Of the captures whose inclination is told, but for those of the turn, whose axis is level.
-LevelsOfImages Unit::levels_of(StationStep step) const {
+LevelRotations Unit::levels_of(StationStep step) const {
   if (step != StationStep::dispersion && step != StationStep::check) return {};
   const auto calibration = calibration_before(step);
   if (!calibration) return {};
   try {
-    return levels_told(captures_table(this->step(step).folder), *calibration, 0);
+    return level_rotations(captures_table(this->step(step).folder), *calibration, 0);
   } catch (const InputError&) {  // the step will say so
     return {};
   }
@@ -151,38 +154,35 @@ LevelsOfImages Unit::levels_of(StationStep step) const {
 
 void Unit::look(StationStep step, const std::vector<fs::path>& files) {
   std::vector<UnitImage> images(files.size());
-  std::optional<LightDetector> lamps;
+  const LevelRotations levels = levels_of(step);
+  std::optional<LampIntake> lamps;
   if (step != StationStep::boards) {
-    lamps.emplace(config_.lamps, detector_camera(*calibration_before(step)));
+    lamps.emplace(LightDetector(config_.lamps, detector_camera(*calibration_before(step))),
+                  use_of(step), config_.frontend, config_.type.imager_px, levels);
   }
-  const LevelsOfImages levels = levels_of(step);
   images_in_parallel(files.size(), threads_, [&](std::size_t i) {
-    if (!lamps) {
-      images[i] = look_at_board(files[i], config_, *boards_);
-      return;
-    }
-    const std::string name = files[i].filename().string();
-    const auto leaning = leaning_detector(*lamps, levels, name);
-    images[i] = look_at_lamps(files[i], config_, leaning ? *leaning : *lamps);
-    images[i].level = level_in(levels, name);
+    images[i] = observe_unit_image(files[i], [&](const SourceImage& source) {
+      return lamps ? lamps->observe(source) : boards_.observe(source);
+    });
+    images[i].level = level_in(levels, images[i].seen.name());
   });
   for (UnitImage& image : images) {
     const std::string owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : "";
-    if (!owner.empty()) image.refused = "already of " + owner;
-    at(step).last = image.file.filename().string();
+    if (!owner.empty()) {
+      image.seen.reject(RejectionReason::used_elsewhere, "already of " + owner);
+    }
+    at(step).last = image.seen.name();
     take(step, std::move(image));
   }
 }
 
 void Unit::take(StationStep step, UnitImage image) {
   UnitStep& state = at(step);
-  const std::string name = image.file.filename().string();
+  const std::string name = image.seen.name();
   drop(step, name);  // it was overwritten
-  if (image.refused.empty()) {
-    std::tie(image.superfluous, image.refused) = superfluity(step, image);
-  }
-  const bool used = image.refused.empty();
-  const bool fault = !used && image.superfluous == Superfluous::no && !state.done();
+  if (image.is_used()) reject_redundant(step, image);
+  const bool used = image.is_used();
+  const bool fault = !used && !image.is_redundant() && !state.done();
   state.refused_together += fault ? 1 : 0;
   state.used_together = state.used_together || used;
   state.images.emplace(name, std::move(image));
@@ -191,26 +191,21 @@ void Unit::take(StationStep step, UnitImage image) {
   forget_after(step);
 }
 
-/// Whether and why a good image is not needed.
-std::pair<Superfluous, std::string> Unit::superfluity(StationStep step,
-                                                      const UnitImage& image) const {
+/// Rejects a good image that is not needed: one of the same content, of any step, or that shows
+/// what one of the step shows, or any if the step has enough.
+void Unit::reject_redundant(StationStep step, UnitImage& image) const {
   for (const UnitStep& any : steps_) {
-    for (const auto& [name, other] : any.images) {
-      if (!other.refused.empty() || other.sha256 != image.sha256) continue;
-      return {Superfluous::same_pose, "same image as " + name};
+    for (const UnitImage* other : used_images(any)) {
+      if (image.sha256.empty() || other->sha256 != image.sha256) continue;
+      return image.seen.reject(RejectionReason::same_image,
+                               "is the same image as " + other->seen.name());
     }
   }
-  const double near_px = config_.refuse.same_pose_share * config_.type.imager_px[0];
-  for (const auto& [name, other] : this->step(step).images) {
-    if (!other.refused.empty()) continue;
-    const bool same =
-        step == StationStep::boards
-            ? same_pose(image.view->seen, other.view->seen, near_px)
-            : step == StationStep::rotation && same_lamps(image.lamps, other.lamps, near_px);
-    if (same) return {Superfluous::same_pose, "same pose as " + name};
-  }
-  if (!this->step(step).done()) return {Superfluous::no, ""};
-  return {Superfluous::enough, "not needed: the step has enough"};
+  Selection selection(use_of(step), config_.frontend);
+  for (const UnitImage* other : used_images(this->step(step))) selection.keep(other->seen);
+  selection.add(image.seen);
+  if (!image.is_used() || !this->step(step).done()) return;
+  image.seen.reject(RejectionReason::not_needed, "not needed: the step has enough");
 }
 
 /// Takes an image out of its step, and with it what rests on it; those that it stood in the way of
@@ -219,20 +214,18 @@ void Unit::drop(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   const auto image = state.images.find(name);
   if (image == state.images.end()) return;
-  const bool used = image->second.refused.empty();
+  const bool used = image->second.is_used();
   state.images.erase(image);
   if (!used) return;
   state.result.reset();
   forget_after(step);
   std::vector<UnitImage> again;
   for (const auto& [other, known] : state.images) {
-    if (known.superfluous != Superfluous::no) again.push_back(known);
+    if (known.is_redundant()) again.push_back(known);
   }
-  std::erase_if(state.images,
-                [](const auto& known) { return known.second.superfluous != Superfluous::no; });
+  std::erase_if(state.images, [](const auto& known) { return known.second.is_redundant(); });
   for (UnitImage& known : again) {
-    known.refused.clear();
-    known.superfluous = Superfluous::no;
+    known.seen.rejection.reset();
     take(step, std::move(known));
   }
 }
@@ -247,9 +240,9 @@ void Unit::remove(StationStep step, const std::string& name) {
 void Unit::discard(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   const auto image = state.images.find(name);
-  if (image == state.images.end() || image->second.refused.empty()) return;
+  if (image == state.images.end() || image->second.is_used()) return;
   state.refused_in_a_row = 0;
-  if (image->second.superfluous != Superfluous::no) {
+  if (image->second.is_redundant()) {
     state.images.erase(image);
   } else {
     image->second.discarded = true;
@@ -262,7 +255,7 @@ void Unit::forget_after(StationStep step) {
     if (later <= step) continue;
     UnitStep& state = at(later);
     for (const auto& [name, image] : state.images) {
-      if (!image.discarded) state.waiting.push_back(image.file);
+      if (!image.discarded) state.waiting.push_back(image.seen.file);
     }
     std::erase_if(state.images, [](const auto& image) { return !image.second.discarded; });
     state.result.reset();
@@ -276,7 +269,7 @@ bool Unit::has_enough(StationStep step) const {
   switch (step) {
     case StationStep::boards:
       return state.used() >= enough.board_views &&
-             board_coverage(state, config_.type.imager_px) >= enough.board_coverage;
+             board_coverage(state, config_.type.imager_px).fraction() >= enough.board_coverage;
     case StationStep::rotation:
       return turn_map(frames_of(state), config_, *calibration_before(step)).enough;
     case StationStep::dispersion:
@@ -298,7 +291,7 @@ StepResult Unit::solve(StationStep step, bool all_in) const {
   try {
     switch (step) {
       case StationStep::boards:
-        result = solve_boards(config_, camera_id_, views_of(state, config_.board));
+        result = solve_boards(config_, camera_id_, observations_of(state));
         break;
       case StationStep::rotation:
         result = solve_rotation(config_, before, frames_of(state));
@@ -326,7 +319,7 @@ StepResult Unit::solve(StationStep step, bool all_in) const {
 HistoryEntry Unit::history_of(StationStep step) const {
   std::string digests;
   for (const auto& [name, image] : this->step(step).images) {
-    if (image.refused.empty()) digests += fmt::format("{}  {}\n", image.sha256, name);
+    if (image.is_used()) digests += fmt::format("{}  {}\n", image.sha256, name);
   }
   return {"",
           program_.program,

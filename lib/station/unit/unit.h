@@ -5,14 +5,14 @@
 #include <array>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "detection/detect_captures.h"
 #include "evaluation/gate.h"
+#include "frontend/board_intake.h"
+#include "frontend/lamp_intake.h"
 #include "session/step_history.h"
 #include "station/unit/station_step.h"
 #include "station/unit/unit_step.h"
@@ -27,7 +27,6 @@ class Unit {
  public:
   /// `config` outlives it.
   Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads);
-  ~Unit();
   Unit(const Unit&) = delete;
   Unit& operator=(const Unit&) = delete;
 
@@ -82,11 +81,11 @@ class Unit {
   static std::size_t index(StationStep step) { return static_cast<std::size_t>(step); }
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
   void look(StationStep step, const std::vector<std::filesystem::path>& files);
-  LevelsOfImages levels_of(StationStep step) const;
+  LevelRotations levels_of(StationStep step) const;
   void look_again(StationStep step);
   void take(StationStep step, UnitImage image);
   void count_refusals(StationStep step);
-  std::pair<Superfluous, std::string> superfluity(StationStep step, const UnitImage& image) const;
+  void reject_redundant(StationStep step, UnitImage& image) const;
   void drop(StationStep step, const std::string& name);
   void forget_after(StationStep step);
   bool has_enough(StationStep step) const;
@@ -100,7 +99,7 @@ class Unit {
   int threads_;
   std::string ended_ = {}, distrusted_ = {};
   std::function<std::string(const std::string&)> owner_ = {};
-  std::unique_ptr<BoardDetector> boards_;
+  BoardIntake boards_;
   std::array<UnitStep, 4> steps_;
 };
 

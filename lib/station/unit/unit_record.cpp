@@ -20,7 +20,7 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
   record.judge(find_causes(unit));
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
-      std::string refused = image.refused;
+      std::string refused = image.refusal();
       if (image.discarded) refused.append(" (not kept)");
       record.images.push_back({.step = name_of(step),
                                .name = name,

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "calibration/intrinsics/image_coverage.h"
 #include "captures/detections_table.h"
-#include "rig/board.h"
 #include "session/step_result.h"
 #include "station/unit/step_picture.h"
 #include "station/unit/unit_image.h"
@@ -43,17 +43,18 @@ struct UnitStep {
   int used() const;
 };
 
-/// The views that are used, by name, behind the tone curve that they call for together
-/// (take_common_curve()).
-std::vector<BoardView> views_of(const UnitStep& boards, const Board& board);
-/// The frames of the images that are used, by name.
+/// Returns the observations of the images, by name.
+Observations observations_of(const UnitStep& step);
+/// Returns the frames of the images that are used, by name.
 std::vector<Frame> frames_of(const UnitStep& step);
+/// Returns the images that are used, by name.
+std::vector<const UnitImage*> used_images(const UnitStep& step);
 
-/// Share of 8 x 6 parts of the image in which the views have corners.
-double board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px);
+/// Counts the corners of the views that are used in the parts of the image.
+ImageCoverage board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px);
 
-/// Median blur of the views that are used once there are enough; before, of all that show a board,
-/// refused ones too: a blurred lens has no others.
+/// Returns the median blur of the views that are used, once there are enough; before, that of all
+/// views, rejected ones too, because a blurred lens has no others.
 std::optional<double> typical_blur_px(const UnitStep& boards);
 
 }  // namespace vlp

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
-#include <map>
 #include <string>
 #include <utility>
 
@@ -28,58 +27,48 @@ void append(std::vector<Cause>& causes, std::vector<Cause> more) {
 
 bool is_solved(const UnitStep& state) { return state.result && state.result->ok(); }
 
-/// A reason in the plural, without figures and names.
-std::string kind_of(const UnitImage& image) {
-  if (image.superfluous == Superfluous::same_pose) return "the same pose again";
-  return image.refused.substr(0, image.refused.find(':'));
-}
-
-/// What became of the images of a step that did not come to its end.
+/// Rejected images of a step that did not end well.
 struct Refusals {
-  /// "12 of 36 images refused: 10 blurred, 2 too dark"; empty when most are used.
+  /// "12 of 36 images refused: 10 blurred, 2 too dark"; empty if most are used.
   std::string text = {};
-  /// More are blurred than all else, so many that it is not a shaky hand.
-  bool blurred = false;
+  /// True if most are blurred, and so many that the operator's hand cannot be the reason.
+  bool are_blurred = false;
 };
 
 /// Returns the number of images from which on a fault is the camera's; fewer may be an accident.
 int min_images_to_blame(const StationConfig& config) {
-  return std::min(config.refuse.in_a_row, (config.enough.board_views + 1) / 2);
+  return std::min(config.max_rejected_in_a_row, (config.enough.board_views + 1) / 2);
 }
 
-Refusals refusals(const UnitStep& state, const StationConfig& config) {
-  std::map<std::string, int> reasons;
-  int refused = 0;
+Refusals find_refusals(const UnitStep& state, const StationConfig& config) {
+  std::vector<Observation> rejected;
   for (const auto& [name, image] : state.images) {
-    if (image.refused.empty() || image.superfluous == Superfluous::enough) continue;
-    ++refused;
-    ++reasons[kind_of(image)];
+    if (image.is_used() || image.seen.rejection->reason == RejectionReason::not_needed) continue;
+    rejected.push_back({image.seen.file});
+    rejected.back().rejection = image.seen.rejection;
   }
-  if (refused == 0 || refused < state.used()) return {};
-  std::string text;
-  for (const auto& [reason, count] : reasons) {
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, reason);
-  }
-  const int blurred = reasons.contains("blurred") ? reasons.at("blurred") : 0;
-  const auto most = [&](const char* reason) {
-    return reasons.contains(reason) && 2 * reasons.at(reason) > refused;
-  };
-  if (most("too dark")) text += ": more exposure, gain or light";
-  if (most("overexposed")) text += ": less exposure, gain or light";
-  return {fmt::format("{} of {} images refused: {}", refused, state.images.size(), text),
-          2 * blurred > refused && blurred >= min_images_to_blame(config)};
+  if (rejected.empty() || std::cmp_less(rejected.size(), state.used())) return {};
+  const auto blurred = std::count_if(
+      rejected.begin(), rejected.end(),
+      [](const Observation& image) { return image.rejection->reason == RejectionReason::blurred; });
+  return {fmt::format("{} of {} images refused: {}", rejected.size(), state.images.size(),
+                      summarize_rejections(rejected)),
+          2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame(config)};
 }
 
 /// Returns that the lights of refused images are the lamps with another row time; empty otherwise.
 std::string find_row_time_fault(const UnitStep& state, const StationConfig& config) {
+  const double row_time_s = config.type.row_time_s.value_or(0);
   std::vector<double> frequencies_hz;
   for (const auto& [name, image] : state.images) {
-    if (image.refused.empty()) continue;
-    frequencies_hz.insert(frequencies_hz.end(), image.unknown_hz.begin(), image.unknown_hz.end());
+    if (image.is_used()) continue;
+    for (const Light& light : image.seen.lights) {
+      if (light.kind != LightKind::unknown || light.reason != LightReason::unknown_period) continue;
+      frequencies_hz.push_back(1 / (light.stripes.period_lines * row_time_s));
+    }
   }
   constexpr std::size_t min_lights = 6;
   if (frequencies_hz.size() < min_lights) return "";
-  const double row_time_s = config.type.row_time_s.value_or(0);
   const auto found_s = row_time_that_fits(frequencies_hz, config.lamps, row_time_s);
   if (!found_s) return "";
   constexpr double microseconds = 1e6;
@@ -98,10 +87,10 @@ std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
     causes.push_back({std::move(fault)});
   }
   const std::string count = count_of(unit, step);
-  const Refusals refused = refusals(state, unit.config());
+  const Refusals refused = find_refusals(state, unit.config());
   if (!refused.text.empty()) {
     causes.push_back(
-        {fmt::format("{} ({}): {}", name_of(step), count, refused.text), refused.blurred});
+        {fmt::format("{} ({}): {}", name_of(step), count, refused.text), refused.are_blurred});
   }
   const bool failed = state.result && !state.result->ok() && state.used() > 0;
   if (failed) causes.push_back({fmt::format("{}: {}", name_of(step), state.result->why)});
@@ -141,7 +130,7 @@ std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
 /// Returns true if most of the board images show another board.
 bool is_other_board(const UnitStep& boards) {
   const auto other = std::count_if(boards.images.begin(), boards.images.end(), [](const auto& i) {
-    return i.second.view && !i.second.view->seen.foreign.empty();
+    return i.second.seen.board && !i.second.seen.board->seen.foreign.empty();
   });
   return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
 }
@@ -150,7 +139,7 @@ bool is_other_board(const UnitStep& boards) {
 bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
   return boards.enough ||
          std::count_if(boards.images.begin(), boards.images.end(), [](const auto& image) {
-           return image.second.blur_px.has_value();
+           return image.second.seen.blur_px.has_value();
          }) >= min_images_to_blame(config);
 }
 

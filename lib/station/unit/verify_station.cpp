@@ -5,13 +5,15 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 
-#include "detection/detect_captures.h"
-#include "detection/image_file.h"
-#include "detection/images_in_parallel.h"
+#include "frontend/board_intake.h"
+#include "frontend/image_file.h"
+#include "frontend/images_in_parallel.h"
+#include "frontend/lamp_intake.h"
+#include "frontend/selection.h"
 #include "rig/input_error.h"
-#include "session/leaning_captures.h"
 #include "session/session_folder.h"
 #include "station/unit/lamp_faults.h"
 #include "station/unit/station_step.h"
@@ -24,15 +26,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-template <typename Look>
-UnitStep step_of(const fs::path& folder, int threads, const Look& look) {
+/// Observes the images of a folder and rejects the repeated ones.
+UnitStep observe_folder(const fs::path& folder, int threads, ImageUse use,
+                        const FrontendOptions& options,
+                        const std::function<Observation(const SourceImage&)>& observe) {
   const auto files = images_in(folder);
   std::vector<UnitImage> images(files.size());
-  images_in_parallel(files.size(), threads, [&](std::size_t i) { images[i] = look(files[i]); });
+  images_in_parallel(files.size(), threads,
+                     [&](std::size_t i) { images[i] = observe_unit_image(files[i], observe); });
   UnitStep step;
   step.folder = folder;
+  Selection selection(use, options);
   for (UnitImage& image : images) {
-    std::string name = image.file.filename().string();
+    selection.add(image.seen);
+    std::string name = image.seen.name();
     step.images.emplace(std::move(name), std::move(image));
   }
   return step;
@@ -46,23 +53,21 @@ class Verification {
   }
 
   void boards() {
-    const BoardDetector detector(config_.board);
-    UnitStep step = step_of(folder_ / "boards", threads_, [&](const fs::path& file) {
-      return look_at_board(file, config_, detector);
-    });
-    const auto views = views_of(step, config_.board);
-    if (!views.empty()) add("boards", solve_boards(config_, golden_.camera_id, views));
+    const BoardIntake intake(config_.board, config_.frontend, config_.type.imager_px);
+    UnitStep step = observe_folder(folder_ / "boards", threads_, ImageUse::boards, config_.frontend,
+                                   [&](const SourceImage& image) { return intake.observe(image); });
+    if (step.used() > 0)
+      add("boards", solve_boards(config_, golden_.camera_id, observations_of(step)));
     note(StationStep::boards, step);
   }
 
   void lamps(StationStep each) {
-    const LightDetector detector(config_.lamps, detector_camera(golden_.calibration));
     const fs::path folder = folder_ / name_of(each);
-    const auto levels = levels_told(captures_table(folder), golden_.calibration, 0);
-    UnitStep step = step_of(folder, threads_, [&](const fs::path& file) {
-      const auto leaning = leaning_detector(detector, levels, file.filename().string());
-      return look_at_lamps(file, config_, leaning ? *leaning : detector);
-    });
+    const LampIntake intake(LightDetector(config_.lamps, detector_camera(golden_.calibration)),
+                            ImageUse::places, config_.frontend, config_.type.imager_px,
+                            level_rotations(captures_table(folder), golden_.calibration, 0));
+    UnitStep step = observe_folder(folder, threads_, ImageUse::places, config_.frontend,
+                                   [&](const SourceImage& image) { return intake.observe(image); });
     const auto frames = frames_of(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = captures_in(step.folder);
@@ -123,8 +128,10 @@ class Verification {
   }
   void note(StationStep each, const UnitStep& step) {
     for (const auto& [name, image] : step.images) {
-      images_.push_back(
-          {.step = name_of(each), .name = name, .sha256 = image.sha256, .refused = image.refused});
+      images_.push_back({.step = name_of(each),
+                         .name = name,
+                         .sha256 = image.sha256,
+                         .refused = image.refusal()});
     }
   }
 

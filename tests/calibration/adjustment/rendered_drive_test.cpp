@@ -9,7 +9,7 @@
 
 #include "calibration/adjustment/adjustment.h"
 #include "calibration/levelling/levelling.h"
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "geometry/angles.h"
 #include "lamps/light_detector.h"
 #include "simulation/exposure.h"

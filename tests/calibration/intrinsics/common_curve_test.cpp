@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/intrinsics/lens_estimate.h"
 #include "calibration/intrinsics/synthetic_views.h"
 #include "detection/boards/tone_curve.h"
 #include "support/random.h"
@@ -152,6 +153,28 @@ TEST(CommonCurve, IsTakenOnce) {
   const auto once = views[0].seen.tags[0].corners_px;
   EXPECT_EQ(take_common_curve(views, synthetic_board(false)), 1);
   EXPECT_EQ(views[0].seen.tags[0].corners_px, once);
+}
+
+TEST(EstimateLens, AppliesTheCurveOfAllViews) {
+  const Board board = synthetic_board(false);
+  const std::vector<BoardView> views = CodedCamera{1.8, 1.8}.views(12, 3);
+  std::vector<BoardView> expected = views;
+  const double gamma = take_common_curve(expected, board);
+  LensViews input;
+  input.views = views;
+  input.board = board;
+  const LensEstimate lens = estimate_lens(input);
+  ASSERT_TRUE(lens.ok()) << lens.problem;
+  EXPECT_NEAR(lens.gamma, 1.8, 0.1);
+  EXPECT_EQ(lens.gamma, gamma);
+  ASSERT_EQ(lens.views.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    ASSERT_EQ(lens.views[i].seen.tags.size(), expected[i].seen.tags.size());
+    for (std::size_t k = 0; k < expected[i].seen.tags.size(); ++k) {
+      EXPECT_EQ(lens.views[i].seen.tags[k].corners_px, expected[i].seen.tags[k].corners_px);
+    }
+  }
+  EXPECT_NE(expected[0].seen.tags[0].corners_px, views[0].seen.tags[0].corners_px);
 }
 
 }  // namespace

@@ -12,8 +12,8 @@
 #include <stdexcept>
 
 #include "captures/csv_reader.h"
-#include "detection/boards/detect_boards.h"
-#include "detection/image_file.h"
+#include "detection/boards/board_view.h"
+#include "frontend/image_file.h"
 #include "support/real_data.h"
 
 namespace vlp {
@@ -116,24 +116,6 @@ TEST_P(RenderedBoard, IsNotFoundInImagesOfARowOrTwo) {
   }
 }
 
-TEST_P(RenderedBoard, IsTheSameWhateverTheThreads) {
-  const BoardDetector detector(board);
-  const std::vector<fs::path> images(6, rig / "sample-boards/0000.png");
-  std::size_t most = 0;
-  ImageSource source(images);
-  const auto four = detect_boards(detector, source, 4, {}, [&](std::size_t n) { most = n; });
-  EXPECT_EQ(most, images.size());
-  const SeenBoard one = detector.detect(image);
-  ASSERT_EQ(four.views.size(), images.size());
-  for (const BoardView& view : four.views) {
-    ASSERT_EQ(view.seen.tags.size(), one.tags.size());
-    for (std::size_t i = 0; i < one.tags.size(); ++i) {
-      EXPECT_EQ(view.seen.tags[i].id, one.tags[i].id);
-      EXPECT_EQ(view.seen.tags[i].corners_px, one.tags[i].corners_px);
-    }
-  }
-}
-
 INSTANTIATE_TEST_SUITE_P(Boards, RenderedBoard, testing::Values("paper-rig", "paper-rig-faulty"));
 
 TEST(BoardDetector, RefusesAFamilyThatArucoLacks) {
@@ -146,9 +128,8 @@ TEST(BoardDetector, RefusesAFamilyThatArucoLacks) {
 std::map<std::size_t, int> images_by_tags(const fs::path& folder, const fs::path& board) {
   std::map<std::size_t, int> counts;
   const BoardDetector detector(read_board(board));
-  ImageSource images(images_in(folder));
-  for (const auto& view : detect_boards(detector, images, 2, {}, [](auto) {}).views) {
-    ++counts[view.seen.tags.size()];
+  for (const fs::path& image : images_in(folder)) {
+    ++counts[detector.detect(read_image(image)).tags.size()];
   }
   return counts;
 }

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "support/random.h"
 
 namespace vlp {

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/image/runs.h"
 #include "lamps/rendered_captures.h"
 #include "support/random.h"

@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 
 namespace vlp {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 
 namespace vlp {
 

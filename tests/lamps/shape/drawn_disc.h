@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/shape/outline.h"
 
 namespace vlp {

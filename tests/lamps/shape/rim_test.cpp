@@ -9,7 +9,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "lamps/light_detector.h"
 

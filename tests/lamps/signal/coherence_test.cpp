@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "support/random.h"
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/signal/stripes.h"
 
 namespace vlp {

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/drawn_lamp.h"
 
 namespace vlp {

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
-#include "detection/mat_view.h"
+#include "frontend/mat_view.h"
 #include "lamps/drawn_lamp.h"
 #include "support/random.h"
 

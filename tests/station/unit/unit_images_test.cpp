@@ -33,9 +33,7 @@ struct UnitImages : testing::Test {
     unit.add(StationStep::boards, {file});
   }
   const UnitStep& boards() const { return unit.step(StationStep::boards); }
-  const std::string& refusal(const std::string& name) const {
-    return boards().images.at(name).refused;
-  }
+  std::string refusal(const std::string& name) const { return boards().images.at(name).refusal(); }
 
   StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   TemporaryFolder folder;
@@ -46,11 +44,11 @@ TEST_F(UnitImages, ThatShowTheSameGetTheirTurnWhenTheFirstGoes) {
   come("a.png", true);
   come("b.png", true);
   EXPECT_EQ(refusal("a.png"), "");
-  EXPECT_EQ(refusal("b.png"), "same image as a.png");
+  EXPECT_EQ(refusal("b.png"), "is the same image as a.png");
   unit.remove(StationStep::boards, "a.png");
   EXPECT_EQ(refusal("b.png"), "");
   come("a.png", true);
-  EXPECT_EQ(refusal("a.png"), "same image as b.png");
+  EXPECT_EQ(refusal("a.png"), "is the same image as b.png");
 }
 
 TEST_F(UnitImages, ThatAreOverwrittenCountNoMore) {
@@ -81,6 +79,13 @@ TEST_F(UnitImages, OfACameraThatAreRefusedStayAsRefusals) {
   EXPECT_THAT(find_causes(unit),
               ElementsAre(testing::Field(&Cause::text, AllOf(HasSubstr("boards (0/1)"),
                                                              HasSubstr("2 of 2 images refused")))));
+}
+
+TEST_F(UnitImages, AreRejectedIfTheyCannotBeRead) {
+  fs::create_directory(folder / "a.png");
+  unit.add(StationStep::boards, {folder / "a.png", folder / "gone.png"});
+  EXPECT_EQ(refusal("a.png"), "cannot be read as an image");
+  EXPECT_EQ(refusal("gone.png"), "cannot be read as an image");
 }
 
 }  // namespace

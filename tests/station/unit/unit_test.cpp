@@ -43,7 +43,7 @@ TEST_F(UnitTest, BeginsWithTheBoards) {
 }
 
 TEST_F(UnitTest, IsHopelessAfterSoManyBadImagesInARow) {
-  for (int i = 0; i < config.refuse.in_a_row; ++i) {
+  for (int i = 0; i < config.max_rejected_in_a_row; ++i) {
     EXPECT_FALSE(unit.hopeless()) << i;
     add_bad(i);
   }
@@ -64,7 +64,7 @@ TEST_F(UnitTest, IsNotHopelessForTheOrderOfNames) {
   const auto good = folder / "000.png";
   fs::copy_file(kView, good);
   std::vector<fs::path> together{good};
-  for (int i = 0; i < config.refuse.in_a_row + 1; ++i) {
+  for (int i = 0; i < config.max_rejected_in_a_row + 1; ++i) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
   }
   // In two parts, as the station takes them.
@@ -74,13 +74,13 @@ TEST_F(UnitTest, IsNotHopelessForTheOrderOfNames) {
   EXPECT_FALSE(unit.hopeless());
   EXPECT_EQ(unit.step(StationStep::boards).refused_in_a_row, 0);
   // One by one their order is known.
-  for (int i = 0; i < config.refuse.in_a_row; ++i) add_bad(100 + i);
+  for (int i = 0; i < config.max_rejected_in_a_row; ++i) add_bad(100 + i);
   EXPECT_TRUE(unit.hopeless());
 }
 
 TEST_F(UnitTest, IsHopelessWhenAllThatIsThereIsBad) {
   std::vector<fs::path> together;
-  for (int i = 0; i < config.refuse.in_a_row; ++i) {
+  for (int i = 0; i < config.max_rejected_in_a_row; ++i) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
   }
   unit.add(StationStep::boards, together);
@@ -107,7 +107,7 @@ TEST_F(UnitTest, TakesNoImageOfAnother) {
   unit.refuse_images_of_others([](const std::string&) { return "camera 0001: run R"; });
   fs::copy_file(kView, folder / "0.png");
   unit.add(StationStep::boards, {folder / "0.png"});
-  EXPECT_EQ(unit.step(StationStep::boards).images.at("0.png").refused,
+  EXPECT_EQ(unit.step(StationStep::boards).images.at("0.png").refusal(),
             "already of camera 0001: run R");
   unit.advance(true);
   EXPECT_THAT(find_causes(unit),

@@ -1,0 +1,332 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/lens_estimate.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/common_curve.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/projection_uncertainty.h"
+#include "calibration/intrinsics/spline_fit.h"
+#include "camera/spline_surface.h"
+#include "geometry/angles.h"
+#include "geometry/median.h"
+#include "geometry/polygon.h"
+
+namespace vlp {
+namespace {
+
+/// Residual above which a lens does not fit, per axis.
+constexpr double kMaxFit_px = 2;
+
+/// The views in the solve, and those that are held out.
+struct SplitViews {
+  IntrinsicsInput solved, held_out;
+};
+
+SplitViews split_views(const LensViews& input, LensEstimate& result) {
+  const IntrinsicsInput empty{BoardLattice(input.board),
+                              {},
+                              input.views.front().imager_px,
+                              input.lens_model,
+                              possible_warp(input.board, input.warp)};
+  SplitViews split{empty, empty};
+  int count = 0;
+  for (const BoardView& view : result.views) {
+    ++count;
+    const bool is_held_out = input.held_out > 0 && count % input.held_out == 0;
+    auto& part = is_held_out ? split.held_out : split.solved;
+    part.views.push_back(empty.lattice.corners(view.seen));
+    if (!is_held_out) result.images.push_back(view.image);
+  }
+  if (input.held_out > 0 && split.held_out.views.empty()) {
+    result.warnings.push_back(fmt::format("of {} views none is held out: there are fewer than {}",
+                                          count, input.held_out));
+  }
+  return split;
+}
+
+void fail(LensEstimate& result, LensStatus status, std::string problem) {
+  result.status = status;
+  result.problem = std::move(problem);
+}
+
+void fail_undetermined(LensEstimate& result, const SplitViews& views, const std::string& problem) {
+  fail(result, LensStatus::undetermined,
+       fmt::format("{} views with the board: {}", views.solved.views.size(), problem));
+}
+
+/// Distance from the axis, in the stereographic plane of OPENCV_FISHEYE, at which boards are seen.
+struct BoardReach {
+  Eigen::Vector2d farthest{0, 0};
+  /// Number of boards that lie within the grid with all of their corners; number of boards.
+  std::size_t boards_within = 0, boards = 0;
+};
+
+BoardReach measure_reach(const IntrinsicsSolution& fisheye, const Eigen::Vector2d& grid_reach) {
+  const Lens lens = fisheye.lens();
+  const BoardProblem& problem = fisheye.problem;
+  const std::size_t points = problem.points_of_a_board();
+  BoardReach reach;
+  for (std::size_t board = 0; board < problem.poses.size(); ++board) {
+    Eigen::Vector2d board_reach(0, 0);
+    for (std::size_t i = board * points; i < (board + 1) * points; ++i) {
+      if (!(problem.points[i].z() > 0)) continue;
+      const auto ray = lens.unproject(problem.points[i].head<2>());
+      if (!ray) continue;
+      const Eigen::Vector3d& x = ray->direction;
+      board_reach = board_reach.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
+    }
+    reach.farthest = reach.farthest.cwiseMax(board_reach);
+    ++reach.boards;
+    if ((board_reach.array() <= grid_reach.array()).all()) ++reach.boards_within;
+  }
+  return reach;
+}
+
+/// Returns why the grid of a splined lens does not suit the views, by OPENCV_FISHEYE: more than a
+/// tenth of the boards (a board of four parts counts four times) reach beyond it, where solves
+/// fail, some after a minute; or it has too few control points where the lens sees. Else empty.
+std::string explain_unsuitable_grid(IntrinsicsInput input) {
+  constexpr double margin = 1.05;
+  const LensModel splined = input.lens_model;
+  const SplineGrid grid = grid_of(input.lens_model);
+  input.lens_model = LensModel::fisheye;
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  if (!solution.ok() || solution.rms_px > kMaxFit_px) return "";
+  const Eigen::Vector2d grid_reach =
+      SplineSurface(grid, std::vector<double>(2 * grid.control_points())).reach();
+  const BoardReach reach = measure_reach(solution, grid_reach);
+  if (10 * reach.boards_within >= 9 * reach.boards) {
+    const Lens lens = solution.lens();
+    const auto core = core_like(lens, seen_px(solution.problem));
+    return splined_like(lens, input.imager_px, splined, core)
+               ? ""
+               : why_too_coarse(lens, input.imager_px, splined, core);
+  }
+  const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
+  return fmt::format(
+      "the control points of {} reach {:.0f} degrees off the axis to the sides and {:.0f} up and "
+      "down, but the board is seen {:.0f} and {:.0f} degrees off: take --lens {}",
+      name_of(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
+      angle_deg(reach.farthest.x()), angle_deg(reach.farthest.y()),
+      name_of(reaching(grid, grid_reach.cwiseMax(margin * reach.farthest))));
+}
+
+std::string recommend_model(LensModel requested, const IntrinsicsSolution& other) {
+  const std::string name(name_of(other.problem.lens_model));
+  return fmt::format("no lens of {} is found, but {} fits to {:.2f} px: take --lens {}",
+                     name_of(requested), name, other.rms_px, name);
+}
+
+/// Returns why no lens of the model fits: the model, if another one fits; else empty.
+std::string explain_no_fit(IntrinsicsInput input, const std::optional<FisheyeFit>& fisheye) {
+  const LensModel requested = input.lens_model;
+  std::string problem = fisheye ? recommend_model(requested, fisheye->solution) : "";
+  double best_px = fisheye ? fisheye->solution.rms_px : kMaxFit_px;
+  for (const LensModel other : {LensModel::opencv4, LensModel::opencv8, LensModel::fisheye}) {
+    if (other == requested || (other == LensModel::fisheye && fisheye)) continue;
+    input.lens_model = other;
+    const IntrinsicsSolution solution = solve_intrinsics(input);
+    if (!solution.ok() || solution.rms_px >= best_px) continue;
+    best_px = solution.rms_px;
+    problem = recommend_model(requested, solution);
+  }
+  return problem;
+}
+
+bool is_opencv(LensModel model) {
+  return model == LensModel::opencv4 || model == LensModel::opencv5 ||
+         model == LensModel::opencv8 || model == LensModel::opencv12;
+}
+
+/// Returns true if the residuals of a lens are as small as those of another, up to 20 times their
+/// mean square, as for the warp.
+bool fits_as_well(const IntrinsicsSolution& lens, const IntrinsicsSolution& other) {
+  constexpr double max_excess = 20;
+  const double ratio = lens.rms_px / other.rms_px;
+  return ratio * ratio <= 1 + max_excess / (2.0 * other.corners);
+}
+
+/// Raises the largest uncertainty to the difference between two lenses that fit equally well, where
+/// the lens is known.
+void include_difference(const Lens& lens, const Lens& other, const std::array<int, 2>& imager_px,
+                        CalibrationReport& report) {
+  std::vector<Eigen::Vector2d> pixels = pixel_grid(imager_px);
+  std::erase_if(pixels, [&](const auto& pixel) { return !polygon_contains(report.region, pixel); });
+  const auto lens_from_other = b_from_a(other, lens, pixels);
+  if (!lens_from_other) return;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const auto ray = other.unproject(pixel);
+    const auto seen = ray ? lens.project(*lens_from_other * ray->direction) : std::nullopt;
+    const double apart_px = seen ? (*seen - pixel).norm() : std::numeric_limits<double>::infinity();
+    report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, apart_px);
+  }
+}
+
+/// Recommends OPENCV_FISHEYE if it fits clearly better, or if the board is seen nearly as far off
+/// the axis as the rays of the lens reach.
+void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
+  constexpr double max_ratio = 0.95, min_angle_rad = 1.3;
+  const IntrinsicsSolution& solution = result.solution;
+  const LensModel model = solution.problem.lens_model;
+  if (fisheye.solution.rms_px > max_ratio * solution.rms_px &&
+      fisheye.farthest_rad < min_angle_rad) {
+    result.details.push_back(
+        fmt::format("{} fits the views as well as {}, so that nothing is known beyond the corners",
+                    name_of(LensModel::fisheye), name_of(model)));
+    return;
+  }
+  result.better_model = LensModel::fisheye;
+  result.warnings.push_back(fmt::format(
+      "the board is seen up to {:.0f} degrees off the axis, and {} fits it to {:.3f} px, {} to "
+      "{:.3f} px, with no rays from 90 degrees on: take --lens {}",
+      deg_from_rad(fisheye.farthest_rad), name_of(LensModel::fisheye), fisheye.solution.rms_px,
+      name_of(model), solution.rms_px, name_of(LensModel::fisheye)));
+}
+
+/// Warns of a displacement of the edges that a wrong gap between the tags causes, not a camera.
+void warn_of_edge_shift(const IntrinsicsSolution& solution, LensEstimate& result) {
+  constexpr double max_shift_px = 0.4;  // cameras, sharpened and at three times white: 0.25
+  const double shift_px = upper_median(solution.edge_shifts_px);
+  if (std::abs(shift_px) <= max_shift_px) return;
+  result.warnings.push_back(fmt::format(
+      "the edges of the tags are {:.2f} px towards the {}, more than a camera that is in "
+      "focus makes; is tag_spacing of board.yaml right?",
+      std::abs(shift_px), shift_px < 0 ? "light" : "dark"));
+}
+
+void warn_of_dropped_views(LensEstimate& result) {
+  const LensModel model = result.solution.problem.lens_model;
+  for (const auto& [view, rms_px] : result.solution.dropped) {
+    if (!std::isfinite(rms_px) && is_splined(model)) {
+      result.warnings.push_back(
+          fmt::format("{}: shows the board where {} has no control points; take a larger "
+                      "fov_x_deg, or Ny; dropped",
+                      result.images[view], name_of(model)));
+      continue;
+    }
+    result.warnings.push_back(fmt::format(
+        "{}: fits no pose that goes with the other views ({:.1f} px are left over); dropped",
+        result.images[view], rms_px));
+  }
+}
+
+/// Selects the lens model of the views. Returns false if there are too few.
+bool choose_model(SplitViews& views, LensEstimate& result) {
+  result.choice = choose_lens(views.solved);
+  if (views.solved.views.size() < kLeastViewsToChoose) {
+    fail(result, LensStatus::too_few_views,
+         fmt::format("{} views with the board do not determine the lens model, which takes {}; "
+                     "add views, or name the model with --lens",
+                     views.solved.views.size(), kLeastViewsToChoose));
+    return false;
+  }
+  // If no model fits, the solve with the stated one gives the reason.
+  if (result.choice) views.solved.lens_model = views.held_out.lens_model = result.choice->model;
+  return true;
+}
+
+/// Returns why the solver found no lens.
+std::string explain_no_lens(const SplitViews& views, const std::optional<FisheyeFit>& fisheye,
+                            IntrinsicsStatus status) {
+  std::string problem;
+  if (status == IntrinsicsStatus::no_solution) problem = explain_no_fit(views.solved, fisheye);
+  return problem.empty() ? std::string(explanation_of(status)) : problem;
+}
+
+/// Adds the uncertainty of a solution.
+void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& fisheye,
+                     bool is_chosen, LensEstimate& result) {
+  IntrinsicsSolution& solution = result.solution;
+  solution.another_fits = fisheye && fits_as_well(fisheye->solution, solution);
+  result.report = report_on(solution, views.solved);
+  if (solution.another_fits) {
+    include_difference(solution.lens(), fisheye->solution.lens(), views.solved.imager_px,
+                       result.report);
+    if (!is_chosen) recommend_fisheye(*fisheye, result);
+  }
+  result.coverage = coverage_of(solution, views.solved);
+  result.held_out = held_out_fit(solution, views.held_out);
+  result.lattice = views.solved.lattice;
+  // The covariance of hundreds of control points would fill the file, without use for fixes.
+  if (is_splined(solution.problem.lens_model)) return;
+  const ProjectionUncertainty uncertainty(solution, views.solved.lattice);
+  const Eigen::VectorXd& pull = uncertainty.intrinsics_pull();
+  const MatrixX covariance = uncertainty.intrinsics_covariance() + pull * pull.transpose();
+  if (covariance.allFinite()) result.intrinsics_covariance = covariance;
+}
+
+}  // namespace
+
+WarpChoice possible_warp(const Board& board, WarpChoice warp) {
+  if (board.kind != BoardKind::chessboard || board.cols != board.rows) return warp;
+  if (warp == WarpChoice::on) {
+    throw std::invalid_argument(
+        "a square chessboard looks the same after a quarter turn, so that its bend cannot be told: "
+        "leave --warp on out");
+  }
+  return WarpChoice::off;
+}
+
+LensEstimate estimate_lens(LensViews input) {
+  LensEstimate result;
+  result.views = std::move(input.views);
+  input.views = {result.views.front()};
+  result.gamma = take_common_curve(result.views, input.board);
+  const BoardCheck layout = check_board(input.board, result.views, {});
+  if (!layout.problem.empty()) {
+    fail(result, LensStatus::wrong_board, layout.problem);
+    return result;
+  }
+  SplitViews views = split_views(input, result);
+  if (input.choose_lens_model && !choose_model(views, result)) return result;
+  const LensModel model = views.solved.lens_model;
+  if (is_splined(model)) {
+    const std::string problem = explain_unsuitable_grid(views.solved);
+    if (!problem.empty()) {
+      fail_undetermined(result, views, problem);
+      return result;
+    }
+  }
+  std::optional<FisheyeFit> fisheye;
+  if (is_opencv(model) && may_be_wide(views.solved)) {
+    fisheye = result.choice ? result.choice->fisheye : fit_fisheye(views.solved);
+    if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) {
+      fail_undetermined(
+          result, views,
+          fmt::format("it is seen up to {:.0f} degrees off the axis, where {} has no rays: take "
+                      "--lens {}",
+                      deg_from_rad(fisheye->farthest_rad), name_of(model),
+                      name_of(LensModel::fisheye)));
+      return result;
+    }
+  }
+  result.solution = solve_intrinsics(views.solved);
+  if (!result.solution.ok()) {
+    fail_undetermined(result, views, explain_no_lens(views, fisheye, result.solution.status));
+    if (result.solution.status == IntrinsicsStatus::too_few_views) {
+      result.status = LensStatus::too_few_views;
+    }
+    return result;
+  }
+  warn_of_dropped_views(result);
+  const BoardCheck exact = check_board(input.board, result.views, result.solution.lens(),
+                                       upper_median(result.solution.edge_shifts_px));
+  if (!exact.problem.empty()) {
+    fail(result, LensStatus::wrong_board, exact.problem);
+    return result;
+  }
+  warn_of_edge_shift(result.solution, result);
+  add_uncertainty(views, fisheye, input.choose_lens_model, result);
+  return result;
+}
+
+}  // namespace vlp

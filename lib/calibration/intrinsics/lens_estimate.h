@@ -1,0 +1,78 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/intrinsics/calibration_report.h"
+#include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/lens_choice.h"
+#include "detection/boards/board_view.h"
+#include "rig/board.h"
+
+namespace vlp {
+
+/// Views of a board from which a lens is estimated.
+struct LensViews {
+  /// Views that differ, each with enough corners (BoardLattice::enough()); one or more.
+  std::vector<BoardView> views;
+  Board board;
+  LensModel lens_model = LensModel::opencv8;
+  /// Every n-th view is kept out of the solve for validation; 0: none.
+  int held_out = 0;
+  WarpChoice warp = WarpChoice::automatic;
+  /// Selects the lens model by cross-validation (choose_lens()) instead of `lens_model`.
+  bool choose_lens_model = false;
+};
+
+enum class LensStatus {
+  ok,
+  wrong_board,    // the views show another board than stated
+  too_few_views,  // fewer than the solve, or the choice of the model, needs
+  undetermined    // the views do not determine a lens of the model
+};
+
+/// An estimated lens with its uncertainty.
+struct LensEstimate {
+  LensStatus status = LensStatus::ok;
+  /// Reason for another status than ok, with what to add or correct.
+  std::string problem = {};
+
+  IntrinsicsSolution solution{};
+  CalibrationReport report{};
+  ViewCoverage coverage{};
+  HeldOut held_out{};
+  /// Result of the selection of the lens model, if it was requested.
+  std::optional<LensChoice> choice = {};
+  /// A model that fits clearly better than the stated one, or equally well where the board is seen
+  /// near a right angle off the axis.
+  std::optional<LensModel> better_model = {};
+  /// Lattice of the corners in `solution`. Covariance of the intrinsics, with the pull of the
+  /// regularization; std::nullopt for a splined lens or if it is not finite.
+  std::optional<BoardLattice> lattice = {};
+  std::optional<MatrixX> intrinsics_covariance = {};
+
+  /// Gamma of the camera's tone curve, 1 for none; the views with their corners behind it.
+  double gamma = 1;
+  std::vector<BoardView> views = {};
+  /// Images of the views in the solve, in the order of IntrinsicsSolution.
+  std::vector<std::string> images = {};
+  std::vector<std::string> warnings = {}, details = {};
+
+  bool ok() const { return status == LensStatus::ok; }
+};
+
+/// Returns `warp`, or WarpChoice::off for a square chessboard: it looks the same after a quarter
+/// turn, so that the direction of its bend cannot be determined. Throws std::invalid_argument if
+/// the bend of such a board is requested.
+WarpChoice possible_warp(const Board& board, WarpChoice warp);
+
+/// Estimates a lens from views of a board, in these stages: the tone curve of the camera
+/// (take_common_curve()), the layout of the board (check_board()), the lens model, the solve
+/// (solve_intrinsics()), the board again by the lens, the uncertainty (report_on()).
+/// Throws std::invalid_argument as BoardLattice does.
+LensEstimate estimate_lens(LensViews input);
+
+}  // namespace vlp

@@ -1,0 +1,377 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/board_intake.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/corner_blunders.h"
+#include "calibration/intrinsics/mrcal_files.h"
+#include "detection/boards/corner_table.h"
+#include "detection/boards/other_tags.h"
+#include "detection/boards/square_corners.h"
+#include "frontend/image_quality.h"
+#include "frontend/selection.h"
+#include "rig/board_layout.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Returns the box around the corners of the board; the whole image if there are none.
+cv::Rect find_board_region(const SeenBoard& seen, const cv::Mat& image) {
+  std::vector<cv::Point2f> corners;
+  const auto add = [&](const Eigen::Vector2d& pixel) {
+    corners.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+  };
+  for (const SeenTag& tag : seen.tags) {
+    for (const auto& corner : tag.corners_px) add(corner);
+  }
+  for (const SeenPoint& point : seen.points) add(point.pixel);
+  return corners.empty() ? cv::Rect({}, image.size()) : cv::boundingRect(corners);
+}
+
+/// Returns true if most of the tags that cannot be used are overexposed.
+bool are_tags_overexposed(const SeenBoard& seen) { return 2 * seen.overexposed > seen.unusable; }
+
+std::string describe_too_few_corners(const Board& board, const SeenBoard& seen) {
+  if (board.kind == BoardKind::chessboard && seen.points.empty()) {
+    return "the chessboard is not seen as a whole";
+  }
+  if (board.has_squares() || !seen.points.empty()) {
+    return fmt::format("only {} corners of the board can be used, or too many of them in a line",
+                       seen.points.size());
+  }
+  std::string message = fmt::format("only {} tags of the board can be used", seen.tags.size());
+  if (are_tags_overexposed(seen)) {
+    message += fmt::format(", around {} more white is overexposed and runs over the corners",
+                           seen.overexposed);
+  } else if (seen.unusable > 0) {
+    message += fmt::format(", {} more are blurred, hidden or cut", seen.unusable);
+  }
+  return message;
+}
+
+/// Rejects images of another size than most; of sizes that are equally frequent the first counts.
+void reject_other_sizes(std::vector<Observation>& images) {
+  std::map<std::array<int, 2>, std::size_t> counts;
+  for (const Observation& image : images) {
+    if (image.board) ++counts[image.size_px];
+  }
+  if (counts.size() < 2) return;
+  const auto most_frequent =
+      std::max_element(images.begin(), images.end(), [&](const auto& a, const auto& b) {
+        return (a.board ? counts[a.size_px] : 0) < (b.board ? counts[b.size_px] : 0);
+      });
+  const std::array<int, 2> size_px = most_frequent->size_px;
+  for (Observation& image : images) {
+    if (!image.board || image.size_px == size_px) continue;
+    image.reject(RejectionReason::wrong_size, describe_wrong_size(image.size_px, size_px));
+    image.board.reset();
+  }
+}
+
+bool is_upside_down(const BoardView& view) {
+  double down_px = 0;
+  for (const SeenTag& tag : view.seen.tags) {
+    down_px +=
+        (tag.corners_px[0] - tag.corners_px[3]).y() + (tag.corners_px[1] - tag.corners_px[2]).y();
+  }
+  return down_px < 0;
+}
+
+void note_orientation(const Board& board, Observations& result) {
+  if (board.kind == BoardKind::chessboard) {
+    result.details.emplace_back(
+        "a chessboard looks the same after half a turn; the lens does not depend on it");
+  }
+  const auto turned = std::count_if(
+      result.images.begin(), result.images.end(),
+      [](const Observation& image) { return image.board && is_upside_down(*image.board); });
+  if (turned == 0) return;
+  result.details.push_back(
+      fmt::format("{} views show the board upside down; that does no harm", turned));
+}
+
+std::vector<BoardView> collect_views(const std::vector<Observation>& images) {
+  std::vector<BoardView> views;
+  for (const Observation& image : images) {
+    if (image.board) views.push_back(*image.board);
+  }
+  return views;
+}
+
+/// Options that take a few frames of videos, spread over their length.
+FrontendOptions make_sparse_options(const std::vector<fs::path>& images, FrontendOptions options) {
+  constexpr std::size_t num_samples = 12;
+  const std::size_t step =
+      std::max<std::size_t>(1, ImageSource(images, options).expected() / num_samples);
+  options.every *= static_cast<int>(step);
+  return options;
+}
+
+/// Reads a few images that can be read, until `inspect` returns false.
+template <typename Inspect>
+void inspect_samples(const std::vector<fs::path>& images, const FrontendOptions& options,
+                     const Inspect& inspect) {
+  const FrontendOptions sparse = make_sparse_options(images, options);
+  ImageSource source(images, sparse);
+  while (const auto image = source.next()) {
+    try {
+      if (!inspect(*image, image->read(sparse))) return;
+    } catch (const InputError&) {
+      continue;  // rejected already
+    }
+  }
+}
+
+/// Explains why no chessboard is seen, by the largest one in a few of the images.
+IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const Board& board,
+                                    const fs::path& board_file, const FrontendOptions& options,
+                                    std::size_t num_views) {
+  constexpr std::size_t num_samples = 12;
+  std::array<int, 2> largest{0, 0};
+  std::size_t inspected = 0;
+  inspect_samples(images, options, [&](const SourceImage&, const cv::Mat& image) {
+    const auto shown = chessboard_shown(image);
+    if (shown[0] * shown[1] > largest[0] * largest[1]) largest = shown;
+    return ++inspected < num_samples;
+  });
+  // The board may be turned by 90 degrees.
+  if ((largest[0] < largest[1]) != (board.cols < board.rows)) std::swap(largest[0], largest[1]);
+  const auto [cols, rows] = largest;
+  if (cols > board.cols || rows > board.rows) {
+    std::string message =
+        fmt::format("the images show a chessboard of {} x {} squares or more", cols, rows);
+    if (cols == board.cols + 1 && rows == board.rows + 1) {
+      message += ": cols and rows count squares, not the corners between them";
+    }
+    return {true, std::move(message), board_file};
+  }
+  std::string message = fmt::format(
+      "no chessboard of {} x {} squares is seen in {} images: is all of it in them, with white "
+      "around it, sharp, well lit, and each square wider than 10 px?",
+      board.cols, board.rows, num_views);
+  if (cols > 0) message += fmt::format(" At most {} x {} squares are seen", cols, rows);
+  return {false, std::move(message)};
+}
+
+/// Explains why no image shows a corner of the board.
+IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board& board,
+                               const fs::path& board_file, const FrontendOptions& options,
+                               const std::vector<BoardView>& views) {
+  if (board.kind == BoardKind::chessboard) {
+    return explain_no_chessboard(images, board, board_file, options, views.size());
+  }
+  int unusable = 0, overexposed = 0;
+  for (const BoardView& view : views) {
+    unusable += view.seen.unusable;
+    overexposed += view.seen.overexposed;
+  }
+  double white = 0;
+  std::string shown;
+  fs::path shown_in;
+  int inspected = 0;
+  inspect_samples(images, options, [&](const SourceImage& source, const cv::Mat& image) {
+    constexpr int num_samples = 3;
+    white = std::max(white, white_fraction(image, cv::Rect({}, image.size())));
+    shown = other_tags(board, image);
+    shown_in = source.file;
+    return shown.empty() && ++inspected < num_samples;
+  });
+  constexpr double max_white = 0.1;
+  if (white > max_white || (overexposed > 0 && 2 * overexposed > unusable)) {
+    std::string message = fmt::format(
+        "no tag of the board can be used in {} images, and {:.0f} % of the image is overexposed: "
+        "white runs over the tags' corners; expose shorter",
+        views.size(), 100 * white);
+    if (!shown.empty()) message += "; or is board.yaml wrong? " + shown;
+    return {false, std::move(message)};
+  }
+  if (!shown.empty()) return {true, shown_in.string() + ": " + shown, board_file};
+  if (unusable > 0) {
+    return {false, fmt::format(
+                       "{} tags of the board are seen in {} images, but none with all four corners "
+                       "sharp: are they blurred, hidden, cut by the image's edge, or seen twice?",
+                       unusable, views.size())};
+  }
+  const auto foreign = std::find_if(views.begin(), views.end(),
+                                    [](const auto& view) { return !view.seen.foreign.empty(); });
+  if (foreign != views.end()) {
+    const std::string layout = check_board(board, views, {}).problem;
+    return {true,
+            fmt::format("the images show tags of {}, but with other ids than the board has, "
+                        "{} to {} ({} of them in {}){}",
+                        board.family, board.first_id,
+                        board.first_id + static_cast<int>(board_layout(board).size()) - 1,
+                        foreign->seen.foreign.size(), foreign->image,
+                        layout.empty() ? "" : "; " + layout),
+            board_file};
+  }
+  const char* tag = board.has_squares() ? "marker" : "tag";
+  return {false, fmt::format("no {} of {} is seen in {} images: is the board in them, sharp, well "
+                             "lit, and each {} wider than 20 px?",
+                             tag, board.family, views.size(), tag)};
+}
+
+/// Removes corners that contradict their neighbours; of tags the whole tag.
+void remove_blunders(const BoardLattice& lattice, BoardView& view,
+                     std::vector<std::string>& warnings) {
+  const auto blunders = corner_blunders(lattice.corners(view.seen));
+  if (blunders.empty()) return;
+  const auto corners = corners_of(view.seen);
+  const Eigen::Vector2d first = corners[blunders.front()].pixel;
+  warnings.push_back(fmt::format(
+      "{}: {} of its {} corners are not where their neighbours predict them, the first at "
+      "({:.1f}, {:.1f}); left out",
+      view.image, blunders.size(), corners.size(), first.x(), first.y()));
+  for (auto i = blunders.rbegin(); i != blunders.rend(); ++i) {
+    if (!view.seen.points.empty()) {
+      view.seen.points.erase(view.seen.points.begin() + static_cast<std::ptrdiff_t>(*i));
+      continue;
+    }
+    const bool is_removed = i != blunders.rbegin() && *(i - 1) / 4 == *i / 4;
+    if (is_removed) continue;
+    view.seen.tags.erase(view.seen.tags.begin() + static_cast<std::ptrdiff_t>(*i / 4));
+    ++view.seen.unusable;
+  }
+}
+
+bool is_mrcal_table(const fs::path& file) { return file.extension() == ".vnl"; }
+
+/// Rejects an image with too few corners to determine the pose of the board.
+void reject_few_corners(const Board& board, const BoardLattice& lattice, Observation& image) {
+  const SeenBoard& seen = image.board->seen;
+  if (lattice.enough(seen)) return;
+  if (!seen.any() && !seen.foreign.empty()) {
+    return image.reject(RejectionReason::other_board, "shows tags that the board does not have");
+  }
+  if (!seen.any() && seen.unusable == 0 && board.kind != BoardKind::chessboard) {
+    return image.reject(RejectionReason::no_board, "does not show the board");
+  }
+  image.reject(
+      are_tags_overexposed(seen) ? RejectionReason::overexposed : RejectionReason::too_few_corners,
+      describe_too_few_corners(board, seen));
+}
+
+}  // namespace
+
+BoardIntake::BoardIntake(const Board& board, const FrontendOptions& options,
+                         const std::optional<std::array<int, 2>>& imager_px)
+    : board_(board),
+      lattice_(board),
+      detector_(board),
+      options_(options),
+      imager_px_(imager_px),
+      cache_(corner_cache(options.corner_cache, board)) {}
+
+Observation BoardIntake::observe(const SourceImage& source) const {
+  Observation result{source.file, source.time_s};
+  std::optional<CachedView> found;
+  if (cache_.find) found = cache_.find(source);
+  if (found && (!imager_px_ || found->view.imager_px == *imager_px_)) {
+    result.size_px = found->view.imager_px;
+  } else {
+    observe_pixels(source, options_, imager_px_, result, [&](const cv::Mat& image) {
+      const ImageBlur blur = measure_blur(image);
+      BoardView view{result.name(), result.size_px, detector_.detect(image)};
+      const double white = white_fraction(image, find_board_region(view.seen, image));
+      found = CachedView{std::move(view),
+                         std::isfinite(blur.sigma_px) ? std::optional(blur.sigma_px) : std::nullopt,
+                         blur.bright_fraction, white};
+    });
+    if (!result.is_kept()) return result;
+    if (cache_.keep) cache_.keep(source, *found);
+  }
+  result.blur_px = found->blur_px;
+  result.board = std::move(found->view);
+  reject_poor(result, found->bright_fraction, found->white_fraction);
+  return result;
+}
+
+void BoardIntake::reject_poor(Observation& image, double bright_fraction,
+                              double white_fraction) const {
+  const SeenBoard& seen = image.board->seen;
+  if (white_fraction > options_.max_white_fraction) {
+    return image.reject(
+        RejectionReason::overexposed,
+        fmt::format("overexposed: {:.0f} % of the {} is at full scale, {:.0f} % at most",
+                    100 * white_fraction, seen.any() ? "board" : "image",
+                    100 * options_.max_white_fraction));
+  }
+  if (!lattice_.enough(seen) && bright_fraction < options_.min_bright_fraction) {
+    return image.reject(RejectionReason::too_dark,
+                        fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
+                                    "{:.0f} % at least",
+                                    100 * bright_fraction, 100 * options_.min_bright_fraction));
+  }
+  if (!image.blur_px) return image.reject(RejectionReason::no_contrast, "no contrast");
+  if (*image.blur_px > options_.max_blur_px) {
+    return image.reject(
+        RejectionReason::blurred,
+        fmt::format("blurred: {:.1f} px, {:.1f} at most", *image.blur_px, options_.max_blur_px));
+  }
+  reject_few_corners(board_, lattice_, image);
+}
+
+Observations observe_boards(const std::vector<fs::path>& images, const Board& board,
+                            const fs::path& board_file, const FrontendOptions& options,
+                            const IntakeProgress& progress) {
+  const BoardIntake intake(board, options);
+  ImageSource source(images, options);
+  Observations result = observe_images(
+      source, options.threads, [&](const SourceImage& image) { return intake.observe(image); },
+      progress);
+  check_any_readable(images.front().parent_path(), result.images);
+  reject_other_sizes(result.images);
+  reject_repeated(result.images, ImageUse::boards, options);
+  if (std::none_of(result.images.begin(), result.images.end(), [](const Observation& image) {
+        return image.board && image.board->seen.any();
+      })) {
+    result.failure =
+        explain_no_board(images, board, board_file, options, collect_views(result.images));
+  }
+  note_orientation(board, result);
+  return result;
+}
+
+bool holds_corners(const fs::path& file) {
+  return is_mrcal_table(file) || file.extension() == ".csv";
+}
+
+Observations read_board_views(const fs::path& file, const Board& board, const fs::path& board_file,
+                              const std::array<int, 2>& imager_px, const FrontendOptions& options) {
+  Observations result;
+  const BoardLattice lattice(board);
+  bool is_seen = false;
+  for (BoardView& view : is_mrcal_table(file) ? read_corners(file, board, imager_px)
+                                              : read_corner_table(file, board, imager_px)) {
+    remove_blunders(lattice, view, result.warnings);
+    is_seen = is_seen || view.seen.any();
+    Observation image{view.image};
+    image.size_px = view.imager_px;
+    image.board = std::move(view);
+    reject_few_corners(board, lattice, image);
+    result.images.push_back(std::move(image));
+  }
+  reject_repeated(result.images, ImageUse::boards, options);
+  if (!is_seen) {
+    result.failure = {true,
+                      fmt::format("none of its {} images has a corner of the board; is it of "
+                                  "another board than {}?",
+                                  result.images.size(), board_file.string()),
+                      file};
+  }
+  note_orientation(board, result);
+  return result;
+}
+
+}  // namespace vlp

@@ -1,0 +1,100 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/image_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <string_view>
+
+#include "frontend/image_header.h"
+#include "rig/input_error.h"
+#include "rig/yaml_text.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A JPEG that is cut short is decoded all the same, grey from there on: its scan has to end with
+/// the marker of the end (FF D9).
+bool is_cut_jpeg(const std::string& bytes) {
+  constexpr std::size_t marker = 2;
+  if (!bytes.starts_with("\xff\xd8")) return false;
+  const auto scan = bytes.rfind("\xff\xda"), end = bytes.rfind("\xff\xd9");
+  return scan == std::string::npos || end == std::string::npos || end < scan + marker;
+}
+
+/// A PNG ends with its IEND chunk: no data, and their check sum. Some programs add to it.
+bool is_cut_png(const std::string& bytes) {
+  using namespace std::string_view_literals;
+  constexpr auto end = "\0\0\0\0IEND\xae\x42\x60\x82"sv;
+  return bytes.starts_with("\x89PNG\r\n\x1a\n") && bytes.rfind(end) == std::string::npos;
+}
+
+}  // namespace
+
+void check_size(const fs::path& file, std::int64_t width, std::int64_t height, double max_mpx) {
+  constexpr double million = 1e6;
+  if (static_cast<double>(width) * static_cast<double>(height) <= max_mpx * million) return;
+  throw InputError(
+      file, "is " + std::to_string(width) + " x " + std::to_string(height) + " px, more than the " +
+                shortest(max_mpx) +
+                " million that are allowed; --max-mpx of vlp-detect and vlp-intrinsics "
+                "allows more");
+}
+
+bool is_image_name(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}) {
+    if (extension == known) return true;
+  }
+  return false;
+}
+
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) throw InputError(folder, "is not a folder of images");
+  std::vector<fs::path> images;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code no_file;  // a folder, a pipe, a link that leads nowhere
+    if (entry->is_regular_file(no_file) && is_image_name(entry->path()))
+      images.push_back(entry->path());
+  }
+  if (error) throw InputError(folder, "cannot be read: " + error.message());
+  if (images.empty()) {
+    throw InputError(folder, "holds no image (.png, .jpg, .bmp, .tif or .pgm)");
+  }
+  std::sort(images.begin(), images.end());
+  return images;
+}
+
+cv::Mat read_image(const fs::path& file, double max_mpx) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (bytes.empty()) throw InputError(file, "cannot be read as an image");
+  const char* const cut = "cannot be read as an image: it is cut short";
+  if (is_cut_jpeg(bytes)) throw InputError(file, cut);
+  if (const auto size = size_in_header(bytes)) check_size(file, (*size)[0], (*size)[1], max_mpx);
+  if (is_cut_png(bytes)) throw InputError(file, cut);
+  cv::Mat image;
+  try {
+    image =
+        cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, bytes.data()),
+                     cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception& failure) {
+    throw InputError(file, "cannot be read as an image: " + failure.err);
+  }
+  if (image.empty()) throw InputError(file, "cannot be read as an image");
+  if (image.depth() != CV_8U && image.depth() != CV_16U) {
+    throw InputError(file, "has neither 8 nor 16 bits");
+  }
+  return image;
+}
+
+}  // namespace vlp

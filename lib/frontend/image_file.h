@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace vlp {
+
+/// Whether the name is that of an image, by its ending: PNG, JPEG, BMP, TIFF and PGM.
+bool is_image_name(const std::filesystem::path& file);
+
+/// The images in a folder by name: PNG, JPEG, BMP, TIFF and PGM. Throws InputError when it is no
+/// folder or holds none.
+std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
+
+/// Throws InputError if an image has more than `max_mpx` megapixels.
+void check_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
+                double max_mpx);
+
+/// Reads an image as grey levels of 8 or 16 bits. Colour is converted. An orientation stated in the
+/// file is ignored, because the readout does not turn with it. Throws InputError for a file that is
+/// no image, and, before decoding, for one with more than `max_mpx` megapixels.
+cv::Mat read_image(const std::filesystem::path& file,
+                   double max_mpx = std::numeric_limits<double>::infinity());
+
+}  // namespace vlp

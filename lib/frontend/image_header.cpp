@@ -1,0 +1,147 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/image_header.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cstddef>
+
+namespace vlp {
+namespace {
+
+using Size = std::optional<std::array<std::int64_t, 2>>;
+
+enum class ByteOrder { big, little };
+
+/// An unsigned number of `count` bytes; nothing beyond the end.
+std::optional<std::int64_t> number_at(std::string_view bytes, std::size_t at, std::size_t count,
+                                      ByteOrder order) {
+  if (at > bytes.size() || bytes.size() - at < count) return {};
+  std::int64_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t place = order == ByteOrder::big ? at + i : at + count - 1 - i;
+    value = value << 8 | static_cast<unsigned char>(bytes[place]);
+  }
+  return value;
+}
+
+Size pair_of(const std::optional<std::int64_t>& width, const std::optional<std::int64_t>& height) {
+  if (!width || !height) return {};
+  return std::array{*width, *height};
+}
+
+/// Length and type of the first chunk, IHDR, follow the signature of 8 bytes.
+Size png_size(std::string_view bytes) {
+  return pair_of(number_at(bytes, 16, 4, ByteOrder::big), number_at(bytes, 20, 4, ByteOrder::big));
+}
+
+/// A negative height means rows from the top.
+Size bmp_size(std::string_view bytes) {
+  const auto header = number_at(bytes, 14, 4, ByteOrder::little);
+  constexpr std::int64_t oldest = 12;  // of OS/2, with sizes of two bytes
+  if (header == oldest) {
+    return pair_of(number_at(bytes, 18, 2, ByteOrder::little),
+                   number_at(bytes, 20, 2, ByteOrder::little));
+  }
+  const auto signed_at = [&](std::size_t at) -> std::optional<std::int64_t> {
+    const auto value = number_at(bytes, at, 4, ByteOrder::little);
+    if (!value) return {};
+    const auto with_sign = static_cast<std::int32_t>(*value);
+    return with_sign < 0 ? -static_cast<std::int64_t>(with_sign) : with_sign;
+  };
+  return pair_of(signed_at(18), signed_at(22));
+}
+
+/// Segments follow each other by their lengths up to the frame header, SOF: FF C0 to FF CF but for
+/// C4, C8 and CC.
+Size jpeg_size(std::string_view bytes) {
+  std::size_t at = 2;
+  while (at + 4 <= bytes.size()) {
+    if (bytes[at] != '\xff') return {};
+    const auto marker = static_cast<unsigned char>(bytes[at + 1]);
+    if (marker == 0xff) {  // filled up
+      ++at;
+      continue;
+    }
+    const auto length = number_at(bytes, at + 2, 2, ByteOrder::big);
+    const bool frame =
+        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    if (frame) {
+      return pair_of(number_at(bytes, at + 7, 2, ByteOrder::big),
+                     number_at(bytes, at + 5, 2, ByteOrder::big));
+    }
+    if (!length || *length < 2) return {};
+    at += 2 + static_cast<std::size_t>(*length);
+  }
+  return {};
+}
+
+/// How TIFF, and BigTIFF with its numbers of 8 bytes, lay out what leads to the size.
+struct TiffLayout {
+  /// Where the place of the first directory stands; bytes of a place, and of a count of entries.
+  std::size_t directory_at, place_bytes, count_bytes;
+  /// Bytes of an entry, and where in it the value stands.
+  std::size_t entry_bytes, value_at;
+};
+constexpr TiffLayout kTiff{4, 4, 2, 12, 8}, kBigTiff{8, 8, 8, 20, 12};
+
+/// Of the first directory: tags 256 and 257, each a SHORT (3), a LONG (4) or as long as a place.
+Size tiff_size(std::string_view bytes, const TiffLayout& layout) {
+  const ByteOrder order = bytes[0] == 'M' ? ByteOrder::big : ByteOrder::little;
+  const auto directory = number_at(bytes, layout.directory_at, layout.place_bytes, order);
+  if (!directory || *directory < 0) return {};
+  const auto start = static_cast<std::size_t>(*directory);
+  const auto entries = number_at(bytes, start, layout.count_bytes, order);
+  if (!entries || *entries < 0) return {};
+  std::optional<std::int64_t> width, height;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(*entries); ++i) {
+    const std::size_t entry = start + layout.count_bytes + i * layout.entry_bytes;
+    const auto tag = number_at(bytes, entry, 2, order),
+               type = number_at(bytes, entry + 2, 2, order);
+    if (!tag || !type) return {};
+    const std::size_t value_bytes = *type == 3 ? 2 : *type == 4 ? 4 : layout.place_bytes;
+    const auto value = number_at(bytes, entry + layout.value_at, value_bytes, order);
+    if (*tag == 256) width = value;
+    if (*tag == 257) height = value;
+  }
+  return pair_of(width, height);
+}
+
+/// "P5", width and height with white space and comments between them.
+Size pnm_size(std::string_view bytes) {
+  std::size_t at = 2;
+  const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
+  const auto next = [&]() -> std::optional<std::int64_t> {
+    while (at < bytes.size() && (is_space(bytes[at]) || bytes[at] == '#')) {
+      at = bytes[at] == '#' ? std::min(bytes.find('\n', at), bytes.size()) : at + 1;
+    }
+    std::int64_t value = 0;
+    const std::string_view rest = bytes.substr(at);
+    const auto [stop, failure] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
+    // A number at the very end may be cut short.
+    if (failure != std::errc() || stop == rest.data() + rest.size()) return {};
+    at += static_cast<std::size_t>(stop - rest.data());
+    return value;
+  };
+  const auto width = next();
+  return pair_of(width, next());
+}
+
+}  // namespace
+
+Size size_in_header(std::string_view bytes) {
+  using namespace std::string_view_literals;
+  if (bytes.starts_with("\x89PNG\r\n\x1a\n"sv)) return png_size(bytes);
+  if (bytes.starts_with("\xff\xd8"sv)) return jpeg_size(bytes);
+  if (bytes.starts_with("BM"sv)) return bmp_size(bytes);
+  if (bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv)) return tiff_size(bytes, kTiff);
+  if (bytes.starts_with("II+\0"sv) || bytes.starts_with("MM\0+"sv))
+    return tiff_size(bytes, kBigTiff);
+  if (bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6') {
+    return pnm_size(bytes);
+  }
+  return {};
+}
+
+}  // namespace vlp

@@ -1,0 +1,96 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/image_quality.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+#include <vector>
+
+namespace vlp {
+namespace {
+
+/// Returns the largest value of an image.
+double full_scale(const cv::Mat& image) {
+  constexpr double full_8 = 255, full_16 = 65535;
+  return image.depth() == CV_8U ? full_8 : full_16;
+}
+
+/// Returns the value that a fraction of the pixels does not exceed.
+double quantile(std::vector<float>& values, double fraction) {
+  const auto at = values.begin() +
+                  static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return double(*at);
+}
+
+/// Returns the standard deviation of a pixel's noise, in levels.
+double estimate_noise(const cv::Mat& image) {
+  // The squares of the kernel sum to 36: differences of independent pixels have six times the
+  // standard deviation of a pixel.
+  const cv::Mat kernel = (cv::Mat_<float>(3, 3) << 1, -2, 1, -2, 4, -2, 1, -2, 1);
+  constexpr double gain = 6;
+  cv::Mat differences;
+  cv::filter2D(image, differences, CV_32F, kernel);
+  const double mean = cv::mean(cv::abs(differences))[0];
+  const double rounding_sd = 1 / std::sqrt(12.0);
+  return std::max(rounding_sd, std::sqrt(std::numbers::pi / 2) * mean / gain);
+}
+
+/// Returns the darkest and the brightest median of a pixel and its neighbours on both sides.
+std::pair<double, double> find_extremes(const cv::Mat& image, const cv::Point& side) {
+  if (image.cols < 3 || image.rows < 3) return {0, 0};
+  const cv::Rect inner(side, cv::Size(image.cols - 2 * side.x, image.rows - 2 * side.y));
+  const cv::Mat before = image(inner - side), here = image(inner), after = image(inner + side);
+  const cv::Mat low = cv::min(before, here), high = cv::max(before, here);
+  const cv::Mat median = cv::max(low, cv::min(high, after));
+  double dark = 0, bright = 0;
+  cv::minMaxLoc(median, &dark, &bright);
+  return {dark, bright};
+}
+
+}  // namespace
+
+ImageBlur measure_blur(const cv::Mat& image) {
+  constexpr double smoothing_px = 1;  // against noise; its variance is subtracted below
+  // The difference over two pixels averages the rise over them: a blur by a box 2 px wide.
+  constexpr double difference_px2 = 4.0 / 12;
+  cv::Mat1f smooth, along_x, along_y;
+  image.convertTo(smooth, CV_32F, 1 / full_scale(image));
+  cv::GaussianBlur(smooth, smooth, {}, smoothing_px);
+  std::vector<float> values(smooth.begin(), smooth.end());
+  const double bright = quantile(values, 0.99), dark = quantile(values, 0.01);
+  cv::Scharr(smooth, along_x, CV_32F, 1, 0, 1.0 / 32);
+  cv::Scharr(smooth, along_y, CV_32F, 0, 1, 1.0 / 32);
+  cv::magnitude(along_x, along_y, along_x);
+  values.assign(along_x.begin(), along_x.end());
+  const double steepest = quantile(values, 0.999);
+  constexpr double min_contrast = 0.02;
+  if (bright - dark < min_contrast || steepest <= 0) {
+    return {std::numeric_limits<double>::infinity(), bright};
+  }
+  const double sigma_px = (bright - dark) / (steepest * std::sqrt(2 * std::numbers::pi));
+  const double variance_px2 = sigma_px * sigma_px - smoothing_px * smoothing_px - difference_px2;
+  return {std::sqrt(std::max(0.0, variance_px2)), bright};
+}
+
+ImageSignal measure_signal(const cv::Mat& image) {
+  const auto [dark_along, bright_along] = find_extremes(image, {1, 0});
+  const auto [dark_across, bright_across] = find_extremes(image, {0, 1});
+  const double dark = std::min(dark_along, dark_across);
+  const double bright = std::max(bright_along, bright_across);
+  return {dark / full_scale(image), (bright - dark) / estimate_noise(image)};
+}
+
+double white_fraction(const cv::Mat& image, cv::Rect region) {
+  region &= cv::Rect({}, image.size());
+  if (region.empty()) return 0;
+  constexpr double tolerance = 0.004;  // a level of 8 bits, by which JPEG changes white
+  const cv::Mat white = image(region) >= (1 - tolerance) * full_scale(image);
+  return cv::countNonZero(white) / static_cast<double>(region.area());
+}
+
+}  // namespace vlp

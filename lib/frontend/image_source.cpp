@@ -1,0 +1,118 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/image_source.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <atomic>
+#include <utility>
+
+#include "frontend/images_in_parallel.h"
+#include "frontend/video.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+
+ImageSource::ImageSource(std::vector<std::filesystem::path> files, const FrontendOptions& options,
+                         const std::optional<std::array<int, 2>>& imager_px)
+    : files_(std::move(files)), every_(options.every) {
+  for (const auto& file : files_) {
+    if (!is_video_name(file)) {
+      ++expected_;
+      continue;
+    }
+    Video video(file.string());
+    const auto [width, height] = video.size_px();
+    check_size(file, width, height, options.max_mpx);
+    check_imager(file, {width, height}, imager_px);
+    if (!video.next()) throw InputError(file, "holds no frame that can be decoded");
+    const auto every = static_cast<std::size_t>(every_);
+    expected_ += (std::max<std::size_t>(video.frames_stated(), 1) + every - 1) / every;
+  }
+}
+
+ImageSource::~ImageSource() = default;
+
+std::size_t ImageSource::expected() const { return expected_; }
+
+std::optional<SourceImage> ImageSource::next_frame() {
+  const auto& file = files_[file_];
+  if (!video_) {
+    video_ = std::make_unique<Video>(file.string());
+  } else {
+    for (int i = 1; i < every_; ++i) video_->skip();
+  }
+  auto frame = video_->next();
+  if (!frame) {
+    const std::string missing = video_->missing();
+    if (!missing.empty()) warnings_.push_back(file.string() + ": " + missing);
+    video_.reset();
+    return {};
+  }
+  SourceImage image(frame_name(file.string(), frame->number));
+  image.frame = std::move(frame->image);
+  image.time_s = frame->time_s;
+  return image;
+}
+
+std::optional<SourceImage> ImageSource::next() {
+  const std::lock_guard lock(taking_);
+  for (; file_ < files_.size(); ++file_) {
+    std::optional<SourceImage> image;
+    if (is_video_name(files_[file_])) {
+      image = next_frame();
+      if (!image) continue;
+    } else {
+      image.emplace(files_[file_++]);
+    }
+    image->index = given_++;
+    return image;
+  }
+  return {};
+}
+
+std::vector<std::filesystem::path> expand_folders(const std::vector<std::string>& names) {
+  std::vector<std::filesystem::path> files;
+  for (const std::string& name : names) {
+    if (!std::filesystem::is_directory(name)) {
+      files.emplace_back(name);
+      continue;
+    }
+    const auto inside = images_in(name);
+    files.insert(files.end(), inside.begin(), inside.end());
+  }
+  return files;
+}
+
+void for_each_image(ImageSource& source, int threads,
+                    const std::function<void(const SourceImage&)>& task) {
+  const auto workers = static_cast<std::size_t>(threads);
+  std::atomic<bool> failed = false;
+  images_in_parallel(workers, threads, [&](std::size_t) {
+    try {
+      while (!failed) {
+        const auto image = source.next();
+        if (!image) return;
+        task(*image);
+      }
+    } catch (...) {
+      failed = true;
+      throw;
+    }
+  });
+}
+
+std::string describe_wrong_size(const std::array<int, 2>& size_px,
+                                const std::array<int, 2>& imager_px) {
+  return fmt::format("is {} x {} px, the camera's images are {} x {} px", size_px[0], size_px[1],
+                     imager_px[0], imager_px[1]);
+}
+
+void check_imager(const std::filesystem::path& file, const std::array<int, 2>& size_px,
+                  const std::optional<std::array<int, 2>>& imager_px) {
+  if (!imager_px || size_px == *imager_px) return;
+  throw InputError(file, describe_wrong_size(size_px, *imager_px));
+}
+
+}  // namespace vlp

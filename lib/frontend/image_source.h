@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontend/image_file.h"
+#include "frontend/options.h"
+
+namespace vlp {
+
+class Video;
+
+/// An image that is still to be read from its file, or a frame of a video.
+struct SourceImage {
+  explicit SourceImage(std::filesystem::path image_file) : file(std::move(image_file)) {}
+
+  /// VIDEO#000123 for a frame, frame_name().
+  std::filesystem::path file;
+  /// Pixels of a video's frame; empty for an image file.
+  cv::Mat frame = {};
+  /// Time of a video's frame since the start of the video.
+  std::optional<double> time_s = {};
+  /// Number of the image in its source.
+  std::size_t index = 0;
+
+  /// Returns the grey levels. Throws as read_image().
+  cv::Mat read(const FrontendOptions& options) const {
+    return frame.empty() ? read_image(file, options.max_mpx) : frame;
+  }
+};
+
+/// Image files and the frames of video files, in their order, for any number of threads. Only the
+/// frames that are being processed are in memory.
+class ImageSource {
+ public:
+  /// `options`: frame step and largest size. Throws InputError for a video that cannot be opened,
+  /// has no frame, is too large, or is not of `imager_px`.
+  explicit ImageSource(std::vector<std::filesystem::path> files,
+                       const FrontendOptions& options = {},
+                       const std::optional<std::array<int, 2>>& imager_px = std::nullopt);
+  ~ImageSource();
+
+  /// Returns the next image; std::nullopt at the end.
+  std::optional<SourceImage> next();
+  /// Number of images, as far as the videos state it.
+  std::size_t expected() const;
+  /// Videos that lack frames, so far, in one line each.
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+ private:
+  std::optional<SourceImage> next_frame();
+
+  std::vector<std::filesystem::path> files_;
+  int every_;
+  std::size_t expected_ = 0, given_ = 0, file_ = 0;
+  std::unique_ptr<Video> video_;
+  std::vector<std::string> warnings_;
+  std::mutex taking_;
+};
+
+/// Replaces each name of a folder by the images in it, by name. Throws InputError.
+std::vector<std::filesystem::path> expand_folders(const std::vector<std::string>& names);
+
+/// Calls task(image) for each image of the source on several threads, as images_in_parallel().
+void for_each_image(ImageSource& source, int threads,
+                    const std::function<void(const SourceImage&)>& task);
+
+/// Returns that an image is not of the camera's size.
+std::string describe_wrong_size(const std::array<int, 2>& size_px,
+                                const std::array<int, 2>& imager_px);
+
+/// Throws InputError if the size of an image is not `imager_px`.
+void check_imager(const std::filesystem::path& file, const std::array<int, 2>& size_px,
+                  const std::optional<std::array<int, 2>>& imager_px);
+
+}  // namespace vlp

@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "captures/detections_table.h"
+#include "frontend/observation.h"
+#include "lamps/signal/lamp_classifier.h"
+#include "lamps/signal/period_groups.h"
+
+namespace vlp {
+
+/// Returns the light that a label means: the nearest one that flickers and is wholly in view, with
+/// the label within half its radius; nullptr if there is none.
+const Light* light_at(const Observation& image, const Eigen::Vector2d& pixel);
+
+/// Lights whose lamps a table states.
+struct Labelled {
+  std::vector<LabelledLight> lights;
+  /// Number of labels in images that were used, and of those without a light.
+  int labels = 0, without_light = 0;
+};
+
+/// Adds the lights of one folder; `labels` refers to its images by name.
+void add_labelled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
+                  Labelled& labelled);
+
+/// Measured period of a light, and the light's place.
+struct LightPeriod : MeasuredPeriod {
+  /// Index of the image.
+  std::size_t image;
+  Eigen::Vector2d pixel;
+  double sigma_px;
+};
+
+/// Returns the periods of the lights that are wholly in view and whose stripes are trustworthy().
+/// With `labels`, only labelled lights count.
+std::vector<LightPeriod> measured_periods(const std::vector<Observation>& images,
+                                          const std::vector<Frame>& labels);
+
+}  // namespace vlp

@@ -1,0 +1,411 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/lamp_intake.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "frontend/annotate.h"
+#include "frontend/image_quality.h"
+#include "frontend/lights_table.h"
+#include "frontend/mat_view.h"
+#include "frontend/video.h"
+#include "lamps/readout.h"
+#include "lamps/signal/lamp_map_check.h"
+#include "positioning/inclination_rotation.h"
+#include "rig/find_lamp.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Signal of an image below which nothing in it can be measured, in standard deviations of the
+/// noise; noise alone has about 6.
+constexpr double kMinSignalToNoise = 12;
+/// Darkest level of an image, as a fraction of the full scale, above which it is overexposed.
+constexpr double kMaxDarkFraction = 0.85;
+/// Fraction of a light's box at full scale above which the light is overexposed: a disc fills pi/4
+/// of its box, and a lamp is dark for half of the time.
+constexpr double kMaxWhiteFraction = 0.65;
+/// Number of lamps that a warning lists one by one.
+constexpr std::size_t kMaxLines = 5;
+
+bool is_overexposed(const Light& light, const cv::Mat& image) {
+  const cv::Point low(static_cast<int>(light.low.x()), static_cast<int>(light.low.y()));
+  const cv::Point high(static_cast<int>(light.high.x()), static_cast<int>(light.high.y()));
+  return light.kind == LightKind::unknown && white_fraction(image, {low, high}) > kMaxWhiteFraction;
+}
+
+/// Returns true if the grey levels of an image span so little that its signal may be noise, because
+/// it is dark or white all over. Takes a small part of the time of measure_signal().
+bool is_flat(const cv::Mat& image) {
+  constexpr double max_range = 0.25;  // of the full scale
+  double min = 0, max = 0;
+  cv::minMaxLoc(image, &min, &max);
+  return max - min < max_range * (image.depth() == CV_8U ? 255 : 65535);
+}
+
+/// Rejects an image in which nothing exceeds the noise, as too dark or overexposed.
+void reject_without_signal(const cv::Mat& image, Observation& result) {
+  const ImageSignal signal = measure_signal(image);
+  if (signal.signal_to_noise < kMinSignalToNoise && signal.dark_fraction > kMaxDarkFraction) {
+    return result.reject(
+        RejectionReason::overexposed,
+        fmt::format("overexposed: all of the image is at {:.0f} % of the full scale or more",
+                    100 * signal.dark_fraction));
+  }
+  if (signal.signal_to_noise < kMinSignalToNoise) {
+    return result.reject(
+        RejectionReason::too_dark,
+        fmt::format("too dark: the brightest is {:.0f} times the noise over the darkest, {:.0f} "
+                    "wanted",
+                    signal.signal_to_noise, kMinSignalToNoise));
+  }
+}
+
+/// Rejects an image with too few lamps, with the exposure as the reason if it is one.
+void reject_few_lamps(const cv::Mat& image, Observation& result) {
+  reject_without_signal(image, result);
+  if (!result.is_kept()) return;
+  const auto count = [&](const auto& condition) {
+    return std::count_if(result.lights.begin(), result.lights.end(), condition);
+  };
+  const auto is_kind = [](LightKind kind) {
+    return [kind](const Light& light) { return light.kind == kind; };
+  };
+  const auto lamps = count(is_kind(LightKind::lamp));
+  const auto unknown = count(is_kind(LightKind::unknown));
+  const auto white = count([&](const Light& light) { return is_overexposed(light, image); });
+  if (white > 0) {
+    return result.reject(
+        RejectionReason::overexposed,
+        fmt::format("overexposed: {} of {} lights are at full scale all over, {} of the lamps seen",
+                    white, unknown, lamps));
+  }
+  result.reject(
+      RejectionReason::too_few_lamps,
+      fmt::format("too few lamps: {} seen, {} cut by the image's edge, {} lights unlike any", lamps,
+                  count(is_kind(LightKind::cut)), unknown));
+}
+
+LampClassifier read_classifier(const LampImages& images, const fs::path& file,
+                               const std::optional<double>& row_time_s,
+                               std::vector<std::string>& warnings) {
+  LampClassifier classifier = read_lamp_classifier(file);
+  for (const auto& lamp : classifier.lamps) {
+    if (find_lamp(images.lamps.lamps, lamp.lamp) != nullptr) continue;
+    throw InputError(file,
+                     fmt::format("lamp {} is not in {}", lamp.lamp, images.lamps_file.string()));
+  }
+  for (const Lamp& lamp : images.lamps.lamps) {
+    const bool is_known = std::any_of(classifier.lamps.begin(), classifier.lamps.end(),
+                                      [&](const auto& other) { return other.lamp == lamp.id; });
+    if (is_known) continue;
+    warnings.push_back(fmt::format("lamp {} is unknown to {}", lamp.id, file.string()));
+  }
+  constexpr double max_relative_difference = 0.005;
+  if (classifier.row_time_s && row_time_s &&
+      std::abs(*classifier.row_time_s / *row_time_s - 1) > max_relative_difference) {
+    throw InputError(
+        file, fmt::format("row_time_s is {:.4g}, that of {} is {:.4g}: train it for this camera",
+                          *classifier.row_time_s,
+                          images.calibration_file.empty() ? "--row-time-s"
+                                                          : images.calibration_file.string(),
+                          *row_time_s));
+  }
+  return classifier;
+}
+
+void warn_of_rest(std::size_t count, const char* items, std::vector<std::string>& warnings) {
+  if (count > kMaxLines) {
+    warnings.push_back(fmt::format("and {} more {}", count - kMaxLines, items));
+  }
+}
+
+/// Warns of lamps in the map that are hard to distinguish, or whose stripes are hard to see.
+void warn_of_map(const LampImages& images, const DetectorCamera& camera,
+                 const std::optional<double>& exposure_s, std::vector<std::string>& warnings) {
+  std::optional<double> focal_px;
+  if (images.calibration) {
+    focal_px = images.calibration->camera.intrinsics[camera.readout == Readout::rows ? 1 : 0];
+  }
+  const StripeConditions conditions{*camera.row_time_s, focal_px, 0, exposure_s};
+  const auto alike = lamps_alike(images.lamps, conditions);
+  for (std::size_t i = 0; i < std::min(alike.size(), kMaxLines); ++i) {
+    const auto& [first, second, gap, needed] = alike[i];
+    warnings.push_back(fmt::format(
+        "lamps {} and {} may be left unknown, seen from z = 0: their frequencies differ by {:.1f} "
+        "%, {:.1f} % would be enough; change one of the two frequencies, or a duty by 0.3",
+        first, second, 100 * gap, 100 * needed));
+  }
+  warn_of_rest(alike.size(), "pairs of lamps with frequencies that are too near", warnings);
+  const auto unreadable = lamps_unreadable(images.lamps, conditions);
+  for (std::size_t i = 0; i < std::min(unreadable.size(), kMaxLines); ++i) {
+    const auto& [lamp, period_lines, periods, contrast] = unreadable[i];
+    if (period_lines < kShortestPeriod_lines) {
+      warnings.push_back(fmt::format(
+          "lamp {} has stripes of {:.2g} lines, too fine to be seen: a lower frequency shows them",
+          lamp, period_lines));
+    } else if (periods < kMinPeriods) {
+      warnings.push_back(fmt::format(
+          "lamp {} shows only {:.1f} stripes, seen from z = 0: a higher frequency, a larger lamp "
+          "or a camera nearer to it shows more",
+          lamp, periods));
+    } else {
+      constexpr double microseconds = 1e6;
+      warnings.push_back(fmt::format(
+          "lamp {} has {:.0f} % of its stripes left after an exposure of {:.3g} us: expose shorter",
+          lamp, 100 * contrast, microseconds * *exposure_s));
+    }
+  }
+  warn_of_rest(unreadable.size(), "lamps with stripes that can hardly be seen", warnings);
+}
+
+/// Explains that no lamp is identified, with the reason that most of the lights have.
+std::string explain_no_lamp(const std::vector<Observation>& images) {
+  const auto count = [&](LightKind kind) { return count_of(images, kind); };
+  const auto skipped = std::count_if(images.begin(), images.end(),
+                                     [](const Observation& image) { return !image.is_kept(); });
+  std::string message = fmt::format(
+      "no lamp was identified wholly in view in {} images ({} skipped; {} lamps are cut by the "
+      "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
+      images.size(), skipped, count(LightKind::cut), count(LightKind::unknown),
+      count(LightKind::steady), count(LightKind::formless));
+  const auto reasons = reasons_of(images);
+  if (reasons.empty()) {
+    return message + ": are lamps lit and in view, and the exposure long enough?";
+  }
+  const auto& [kind, reason, lights] = reasons.front();
+  return message + fmt::format("; most often, {} times: {}", lights, explanation_of(reason));
+}
+
+/// Creates the folder for pictures of the lights.
+void create_annotate_folder(const fs::path& folder, const fs::path& images) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw InputError(folder, "cannot be made: " + error.message());
+  if (fs::equivalent(folder, images, error)) {
+    throw InputError(folder, "holds the images: the pictures go into another folder");
+  }
+}
+
+/// Creates the detector of a set of images.
+LightDetector make_detector(const LampImages& images, const FrontendOptions& options,
+                            Observations& result) {
+  DetectorCamera camera = images.calibration
+                              ? detector_camera(*images.calibration)
+                              : DetectorCamera{Readout::rows, options.row_time_s, {}};
+  std::optional<LampClassifier> classifier;
+  if (options.classifier.empty()) {
+    check_frequencies(images.lamps, images.lamps_file);
+    if (!camera.row_time_s) {
+      throw InputError(
+          images.calibration_file,
+          "camera.row_time_s is missing: without it no stripe tells its lamp; --row-time-s of "
+          "vlp-intrinsics states it, vlp-train --row-time finds it");
+    }
+  } else {
+    classifier = read_classifier(images, options.classifier, camera.row_time_s, result.warnings);
+  }
+  std::optional<Readout> known_readout = options.readout;
+  std::optional<std::array<int, 2>> imager_px;
+  if (images.calibration) {
+    imager_px = images.calibration->camera.imager_px;
+    if (!known_readout) known_readout = images.calibration->camera.readout;
+  }
+  Observations remarks;
+  camera.readout =
+      find_readout(list_lamp_images(images.images), known_readout, options, imager_px, remarks);
+  result.notes.insert(result.notes.end(), remarks.notes.begin(), remarks.notes.end());
+  // Each image of an unknown camera decides for itself.
+  if (known_readout || images.calibration) {
+    result.warnings.insert(result.warnings.end(), remarks.warnings.begin(), remarks.warnings.end());
+  }
+  if (!classifier) warn_of_map(images, camera, options.exposure_s, result.warnings);
+  return LightDetector(images.lamps, camera, std::move(classifier));
+}
+
+/// Returns the level rotations of a set of images, by its table of captures.
+LevelRotations read_levels(const LampImages& images) {
+  if (!images.calibration) return {};
+  CapturesTable captures = images.captures.value_or(CapturesTable());
+  if (!images.captures && !is_video_name(images.images)) captures = captures_table(images.images);
+  return level_rotations(captures, *images.calibration, images.yaw_in_robot_rad);
+}
+
+}  // namespace
+
+Eigen::Matrix3d level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
+                               const Eigen::Matrix3d& base_from_camera) {
+  const Eigen::Matrix3d level_from_base =
+      inclination_rotation(inclination, yaw_in_robot_rad).level_from_base;
+  return level_from_zenith((level_from_base * base_from_camera).inverse().col(2));
+}
+
+LevelRotations level_rotations(const CapturesTable& captures, const Calibration& calibration,
+                               double yaw_in_robot_rad) {
+  const Eigen::Matrix3d base_from_camera = detector_camera(calibration).level_from_camera;
+  LevelRotations levels;
+  for (const auto& [image, capture] : captures) {
+    if (!capture.inclination) continue;
+    levels.emplace(image, level_rotation(*capture.inclination, yaw_in_robot_rad, base_from_camera));
+  }
+  return levels;
+}
+
+LampIntake::LampIntake(LightDetector detector, ImageUse use, const FrontendOptions& options,
+                       const std::optional<std::array<int, 2>>& imager_px, LevelRotations levels)
+    : levels_(std::move(levels)),
+      detector_(std::move(detector)),
+      use_(use),
+      options_(options),
+      imager_px_(imager_px) {}
+
+LampIntake::LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options,
+                       Observations& result)
+    : levels_(read_levels(images)),
+      detector_(make_detector(images, options, result)),
+      use_(use),
+      options_(options),
+      can_turn_(!options.readout && !images.calibration) {
+  if (images.calibration) imager_px_ = images.calibration->camera.imager_px;
+  if (!options.annotate.empty()) create_annotate_folder(options.annotate, images.images);
+}
+
+LampIntake LampIntake::with_levels(const LevelRotations& levels) const {
+  LampIntake other = *this;
+  other.use_ = ImageUse::fixes;
+  for (const auto& [image, level] : levels) other.levels_.insert_or_assign(image, level);
+  return other;
+}
+
+LampIntake LampIntake::with_annotate(const fs::path& folder) const {
+  LampIntake other = *this;
+  other.options_.annotate = folder;
+  return other;
+}
+
+std::optional<LightDetector> LampIntake::detector_for(const std::string& image) const {
+  const auto level = levels_.find(image);
+  if (level == levels_.end()) return std::nullopt;
+  return detector_.leaning(level->second);
+}
+
+Observation LampIntake::observe(const SourceImage& source) const {
+  Observation result{source.file, source.time_s};
+  result.readout = detector_.readout();
+  cv::Mat pixels;
+  observe_pixels(source, options_, imager_px_, result, [&](const cv::Mat& image) {
+    pixels = image;
+    if (min_lamps(use_) > 0 && is_flat(image)) reject_without_signal(image, result);
+    if (!result.is_kept()) return;
+    const auto tilted = detector_for(result.name());
+    const LightDetector& detector = tilted ? *tilted : detector_;
+    if (can_turn_) {
+      auto [readout, lights] = detect_either_way(detector, image_view(image));
+      result.readout = readout;
+      result.lights = std::move(lights);
+    } else {
+      result.lights = detector.detect(image_view(image));
+    }
+    if (std::cmp_less(lamps_in(result).size(), min_lamps(use_))) reject_few_lamps(image, result);
+  });
+  if (!options_.annotate.empty() && !pixels.empty()) {
+    write_annotated(options_.annotate, source.file,
+                    annotated(pixels, result.lights, result.readout));
+  }
+  for (Light& light : result.lights) std::vector<EdgePoint>().swap(light.outline);
+  return result;
+}
+
+Observations LampIntake::observe_all(const std::vector<fs::path>& files,
+                                     const IntakeProgress& progress) const {
+  ImageSource source(files, options_, imager_px_);
+  Observations result = observe_images(
+      source, options_.threads, [&](const SourceImage& image) { return observe(image); }, progress);
+  reject_repeated(result.images, use_, options_);
+  const auto turned =
+      std::count_if(result.images.begin(), result.images.end(),
+                    [&](const Observation& image) { return image.readout != detector_.readout(); });
+  if (turned > 0) {
+    result.notes.push_back(fmt::format("{} of {} images show stripes along {}", turned,
+                                       result.images.size(),
+                                       readout() == Readout::rows ? "columns" : "rows"));
+  }
+  return result;
+}
+
+std::vector<fs::path> list_lamp_images(const fs::path& images) {
+  return is_video_name(images) ? std::vector{images} : images_in(images);
+}
+
+Observations observe_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,
+                           const IntakeProgress& progress) {
+  Observations remarks;
+  const LampIntake intake(images, use, options, remarks);
+  Observations result = intake.observe_all(list_lamp_images(images.images), progress);
+  result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
+  result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(), remarks.warnings.end());
+  check_lamps_seen(images.images, result);
+  return result;
+}
+
+void check_lamps_seen(const fs::path& images, Observations& result) {
+  check_any_readable(images, result.images);
+  if (count_of(result.images, LightKind::lamp) == 0) {
+    result.failure = {false, explain_no_lamp(result.images)};
+  } else if (std::none_of(result.images.begin(), result.images.end(),
+                          [](const Observation& image) { return image.is_kept(); })) {
+    result.failure = {false, describe_none_kept(result.images)};
+  }
+}
+
+Readout find_readout(const std::vector<fs::path>& images, const std::optional<Readout>& known,
+                     const FrontendOptions& options,
+                     const std::optional<std::array<int, 2>>& imager_px, Observations& result) {
+  if (known) return *known;
+  ImageSource source(images, options, imager_px);
+  cv::Mat pixels;
+  const auto found = find_readout(source.expected(), [&](std::size_t) {
+    const auto image = source.next();
+    pixels.release();
+    try {
+      if (image) pixels = image->read(options);
+    } catch (const InputError&) {  // rejected when its lights are detected
+    }
+    return image_view(pixels);
+  });
+  if (!found) {
+    result.warnings.emplace_back(
+        "the read-out is not stated and the images do not show it: rows are taken; --readout "
+        "states it");
+    return Readout::rows;
+  }
+  result.notes.push_back(fmt::format("the read-out is not stated: the images show stripes along {}",
+                                     *found == Readout::rows ? "rows" : "columns"));
+  return *found;
+}
+
+void check_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
+  if (std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
+                  [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); })) {
+    return;
+  }
+  throw InputError(lamps_file, "no lamp has a frequency_hz: none could be told from another");
+}
+
+void check_lamps(std::span<const Frame> frames, const LampMap& lamps, const fs::path& lamps_file) {
+  for (const Frame& frame : frames) {
+    for (const Detection& detection : frame.detections) {
+      if (find_lamp(lamps.lamps, detection.lamp) != nullptr) return;
+    }
+  }
+  throw InputError(lamps_file, "has none of the lamps that the captures show");
+}
+
+}  // namespace vlp

@@ -1,0 +1,134 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "captures/detections_table.h"
+#include "detection/boards/board_view.h"
+#include "frontend/image_source.h"
+#include "frontend/options.h"
+#include "lamps/shape/light.h"
+#include "rig/calibration.h"
+
+namespace vlp {
+
+/// Reason why an image is not used.
+enum class RejectionReason {
+  unreadable,       // no image, damaged, or larger than FrontendOptions::max_mpx
+  wrong_size,       // not of the camera
+  too_dark,         // nothing exceeds the noise, or the level of a board
+  overexposed,      // too many pixels at full scale
+  no_contrast,      // no edge in the image
+  blurred,          // by more than FrontendOptions::max_blur_px
+  other_board,      // tags that the board does not have, and none that it has
+  no_board,         // no tag or corner of the board
+  too_few_corners,  // they do not determine the pose of the board
+  too_few_lamps,    // fewer than the step needs
+  same_image,       // a copy of an image that is used
+  same_view,        // shows what an image that is used shows
+  not_needed,       // came when its step had enough images
+  used_elsewhere    // of another camera or run
+};
+
+/// Returns a phrase that follows a number of images, for example "blurred" or "cannot be read".
+std::string_view name_of(RejectionReason reason);
+
+/// Returns true for images without a fault that others make unnecessary.
+bool is_redundant(RejectionReason reason);
+
+struct Rejection {
+  RejectionReason reason;
+  /// The reason with its figures, in one line for people.
+  std::string message;
+};
+
+/// The result of the intake of one image: what was detected in it, and whether it is used.
+struct Observation {
+  /// VIDEO#000123 for a frame of a video.
+  std::filesystem::path file;
+  /// Time of a video's frame since the start of the video.
+  std::optional<double> time_s = {};
+  /// Width and height; 0 for an image that cannot be read.
+  std::array<int, 2> size_px = {0, 0};
+  /// std::nullopt: the image is used.
+  std::optional<Rejection> rejection = {};
+
+  /// Board images only: the detection, unless the image is unreadable or of another size, and the
+  /// blur, unless there is no contrast.
+  std::optional<BoardView> board = {};
+  std::optional<double> blur_px = {};
+
+  /// Lamp images only: all lights, without outlines, and the readout direction used.
+  std::vector<Light> lights = {};
+  Readout readout = Readout::rows;
+
+  bool is_kept() const { return !rejection; }
+  std::string name() const { return file.filename().string(); }
+  void reject(RejectionReason reason, std::string message) {
+    rejection = Rejection{reason, std::move(message)};
+  }
+};
+
+/// Reason why no image of a set can be used.
+struct IntakeFailure {
+  /// True if the images contradict `file`; false if they are of no use.
+  bool is_wrong_file;
+  std::string message;
+  /// File to correct; empty if it is the images.
+  std::filesystem::path file = {};
+};
+
+/// The observations of a set of images, in the order of the images.
+struct Observations {
+  std::vector<Observation> images;
+  /// Doubts, decisions, and details for --verbose.
+  std::vector<std::string> warnings = {}, notes = {}, details = {};
+  std::optional<IntakeFailure> failure = {};
+};
+
+/// Returns the lamps among the lights, with their centres.
+std::vector<Detection> lamps_in(const Observation& image);
+
+/// Returns the views of the boards in the images that are used.
+std::vector<BoardView> kept_views(std::span<const Observation> images);
+
+/// Returns the lamps in the images that are used, one frame per image.
+std::vector<Frame> kept_frames(std::span<const Observation> images);
+
+/// Returns the number of rejected images per reason, for example "10 blurred, 2 too dark", followed
+/// by the remedy if one reason applies to more than half of them; empty if no image is rejected.
+std::string summarize_rejections(std::span<const Observation> images);
+
+/// Returns that none of the images can be used, with their number per reason.
+std::string describe_none_kept(std::span<const Observation> images);
+
+/// Throws InputError if no image can be read, with the reason of the first one.
+void check_any_readable(const std::filesystem::path& where, std::span<const Observation> images);
+
+/// Reads an image and passes its pixels to `detect`. Rejects the image, with the reason, if it
+/// cannot be read, is not of `imager_px`, or makes `detect` throw an exception.
+void observe_pixels(const SourceImage& source, const FrontendOptions& options,
+                    const std::optional<std::array<int, 2>>& imager_px, Observation& result,
+                    const std::function<void(const cv::Mat&)>& detect);
+
+/// Reports the number of images done and their total, as far as videos state it. Calls do not
+/// overlap.
+using IntakeProgress = std::function<void(std::size_t done, std::size_t total)>;
+
+/// Calls `observe` for each image of the source on several threads and returns the results in the
+/// order of the images. An image that cannot be used does not end the run.
+Observations observe_images(ImageSource& source, int threads,
+                            const std::function<Observation(const SourceImage&)>& observe,
+                            const IntakeProgress& progress = {});
+
+}  // namespace vlp

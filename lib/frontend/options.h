@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "rig/calibration.h"
+
+namespace vlp {
+
+/// Options of the intake of images: reading, detection, rejection. Programs, sessions and the
+/// station share them.
+struct FrontendOptions {
+  /// Number of images processed at the same time.
+  int threads = 1;
+  /// Images of more megapixels are rejected before they are decoded.
+  double max_mpx = 200;
+  /// Every n-th frame of a video is used.
+  int every = 1;
+
+  /// Board images: largest sigma of the blur of the sharpest edges (measure_blur()).
+  double max_blur_px = 2;
+  /// Board images: largest fraction of the board's pixels at full scale. More displaces edges.
+  double max_white_fraction = 0.25;
+  /// Board images: level that 1 % of the pixels exceed, as a fraction of the full scale. An image
+  /// below it with too few corners is too dark.
+  double min_bright_fraction = 0.1;
+  /// Two images show the same view if what both show lies this close together, as a fraction of the
+  /// image's width.
+  double same_view_fraction = 0.01;
+
+  /// Folder of corners that were detected before (corner_cache()); empty: none.
+  std::filesystem::path corner_cache = {};
+  /// Folder for pictures of the detected lights; created if missing. Empty: none.
+  std::filesystem::path annotate = {};
+  /// Lamp classifier by vlp-train; empty: lamps are identified by the map's frequencies.
+  std::filesystem::path classifier = {};
+  /// Readout direction; overrides that of the calibration. Without either it is estimated from the
+  /// images.
+  std::optional<Readout> readout = {};
+  /// Row time of a camera without a calibration.
+  std::optional<double> row_time_s = {};
+  /// Exposure of the images for the check of the lamp map; short if unknown.
+  std::optional<double> exposure_s = {};
+};
+
+}  // namespace vlp

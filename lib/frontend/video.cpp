@@ -1,0 +1,139 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/video.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <opencv2/videoio/registry.hpp>
+
+#include "rig/input_error.h"
+
+namespace vlp {
+
+bool is_video_name(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* known : {".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".mpg", ".mpeg"}) {
+    if (extension == known) return true;
+  }
+  return false;
+}
+
+std::string frame_name(const std::string& video, std::size_t number) {
+  return fmt::format("{}#{:06}", video, number);
+}
+
+std::optional<std::string> video_of_frame(const std::string& name) {
+  const auto mark = name.rfind('#');
+  if (mark == std::string::npos || mark + 1 == name.size() ||
+      name.find_first_not_of("0123456789", mark + 1) != std::string::npos ||
+      !is_video_name(name.substr(0, mark))) {
+    return {};
+  }
+  return name.substr(0, mark);
+}
+
+struct Video::Capture {
+  cv::VideoCapture video;
+};
+
+Video::Video(const std::string& source, const std::optional<std::array<int, 2>>& camera_px)
+    : source_(source), capture_(std::make_unique<Capture>()) {
+  // What OpenCV and FFmpeg say of each of their ways to open a video helps nobody.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+  const bool is_url = source.find("://") != std::string::npos;
+  if (!is_url && !std::filesystem::exists(source)) {
+    throw InputError(source, is_camera() ? "there is no such camera: is it connected?"
+                                         : "there is no such video");
+  }
+  // For a file OpenCV would try sequences of images, too.
+  const bool has_ffmpeg = cv::videoio_registry::hasBackend(cv::CAP_FFMPEG);
+  const int file_api = !is_url && has_ffmpeg ? cv::CAP_FFMPEG : cv::CAP_ANY;
+  cv::VideoCapture& video = capture_->video;
+  if (!video.open(source, is_camera() ? cv::CAP_V4L2 : file_api)) {
+    throw InputError(source, is_camera()
+                                 ? "cannot be opened as a camera"
+                                 : "cannot be opened as a video: is it cut short, or none?");
+  }
+  video.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+  if (!is_camera() || !camera_px) return;
+  video.set(cv::CAP_PROP_FRAME_WIDTH, (*camera_px)[0]);
+  video.set(cv::CAP_PROP_FRAME_HEIGHT, (*camera_px)[1]);
+  video.set(cv::CAP_PROP_BUFFERSIZE, 1);  // what it sees now, not some frames ago
+}
+
+Video::~Video() = default;
+
+bool Video::is_camera() const { return source_.starts_with("/dev/"); }
+
+std::array<int, 2> Video::size_px() const {
+  const auto of = [&](int property) { return static_cast<int>(capture_->video.get(property)); };
+  return {of(cv::CAP_PROP_FRAME_WIDTH), of(cv::CAP_PROP_FRAME_HEIGHT)};
+}
+
+std::size_t Video::frames_stated() const {
+  constexpr double most = 1e9;
+  const double stated = capture_->video.get(cv::CAP_PROP_FRAME_COUNT);
+  return stated > 0 && stated < most ? static_cast<std::size_t>(stated) : 0;
+}
+
+/// After a frame that cannot be decoded OpenCV fails some times, and then goes on.
+bool Video::grab() {
+  constexpr int most_tries = 100;
+  if (ended_) return false;
+  const std::size_t stated = is_camera() ? 0 : frames_stated();
+  const int tries = grabbed_ < stated ? most_tries : 1;
+  for (int i = 0; i < tries; ++i) {
+    if (!capture_->video.grab()) continue;
+    gap_ = gap_ || i > 0;
+    ++grabbed_;
+    return true;
+  }
+  ended_ = true;
+  return false;
+}
+
+std::optional<VideoFrame> Video::next() {
+  cv::Mat frame;
+  do {
+    if (!grab()) return {};
+  } while (!capture_->video.retrieve(frame) || frame.empty());
+  VideoFrame next{{}, grabbed_ - 1, capture_->video.get(cv::CAP_PROP_POS_MSEC) / 1000};
+  if (frame.channels() == 1) {
+    next.image = frame.clone();  // OpenCV writes the next one over it
+  } else {
+    cv::cvtColor(frame, next.image, cv::COLOR_BGR2GRAY);
+  }
+  // Some decoders lose the stamps of the last frames.
+  const double rate = capture_->video.get(cv::CAP_PROP_FPS);
+  if (!(next.time_s > last_s_) && last_ && rate > 0) {
+    next.time_s = last_s_ + static_cast<double>(next.number - *last_) / rate;
+  }
+  last_ = next.number;
+  last_s_ = next.time_s;
+  return next;
+}
+
+void Video::skip() { grab(); }
+
+std::string Video::missing() const {
+  const std::size_t stated = frames_stated();
+  // Files of the other kinds state it by their length.
+  const std::string kind = std::filesystem::path(source_).extension().string();
+  const bool exact = kind == ".avi" || kind == ".mp4" || kind == ".mov" || kind == ".m4v";
+  const std::size_t tolerated = exact || gap_ ? 0 : 1 + stated / 50;
+  if (grabbed_ + tolerated >= stated) return "";
+  return fmt::format("{} of its {} frames can be decoded; is it cut short, or damaged?", grabbed_,
+                     stated);
+}
+
+}  // namespace vlp

@@ -1,0 +1,226 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/board_intake.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "frontend/image_file.h"
+#include "support/datasets.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+namespace fs = std::filesystem;
+
+/// A folder for images of the board of the paper's rig.
+struct BoardImages : testing::Test {
+  Board board = read_board(kRig + "/board.yaml");
+  TemporaryFolder folder;
+  cv::Mat good = read_image(kRig + "/sample-boards/0000.png");
+  cv::Mat other;  // upside down
+  FrontendOptions options;
+
+  BoardImages() { cv::rotate(good, other, cv::ROTATE_180); }
+
+  fs::path write(const char* name, const cv::Mat& image) const {
+    cv::imwrite((folder / name).string(), image);
+    return folder / name;
+  }
+  /// Returns the observation of an image with these pixels.
+  Observation observe(const cv::Mat& image) const {
+    return BoardIntake(board, options, std::array{good.cols, good.rows})
+        .observe(SourceImage(write("image.png", image)));
+  }
+  Observations observe_all() const {
+    return observe_boards(images_in(folder / ""), board, "board.yaml", options);
+  }
+};
+
+RejectionReason reason_of(const Observation& image) {
+  EXPECT_TRUE(image.rejection) << image.name() << " is not rejected";
+  return image.rejection ? image.rejection->reason : RejectionReason::not_needed;
+}
+
+cv::Mat scaled(const cv::Mat& image, double factor) {
+  cv::Mat result;
+  image.convertTo(result, CV_8U, factor);
+  return result;
+}
+
+TEST_F(BoardImages, KeepsAGoodImage) {
+  const Observation image = observe(good);
+  EXPECT_TRUE(image.is_kept()) << image.rejection->message;
+  ASSERT_TRUE(image.board);
+  EXPECT_GE(image.board->seen.tags.size(), 20U);
+  EXPECT_EQ(image.size_px, (std::array{800, 600}));
+  ASSERT_TRUE(image.blur_px);
+  EXPECT_LT(*image.blur_px, 1.5);
+}
+
+TEST_F(BoardImages, RejectsPoorImagesWithTheirFigures) {
+  cv::Mat blurred;
+  cv::GaussianBlur(good, blurred, {}, 3);
+  const Observation blur = observe(blurred);
+  EXPECT_EQ(reason_of(blur), RejectionReason::blurred);
+  EXPECT_THAT(blur.rejection->message, testing::MatchesRegex("blurred: [23]\\.[0-9] px, 2\\.0 .*"));
+
+  const Observation dark = observe(scaled(good, 0.012));
+  EXPECT_EQ(reason_of(dark), RejectionReason::too_dark);
+  EXPECT_THAT(dark.rejection->message, HasSubstr("of the full scale, 10 % at least"));
+
+  const Observation white = observe(scaled(good, 8));
+  EXPECT_EQ(reason_of(white), RejectionReason::overexposed);
+  EXPECT_THAT(white.rejection->message, HasSubstr("is at full scale, 25 % at most"));
+
+  EXPECT_EQ(reason_of(observe(cv::Mat1b(600, 800, uchar(128)))), RejectionReason::no_contrast);
+  EXPECT_EQ(reason_of(observe(good(cv::Rect(0, 0, 400, 300)))), RejectionReason::wrong_size);
+}
+
+TEST_F(BoardImages, RejectsByTheLimitsOfTheOptions) {
+  cv::Mat blurred;
+  cv::GaussianBlur(good, blurred, {}, 1.5);
+  ASSERT_TRUE(observe(blurred).is_kept());
+  options.max_blur_px = 1;
+  EXPECT_EQ(reason_of(observe(blurred)), RejectionReason::blurred);
+}
+
+TEST_F(BoardImages, RejectsImagesWithTooLittleOfTheBoard) {
+  // Some tags are left, then none.
+  cv::Mat few = good.clone(), none = good.clone();
+  const SeenBoard seen = BoardDetector(board).detect(good);
+  ASSERT_GE(seen.tags.size(), 6U);
+  const auto hide = [](const SeenTag& tag, cv::Mat& image) {
+    std::vector<cv::Point> corners;
+    for (const auto& corner : tag.corners_px) corners.emplace_back(corner.x(), corner.y());
+    cv::fillConvexPoly(image, corners, cv::Scalar(255));
+  };
+  for (std::size_t i = 0; i < seen.tags.size(); ++i) {
+    if (i > 1) hide(seen.tags[i], few);
+    hide(seen.tags[i], none);
+  }
+  const Observation image = observe(few);
+  EXPECT_EQ(reason_of(image), RejectionReason::too_few_corners);
+  EXPECT_THAT(image.rejection->message, StartsWith("only 2 tags of the board can be used"));
+  cv::rectangle(none, {100, 100, 80, 80}, cv::Scalar(0), -1);  // sharp edges
+  EXPECT_EQ(reason_of(observe(none)), RejectionReason::no_board);
+}
+
+TEST_F(BoardImages, RejectsTagsOfAnotherBoard) {
+  const Observation before = observe(good);
+  ASSERT_TRUE(before.is_kept());
+  board.first_id += 100;
+  const Observation image = observe(good);
+  EXPECT_EQ(reason_of(image), RejectionReason::other_board);
+}
+
+TEST_F(BoardImages, GivesTheSameForAnyNumberOfThreads) {
+  for (const char* name : {"a.png", "b.png", "c.png", "d.png"}) write(name, good);
+  write("e.png", other);
+  folder.file("bad.png", "no image");
+  std::size_t last = 0;
+  const Observations one = observe_all();
+  options.threads = 4;
+  const Observations four = observe_boards(images_in(folder / ""), board, "board.yaml", options,
+                                           [&](std::size_t done, std::size_t total) {
+                                             last = done;
+                                             EXPECT_EQ(total, 6U);
+                                           });
+  EXPECT_EQ(last, 6U);
+  ASSERT_EQ(four.images.size(), 6U);
+  ASSERT_EQ(one.images.size(), 6U);
+  for (std::size_t i = 0; i < one.images.size(); ++i) {
+    EXPECT_EQ(one.images[i].name(), four.images[i].name());
+    ASSERT_EQ(one.images[i].is_kept(), four.images[i].is_kept()) << one.images[i].name();
+    ASSERT_EQ(one.images[i].board.has_value(), four.images[i].board.has_value());
+    if (!one.images[i].board) continue;
+    const auto &tags = one.images[i].board->seen.tags, &others = four.images[i].board->seen.tags;
+    ASSERT_EQ(tags.size(), others.size());
+    for (std::size_t k = 0; k < tags.size(); ++k) {
+      EXPECT_EQ(tags[k].corners_px, others[k].corners_px);
+    }
+  }
+}
+
+TEST_F(BoardImages, RejectsRepeatedImagesAndViews) {
+  write("a.png", good);
+  write("b.png", good);
+  cv::Mat moved;
+  cv::warpAffine(good, moved, cv::Mat(cv::Matx23d(1, 0, 3, 0, 1, 1)), good.size(), cv::INTER_LINEAR,
+                 cv::BORDER_REPLICATE);
+  write("c.png", moved);
+  write("d.png", other);
+  const Observations seen = observe_all();
+  ASSERT_EQ(seen.images.size(), 4U);
+  EXPECT_TRUE(seen.images[0].is_kept());
+  EXPECT_EQ(reason_of(seen.images[1]), RejectionReason::same_image);
+  EXPECT_EQ(seen.images[1].rejection->message, "is the same image as a.png");
+  EXPECT_EQ(reason_of(seen.images[2]), RejectionReason::same_view);
+  EXPECT_EQ(seen.images[2].rejection->message, "shows the same view as a.png: views count once");
+  EXPECT_TRUE(seen.images[3].is_kept());
+  EXPECT_FALSE(seen.failure);
+  EXPECT_EQ(kept_views(seen.images).size(), 2U);
+}
+
+TEST_F(BoardImages, RejectsImagesOfAnotherSizeThanMost) {
+  write("a.png", good(cv::Rect(0, 0, 700, 600)));
+  write("b.png", good);
+  write("c.png", other);
+  const Observations seen = observe_all();
+  ASSERT_EQ(seen.images.size(), 3U);
+  EXPECT_EQ(reason_of(seen.images[0]), RejectionReason::wrong_size);
+  EXPECT_THAT(seen.images[0].rejection->message,
+              StartsWith("is 700 x 600 px, the camera's images are 800 x 600"));
+  EXPECT_TRUE(seen.images[1].is_kept());
+}
+
+TEST_F(BoardImages, ThrowsIfNoImageCanBeRead) {
+  folder.file("a.png", "no image");
+  EXPECT_THAT(refusal_of([&] { observe_all(); }),
+              AllOf(HasSubstr("none of its 1 images can be used; the first, a.png: "),
+                    HasSubstr("cannot be read as an image")));
+}
+
+TEST_F(BoardImages, FailsWithTheReasonIfNoImageShowsTheBoard) {
+  write("a.png", good);
+  write("b.png", other);
+  board.first_id += 100;
+  const Observations seen = observe_all();
+  ASSERT_TRUE(seen.failure);
+  EXPECT_TRUE(seen.failure->is_wrong_file);
+  EXPECT_EQ(seen.failure->file, "board.yaml");
+  EXPECT_THAT(seen.failure->message, HasSubstr("with other ids than the board has"));
+}
+
+TEST_F(BoardImages, GivesTheSameFromTheCache) {
+  const fs::path file = write("a.png", good);
+  options.corner_cache = folder / "cache";
+  const BoardIntake intake(board, options);
+  const Observation detected = intake.observe(SourceImage(file));
+  ASSERT_FALSE(fs::is_empty(options.corner_cache));
+  const Observation cached = intake.observe(SourceImage(file));
+  ASSERT_TRUE(detected.board && cached.board);
+  EXPECT_EQ(detected.blur_px, cached.blur_px);
+  EXPECT_EQ(detected.size_px, cached.size_px);
+  EXPECT_EQ(detected.board->seen.tags.size(), cached.board->seen.tags.size());
+  // The stored figures count, not the image.
+  corner_cache(options.corner_cache, board)
+      .keep(SourceImage(file), {*detected.board, 1.25, 0.9, 0.1});
+  EXPECT_EQ(intake.observe(SourceImage(file)).blur_px, 1.25);
+  // Limits are no part of the cache.
+  options.max_blur_px = 0.1;
+  EXPECT_EQ(reason_of(BoardIntake(board, options).observe(SourceImage(file))),
+            RejectionReason::blurred);
+}
+
+}  // namespace
+}  // namespace vlp

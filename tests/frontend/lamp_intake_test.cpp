@@ -1,0 +1,106 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "frontend/lamp_intake.h"
+
+#include <gmock/gmock.h>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "frontend/image_file.h"
+#include "support/datasets.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::StartsWith;
+
+/// Images of lamps seen by the camera of the paper's rig.
+struct LampImage : testing::Test {
+  LampMap lamps = read_lamp_map(kRig + "/lamps.yaml");
+  Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");
+  TemporaryFolder folder;
+
+  Observation observe(const cv::Mat& image, ImageUse use = ImageUse::places) const {
+    const auto file = folder / "0.png";
+    cv::imwrite(file.string(), image);
+    return LampIntake(LightDetector(lamps, detector_camera(calibration)), use, {},
+                      calibration.camera.imager_px)
+        .observe(SourceImage(file));
+  }
+  std::string refusal(const cv::Mat& image) const {
+    const Observation seen = observe(image);
+    return seen.is_kept() ? "" : seen.rejection->message;
+  }
+  /// A ceiling at a level, its noise, and a lamp with stripes that are so much brighter.
+  cv::Mat1b ceiling(double level, double sd, double lamp) const {
+    cv::Mat1f image(600, 800);
+    cv::RNG random(3);
+    random.fill(image, cv::RNG::NORMAL, level, sd);
+    for (int v = 200; v < 260; ++v) {
+      if (v / 5 % 2 == 0) image(cv::Rect(300, v, 60, 1)) += lamp;
+    }
+    cv::Mat1b levels;
+    image.convertTo(levels, CV_8U);
+    return levels;
+  }
+};
+
+/// Whatever is detected in its noise.
+TEST_F(LampImage, IsTooDarkWhenNothingStandsOutOfTheNoise) {
+  EXPECT_THAT(refusal(ceiling(2, 0.5, 2)), StartsWith("too dark: the brightest is "));
+  EXPECT_THAT(refusal(ceiling(20, 3, 5)), StartsWith("too dark: the brightest is "));
+  EXPECT_THAT(refusal(ceiling(0, 0, 0)), StartsWith("too dark: the brightest is 0 times"));
+  EXPECT_THAT(refusal(ceiling(20, 1, 100)), StartsWith("too few lamps: ")) << "one lamp, bright";
+}
+
+/// At full scale, and where the sensor is full before that.
+TEST_F(LampImage, IsOverexposedWhenAllOfItIsBright) {
+  EXPECT_THAT(refusal(ceiling(400, 1, 100)),
+              StartsWith("overexposed: all of the image is at 100 % of the full scale"));
+  EXPECT_THAT(refusal(ceiling(240, 0.3, 0)), StartsWith("overexposed: all of the image is at 9"));
+}
+
+TEST_F(LampImage, OfAnotherSizeIsOfAnotherCamera) {
+  EXPECT_EQ(refusal(cv::Mat1b(100, 200, static_cast<unsigned char>(0))),
+            "is 200 x 100 px, the camera's images are 800 x 600 px");
+}
+
+TEST_F(LampImage, IsKeptWithItsLamps) {
+  const Observation image = observe(read_image(kRig + "/sample/0000.png"));
+  EXPECT_TRUE(image.is_kept());
+  EXPECT_GE(lamps_in(image).size(), 4U);
+  EXPECT_EQ(kept_frames(std::vector{image}).at(0).detections.size(), lamps_in(image).size());
+  for (const Light& light : image.lights) EXPECT_TRUE(light.outline.empty());
+}
+
+/// A fix of a dark image is no fix, which its row says.
+TEST_F(LampImage, IsKeptForFixesWhateverItShows) {
+  const Observation image = observe(ceiling(2, 0.5, 2), ImageUse::fixes);
+  EXPECT_TRUE(image.is_kept());
+  EXPECT_TRUE(lamps_in(image).empty());
+}
+
+TEST(ObserveLamps, RejectsByUse) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.png", "b.png"}) {
+    std::filesystem::copy_file(kRig + "/sample/0000.png", folder / name);
+  }
+  std::filesystem::copy_file(kRig + "/sample/0001.png", folder / "c.png");
+  folder.file("d.png", "no image");
+  const LampImages images{folder / "", read_lamp_map(kRig + "/lamps.yaml"), "lamps.yaml",
+                          read_calibration(kRig + "/true_calibration.yaml"), "calibration.yaml"};
+  const Observations turn = observe_lamps(images, ImageUse::turn, {});
+  ASSERT_EQ(turn.images.size(), 4U);
+  EXPECT_TRUE(turn.images[0].is_kept());
+  ASSERT_FALSE(turn.images[1].is_kept());
+  EXPECT_EQ(turn.images[1].rejection->reason, RejectionReason::same_image);
+  EXPECT_TRUE(turn.images[2].is_kept());
+  ASSERT_FALSE(turn.images[3].is_kept());
+  EXPECT_EQ(turn.images[3].rejection->reason, RejectionReason::unreadable);
+  EXPECT_EQ(kept_frames(turn.images).size(), 2U);
+  EXPECT_EQ(kept_frames(observe_lamps(images, ImageUse::fixes, {}).images).size(), 3U);
+}
+
+}  // namespace
+}  // namespace vlp

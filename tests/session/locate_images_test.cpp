@@ -1,0 +1,106 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/locate_images.h"
+
+#include <gmock/gmock.h>
+
+#include "geometry/angles.h"
+#include "support/body_rig.h"
+
+namespace vlp {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+/// A camera that leans by 20 degrees; centres that are looked for in a plane that is off by an
+/// angle are off by 40 px a radian, and 2 px where ellipses stand for discs.
+class LeaningRig {
+ public:
+  LeaningRig() { rig_.body.motion.inclination = lean_; }
+
+  LocateInput input(double lean_sd_rad) const {
+    LocateInput input{{{"a", seen_in(Eigen::Matrix3d::Identity())}}, rig_.map, rig_.calibration};
+    input.lean_sd_rad = lean_sd_rad;
+    return input;
+  }
+  Redetector redetector() {
+    return [this](const LevelRotations& levels) {
+      std::vector<Frame> frames;
+      for (const auto& [image, level] : levels) {
+        EXPECT_EQ(image, "a");
+        looks.push_back(level ? deg_from_rad(off_rad(*level)) : -1);
+        frames.push_back({image, seen_in(level)});
+      }
+      return frames;
+    };
+  }
+  std::vector<Detection> exact() const { return seen_from(rig_, 0.05); }
+
+  /// How far off the level of each was, in degrees; -1: nobody knew.
+  std::vector<double> looks;
+  /// Only ellipses show lamps.
+  bool shown_by_ellipses_alone = false;
+
+ private:
+  double off_rad(const Eigen::Matrix3d& level) const {
+    const Eigen::Vector3d up = level_from_inclination(lean_).row(2);
+    return std::acos(std::min(1.0, up.dot(level.row(2))));
+  }
+  std::vector<Detection> seen_in(const std::optional<Eigen::Matrix3d>& level) const {
+    std::vector<Detection> seen = exact();
+    const double off_px = level ? 40 * off_rad(*level) : 2;
+    for (Detection& one : seen) one.pixel += off_px * Eigen::Vector2d(one.lamp % 2, one.lamp % 3);
+    if (shown_by_ellipses_alone) seen.resize(level ? 1 : 2);
+    return seen;
+  }
+
+  Inclination lean_{rad_from_deg(16), rad_from_deg(-12)};
+  BodyRig rig_{synthetic_lamps(), rolling_calibration(), {}, {}};
+};
+
+double error_m(const LocateInput& input) {
+  const LocateResult found = locate_frames(input);
+  return found.ok() ? found.rows[0].fix->pose.position_m.norm() : 1;
+}
+
+TEST(RedetectTilted, LooksUntilTheFixStays) {
+  LeaningRig rig;
+  LocateInput input = rig.input(1.6);
+  EXPECT_GT(error_m(input), 0.01);
+  const LevelRotations levels = redetect_tilted(input, rig.redetector());
+  EXPECT_LT(error_m(input), 1e-4);
+  ASSERT_EQ(levels.size(), 1U);
+  EXPECT_TRUE(levels.at("a"));
+  ASSERT_GE(rig.looks.size(), 3U);
+  EXPECT_LE(rig.looks.size(), 7U);
+  EXPECT_EQ(rig.looks[0], -1) << "of no plane, as the lean may be any";
+  EXPECT_LT(rig.looks.back(), 0.01);
+}
+
+TEST(RedetectTilted, LeavesCapturesWhoseLeanIsGiven) {
+  LeaningRig rig;
+  LocateInput input = rig.input(0);
+  input.captures["a"].inclination = Inclination{rad_from_deg(16), rad_from_deg(-12)};
+  const double before_m = error_m(input);
+  EXPECT_THAT(redetect_tilted(input, rig.redetector()), IsEmpty());
+  EXPECT_THAT(rig.looks, IsEmpty());
+  EXPECT_EQ(error_m(input), before_m);
+  input.inclination_sigma_rad = rad_from_deg(0.5);
+  redetect_tilted(input, rig.redetector());
+  EXPECT_LT(error_m(input), 1e-4) << "but for a sensor that is not exact";
+}
+
+TEST(RedetectTilted, KeepsWhatShowsMoreLampsWhereThereIsNoFix) {
+  LeaningRig rig;
+  rig.shown_by_ellipses_alone = true;
+  LocateInput input = rig.input(1.6);
+  const LevelRotations levels = redetect_tilted(input, rig.redetector());
+  EXPECT_THAT(rig.looks, ElementsAre(-1));
+  EXPECT_EQ(input.frames[0].detections.size(), 2U);
+  ASSERT_EQ(levels.size(), 1U);
+  EXPECT_FALSE(levels.at("a"));
+}
+
+}  // namespace
+}  // namespace vlp
