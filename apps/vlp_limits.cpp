@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/map/map_errors.h"
 #include "evaluation/limits_table.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"
@@ -67,7 +68,7 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
     spdlog::warn("{}: the errors are not stated, and count as none", unstated);
   }
   if (const int elsewhere = unit.common().lamps_elsewhere(); elsewhere > 0) {
-    spdlog::warn(words_of_lamps_elsewhere(elsewhere));
+    spdlog::warn(describe_lamps_elsewhere(elsewhere));
   }
   return unit;
 }

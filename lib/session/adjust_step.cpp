@@ -108,14 +108,15 @@ AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& re
   return all;
 }
 
-void add_warnings(AdjustStepResult& result, bool noise_is_stated) {
+void add_warnings(AdjustStepResult& result, const MapErrors& map_errors, bool noise_is_stated) {
   const AdjustmentResult& found = result.found;
   for (const auto& lamp : found.lamps) {
-    if (!lamp.moved) continue;
+    const bool is_known = std::any_of(
+        map_errors.errors.begin(), map_errors.errors.end(),
+        [&](const MapError& error) { return error.lamps == std::vector<int>{lamp.id}; });
+    if (!lamp.moved || is_known) continue;
     result.warnings.push_back(
-        fmt::format("lamp {} hangs {:.1f} mm from where the map has it: what the map says of it is "
-                    "left out",
-                    lamp.id, 1e3 * lamp.correction_m.norm()));
+        describe({MapErrorKind::moved, {lamp.id}, lamp.correction_m, lamp.sd_m}));
   }
   for (const auto& place : found.places) {
     if (!place.wrong) continue;
@@ -172,8 +173,10 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
     captures.frames.insert(captures.frames.end(), set.frames.begin(), set.frames.end());
   }
   const Calibration alone = camera_alone(input.calibration);
-  if (map_is_wrong(captures, alone, result)) return result;
   const AdjustmentInput all = adjustment_of(input, result);
+  captures.lamps = all.lamps;
+  const MapErrors map_errors = check_map(captures, alone, result);
+  if (!result.ok()) return result;
   result.found = adjust_captures(all);
   const AdjustmentResult& found = result.found;
   if (!found.ok()) {
@@ -181,7 +184,7 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
     blame_map(captures, alone, result);
     return result;
   }
-  add_warnings(result, states_noise(all));
+  add_warnings(result, map_errors, states_noise(all));
   result.metrics = {{"tilt_deg", deg_from_rad(tilt_of(found.center).angle_rad)}};
   if (const auto& arm_m = found.center.lever_arm_m) {
     result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});

@@ -159,7 +159,8 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   DispersionResult result;
   Calibration levelled = input.calibration;
   levelled.dispersion.reset();
-  if (map_is_wrong(input, levelled, result)) return result;
+  check_map(input, levelled, result);
+  if (!result.ok()) return result;
   const bool of_axis =
       std::find(places.of.begin(), places.of.end(), PlaceOf::axis) != places.of.end();
   const auto& center = input.calibration.rotation_center;
@@ -179,20 +180,19 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   result.fit = fit_dispersion(captures, input.lamps, input.calibration, method, circle);
   const DispersionFit& fit = result.fit;
   std::string why(explanation_of(fit.status));
-  switch (fit.status) {
-    case DispersionStatus::ok:
-      break;
-    case DispersionStatus::no_fix:
-      why += fmt::format("; the first: {}", explanation_of(fit.no_fix_status));
-      result.fail(StepFailure::undetermined, std::move(why));
-      blame_map(input, levelled, result);
-      return result;
-    case DispersionStatus::station_far:
-      result.fail(StepFailure::wrong_place, std::move(why));
-      return result;
-    default:
-      result.fail(StepFailure::undetermined, std::move(why));
-      return result;
+  if (fit.status == DispersionStatus::no_fix) {
+    why += fmt::format("; the first: {}", explanation_of(fit.no_fix_status));
+  }
+  if (fit.status == DispersionStatus::station_far) {
+    result.fail(StepFailure::wrong_place, std::move(why));
+    return result;
+  }
+  if (fit.status != DispersionStatus::ok) {
+    result.fail(StepFailure::undetermined, std::move(why));
+    const bool is_of_yaws =
+        fit.status == DispersionStatus::one_yaw || fit.status == DispersionStatus::many_yaws;
+    if (!is_of_yaws) blame_map(input, levelled, result);
+    return result;
   }
   if (!input.calibration.rotation_center) {
     result.warnings.emplace_back("the calibration has no rotation_center: run vlp-rotation first");

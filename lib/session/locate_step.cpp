@@ -7,20 +7,16 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
-#include <set>
 #include <stdexcept>
 
+#include "calibration/map/map_errors.h"
 #include "camera/lens.h"
 #include "captures/outside_image.h"
-#include "geometry/median.h"
 #include "geometry/polygon.h"
-#include "positioning/correction.h"
-#include "positioning/inclination_rotation.h"
 #include "positioning/known_motion.h"
 #include "positioning/residual_noise.h"
 #include "rig/find_lamp.h"
 #include "session/capture_motion.h"
-#include "session/lamp_offsets.h"
 
 namespace vlp {
 
@@ -175,7 +171,7 @@ void warn_of_noise(LocateResult& result, const std::vector<Frame>& frames) {
 
 void warn_of_map(LocateResult& result, const LocateInput& input) {
   const int elsewhere = Positioner(input.lamps, input.calibration, input.how).lamps_elsewhere();
-  if (elsewhere > 0) result.warnings.push_back(words_of_lamps_elsewhere(elsewhere));
+  if (elsewhere > 0) result.warnings.push_back(describe_lamps_elsewhere(elsewhere));
 }
 
 void warn_of_image(LocateResult& result, const LocateInput& input) {
@@ -230,112 +226,57 @@ void warn_of_captures(LocateResult& result, const LocateInput& input) {
       without, input.frames.size(), input.frames.front().image, captures.begin()->first));
 }
 
-/// From its place in the map to where a lamp is seen, on the ceiling; nothing where that is not
-/// known: with a mount fixes are not of the camera.
-std::optional<Eigen::Vector2d> off_m(const LocateInput& input, std::size_t frame, const Fix& fix,
-                                     int id, const Lens& lens,
-                                     const Eigen::Matrix3d& base_from_camera) {
-  const Lamp* lamp = find_lamp(input.lamps.lamps, id);
-  if (lamp == nullptr || input.how.mount) return std::nullopt;
-  const auto& [image, detections] = input.frames[frame];
-  const auto detection = std::find_if(detections.begin(), detections.end(),
-                                      [&](const Detection& one) { return one.lamp == id; });
-  if (detection == detections.end()) return std::nullopt;
-  const auto ray = lens.unproject(detection->pixel);
-  if (!ray) return std::nullopt;
-  const auto inclination =
-      fix.body ? std::optional(fix.body->inclination) : sensors_of(image, input).inclination;
-  const InclinationRotation lean =
-      inclination ? inclination_rotation(*inclination, 0) : InclinationRotation();
-  const Eigen::Vector3d level = lean.level_from_base * base_from_camera * ray->direction;
-  if (!(level.z() > 0)) return std::nullopt;
-  const Pose& pose = fix.estimate.pose;
-  const double height_m = lamp->position_m.z() - pose.position_m.z();
-  const Eigen::Vector3d seen_m =
-      pose.position_m + rotation_about_z(pose.yaw_rad) * level * (height_m / level.z());
-  return (seen_m - lamp->position_m).head<2>();
-}
-
-bool has_a_lamp_twice(const std::vector<Detection>& detections) {
-  std::set<int> ids;
-  for (const Detection& one : detections) ids.insert(one.lamp);
-  return ids.size() < detections.size();
-}
-
-/// What the fixes see.
-std::vector<CeilingView> ceiling_views(const LocateInput& input, const std::vector<Fix>& fixes) {
-  const Lens lens(input.calibration.camera.lens_model, input.calibration.camera.intrinsics);
-  const Eigen::Matrix3d base_from_camera =
-      level_from_camera(input.calibration, input.how.correction);
-  std::vector<CeilingView> views;
+/// Finds errors of the lamp map by the captures in which the camera stands.
+MapErrors find_errors_while_standing(const LocateInput& input, const std::vector<Fix>& fixes) {
+  std::vector<Frame> frames;
+  MapErrorOptions options;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const auto& detections = input.frames[i].detections;
-    if (has_a_lamp_twice(detections)) continue;  // which of the two it is nobody knows
-    if (!fixes[i].ok() || fixes[i].lamps < 2) continue;
-    const Eigen::Vector3d& camera_m = fixes[i].estimate.pose.position_m;
-    CeilingView view{camera_m.head<2>(), {}};
-    for (const Detection& one : detections) {
-      const auto off = off_m(input, i, fixes[i], one.lamp, lens, base_from_camera);
-      if (!off) continue;
-      const Eigen::Vector3d& map_m = find_lamp(input.lamps.lamps, one.lamp)->position_m;
-      view.lamps.push_back({one.lamp, map_m.head<2>() + *off, map_m.z() - camera_m.z()});
-    }
-    views.push_back(std::move(view));
+    const Sensors sensors = sensors_of(input.frames[i].image, input);
+    if (sensors.motion && moves(*sensors.motion)) continue;
+    const auto& body = fixes[i].body;
+    frames.push_back(input.frames[i]);
+    options.inclinations.push_back(body ? std::optional(body->inclination) : sensors.inclination);
   }
-  return views;
+  if (input.lamp_offsets) options.max_captures = std::max<std::size_t>(frames.size(), 1);
+  return find_map_errors(frames, input.lamps, input.calibration, options);
 }
 
-void tell_of_lamps_left_out(LocateResult& result, const LocateInput& input) {
-  const Lens lens(input.calibration.camera.lens_model, input.calibration.camera.intrinsics);
-  const Eigen::Matrix3d base_from_camera =
-      level_from_camera(input.calibration, input.how.correction);
+void warn_of_rejected_lamps(LocateResult& result, const LocateInput& input,
+                            const MapErrors& map_errors) {
   int unknown = 0, rejected = 0;
-  struct LeftOut {
-    int captures = 0;
-    std::vector<double> off_m = {};
-  };
-  std::map<int, LeftOut> lamps;
+  std::map<int, int> captures;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const Fix& fix = result.fixes[i];
-    unknown += fix.unknown_lamps;
-    rejected += fix.rejected_lamps;
+    unknown += result.fixes[i].unknown_lamps;
+    rejected += result.fixes[i].rejected_lamps;
     for (const int id : result.rows[i].rejected) {
-      LeftOut& lamp = lamps[id];
-      ++lamp.captures;
-      if (const auto off = off_m(input, i, fix, id, lens, base_from_camera)) {
-        lamp.off_m.push_back(off->norm());
-      }
+      ++captures[id];
       result.details.push_back(fmt::format("{}: lamp {} contradicts the others and is left out",
                                            input.frames[i].image, id));
     }
   }
+  for (const auto& [id, count] : captures) result.lamps_left_out.push_back({id, count});
   if (unknown > 0) {
     result.warnings.push_back(
         fmt::format("{} detections of lamps that are not in the map, left out", unknown));
+  }
+  for (const MapError& error : map_errors.errors) {
+    result.warnings.push_back(describe(error));
+    for (const int id : error.lamps) {
+      rejected -= captures[id];
+      captures.erase(id);
+    }
   }
   if (rejected > 0) {
     result.warnings.push_back(
         fmt::format("{} detections that contradict the others, left out", rejected));
   }
-  for (auto& [id, lamp] : lamps) {
-    result.lamps_left_out.push_back({id, lamp.captures});
-    std::string words = fmt::format("lamp {} is left out of {} of {} captures", id, lamp.captures,
-                                    input.frames.size());
-    if (!lamp.off_m.empty()) {
-      words += fmt::format(": {:.0f} mm off", 1e3 * upper_median(std::move(lamp.off_m)));
-    }
-    result.warnings.push_back(std::move(words));
+  for (const auto& [id, count] : captures) {
+    result.warnings.push_back(
+        fmt::format("lamp {} is left out of {} of {} captures", id, count, input.frames.size()));
   }
 }
 
 }  // namespace
-
-std::string words_of_lamps_elsewhere(int lamps) {
-  return fmt::format(
-      "{} lamps are elsewhere than in the adjustment of the calibration, and sd does not "
-      "know how well they are: give the map that vlp-adjust --refine-map wrote with it",
-      lamps);
-}
 
 LocateResult locate_frames(const LocateInput& input) {
   if (input.sigma_px) return locate_frames(with_sigma(input));
@@ -366,12 +307,16 @@ LocateResult locate_frames(const LocateInput& input) {
   mark_outside_region(result, input);
   warn_of_map(result, input);
   warn_of_captures(result, input);
-  tell_of_lamps_left_out(result, input);
+  const bool is_contradicted =
+      std::any_of(result.fixes.begin(), result.fixes.end(),
+                  [](const Fix& fix) { return !fix.ok() || fix.rejected_lamps > 0; });
+  MapErrors map_errors;
+  if (input.lamp_offsets || is_contradicted)
+    map_errors = find_errors_while_standing(input, result.fixes);
+  warn_of_rejected_lamps(result, input, map_errors);
   if (input.lamp_offsets) {
-    auto views = ceiling_views(input, result.fixes);
-    const bool several = views.size() > 1;
-    result.lamp_offsets = offsets_of_lamps(input.lamps, std::move(views));
-    if (several && result.lamp_offsets.empty()) {
+    result.lamp_offsets = std::move(map_errors.offsets);
+    if (input.frames.size() > 1 && result.lamp_offsets.empty()) {
       result.notes.push_back(
           "where the other lamps see each lamp is not told: captures do not tie all lamps "
           "together");

@@ -63,7 +63,4 @@ struct LocateResult : StepResult {
 /// that `captures` lacks, of lamps left out. undetermined: no frame has a fix.
 LocateResult locate_frames(const LocateInput& input);
 
-/// The warning of Positioner::lamps_elsewhere(), of one or more.
-std::string words_of_lamps_elsewhere(int lamps);
-
 }  // namespace vlp

@@ -9,7 +9,6 @@
 #include <functional>
 #include <utility>
 
-#include "calibration/levelling/map_diagnosis.h"
 #include "calibration/passed_on.h"
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/turning_axis.h"
@@ -135,6 +134,14 @@ void add_metrics(RotationResult& result) {
   }
 }
 
+MapErrors find_errors_while_standing(const LampCaptures& input, const Calibration& calibration) {
+  std::vector<Frame> frames;
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    if (input.motions.empty() || !moves(input.motions[i])) frames.push_back(input.frames[i]);
+  }
+  return find_map_errors(frames, input.lamps, calibration);
+}
+
 }  // namespace
 
 Calibration camera_alone(const Calibration& calibration) {
@@ -143,25 +150,32 @@ Calibration camera_alone(const Calibration& calibration) {
   return alone;
 }
 
-bool map_is_wrong(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
-  const std::string doubt = diagnose_map(input.frames, input.lamps, calibration);
-  if (!doubt.empty()) result.fail(StepFailure::wrong_map, doubt, input.lamps_file);
-  return !doubt.empty();
+MapErrors check_map(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
+  MapErrors found = find_errors_while_standing(input, calibration);
+  if (found.is_unusable()) {
+    result.fail(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
+    return found;
+  }
+  for (const MapError& error : found.errors) {
+    if (!error.lamps.empty()) result.warnings.push_back(describe(error));
+  }
+  return found;
 }
 
 void blame_map(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
-  if (map_is_wrong(input, calibration, result)) return;
-  if (!contradicts_map(input.frames, input.lamps, calibration)) return;
-  result.fail(StepFailure::wrong_map,
-              "most captures contradict it: is it the map of this room, and the calibration this "
-              "camera's?",
-              input.lamps_file);
+  const MapErrors found = find_errors_while_standing(input, calibration);
+  const bool has_lamps = std::any_of(found.errors.begin(), found.errors.end(),
+                                     [](const MapError& error) { return !error.lamps.empty(); });
+  if (found.errors.empty() || (!has_lamps && result.failure == StepFailure::wrong_map)) return;
+  result.fail(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
+  for (const MapError& error : found.errors) std::erase(result.warnings, describe(error));
 }
 
 RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
                               HistoryEntry entry) {
   RotationResult result;
-  if (map_is_wrong(input, camera_alone(input.calibration), result)) return result;
+  check_map(input, camera_alone(input.calibration), result);
+  if (!result.ok()) return result;
   const Camera& camera = input.calibration.camera;
   result.spot = spot_captures(input.frames, input.lamps, camera);
   for (const auto& [image, reason] : result.spot.left_out) {
@@ -172,6 +186,9 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
     result.fail(map ? StepFailure::wrong_map : StepFailure::undetermined,
                 std::string(explanation_of(result.spot.status)),
                 map ? input.lamps_file : std::filesystem::path());
+    if (map || result.spot.status == SpotStatus::moved) {
+      blame_map(input, camera_alone(input.calibration), result);
+    }
     return result;
   }
   result.circles = fit_circle_centers(result.spot, camera);
@@ -181,6 +198,7 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
                 "no rotation centre fits the captures: take them on one spot at each height, over "
                 "more of the turn, with more of the lamps in view, and see that lens and lamp map "
                 "are right");
+    blame_map(input, camera_alone(input.calibration), result);
     return result;
   }
   pass_on_lens(result, input, method);
@@ -197,7 +215,8 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
 LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
   LevellingResult result;
   const Calibration alone = camera_alone(input.calibration);
-  if (map_is_wrong(input, alone, result)) return result;
+  check_map(input, alone, result);
+  if (!result.ok()) return result;
   LevellingOptions options;
   options.refine_map = refine_map;
   options.motions = input.motions;

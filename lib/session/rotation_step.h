@@ -3,6 +3,7 @@
 #pragma once
 
 #include "calibration/levelling/levelling.h"
+#include "calibration/map/map_errors.h"
 #include "calibration/rotation/circle_center.h"
 #include "session/lamp_captures.h"
 #include "session/step_result.h"
@@ -12,12 +13,11 @@ namespace vlp {
 /// Without rotation centre and dispersion.
 Calibration camera_alone(const Calibration& calibration);
 
-/// Whether the captures, seen by this calibration, say in particular what is wrong with the lamp
-/// map (calibration/levelling/map_diagnosis.h); then the step fails: wrong_map.
-bool map_is_wrong(const LampCaptures& input, const Calibration& calibration, StepResult& result);
+/// Checks the lamp map by the captures in which the camera stands (calibration/map/map_errors.h).
+/// Warns of lamps that hang elsewhere. If the map cannot be used the step fails: wrong_map.
+MapErrors check_map(const LampCaptures& input, const Calibration& calibration, StepResult& result);
 
-/// Of a step that failed: the map is to blame when the captures contradict it, in particular or
-/// mostly.
+/// Changes the failure of a step to wrong_map if the lamp map has errors, and its reason to these.
 void blame_map(const LampCaptures& input, const Calibration& calibration, StepResult& result);
 
 enum class RotationMethod {

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -10,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "calibration/map/lamp_displacements.h"
 #include "evaluation/gate.h"
 #include "report/plots/gnuplot.h"
 #include "rig/calibration.h"
@@ -37,15 +37,6 @@ struct SkippedImage {
 struct LampLeftOut {
   int lamp;
   int captures;
-};
-
-/// Where the other lamps see a lamp, on the ceiling and in the world, less where the map has it, by
-/// all captures together, and its standard deviation by what they leave over. A lamp that moves by
-/// d is seen d off, the others otherwise.
-struct LampOffset {
-  int lamp;
-  int captures;
-  Eigen::Vector2d map_m, offset_m, sd_m;
 };
 
 /// What every step of the calibration tells of how it went; the words are for people, a line each.

@@ -98,7 +98,7 @@ faulty() {
   awk -v id="$lamp" -v off=0.0$((2 + $1 % 5)) -F'[][]' '$0 ~ "id: " id "," {
     split($2, at, ", "); $0 = $1 "[" at[1] + off ", " at[2] - off / 2 ", " at[3] "]" $3 } { print }' \
     datasets/station/lamps.yaml >"$lamps"
-  tried loose "$1" "lamp $lamp is loose"
+  tried loose "$1" "lamp $lamp hangs"
   cp datasets/station/lamps.yaml "$lamps"
   local first_hz second_hz
   first_hz=$(sed -n "s/.*id: $lamp,.*frequency_hz: \([0-9]*\).*/\1/p" "$lamps")
@@ -214,11 +214,11 @@ kinds() {
   # The lamps, and what the station's files say of them.
   unit_again
   station_change lamps.yaml 's/\[0, 0.28, 1.6\]/[0.04, 0.26, 1.6]/'
-  tried loose-lamp "$seed" 'lamp 5 is loose'
+  tried loose-lamp "$seed" 'lamp 5 hangs'
   station_again
   unit_again
   station_change lamps.yaml 's/\[0.6, -0.3, 1.6\]/[0.61, -0.3, 1.6]/'
-  tried lamp-10-mm "$seed" 'lamp 3 is loose'
+  tried lamp-10-mm "$seed" 'lamp 3 hangs'
   station_again
   unit_again
   station_change lamps.yaml 's/id: 2, \(.*\)frequency_hz: 2000/id: 2, \1frequency_hz: 3800/;s/id: 5, \(.*\)frequency_hz: 3800/id: 5, \1frequency_hz: 2000/'

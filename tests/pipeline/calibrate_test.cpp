@@ -82,6 +82,30 @@ TEST_P(Accuracy, KeepsToItsGates) {
 
 INSTANTIATE_TEST_SUITE_P(Rigs, Accuracy, testing::Values("paper-rig", "paper-rig-faulty"));
 
+/// The fixes at the dispersion's place reject different lamps, so that no offset explains them.
+TEST_F(Calibrate, NamesAMovedLampInEveryStep) {
+  render(kDatasets + "paper-rig/scene.yaml", "rotation,dispersion,check");
+  Calibration known;
+  known.camera = read_calibration(folder / "a session/true_calibration.yaml").camera;
+  write_calibration(folder / "a session/camera.yaml", known);
+  const std::string lamps = TemporaryFolder::content_of(folder / "a session/lamps.yaml");
+  const auto expect_lines = [&](const std::string& moved_to, const std::string& line) {
+    folder.file("a session/lamps.yaml",
+                std::regex_replace(lamps, std::regex("\\[0, -0.32, 1.6\\]"), moved_to));
+    const std::string errors = calibrate("--no-report").errors;
+    std::size_t count = 0;
+    for (auto at = errors.find(line); at != std::string::npos; at = errors.find(line, at + 1)) {
+      ++count;
+    }
+    EXPECT_GE(count, 2U) << "rotation, dispersion, and check unless dispersion fails";
+    EXPECT_THAT(errors, Not(HasSubstr("no offset explains")));
+  };
+  expect_lines("[-0.03, -0.32, 1.6]",
+               "lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm)");
+  expect_lines("[0, -0.35, 1.6]",
+               "lamp 2 hangs 30 mm from where the map has it (x +0 mm, y +30 mm)");
+}
+
 // From boards that are seen beyond 90 degrees off the axis.
 TEST_F(Calibrate, FindsALensOf190DegreesAndItsAxis) {
   std::string scene = TemporaryFolder::content_of(kDatasets + "fisheye/scene.yaml");

@@ -96,7 +96,7 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.06, 0.28, 1.6]");
   const auto moved = records(verify);
   EXPECT_EQ(moved.exit_code, 1);
-  EXPECT_THAT(moved.errors, HasSubstr("lamp 5 is loose"));
+  EXPECT_THAT(moved.errors, HasSubstr("lamp 5 hangs"));
   EXPECT_THAT(records("list --kind golden").output, HasSubstr("2 runs, 1 passed"));
 
   // From where its images arrive, like any unit's; they are put away.
@@ -159,12 +159,11 @@ TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.05, 0.27, 1.6]");
   const auto loose = run_program(batch("loose"));
   EXPECT_EQ(loose.exit_code, 3);
-  EXPECT_THAT(loose.errors, HasSubstr("not judged: lamp 5 is loose"));
+  EXPECT_THAT(loose.errors, HasSubstr("not judged: lamp 5 hangs"));
   EXPECT_THAT(loose.output, HasSubstr("INVALID   camera loose"));
   EXPECT_EQ(result("loose", "calibration.yaml"), "");
   EXPECT_NE(result("loose", "invalid-calibration.yaml"), "");
-  EXPECT_THAT(result("loose", "report.html"),
-              HasSubstr("<strong>INVALID</strong><p>lamp 5 is loose"));
+  EXPECT_THAT(result("loose", "report.html"), HasSubstr("<strong>INVALID</strong><p>lamp 5 hangs"));
 
   folder.file("station/lamps.yaml", lamps);
   change("lamps.yaml", "frequency_hz: 2000", "frequency_hz: 9999");

@@ -99,10 +99,11 @@ LocateInput room_with_a_moved_lamp(double by_m) {
   return input;
 }
 
-TEST(LocateFrames, SaysOfALampLeftOutHowFarItIsOff) {
+TEST(LocateFrames, NamesALampLeftOutWithItsOffset) {
   const LocateResult found = locate_frames(room_with_a_moved_lamp(0.03));
   EXPECT_THAT(found.warnings,
-              testing::Contains("lamp 2 is left out of 12 of 36 captures: 30 mm off"));
+              testing::Contains("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm): "
+                                "moved, or entered wrongly"));
   ASSERT_EQ(found.lamps_left_out.size(), 1U);
   EXPECT_EQ(found.lamps_left_out[0].lamp, 2);
   for (std::size_t i = 0; i < 36; ++i) {

@@ -10,6 +10,7 @@
 
 #include <fmt/core.h>
 
+#include "calibration/map/row_time_error.h"
 #include "session/session_folder.h"
 #include "station/unit/guidance.h"
 #include "station/unit/lamp_faults.h"
@@ -69,7 +70,7 @@ std::string find_row_time_fault(const UnitStep& state, const StationConfig& conf
   }
   constexpr std::size_t min_lights = 6;
   if (frequencies_hz.size() < min_lights) return "";
-  const auto found_s = row_time_that_fits(frequencies_hz, config.lamps, row_time_s);
+  const auto found_s = find_true_row_time(frequencies_hz, config.lamps, row_time_s);
   if (!found_s) return "";
   constexpr double microseconds = 1e6;
   return fmt::format(

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "session/lamp_offsets.h"
+#include "calibration/map/lamp_displacements.h"
 
 #include <gmock/gmock.h>
 
@@ -12,6 +12,12 @@
 
 namespace vlp {
 namespace {
+
+std::vector<LampOffset> offsets_of_lamps(const LampMap& map,
+                                         const std::vector<CeilingView>& views) {
+  const auto found = estimate_lamp_displacements(map, views);
+  return found ? offsets_from_other_lamps(*found) : std::vector<LampOffset>();
+}
 
 /// Eight lamps of a room, seen from twelve places in it, by fixes that are wrong themselves: by
 /// place, yaw and height. Every third capture lacks two of the lamps.
@@ -26,7 +32,7 @@ class Offsets : public testing::Test {
       const Eigen::Vector2d camera_m(0.1 * (i % 4), 0.05 * (i % 3));
       const Eigen::Vector2d wrong_m(random.uniform(-1e-2, 1e-2), random.uniform(-1e-2, 1e-2));
       const Eigen::Vector2d turned(1 + random.uniform(-1e-2, 1e-2), random.uniform(-1e-2, 1e-2));
-      CeilingView view{camera_m, {}};
+      CeilingView view{camera_m, {}, 0};
       for (const Lamp& lamp : lamps_.lamps) {
         if (i % 3 == 0 && (lamp.id == 1 + i % 8 || lamp.id == 1 + (i + 3) % 8)) continue;
         const Eigen::Vector2d from_camera_m =

@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// Lamps of one capture, projected onto the ceiling by an approximate pose of the camera.
+struct CeilingView {
+  struct SeenLamp {
+    int lamp;
+    Eigen::Vector2d seen_m;
+    double above_camera_m;
+  };
+  Eigen::Vector2d camera_m;
+  /// Each lamp at most once.
+  std::vector<SeenLamp> lamps;
+  /// Rotation about the vertical from the level camera to the world; required for an unknown tilt.
+  double yaw_rad = 0;
+};
+
+/// Displacement of one lamp: its place according to the other lamps minus its place in the map,
+/// horizontal, in the world. A single lamp that moves by d has the displacement d.
+struct LampOffset {
+  int lamp;
+  /// Captures that contribute.
+  int captures;
+  Eigen::Vector2d map_m, offset_m, sd_m;
+};
+
+/// Joint estimate of the displacements of all lamps.
+struct LampDisplacements {
+  std::vector<int> lamps;
+  std::vector<Eigen::Vector2d> map_m;
+  /// Captures per lamp that contribute, and detections per lamp that are rejected as outliers.
+  std::vector<int> captures, outliers;
+  /// Two rows per lamp. `projector`: onto the displacements that are no similarity of the map.
+  Eigen::VectorXd displacement_m;
+  Eigen::MatrixXd covariance_m2, projector;
+  /// N: the squared residuals of all captures for lamps at p are p' N p, two rows per lamp. Does
+  /// not depend on the map.
+  Eigen::MatrixXd information;
+  /// Rotation about x and y of the level frame, as the shift (a, b) of a point straight up.
+  Eigen::Vector2d tilt{0, 0};
+  /// Residuals of each view, two rows per lamp.
+  std::vector<Eigen::VectorXd> residuals_m = {};
+  double degrees_of_freedom = 0;
+  /// Height of a lamp above the camera, in the first capture.
+  double height_m = 0;
+
+  /// Returns the displaced place of a lamp, up to a similarity of all.
+  Eigen::Vector2d displaced_m(std::size_t lamp) const {
+    return map_m[lamp] + displacement_m.segment<2>(2 * static_cast<Eigen::Index>(lamp));
+  }
+};
+
+/// Estimates the displacements x of all lamps from all captures c:
+///   sum over c |seen_c - map_c - x_c + B_c t - A_c y_c|^2 -> min,   G' x = 0
+///   y_c  position, yaw and height of the camera, which are free in each capture
+///   A_c  derivative of seen_c with respect to y_c
+///   t    tilt that all captures share, only with `tilt_is_free`; B_c its derivative
+///   G    similarities of the floor plan, which captures cannot determine
+/// Outliers beyond 6 standard deviations, such as misidentified lamps, are rejected. The covariance
+/// is scaled by the residuals.
+///
+/// Uses lamps that two captures or more see together with two other lamps or more. Returns
+/// std::nullopt if captures do not tie all these lamps together or there is no redundancy.
+/// @pre the lamps hang at about one height
+std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
+                                                             std::vector<CeilingView> views,
+                                                             bool tilt_is_free = false);
+
+/// Returns the offset of a lamp from the similarity that takes the lamps without `excluded` to the
+/// map, or std::nullopt if there is none.
+std::optional<Eigen::Vector2d> offset_from_others(const LampDisplacements& found, std::size_t lamp,
+                                                  const std::vector<std::size_t>& excluded);
+
+/// Computes the offset of each lamp from the similarity that fits the other lamps best. Omits lamps
+/// that the other lamps do not determine.
+std::vector<LampOffset> offsets_from_other_lamps(const LampDisplacements& found);
+
+}  // namespace vlp

@@ -1,0 +1,514 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/map/map_errors.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "camera/lens.h"
+#include "geometry/frames.h"
+#include "geometry/similarity.h"
+#include "geometry/symmetric.h"
+#include "positioning/correction.h"
+#include "positioning/inclination_rotation.h"
+#include "rig/find_lamp.h"
+
+namespace vlp {
+namespace {
+
+/// Probability of a false alarm per map.
+constexpr double kFalseAlarm = 0.01;
+
+/// A lamp in a capture, seen along (z, 1) by a level camera.
+struct LevelRay {
+  const Lamp* lamp;
+  Eigen::Vector2d z;
+};
+
+/// Returns the rays to the lamps of the map, or none if one of them is seen twice.
+std::vector<LevelRay> level_rays(const Frame& frame, const LampMap& map, const Lens& lens,
+                                 const Eigen::Matrix3d& level_from_camera) {
+  std::vector<LevelRay> rays;
+  std::set<int> ids;
+  for (const Detection& detection : frame.detections) {
+    const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
+    if (lamp == nullptr) continue;
+    if (!ids.insert(lamp->id).second) return {};
+    const auto ray = lens.unproject(detection.pixel);
+    if (!ray) continue;
+    const Eigen::Vector3d level = level_from_camera * ray->direction;
+    if (level.z() > 0) rays.push_back({lamp, level.hnormalized()});
+  }
+  return rays;
+}
+
+double rms_radius(const std::vector<Eigen::Vector2d>& points) {
+  Eigen::Vector2d sum(0, 0);
+  double squares = 0;
+  for (const Eigen::Vector2d& point : points) {
+    sum += point;
+    squares += point.squaredNorm();
+  }
+  const auto count = static_cast<double>(points.size());
+  return std::sqrt(std::max(0.0, squares / count - (sum / count).squaredNorm()));
+}
+
+using PlacesOfLamps = std::map<int, Eigen::Vector2d>;
+
+/// Returns the displaced lamps, scaled to the size of the map.
+std::vector<Eigen::Vector2d> displaced_places(const LampDisplacements& found) {
+  Eigen::Vector2d mean_m(0, 0);
+  std::vector<Eigen::Vector2d> places_m;
+  for (std::size_t i = 0; i < found.lamps.size(); ++i) {
+    places_m.push_back(found.displaced_m(i));
+    mean_m += places_m.back() / static_cast<double>(found.lamps.size());
+  }
+  const double scale = rms_radius(found.map_m) / rms_radius(places_m);
+  for (Eigen::Vector2d& place_m : places_m) place_m = mean_m + scale * (place_m - mean_m);
+  return places_m;
+}
+
+/// Projects the rays onto the ceiling from the camera pose that fits the displaced lamps best. The
+/// height comes from the sizes of both patterns, so that a wrong map does not change it much.
+std::optional<CeilingView> project(const std::vector<LevelRay>& rays,
+                                   const PlacesOfLamps& places_m) {
+  std::vector<Eigen::Vector2d> z, lamps_m;
+  double mean_z_m = 0;
+  for (const LevelRay& ray : rays) {
+    lamps_m.push_back(places_m.at(ray.lamp->id));
+    z.push_back(ray.z);
+    mean_z_m += ray.lamp->position_m.z() / static_cast<double>(rays.size());
+  }
+  double height_m = rms_radius(lamps_m) / rms_radius(z);
+  const auto above_m = [&](std::size_t i) {
+    return rays[i].lamp->position_m.z() - mean_z_m + height_m;
+  };
+  Similarity pose{{0, 0}, {1, 0}};
+  constexpr int iterations = 3;
+  constexpr double max_factor = 1.25;  // beyond it the lamps do not fit, and the fit means nothing
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    const auto fit = fit_similarity(
+        z.size(), [&](std::size_t i) -> Eigen::Vector2d { return above_m(i) * z[i]; },
+        [&](std::size_t i) { return lamps_m[i]; });
+    if (!fit) break;
+    const double factor = fit->factor.norm();
+    pose = {fit->offset, fit->factor / factor};
+    if (std::max(factor, 1 / factor) > max_factor) break;
+    height_m *= factor;
+  }
+  CeilingView view{pose.offset, {}, std::atan2(pose.factor.y(), pose.factor.x())};
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!(above_m(i) > 0) || !std::isfinite(height_m)) return std::nullopt;
+    view.lamps.push_back({rays[i].lamp->id,
+                          pose.offset + complex_product(pose.factor, above_m(i) * z[i]),
+                          above_m(i)});
+  }
+  return view;
+}
+
+/// Captures of a camera that stands.
+struct MapCaptures {
+  std::span<const Frame> frames;
+  const Calibration& calibration;
+  const MapErrorOptions& options;
+  const Lens lens{calibration.camera.lens_model, calibration.camera.intrinsics};
+  /// Projects the captures with three lamps or more.
+  std::vector<CeilingView> views(const LampMap& map, const Eigen::Matrix3d& base_from_camera,
+                                 const PlacesOfLamps& places_m) const {
+    constexpr std::size_t min_lamps = 3;
+    std::vector<CeilingView> views;
+    const auto& inclinations = options.inclinations;
+    const std::size_t stride = 1 + (frames.size() - 1) / options.max_captures;
+    for (std::size_t i = 0; i < frames.size(); i += stride) {
+      const bool is_inclined = !inclinations.empty() && inclinations[i];
+      const InclinationRotation lean =
+          is_inclined ? inclination_rotation(*inclinations[i], 0) : InclinationRotation();
+      const auto rays = level_rays(frames[i], map, lens, lean.level_from_base * base_from_camera);
+      if (rays.size() < min_lamps) continue;
+      if (auto view = project(rays, places_m)) views.push_back(std::move(*view));
+    }
+    return views;
+  }
+
+  /// Estimates the displacements. Iterates, because the tilt and lamps of unequal heights are
+  /// linearized at the pose of each capture.
+  std::optional<LampDisplacements> displacements(const LampMap& map) const {
+    constexpr int max_iterations = 8;
+    constexpr double tolerance_m = 1e-6;
+    const bool tilt_is_free = !calibration.rotation_center;
+    Eigen::Matrix3d base_from_camera = tilt_is_free
+                                           ? Eigen::Matrix3d::Identity()
+                                           : level_from_camera(calibration, Correction::all);
+    PlacesOfLamps places_m;
+    for (const Lamp& lamp : map.lamps) places_m[lamp.id] = lamp.position_m.head<2>();
+    std::optional<LampDisplacements> found;
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
+      found =
+          estimate_lamp_displacements(map, views(map, base_from_camera, places_m), tilt_is_free);
+      if (!found) return std::nullopt;
+      double change_m = found->tilt.norm() * rms_radius(found->map_m);
+      const std::vector<Eigen::Vector2d> displaced_m = displaced_places(*found);
+      for (std::size_t i = 0; i < found->lamps.size(); ++i) {
+        Eigen::Vector2d& place_m = places_m.at(found->lamps[i]);
+        change_m = std::max(change_m, (displaced_m[i] - place_m).norm());
+        place_m = displaced_m[i];
+      }
+      if (change_m < tolerance_m) break;
+      const Eigen::Vector3d up(-found->tilt.x(), -found->tilt.y(), 1);
+      const Eigen::Vector3d zenith = base_from_camera.transpose() * up.normalized();
+      if (!(zenith.z() > 0)) return std::nullopt;
+      if (tilt_is_free) base_from_camera = level_from_zenith(zenith);
+    }
+    return found;
+  }
+};
+
+/// Displacements as independent coordinates, with what explains them.
+class DisplacementTest {
+ public:
+  struct Fit {
+    double chi_squared;
+    /// Two rows per free lamp.
+    Eigen::VectorXd offsets_m;
+    Eigen::MatrixXd covariance_m2;
+  };
+
+  DisplacementTest(const LampDisplacements& found, const LampMap& map)
+      : lamps_(found.lamps.size()) {
+    const Eigen::Index size = found.displacement_m.size();
+    Eigen::MatrixXd covariance = found.covariance_m2;
+    for (Eigen::Index i = 0; i < size; ++i) {
+      const auto sd_m = find_lamp(map.lamps, found.lamps[static_cast<std::size_t>(i / 2)])->sd_m;
+      variance_is_known_ = variance_is_known_ && sd_m;
+      covariance(i, i) += sd_m.value_or(0) * sd_m.value_or(0) + kNumericVariance_m2;
+    }
+    const auto range = symmetric_eigen(found.projector);
+    const Eigen::Index rank = (range.values.array() > 0.5).count();
+    const Eigen::MatrixXd basis = range.vectors.rightCols(rank);
+    const auto [values, vectors] =
+        symmetric_eigen(Eigen::MatrixXd(basis.transpose() * covariance * basis));
+    variances_m2_ = values.cwiseMax(kNumericVariance_m2);
+    basis_ = basis * vectors;
+    coordinates_ = basis_.transpose() * found.displacement_m;
+  }
+
+  Eigen::Index rank() const { return basis_.cols(); }
+
+  /// Fits offsets of the free lamps to the coordinates, with the variance of the other lamps.
+  Fit fit(const std::vector<std::size_t>& free, double added_m2) const {
+    const auto size = 2 * std::ssize(free);
+    const Eigen::ArrayXd weights = (variances_m2_.array() + added_m2).inverse();
+    Eigen::MatrixXd jacobian(size, rank());
+    for (Eigen::Index k = 0; k < size; k += 2) {
+      const auto lamp = static_cast<Eigen::Index>(free[static_cast<std::size_t>(k / 2)]);
+      jacobian.middleRows<2>(k) = basis_.middleRows<2>(2 * lamp);
+    }
+    const Eigen::MatrixXd weighted = jacobian * weights.matrix().asDiagonal();
+    const Eigen::VectorXd gradient = weighted * coordinates_;
+    Fit fit{(weights * coordinates_.array().square()).sum(), {}, {}};
+    fit.covariance_m2 =
+        solve_symmetric(weighted * jacobian.transpose(), Eigen::MatrixXd::Identity(size, size));
+    fit.offsets_m = fit.covariance_m2 * gradient;
+    fit.chi_squared -= gradient.dot(fit.offsets_m);
+    return fit;
+  }
+
+  /// Returns the variance to add to those known, so that chi^2 is its degrees of freedom.
+  double added_variance_m2(const std::vector<std::size_t>& free) const {
+    const double freedom = static_cast<double>(rank() - 2 * std::ssize(free));
+    double low = 0, high = coordinates_.squaredNorm() / freedom;
+    if (fit(free, 0).chi_squared <= freedom) return 0;
+    constexpr int iterations = 60;
+    for (int iteration = 0; iteration < iterations; ++iteration) {
+      const double middle = low + (high - low) / 2;
+      (fit(free, middle).chi_squared > freedom ? low : high) = middle;
+    }
+    return high;
+  }
+
+  /// Returns the bound of a drop of chi^2, of so many that are tested together.
+  double bound(std::size_t free, double tests) const {
+    const double exponent = -2 * std::log(kFalseAlarm / tests);
+    if (variance_is_known_) return exponent;
+    const double freedom = static_cast<double>(rank()) - 2 * static_cast<double>(free);
+    return freedom * std::expm1(exponent / freedom);
+  }
+
+  /// Adds the lamp, other than `excluded`, that explains most beside the free ones. Returns chi^2.
+  double add_best(std::vector<std::size_t>& free, double added_m2,
+                  std::optional<std::size_t> excluded = {}) const {
+    std::size_t best = 0;
+    double smallest = std::numeric_limits<double>::infinity();
+    free.push_back(0);
+    for (std::size_t lamp = 0; lamp < lamps_; ++lamp) {
+      if (lamp == excluded || std::find(free.begin(), free.end() - 1, lamp) != free.end() - 1) {
+        continue;
+      }
+      free.back() = lamp;
+      const double chi_squared = fit(free, added_m2).chi_squared;
+      if (chi_squared < smallest) std::tie(smallest, best) = std::pair(chi_squared, lamp);
+    }
+    free.back() = best;
+    return smallest;
+  }
+
+  /// Returns true if another lamp in place of any of the free ones is worse by more than the bound.
+  bool is_significant(const std::vector<std::size_t>& free, double added_m2) const {
+    double sets = 1;
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      sets *= static_cast<double>(lamps_ - k) / static_cast<double>(k + 1);
+    }
+    const double limit = fit(free, added_m2).chi_squared + bound(free.size(), sets);
+    return std::all_of(free.begin(), free.end(), [&](std::size_t lamp) {
+      std::vector<std::size_t> other = free;
+      std::erase(other, lamp);
+      return add_best(other, added_m2, lamp) > limit;
+    });
+  }
+
+ private:
+  /// Rounding of simulated captures without noise.
+  static constexpr double kNumericVariance_m2 = 1e-14;
+
+  std::size_t lamps_;
+  Eigen::MatrixXd basis_;
+  Eigen::VectorXd variances_m2_, coordinates_;
+  bool variance_is_known_ = true;
+};
+
+/// Another map that may explain the captures, with the displacements that it leaves.
+struct OtherMap {
+  MapError error;
+  LampMap map;
+  std::optional<LampDisplacements> found = {};
+
+  double size_m() const {
+    return found ? found->displacement_m.norm() : std::numeric_limits<double>::infinity();
+  }
+};
+
+/// Returns the two maps with two lamps swapped that have the smallest residuals, best first, if
+/// these are smaller than those of the map.
+std::vector<OtherMap> swapped_maps(const LampDisplacements& found, const LampMap& map) {
+  Eigen::Matrix2Xd lamps_m(2, std::ssize(found.lamps));
+  for (Eigen::Index i = 0; i < lamps_m.cols(); ++i) {
+    lamps_m.col(i) = found.map_m[static_cast<std::size_t>(i)];
+  }
+  const auto squares_m2 = [&] {
+    return lamps_m.reshaped().dot(found.information * lamps_m.reshaped());
+  };
+  const Eigen::Map<const Eigen::Matrix2Xd> moved_m(found.displacement_m.data(), 2, lamps_m.cols());
+  const double unchanged_m2 = squares_m2();
+  std::vector<std::tuple<double, Eigen::Index, Eigen::Index>> pairs;
+  for (Eigen::Index i = 0; i < lamps_m.cols(); ++i) {
+    for (Eigen::Index k = 0; k < i; ++k) {
+      constexpr double min_fraction = 0.1;  // of lamps that are displaced by their distance
+      const double distance_m = (lamps_m.col(i) - lamps_m.col(k)).norm();
+      if (std::min(moved_m.col(i).norm(), moved_m.col(k).norm()) < min_fraction * distance_m) {
+        continue;
+      }
+      lamps_m.col(i).swap(lamps_m.col(k));
+      if (squares_m2() < unchanged_m2) pairs.emplace_back(squares_m2(), k, i);
+      lamps_m.col(i).swap(lamps_m.col(k));
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<OtherMap> maps;
+  for (const auto& [squares, k, i] : pairs) {
+    const int first = found.lamps[static_cast<std::size_t>(k)];
+    const int second = found.lamps[static_cast<std::size_t>(i)];
+    LampMap swapped = map;
+    for (Lamp& lamp : swapped.lamps) {
+      if (lamp.id == first) lamp.position_m = find_lamp(map.lamps, second)->position_m;
+      if (lamp.id == second) lamp.position_m = find_lamp(map.lamps, first)->position_m;
+    }
+    maps.push_back({{MapErrorKind::swapped, {first, second}}, std::move(swapped)});
+    if (maps.size() == 2) break;
+  }
+  return maps;
+}
+
+/// Finds two lamps that are swapped, or a mirrored map. With it the captures have to fit far better
+/// than with the map, and with two lamps swapped better than with any other two.
+std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap& map,
+                                      const std::optional<LampDisplacements>& found) {
+  std::vector<OtherMap> others;
+  if (found) others = swapped_maps(*found, map);
+  if (found && others.empty()) return std::nullopt;
+  LampMap mirrored = map;
+  for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
+  others.push_back({{MapErrorKind::mirrored}, std::move(mirrored)});
+  for (OtherMap& other : others) other.found = captures.displacements(other.map);
+  // The mirror image of a square is one with two corners swapped.
+  const bool is_mirrored = others.back().size_m() <= 2 * others.front().size_m();
+  const std::size_t best = is_mirrored ? others.size() - 1 : 0;
+  if (!others[best].found) return std::nullopt;
+  const DisplacementTest test(*others[best].found, map);
+  const double added_m2 = test.added_variance_m2({});
+  const auto count = static_cast<double>(map.lamps.size());
+  const double limit =
+      test.fit({}, added_m2).chi_squared + test.bound(0, 1 + count * (count - 1) / 2);
+  const auto is_worse = [&](const std::optional<LampDisplacements>& other) {
+    return !other || DisplacementTest(*other, map).fit({}, added_m2).chi_squared > limit;
+  };
+  if (!is_worse(found)) return std::nullopt;
+  if (!is_mirrored && others.size() > 2 && !is_worse(others[1].found)) return std::nullopt;
+  return others[best].error;
+}
+
+/// Finds the lamps that hang elsewhere: the largest set of which each is significant.
+std::vector<MapError> find_moved(const LampDisplacements& found, const DisplacementTest& test) {
+  std::vector<std::size_t> free, moved;
+  while (2 * (free.size() + 1) < found.lamps.size() && test.rank() > 2 * std::ssize(free) + 2) {
+    test.add_best(free, test.added_variance_m2(free));
+    if (test.is_significant(free, test.added_variance_m2(free))) {
+      moved = free;
+    }
+  }
+  std::vector<MapError> errors;
+  if (moved.empty()) return errors;
+  const auto fit = test.fit(moved, test.added_variance_m2(moved));
+  for (std::size_t k = 0; k < moved.size(); ++k) {
+    const auto row = 2 * static_cast<Eigen::Index>(k);
+    MapError& error = errors.emplace_back(MapErrorKind::moved, std::vector{found.lamps[moved[k]]});
+    // Exact, where the offset in d is linear.
+    error.offset_m.head<2>() =
+        offset_from_others(found, moved[k], moved).value_or(fit.offsets_m.segment<2>(row));
+    error.sd_m.head<2>() = fit.covariance_m2.diagonal().segment<2>(row).cwiseSqrt();
+  }
+  return errors;
+}
+
+/// Finds the lamp with most of the outliers, two or more, in more than a tenth of its captures.
+std::optional<MapError> find_unsteady(const LampDisplacements& found) {
+  constexpr int min_captures = 2, min_fraction_of = 10;
+  int all = 0;
+  for (const int count : found.outliers) all += count;
+  for (std::size_t i = 0; i < found.lamps.size(); ++i) {
+    const int outliers = found.outliers[i], captures = found.captures[i] + outliers;
+    if (outliers < min_captures || min_fraction_of * outliers <= captures) continue;
+    if (2 * outliers > all) {
+      MapError error{MapErrorKind::unsteady, {found.lamps[i]}};
+      error.contradicting = outliers;
+      error.captures = captures;
+      return error;
+    }
+  }
+  return std::nullopt;
+}
+
+/// Returns true if the lamps are displaced by more than Positioner accepts, relative to the size of
+/// the map.
+bool is_other_room(const LampDisplacements& found) {
+  constexpr double max_residual_fraction = 0.1;  // PositionerOptions::max_residual_share
+  const double rms_m =
+      found.displacement_m.norm() / std::sqrt(static_cast<double>(found.lamps.size()));
+  return rms_m > max_residual_fraction * rms_radius(found.map_m);
+}
+
+/// Whole millimetres from 10 mm on, else tenths. The height only if it is not rounded to 0.
+std::string describe_offset(int lamp, const Eigen::Vector3d& offset_m) {
+  const double unit_mm = offset_m.norm() < 9.95e-3 ? 0.1 : 1;
+  const int digits = unit_mm < 1 ? 1 : 0;
+  const auto rounded_mm = [&](double m) { return unit_mm * std::round(1e3 * m / unit_mm) + 0.0; };
+  std::string text = fmt::format("lamp {} hangs {:.{}f} mm from where the map has it (", lamp,
+                                 rounded_mm(offset_m.norm()), digits);
+  text += fmt::format("x {:+.{}f} mm, y {:+.{}f} mm", rounded_mm(offset_m.x()), digits,
+                      rounded_mm(offset_m.y()), digits);
+  if (const double z_mm = rounded_mm(offset_m.z()); z_mm != 0) {
+    text += fmt::format(", z {:+.{}f} mm", z_mm, digits);
+  }
+  return text + "): moved, or entered wrongly";
+}
+
+}  // namespace
+
+std::string describe(const MapError& error) {
+  switch (error.kind) {
+    case MapErrorKind::moved:
+      return describe_offset(error.lamps[0], error.offset_m);
+    case MapErrorKind::unsteady:
+      return fmt::format(
+          "lamp {} contradicts the other lamps in {} of {} captures, in no one direction: another "
+          "light is taken for it, or it moved in between",
+          error.lamps[0], error.contradicting, error.captures);
+    case MapErrorKind::swapped:
+      return fmt::format(
+          "lamps {} and {} look swapped: the captures fit the map once these two change places or "
+          "ids",
+          error.lamps[0], error.lamps[1]);
+    case MapErrorKind::mirrored:
+      return "the lamp map looks mirrored, as if drawn as seen from below: the captures fit its "
+             "mirror image; turn the sign of x or of y of every lamp";
+    case MapErrorKind::other_room:
+      return "most captures contradict it: is it the map of this room, and the calibration this "
+             "camera's?";
+    case MapErrorKind::unseen:
+      return fmt::format("lamp {} is never seen: is it lit, and not overexposed?", error.lamps[0]);
+  }
+  return "";
+}
+
+std::string describe(std::span<const MapError> errors) {
+  std::string text;
+  for (const MapError& error : errors) text += (text.empty() ? "" : "; ") + describe(error);
+  return text;
+}
+
+std::string describe_lamps_elsewhere(int lamps) {
+  return fmt::format(
+      "{} lamps are elsewhere than in the adjustment of the calibration, and sd does not "
+      "know how well they are: give the map that vlp-adjust --refine-map wrote with it",
+      lamps);
+}
+
+bool MapErrors::is_unusable() const {
+  return std::any_of(errors.begin(), errors.end(), [](const MapError& error) {
+    return error.kind == MapErrorKind::swapped || error.kind == MapErrorKind::mirrored;
+  });
+}
+
+MapErrors find_map_errors(std::span<const Frame> frames, const LampMap& map,
+                          const Calibration& calibration, const MapErrorOptions& options) {
+  const MapCaptures captures{frames, calibration, options};
+  const auto found = captures.displacements(map);
+  MapErrors result;
+  if (found) result.offsets = offsets_from_other_lamps(*found);
+  if (auto exchange = find_exchange(captures, map, found)) {
+    result.errors.push_back(std::move(*exchange));
+    return result;
+  }
+  if (!found) return result;
+  const DisplacementTest test(*found, map);
+  result.errors = find_moved(*found, test);
+  const double min_offset_m =
+      options.min_offset_px * found->height_m / calibration.camera.focal_px().mean();
+  std::erase_if(result.errors,
+                [&](const MapError& error) { return error.offset_m.norm() < min_offset_m; });
+  if (auto unsteady = find_unsteady(*found)) result.errors.push_back(std::move(*unsteady));
+  if (result.errors.empty() && is_other_room(*found)) {
+    result.errors.push_back({MapErrorKind::other_room});
+  }
+  return result;
+}
+
+std::vector<MapError> find_unseen_lamps(std::span<const Frame> frames, const LampMap& map) {
+  std::set<int> seen;
+  for (const Frame& frame : frames) {
+    for (const Detection& detection : frame.detections) seen.insert(detection.lamp);
+  }
+  std::vector<MapError> unseen;
+  for (const Lamp& lamp : map.lamps) {
+    if (!seen.contains(lamp.id)) unseen.push_back({MapErrorKind::unseen, {lamp.id}});
+  }
+  return unseen;
+}
+
+}  // namespace vlp

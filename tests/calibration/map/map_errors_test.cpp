@@ -1,0 +1,203 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/map/map_errors.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <utility>
+
+#include "calibration/levelling/drive.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+/// A camera that is tilted by 3 degrees, which its calibration does not contain.
+class FindMapErrors : public testing::Test {
+ protected:
+  Random random{41};
+  SyntheticRig rig = leaning_rig(0.05, 1);
+  std::vector<Frame> frames = noisy_drive();
+  LampMap map = rig.map;
+
+  Calibration camera_alone() const {
+    Calibration camera;
+    camera.camera = rig.calibration.camera;
+    return camera;
+  }
+  std::vector<MapError> errors() const {
+    return find_map_errors(frames, map, camera_alone()).errors;
+  }
+  std::string found() const { return describe(errors()); }
+  std::vector<Frame> noisy_drive() {
+    std::vector<Frame> noisy = drive(rig, 20, random, 0.1);
+    for (Frame& frame : noisy) frame.detections = with_noise(frame.detections, random);
+    return noisy;
+  }
+  void use_lamps(std::size_t count) {
+    rig.map.lamps.resize(count);
+    map = rig.map;
+    frames = noisy_drive();
+  }
+  /// Adds survey errors to the map.
+  void survey(double sd_m) {
+    map = rig.map;
+    for (Lamp& lamp : map.lamps) {
+      lamp.position_m.head<2>() += sd_m * Eigen::Vector2d(random.normal(), random.normal());
+    }
+  }
+  Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
+};
+
+TEST_F(FindMapErrors, ReturnsNoneOfARightMap) {
+  EXPECT_EQ(found(), "");
+  for (Lamp& lamp : map.lamps) lamp.position_m.x() += random.uniform(-0.005, 0.005);
+  EXPECT_EQ(found(), "") << "5 mm are for --refine-map";
+}
+
+TEST_F(FindMapErrors, ReturnsTheOffsetOfOneLampWhateverTheTilt) {
+  for (std::size_t i = 0; i < map.lamps.size(); ++i) {
+    map = rig.map;
+    place(i).head<2>() += Eigen::Vector2d(-0.03, 0.004);
+    const auto one = errors();
+    ASSERT_THAT(one, SizeIs(1)) << found();
+    EXPECT_EQ(one[0].kind, MapErrorKind::moved);
+    EXPECT_EQ(one[0].lamps, std::vector<int>{map.lamps[i].id});
+    EXPECT_LT((one[0].offset_m - Eigen::Vector3d(0.03, -0.004, 0)).norm(), 1e-3);
+    const MapErrors levelled = find_map_errors(frames, map, rig.calibration);
+    EXPECT_EQ(describe(levelled.errors), found()) << "with the tilt in the calibration";
+    EXPECT_THAT(levelled.offsets, SizeIs(map.lamps.size()));
+  }
+  EXPECT_THAT(found(),
+              testing::StartsWith("lamp 8 hangs 30 mm from where the map has it (x +30 mm"));
+}
+
+TEST_F(FindMapErrors, ReturnsThreeOfEightLamps) {
+  survey(1e-3);
+  place(0).x() += 0.05;
+  place(3).y() -= 0.07;
+  place(6).x() += 0.06;
+  const auto three = errors();
+  ASSERT_THAT(three, SizeIs(3)) << found();
+  std::vector<int> lamps;
+  for (const MapError& error : three) lamps.push_back(error.lamps[0]);
+  EXPECT_THAT(lamps, testing::UnorderedElementsAre(1, 4, 7));
+}
+
+/// Of three lamps each may be the one; of four the others determine the scatter of the map poorly.
+TEST_F(FindMapErrors, NeedsLargeOffsetsOfFewLamps) {
+  use_lamps(3);
+  place(0).x() += 0.05;
+  EXPECT_THAT(errors(), IsEmpty());
+  rig = leaning_rig(0.05, 1);
+  use_lamps(4);
+  survey(1e-3);
+  place(0).x() += 0.03;
+  EXPECT_THAT(errors(), IsEmpty());
+  for (Lamp& lamp : map.lamps) lamp.sd_m = 1e-3;
+  EXPECT_THAT(errors(), SizeIs(1)) << "the survey states its errors";
+  place(0) = rig.map.lamps[0].position_m;
+  EXPECT_THAT(errors(), IsEmpty());
+}
+
+TEST_F(FindMapErrors, GivesFewFalseAlarms) {
+  constexpr int maps = 400, max_alarms = 10;  // 4 are to be expected of p = 0.01
+  for (const std::size_t lamps : {5U, 8U}) {
+    rig = leaning_rig(0.05, 1);
+    use_lamps(lamps);
+    for (const bool is_stated : {false, true}) {
+      int alarms = 0;
+      for (int i = 0; i < maps; ++i) {
+        survey(2e-3);
+        for (Lamp& lamp : map.lamps) {
+          if (is_stated) lamp.sd_m = 2e-3;
+        }
+        alarms += errors().empty() ? 0 : 1;
+      }
+      RecordProperty("alarms_" + std::to_string(lamps) + (is_stated ? "_stated" : ""), alarms);
+      EXPECT_LE(alarms, max_alarms) << lamps << " lamps, stated " << is_stated;
+    }
+  }
+}
+
+TEST_F(FindMapErrors, StatesTheStandardDeviationOfOffsets) {
+  constexpr int maps = 200;
+  double squares = 0;
+  int count = 0;
+  for (int i = 0; i < maps; ++i) {
+    survey(2e-3);
+    place(2).y() += 0.05;
+    for (Lamp& lamp : map.lamps) lamp.sd_m = 2e-3;
+    for (const MapError& error : errors()) {
+      if (error.lamps != std::vector<int>{3}) continue;
+      const Eigen::Vector2d difference_m = error.offset_m.head<2>() - Eigen::Vector2d(0, -0.05);
+      squares += difference_m.cwiseQuotient(error.sd_m.head<2>()).squaredNorm() / 2;
+      ++count;
+    }
+  }
+  ASSERT_GT(count, maps * 9 / 10);
+  RecordProperty("error_over_sd", std::to_string(std::sqrt(squares / count)));
+  EXPECT_NEAR(std::sqrt(squares / count), 1, 0.15);
+}
+
+TEST_F(FindMapErrors, ReturnsAMirroredMap) {
+  for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
+  EXPECT_THAT(found(), HasSubstr("looks mirrored"));
+}
+
+TEST_F(FindMapErrors, ReturnsTwoLampsThatAreSwapped) {
+  for (const auto& [first, second] : {std::pair(2, 4), std::pair(0, 7)}) {
+    map = rig.map;
+    std::swap(place(static_cast<std::size_t>(first)), place(static_cast<std::size_t>(second)));
+    EXPECT_THAT(found(), HasSubstr("lamps " + std::to_string(first + 1) + " and " +
+                                   std::to_string(second + 1) + " look swapped"));
+  }
+}
+
+TEST_F(FindMapErrors, ReturnsTwoSwappedLampsOfFour) {
+  use_lamps(4);
+  rig.map.lamps[1].position_m.x() =
+      0.5;  // a rectangle's mirror image is an exchange of its corners
+  use_lamps(4);
+  std::swap(place(0), place(2));
+  EXPECT_THAT(found(), HasSubstr("lamps 1 and 3 look swapped"));
+}
+
+/// No similarity takes a square to its mirror image.
+TEST_F(FindMapErrors, ReturnsAMirroredSquare) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    Eigen::Vector3d& corner_m = rig.map.lamps[i].position_m;
+    corner_m.x() = std::copysign(corner_m.y(), corner_m.x());
+  }
+  use_lamps(4);
+  EXPECT_THAT(errors(), IsEmpty());
+  for (Lamp& lamp : map.lamps) lamp.position_m.x() *= -1;
+  EXPECT_THAT(found(), HasSubstr("looks mirrored"));
+}
+
+TEST_F(FindMapErrors, NamesALampWithMostOfTheOutliers) {
+  for (std::size_t i = 0; i < 6; ++i) {
+    std::swap(frames[i].detections[0], frames[i].detections.back());
+    frames[i].detections.back().pixel += Eigen::Vector2d(i % 2 == 0 ? 60 : -40, 30);
+  }
+  EXPECT_THAT(found(), HasSubstr("lamp 1 contradicts the other lamps in 6 of "));
+}
+
+TEST_F(FindMapErrors, NamesNoLampOfAnotherRoom) {
+  for (Lamp& lamp : map.lamps) {
+    lamp.position_m.head<2>() = Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
+  }
+  EXPECT_THAT(found(), HasSubstr("most captures contradict it"));
+  for (Lamp& lamp : map.lamps) lamp.id += 100;
+  EXPECT_EQ(found(), "");
+  EXPECT_THAT(find_unseen_lamps(frames, map), SizeIs(map.lamps.size()));
+  frames.clear();
+  EXPECT_EQ(found(), "");
+}
+
+}  // namespace
+}  // namespace vlp

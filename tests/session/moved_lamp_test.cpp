@@ -1,0 +1,122 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Every step names a lamp that is not where the map has it, in the same words.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "session/adjust_step.h"
+#include "session/dispersion_step.h"
+#include "session/locate_step.h"
+#include "session/rotation_step.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+using testing::Contains;
+using testing::Each;
+using testing::HasSubstr;
+using testing::Not;
+
+/// The captures of a session in a room with six lamps. Lamp 2 hangs `moved_m` from its place in the
+/// map.
+class MovedLamp : public testing::Test {
+ protected:
+  void take_captures(const Eigen::Vector2d& moved_m) {
+    rig.map.lamps[1].position_m.head<2>() += moved_m;
+    turn({0.05, 0.02, 0}, 12, rotation.frames);
+    turn({0.05, 0.02, 0.3}, 12, rotation.frames);
+    turn({0, 0, 0}, 40, dispersion.frames);
+    for (int i = 0; i < 36; ++i) turn({0.2 * (i % 6) - 0.5, 0.12 * (i / 6) - 0.3, 0}, 3, check);
+    dispersion.calibration.rotation_center = rig.calibration.rotation_center;
+  }
+
+  void turn(const Eigen::Vector3d& place_m, int count, std::vector<Frame>& frames) {
+    for (int i = 0; i < count; ++i) {
+      rig.camera = {place_m, 2 * std::numbers::pi * (i + 0.1 * random.uniform(0, 1)) / count};
+      std::vector<Detection> seen = with_noise(seen_from(rig, 0.006), random);
+      const auto [width_px, height_px] = rig.calibration.camera.imager_px;
+      std::erase_if(seen, [&](const Detection& one) {
+        return one.pixel.minCoeff() < 0 || one.pixel.x() > width_px || one.pixel.y() > height_px;
+      });
+      frames.push_back({std::to_string(frames.size()), seen});
+    }
+  }
+
+  StepResult rotate() const { return solve_rotation(rotation, RotationMethod::axis, {}); }
+  StepResult disperse() const {
+    KnownPlaces places;
+    for (const Frame& frame : dispersion.frames) {
+      places.captures.push_back({frame.detections, {0, 0}});
+      places.of.push_back(PlaceOf::camera);
+    }
+    return solve_dispersion(dispersion, places, DispersionMethod::camera, DispersionCircle::mean,
+                            {});
+  }
+  StepResult level() const { return solve_levelling({check, map, kFile, camera}, false, {}); }
+  StepResult locate() const { return locate_frames({check, map, dispersion.calibration}); }
+  StepResult adjust() const {
+    return solve_adjustment({{{"check", check, {}}}, map, kFile, camera, "camera.yaml", 1e-3, {}},
+                            {});
+  }
+
+  static constexpr const char* kFile = "lamps.yaml";
+  Random random{3};
+  SyntheticRig rig{lamp_map_of({{-0.6, -0.3, 1.6},
+                                {0, -0.32, 1.6},
+                                {0.6, -0.3, 1.6},
+                                {-0.6, 0.3, 1.6},
+                                {0, 0.28, 1.6},
+                                {0.6, 0.3, 1.6}}),
+                   {synthetic_camera(), {}, tilted_by(synthetic_camera(), 0.01, 1), {}, {}},
+                   {},
+                   {}};
+  const LampMap map = rig.map;
+  const Calibration camera{synthetic_camera(), {}, {}, {}, {}};
+  LampCaptures rotation{{}, map, kFile, camera}, dispersion{{}, map, kFile, camera};
+  std::vector<Frame> check;
+};
+
+/// Returns the warnings and, of a step that failed, the reason.
+std::vector<std::string> lines_of(const StepResult& result) {
+  std::vector<std::string> lines = result.warnings;
+  if (!result.ok()) lines.push_back(message_of(result));
+  return lines;
+}
+
+TEST_F(MovedLamp, IsNamedByEveryStepInTheSameWords) {
+  take_captures({-0.018, 0.024});
+  const auto names_it = HasSubstr(
+      "lamp 2 hangs 30 mm from where the map has it (x -18 mm, y +24 mm): moved, or entered "
+      "wrongly");
+  for (const StepResult& result : {rotate(), disperse(), level(), locate(), adjust()}) {
+    SCOPED_TRACE(testing::PrintToString(lines_of(result)));
+    EXPECT_EQ(std::ranges::count_if(lines_of(result),
+                                    [](const std::string& line) {
+                                      return line.find("lamp 2 ") != std::string::npos;
+                                    }),
+              1);
+    EXPECT_THAT(lines_of(result), Contains(names_it));
+  }
+}
+
+TEST_F(MovedLamp, IsTheReasonOfADispersionThatFails) {
+  take_captures({0.03, 0});
+  const StepResult result = disperse();
+  EXPECT_EQ(result.failure, StepFailure::wrong_map);
+  EXPECT_THAT(message_of(result),
+              testing::StartsWith("lamps.yaml: lamp 2 hangs 30 mm from where the map has it"));
+}
+
+TEST_F(MovedLamp, IsNoneOfARightMap) {
+  take_captures({0, 0});
+  for (const StepResult& result : {rotate(), disperse(), level(), locate(), adjust()}) {
+    EXPECT_TRUE(result.ok()) << result.why;
+    EXPECT_THAT(result.warnings, Each(Not(HasSubstr("lamp "))));
+  }
+}
+
+}  // namespace
+}  // namespace vlp
