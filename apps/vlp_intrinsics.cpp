@@ -200,7 +200,7 @@ void run(const CLI::App& app, const Options& options) {
                   failed));
 }
 
-void add_options(CLI::App& app, Options& options) {
+void add_input_options(CLI::App& app, Options& options) {
   app.add_option("images", options.images,
                  "Images of the board, folders of them, or videos; or a file of its corners, "
                  "mrcal's .vnl or a .csv as of --corners, with --imager-px")
@@ -223,6 +223,9 @@ void add_options(CLI::App& app, Options& options) {
                  "Width and height of the images that a file of corners is of")
       ->check(CLI::Range(16, 100000))
       ->option_text("WIDTH HEIGHT");
+}
+
+void add_solve_options(CLI::App& app, Options& options) {
   app.add_option("--corners", options.corners,
                  "Write the corners as they were seen, too, a .csv to calibrate from again without "
                  "the images")
@@ -250,6 +253,9 @@ void add_options(CLI::App& app, Options& options) {
          "views=6 (that differ), board_tilt_deg=20 (between two views)")
       ->delimiter(',')
       ->option_text("NAME=VALUE,...");
+}
+
+void add_output_options(CLI::App& app, Options& options) {
   app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
   app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");
   app.add_option("--opencv", options.opencv, "Write the camera for OpenCV, too (FileStorage)");
@@ -279,6 +285,8 @@ int main(int argc, char** argv) {
       "    --row-time-s 3e-5 --readout rows -o camera.yaml\n",
       "vlp-intrinsics");
   vlp::Options options;
-  vlp::add_options(app, options);
+  vlp::add_input_options(app, options);
+  vlp::add_solve_options(app, options);
+  vlp::add_output_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

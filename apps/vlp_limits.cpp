@@ -131,6 +131,55 @@ void run(const Options& options) {
   if (options.stated) print_advice(*summary);
 }
 
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
+  app.add_option("--calibration", options.calibration,
+                 "Calibration; its camera part is used, with --stated all of it")
+      ->required();
+  app.add_option("--height-m", options.height_m, "Height of the camera in the world")
+      ->required()
+      ->check(finite());
+  app.add_option("--noise-px", options.noise_px,
+                 "Standard deviation of each lamp's pixel, per axis")
+      ->required()
+      ->check(finite_positive());
+  auto* center = app.add_option("--center-px", options.center_px,
+                                "... of the image centre, per axis (default 0)")
+                     ->check(finite_not_negative());
+  auto* tilt = app.add_option("--tilt-deg", options.tilt_deg,
+                              "... of the camera's tilt, per axis (default 0)")
+                   ->check(finite_not_negative());
+  auto* lamp_map = app.add_option("--lamp-map-mm", options.lamp_map_mm,
+                                  "... of each lamp's position, per axis (default 0)")
+                       ->check(finite_not_negative());
+  app.add_flag("--stated", options.stated,
+               "In place of these three: what the calibration states of lens, zenith and offset, "
+               "and the map (sd_m) or the calibration of the lamps")
+      ->excludes(center)
+      ->excludes(tilt)
+      ->excludes(lamp_map);
+  add_motion_options(app, options.motion,
+                     "What it costs that the camera may drive, so fast at most, and that its "
+                     "velocity is estimated "
+                     "(default: it stands; odometry good to S m/s: twice S)");
+  app.add_option("--lean-sd-deg", options.lean_sd_deg,
+                 "What it costs that roll and pitch are known to this standard deviation, and "
+                 "estimated; 90: not at all (default: known)")
+      ->check(finite_not_negative());
+  app.add_option("--yaw-deg", options.yaw_deg, "Yaw of the camera (default 0)")->check(finite());
+  app.add_option("--floor-m", options.floor_m,
+                 "The floor (default: the rectangle around the lamps)")
+      ->expected(4)
+      ->check(finite())
+      ->option_text("X_MIN X_MAX Y_MIN Y_MAX");
+  app.add_option("--step-m", options.step_m, "Distance between places on the floor (default 0.05)")
+      ->check(finite_positive());
+  app.add_option("--map", options.map, "Write the figures of every place to this CSV file");
+  app.add_option("--picture", options.picture,
+                 "Draw the horizontal standard deviation over the floor, .png or .svg")
+      ->check(is_picture());
+}
+
 }  // namespace
 }  // namespace vlp
 
@@ -147,52 +196,6 @@ int main(int argc, char** argv) {
       "    --noise-px 0.05 --tilt-deg 0.01 --lamp-map-mm 0.1 --picture limits.png\n",
       "vlp-limits");
   vlp::Options options;
-  app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
-  app.add_option("--calibration", options.calibration,
-                 "Calibration; its camera part is used, with --stated all of it")
-      ->required();
-  app.add_option("--height-m", options.height_m, "Height of the camera in the world")
-      ->required()
-      ->check(vlp::finite());
-  app.add_option("--noise-px", options.noise_px,
-                 "Standard deviation of each lamp's pixel, per axis")
-      ->required()
-      ->check(vlp::finite_positive());
-  auto* center = app.add_option("--center-px", options.center_px,
-                                "... of the image centre, per axis (default 0)")
-                     ->check(vlp::finite_not_negative());
-  auto* tilt = app.add_option("--tilt-deg", options.tilt_deg,
-                              "... of the camera's tilt, per axis (default 0)")
-                   ->check(vlp::finite_not_negative());
-  auto* lamp_map = app.add_option("--lamp-map-mm", options.lamp_map_mm,
-                                  "... of each lamp's position, per axis (default 0)")
-                       ->check(vlp::finite_not_negative());
-  app.add_flag("--stated", options.stated,
-               "In place of these three: what the calibration states of lens, zenith and offset, "
-               "and the map (sd_m) or the calibration of the lamps")
-      ->excludes(center)
-      ->excludes(tilt)
-      ->excludes(lamp_map);
-  vlp::add_motion_options(app, options.motion,
-                          "What it costs that the camera may drive, so fast at most, and that its "
-                          "velocity is estimated "
-                          "(default: it stands; odometry good to S m/s: twice S)");
-  app.add_option("--lean-sd-deg", options.lean_sd_deg,
-                 "What it costs that roll and pitch are known to this standard deviation, and "
-                 "estimated; 90: not at all (default: known)")
-      ->check(vlp::finite_not_negative());
-  app.add_option("--yaw-deg", options.yaw_deg, "Yaw of the camera (default 0)")
-      ->check(vlp::finite());
-  app.add_option("--floor-m", options.floor_m,
-                 "The floor (default: the rectangle around the lamps)")
-      ->expected(4)
-      ->check(vlp::finite())
-      ->option_text("X_MIN X_MAX Y_MIN Y_MAX");
-  app.add_option("--step-m", options.step_m, "Distance between places on the floor (default 0.05)")
-      ->check(vlp::finite_positive());
-  app.add_option("--map", options.map, "Write the figures of every place to this CSV file");
-  app.add_option("--picture", options.picture,
-                 "Draw the horizontal standard deviation over the floor, .png or .svg")
-      ->check(vlp::is_picture());
+  vlp::add_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }

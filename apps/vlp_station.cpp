@@ -96,6 +96,135 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
   return command;
 }
 
+/// Adds the commands that print or write what is recorded of a run.
+void add_commands_of_a_run(CLI::App& app, StationRecordsOptions& options) {
+  add_records(app, "list", "A line for each run", options);
+  auto* show = add_records(app, "show", "All of one run, the last unless it is named", options);
+  show->add_option("run", options.run, "Name of the run");
+  auto* restore =
+      add_records(app, "restore",
+                  "Write the calibration and the report of a run again, from its record", options);
+  restore->add_option("run", options.run, "Name of the run")->required();
+  restore->add_option("-o,--output", options.output,
+                      "The folder of results (default: the station's); in it CAMERA/RUN/");
+  auto* certified = add_records(
+      app, "certificate",
+      "Write the certificate of a run, certificate.html: values with expanded uncertainty, "
+      "conformity, traceability",
+      options);
+  certified->add_option("run", options.run, "Name of the run")->required();
+  certified->add_option("-o,--output", options.output,
+                        "The folder of results (default: the station's); in it CAMERA/RUN/");
+}
+
+/// Adds the commands that check or change records and results.
+void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
+  CLI::App* clean = app.add_subcommand(
+      "clean", "What of the runs is kept no longer ('keep' in station.yaml); records stay");
+  clean->add_option("--station", options.station, "The station, station.yaml")->required();
+  clean->add_flag("--delete", options.remove, "Delete it (default: only tell)");
+  CLI::App* verify_records = add_where(
+      app, "verify-records",
+      "Whether the records are as they were kept: what was changed, removed or added by hand, by "
+      "name; exit code 1 when there is any",
+      options);
+  verify_records->add_option("--noted", options.noted,
+                             "The last digest that an earlier verify-records told: the trail has "
+                             "to have it still");
+  CLI::App* voided = add_where(
+      app, "void",
+      "A run counts no more: in no yield, trend or study; it stays in the records, with who voided "
+      "it and why, and is done again",
+      options);
+  voided->add_option("run", options.run, "Name of the run")->required();
+  voided->add_option("--operator", options.operator_name, "Who")->required();
+  voided->add_option("--reason", options.reason, "Why")->required();
+}
+
+/// Adds the commands that move runs into and out of records.
+void add_transfer(CLI::App& app, StationRecordsOptions& options) {
+  auto* exported = add_records(app, "export", "Write runs as CSV or JSON", options);
+  exported->add_option("-o,--output", options.output, "Where to: .csv or .json")->required();
+  CLI::App* imported = app.add_subcommand(
+      "import",
+      "Take the sessions of a reprocessed archive into records, as runs of a station that has the "
+      "results' name: for trend, capability and study. Those that are there already stay");
+  imported->add_option("results", options.archive, "RESULTS of scripts/reprocess.sh")->required();
+  imported
+      ->add_option("--records", options.records,
+                   "A file of SQLite, made when it is not there, or postgresql://USER@HOST/NAME")
+      ->required();
+}
+
+constexpr const char* kFigureHelp = "Which: rms_px, check_mean_mm, ...";
+
+/// Adds the statistics over runs: trend, capability, study.
+void add_statistics(CLI::App& app, StationRecordsOptions& options) {
+  auto* trend = add_records(
+      app, "trend",
+      "A figure over the runs, with the limits of a control chart; exit code 1 for an alarm. Of "
+      "units "
+      "of the station that passed, unless --verdict, --kind or --of-station says otherwise",
+      options);
+  trend->add_option("figure", options.figure, kFigureHelp)->required();
+  trend->add_option("-o,--output", options.output, "Draw it, .png or .svg");
+  trend
+      ->add_option(
+          "--rules", options.rules,
+          "What is an alarm: western-electric (four rules), nelson (eight), one of them as "
+          "nelson-3, ewma (default: western-electric)")
+      ->option_text("RULE ...");
+  auto* capable = add_records(app, "capability",
+                              "How figures scatter compared with their gates: Cpk, Ppk, with "
+                              "95 % intervals. Of units of the "
+                              "station that were judged",
+                              options);
+  capable->add_option("figure", options.figure, "Only this: rms_px, check_mean_mm, ...");
+  auto* study = add_records(app, "study",
+                            "What measuring adds to a figure: repeatability and "
+                            "reproducibility (%GRR, ndc) of units that "
+                            "were run as often on each station; with --reference bias and "
+                            "linearity",
+                            options);
+  study->add_option("figure", options.figure, kFigureHelp)->required();
+  study->add_option("--units", options.units, "Its cameras (default: those with two runs or more)")
+      ->option_text("ID ...");
+  study
+      ->add_option("--reference", options.references,
+                   "Units whose figure is known from elsewhere, and what it is: bias and linearity "
+                   "of the station")
+      ->option_text("UNIT=VALUE ...")
+      ->excludes("--units");
+  study->add_option("-o,--output", options.output, "Draw the bias, .png or .svg")
+      ->needs("--reference");
+}
+
+/// Runs the command that was given.
+void run_command(const CLI::App& app, const StationRunOptions& run,
+                 const StationRecordsOptions& records) {
+  if (app.got_subcommand("run")) {
+    if (run.camera_id.empty()) {
+      run_shift(run);
+    } else {
+      run_unit(run);
+    }
+  }
+  if (app.got_subcommand("verify")) run_verify(run);
+  if (app.got_subcommand("hook")) run_hooks(run);
+  if (app.got_subcommand("list")) list_runs(records);
+  if (app.got_subcommand("show")) show_run(records);
+  if (app.got_subcommand("restore")) restore_run(records);
+  if (app.got_subcommand("certificate")) write_certificate(records);
+  if (app.got_subcommand("clean")) clean_up(records);
+  if (app.got_subcommand("void")) void_run(records);
+  if (app.got_subcommand("verify-records")) verify_records(records);
+  if (app.got_subcommand("import")) import_archive(records);
+  if (app.got_subcommand("export")) export_runs(records);
+  if (app.got_subcommand("trend")) show_trend(records);
+  if (app.got_subcommand("capability")) show_capability(records);
+  if (app.got_subcommand("study")) show_study(records);
+}
+
 }  // namespace
 }  // namespace vlp
 
@@ -132,114 +261,9 @@ int main(int argc, char** argv) {
   vlp::add_run(app, run);
   vlp::add_verify(app, run);
   vlp::add_hook(app, run);
-  vlp::add_records(app, "list", "A line for each run", records);
-  auto* show =
-      vlp::add_records(app, "show", "All of one run, the last unless it is named", records);
-  show->add_option("run", records.run, "Name of the run");
-  auto* restore = vlp::add_records(
-      app, "restore", "Write the calibration and the report of a run again, from its record",
-      records);
-  restore->add_option("run", records.run, "Name of the run")->required();
-  restore->add_option("-o,--output", records.output,
-                      "The folder of results (default: the station's); in it CAMERA/RUN/");
-  auto* certified = vlp::add_records(
-      app, "certificate",
-      "Write the certificate of a run, certificate.html: values with expanded uncertainty, "
-      "conformity, traceability",
-      records);
-  certified->add_option("run", records.run, "Name of the run")->required();
-  certified->add_option("-o,--output", records.output,
-                        "The folder of results (default: the station's); in it CAMERA/RUN/");
-  CLI::App* clean = app.add_subcommand(
-      "clean", "What of the runs is kept no longer ('keep' in station.yaml); records stay");
-  clean->add_option("--station", records.station, "The station, station.yaml")->required();
-  clean->add_flag("--delete", records.remove, "Delete it (default: only tell)");
-  CLI::App* verify_records = vlp::add_where(
-      app, "verify-records",
-      "Whether the records are as they were kept: what was changed, removed or added by hand, by "
-      "name; exit code 1 when there is any",
-      records);
-  verify_records->add_option("--noted", records.noted,
-                             "The last digest that an earlier verify-records told: the trail has "
-                             "to have it still");
-  CLI::App* voided = vlp::add_where(
-      app, "void",
-      "A run counts no more: in no yield, trend or study; it stays in the records, with who voided "
-      "it and why, and is done again",
-      records);
-  voided->add_option("run", records.run, "Name of the run")->required();
-  voided->add_option("--operator", records.operator_name, "Who")->required();
-  voided->add_option("--reason", records.reason, "Why")->required();
-  auto* exported = vlp::add_records(app, "export", "Write runs as CSV or JSON", records);
-  exported->add_option("-o,--output", records.output, "Where to: .csv or .json")->required();
-  CLI::App* imported = app.add_subcommand(
-      "import",
-      "Take the sessions of a reprocessed archive into records, as runs of a station that has the "
-      "results' name: for trend, capability and study. Those that are there already stay");
-  imported->add_option("results", records.archive, "RESULTS of scripts/reprocess.sh")->required();
-  imported
-      ->add_option("--records", records.records,
-                   "A file of SQLite, made when it is not there, or postgresql://USER@HOST/NAME")
-      ->required();
-  constexpr const char* which = "Which: rms_px, check_mean_mm, ...";
-  auto* trend = vlp::add_records(
-      app, "trend",
-      "A figure over the runs, with the limits of a control chart; exit code 1 for an alarm. Of "
-      "units "
-      "of the station that passed, unless --verdict, --kind or --of-station says otherwise",
-      records);
-  trend->add_option("figure", records.figure, which)->required();
-  trend->add_option("-o,--output", records.output, "Draw it, .png or .svg");
-  trend
-      ->add_option(
-          "--rules", records.rules,
-          "What is an alarm: western-electric (four rules), nelson (eight), one of them as "
-          "nelson-3, ewma (default: western-electric)")
-      ->option_text("RULE ...");
-  auto* capable = vlp::add_records(app, "capability",
-                                   "How figures scatter compared with their gates: Cpk, Ppk, with "
-                                   "95 % intervals. Of units of the "
-                                   "station that were judged",
-                                   records);
-  capable->add_option("figure", records.figure, "Only this: rms_px, check_mean_mm, ...");
-  auto* study = vlp::add_records(app, "study",
-                                 "What measuring adds to a figure: repeatability and "
-                                 "reproducibility (%GRR, ndc) of units that "
-                                 "were run as often on each station; with --reference bias and "
-                                 "linearity",
-                                 records);
-  study->add_option("figure", records.figure, which)->required();
-  study->add_option("--units", records.units, "Its cameras (default: those with two runs or more)")
-      ->option_text("ID ...");
-  study
-      ->add_option("--reference", records.references,
-                   "Units whose figure is known from elsewhere, and what it is: bias and linearity "
-                   "of the station")
-      ->option_text("UNIT=VALUE ...")
-      ->excludes("--units");
-  study->add_option("-o,--output", records.output, "Draw the bias, .png or .svg")
-      ->needs("--reference");
-  return vlp::run_app(app, argc, argv, [&] {
-    if (app.got_subcommand("run")) {
-      if (run.camera_id.empty()) {
-        vlp::run_shift(run);
-      } else {
-        vlp::run_unit(run);
-      }
-    }
-    if (app.got_subcommand("verify")) vlp::run_verify(run);
-    if (app.got_subcommand("hook")) vlp::run_hooks(run);
-    if (app.got_subcommand("list")) vlp::list_runs(records);
-    if (app.got_subcommand("show")) vlp::show_run(records);
-    if (app.got_subcommand("restore")) vlp::restore_run(records);
-    if (app.got_subcommand("certificate")) vlp::write_certificate(records);
-    if (app.got_subcommand("clean")) vlp::clean_up(records);
-    if (app.got_subcommand("void")) vlp::void_run(records);
-    if (app.got_subcommand("verify-records")) vlp::verify_records(records);
-    if (app.got_subcommand("import")) vlp::import_archive(records);
-    if (app.got_subcommand("export")) vlp::export_runs(records);
-    if (app.got_subcommand("trend")) vlp::show_trend(records);
-    if (app.got_subcommand("capability")) vlp::show_capability(records);
-    if (app.got_subcommand("study")) vlp::show_study(records);
-  });
+  vlp::add_commands_of_a_run(app, records);
+  vlp::add_upkeep(app, records);
+  vlp::add_transfer(app, records);
+  vlp::add_statistics(app, records);
+  return vlp::run_app(app, argc, argv, [&] { vlp::run_command(app, run, records); });
 }

@@ -154,6 +154,9 @@ class Positioner::Impl {
                             const PoseEstimate& camera) const;
   BodyCovariance common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
                                    const BodyFix& fix) const;
+  /// Adds the covariances of a fix of lamps, and transfers it to the robot if there is a mount.
+  void add_covariances(const SightedFrame& frame, const InclinationRotation& lean,
+                       const InclinationJacobian& by_lean, double sigma_rad, Fix& fix) const;
   FixStatus sight_from_body(std::span<const Detection> detections, double time_s, BodyFrame& frame,
                             int& unknown_lamps) const;
   /// Nothing when fewer than two lamps of the map are seen.
@@ -370,6 +373,28 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   return locate(detections, sensors);
 }
 
+void Positioner::Impl::add_covariances(const SightedFrame& frame, const InclinationRotation& lean,
+                                       const InclinationJacobian& by_lean, double sigma_rad,
+                                       Fix& fix) const {
+  const Matrix4 common = common_.stated()
+                             ? common_covariance(frame, lean.level_from_base, fix.estimate)
+                             : Matrix4(Matrix4::Zero());
+  // The error of the inclination is of this frame, too.
+  if (mount_) {
+    PoseEstimate whole = fix.estimate;
+    whole.covariance += common;
+    fix.noise_covariance =
+        robot_from_camera(fix.estimate, by_lean, sigma_rad, *mount_, lean).covariance;
+    fix.estimate = robot_from_camera(whole, by_lean, sigma_rad, *mount_, lean);
+  } else {
+    if (sigma_rad > 0) {
+      fix.estimate.covariance += sigma_rad * sigma_rad * by_lean * by_lean.transpose();
+    }
+    fix.noise_covariance = fix.estimate.covariance;
+    fix.estimate.covariance += common;
+  }
+}
+
 Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensors& sensors) const {
   if (!finite(sensors)) return refused(FixStatus::not_finite, 0);
   if (needs_body(sensors) && detections.size() > 1) {
@@ -413,23 +438,7 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   fix.time_s = sensors.time_s;
   name_rejected(frame, fix);
   fix.unknown_lamps = frame.unknown_lamps;
-  const Matrix4 common = common_.stated()
-                             ? common_covariance(frame, lean.level_from_base, fix.estimate)
-                             : Matrix4(Matrix4::Zero());
-  // The error of the inclination is of this frame, too.
-  if (mount_) {
-    PoseEstimate whole = fix.estimate;
-    whole.covariance += common;
-    fix.noise_covariance =
-        robot_from_camera(fix.estimate, by_lean, sigma_rad, *mount_, lean).covariance;
-    fix.estimate = robot_from_camera(whole, by_lean, sigma_rad, *mount_, lean);
-  } else {
-    if (sigma_rad > 0) {
-      fix.estimate.covariance += sigma_rad * sigma_rad * by_lean * by_lean.transpose();
-    }
-    fix.noise_covariance = fix.estimate.covariance;
-    fix.estimate.covariance += common;
-  }
+  add_covariances(frame, lean, by_lean, sigma_rad, fix);
   fix.estimate.pose.position_m += origin_m_;
   return fix;
 }

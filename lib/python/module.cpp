@@ -423,22 +423,9 @@ void check_numpy() {
                          ": install \"numpy<2\", or build vlp with pybind11 2.12 or later");
 }
 
-}  // namespace
-}  // namespace vlp
-
-PYBIND11_MODULE(vlp, m) {
-  using namespace vlp;
+/// Defines the statuses of fixes and their explanations.
+void define_statuses(py::module_& m) {
   using namespace pybind11::literals;
-  check_numpy();
-  m.doc() =
-      "Positions from modulated ceiling lamps: lens, lamp map, calibration, lamps in images, "
-      "fixes.\n\n"
-      "Metres, radians, seconds, pixels; the world has z up, yaw is counter-clockwise seen from\n"
-      "above, the centre of an image's top left pixel is (0, 0). Nothing is None, or NaN in "
-      "arrays.";
-  m.attr("__version__") = VLP_VERSION;
-  py::register_exception<InputError>(m, "InputError", PyExc_ValueError).doc() =
-      "A file that is bad: file, line, key, and what to do.";
   py::list statuses;
   for (int i = 0; i < kStatuses; ++i) statuses.append(name_of(static_cast<FixStatus>(i)));
   m.attr("STATUSES") = py::tuple(statuses);
@@ -449,7 +436,11 @@ PYBIND11_MODULE(vlp, m) {
         return explanation_of(static_cast<FixStatus>(status));
       },
       "status"_a, "What a status, an index of STATUSES, means and what to do.");
+}
 
+/// Defines lamp map, lens and calibration.
+void define_calibration(py::module_& m) {
+  using namespace pybind11::literals;
   py::class_<LampMap>(m, "LampMap", "The lamps of a room, lamps.yaml.")
       .def(py::init(&read_lamp_map), "file"_a)
       .def_property_readonly("ids", &ids_of)
@@ -476,18 +467,10 @@ PYBIND11_MODULE(vlp, m) {
       .def_property_readonly("lens", [](const Calibration& c) {
         return Lens(c.camera.lens_model, c.camera.intrinsics);
       });
+}
 
-  py::class_<Sensors>(m, "Sensors", "What a robot knows of a frame besides the image.")
-      .def(py::init(&sensors_of), py::kw_only(), "inclination_rad"_a = py::none(),
-           "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
-           "velocity_m_per_s"_a = py::none(), "velocity_sd_m_per_s"_a = 0.0,
-           "yaw_rate_rad_per_s"_a = 0.0, "yaw_rate_sd_rad_per_s"_a = 0.0, "height_m"_a = py::none(),
-           "time_s"_a = py::none(),
-           "inclination_rad: (roll, pitch), and its standard deviation, with which they are\n"
-           "estimated. height_and_yaw: of the camera, for fixes of one lamp. velocity_m_per_s: in\n"
-           "the level frame; with standard deviations it is estimated. height_m: (z, sd), with a\n"
-           "standard deviation that is positive.");
-
+/// Defines the fix of a frame.
+void define_fix(py::module_& m) {
   py::class_<Fix>(m, "Fix", "The answer to one frame; figures are NaN where it is not ok.")
       .def_property_readonly("ok", &Fix::ok)
       .def_property_readonly("status", [](const Fix& fix) { return name_of(fix.status); })
@@ -528,6 +511,21 @@ PYBIND11_MODULE(vlp, m) {
       .def_readonly("unknown_lamps", &Fix::unknown_lamps)
       .def_readonly("time_s", &Fix::time_s)
       .def("__repr__", &shown);
+}
+
+/// Defines sensors, positioner and lamp detector.
+void define_positioner(py::module_& m) {
+  using namespace pybind11::literals;
+  py::class_<Sensors>(m, "Sensors", "What a robot knows of a frame besides the image.")
+      .def(py::init(&sensors_of), py::kw_only(), "inclination_rad"_a = py::none(),
+           "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
+           "velocity_m_per_s"_a = py::none(), "velocity_sd_m_per_s"_a = 0.0,
+           "yaw_rate_rad_per_s"_a = 0.0, "yaw_rate_sd_rad_per_s"_a = 0.0, "height_m"_a = py::none(),
+           "time_s"_a = py::none(),
+           "inclination_rad: (roll, pitch), and its standard deviation, with which they are\n"
+           "estimated. height_and_yaw: of the camera, for fixes of one lamp. velocity_m_per_s: in\n"
+           "the level frame; with standard deviations it is estimated. height_m: (z, sd), with a\n"
+           "standard deviation that is positive.");
 
   py::class_<Positioner>(m, "Positioner", "From identified lamps in an image to a position.")
       .def(py::init(&positioner_of), "lamp_map"_a, "calibration"_a, py::kw_only(),
@@ -551,11 +549,37 @@ PYBIND11_MODULE(vlp, m) {
            "(lamps, pixels, sigma_px) of the lamps wholly in view, as Positioner.locate takes "
            "them;\n"
            "the image has the camera's shape (rows, columns), uint8 or uint16.");
+}
 
+/// Defines the readers of tables.
+void define_tables(py::module_& m) {
+  using namespace pybind11::literals;
   m.def("read_detections", &detections_table, "file"_a,
         "detections.csv as a dict: images, and for each detection frames (an index of images),\n"
         "lamps, pixels, sigma_px.");
   m.def("read_fixes", &fixes_table, "file"_a,
         "fixes.csv as a dict: images, statuses, position_m, yaw_rad, sd (n, 4).");
   m.def("read_truth", &truth_table, "file"_a, "truth.csv as a dict: images, position_m, yaw_rad.");
+}
+
+}  // namespace
+}  // namespace vlp
+
+PYBIND11_MODULE(vlp, m) {
+  using namespace vlp;
+  check_numpy();
+  m.doc() =
+      "Positions from modulated ceiling lamps: lens, lamp map, calibration, lamps in images, "
+      "fixes.\n\n"
+      "Metres, radians, seconds, pixels; the world has z up, yaw is counter-clockwise seen from\n"
+      "above, the centre of an image's top left pixel is (0, 0). Nothing is None, or NaN in "
+      "arrays.";
+  m.attr("__version__") = VLP_VERSION;
+  py::register_exception<InputError>(m, "InputError", PyExc_ValueError).doc() =
+      "A file that is bad: file, line, key, and what to do.";
+  define_statuses(m);
+  define_calibration(m);
+  define_fix(m);
+  define_positioner(m);
+  define_tables(m);
 }

@@ -21,6 +21,55 @@
 
 namespace vlp {
 
+namespace {
+
+/// Fills in the uncertainty over the image: the mean and the worst in the region, the worst beyond.
+void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const Lens& lens,
+                                const std::array<int, 2>& imager_px, CalibrationReport& report) {
+  double inside = 0;
+  for (const Eigen::Vector2d& pixel : pixel_grid(imager_px)) {
+    // Beyond the farthest corner a fisheye may end, as splines do; there they refuse pixels.
+    const bool can_end = lens.model() == LensModel::fisheye || is_splined(lens.model());
+    if (can_end && !lens.unproject(pixel)) continue;
+    const double sigma_px = uncertainty.worst_px(pixel);
+    if (!polygon_contains(report.region, pixel)) {
+      report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
+      continue;
+    }
+    ++inside;
+    report.uncertainty_mean_px += sigma_px;
+    report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, sigma_px);
+  }
+  report.uncertainty_mean_px /= std::max(inside, 1.0);
+}
+
+/// Compares the lenses of the even and the odd views; std::nullopt if one of them is not
+/// determined.
+std::optional<ProjectionDifference> compare_halves(const IntrinsicsSolution& solution,
+                                                   const IntrinsicsInput& input,
+                                                   const ProjectionUncertainty& uncertainty,
+                                                   const ImageRegion& region) {
+  const IntrinsicsSolution even = solve_every_other(solution, 0);
+  const IntrinsicsSolution odd = solve_every_other(solution, 1);
+  if (!even.ok() || !odd.ok()) return std::nullopt;
+  // Half of the views leave parts of a splined lens undetermined.
+  std::vector<ProjectionUncertainty> halves;
+  if (is_splined(solution.lens().model())) halves = {{even, input.lattice}, {odd, input.lattice}};
+  constexpr double max_ratio = 3;  // sqrt(2) is usual
+  return projection_difference(
+      even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
+        const double sigma_px = uncertainty.worst_px(pixel);
+        const bool is_determined =
+            polygon_contains(region, pixel) &&
+            std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
+              return half.worst_px(pixel) > max_ratio * sigma_px;
+            });
+        return is_determined ? sigma_px : std::numeric_limits<double>::infinity();
+      });
+}
+
+}  // namespace
+
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
   const ProjectionUncertainty uncertainty(solution, input.lattice);
   const Lens lens = solution.lens();
@@ -42,21 +91,7 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
                            expected.rms_px,
                            expected_difference(lens, input.imager_px, by_views, compared).rms_px,
                            {}};
-  double inside = 0;
-  for (const Eigen::Vector2d& pixel : pixel_grid(input.imager_px)) {
-    // Beyond the farthest corner a fisheye may end, as splines do; there they refuse pixels.
-    const bool ends = lens.model() == LensModel::fisheye || is_splined(lens.model());
-    if (ends && !lens.unproject(pixel)) continue;
-    const double sigma_px = uncertainty.worst_px(pixel);
-    if (!polygon_contains(report.region, pixel)) {
-      report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
-      continue;
-    }
-    ++inside;
-    report.uncertainty_mean_px += sigma_px;
-    report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, sigma_px);
-  }
-  report.uncertainty_mean_px /= std::max(inside, 1.0);
+  add_uncertainty_over_image(uncertainty, lens, input.imager_px, report);
   if (!is_splined(lens.model())) {
     // Of few views each of them may chance to be small.
     const ProjectionUncertainty independent(solution);
@@ -68,22 +103,7 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
                    expected_worst_px(lens, input.imager_px, covariance, report.region));
     }
   }
-  const IntrinsicsSolution even = solve_every_other(solution, 0);
-  const IntrinsicsSolution odd = solve_every_other(solution, 1);
-  if (!even.ok() || !odd.ok()) return report;
-  // Of a splined lens, half of the views leave holes, which tell nothing of it.
-  std::vector<ProjectionUncertainty> halves;
-  if (is_splined(lens.model())) halves = {{even, input.lattice}, {odd, input.lattice}};
-  constexpr double hole = 3;  // sqrt(2) is usual
-  report.halves = projection_difference(
-      even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
-        const double sigma_px = uncertainty.worst_px(pixel);
-        const bool told = polygon_contains(report.region, pixel) &&
-                          std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
-                            return half.worst_px(pixel) > hole * sigma_px;
-                          });
-        return told ? sigma_px : std::numeric_limits<double>::infinity();
-      });
+  report.halves = compare_halves(solution, input, uncertainty, report.region);
   return report;
 }
 

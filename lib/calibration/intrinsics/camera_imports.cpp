@@ -251,6 +251,64 @@ LensFit lens_fit_at(const std::vector<double>& parameters, LensModel model,
   return step;
 }
 
+/// Fits the parameters of a lens model to the rays of another lens, by Levenberg and Marquardt's
+/// method; those of a splined lens are left as they are. Throws std::invalid_argument if the model
+/// has no lens near the other one.
+void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
+                    std::vector<double>& parameters) {
+  constexpr int max_iterations = 200;
+  constexpr double function_tolerance = 1e-12, min_damping = 1e-12, max_damping = 1e12;
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;
+  for (const Eigen::Vector2d& pixel : pixel_grid(camera.imager_px)) {
+    if (const auto ray = from.unproject(pixel)) rays.emplace_back(pixel, ray->direction);
+  }
+  double damping = 1e-3;
+  LensFit fit = lens_fit_at(parameters, model, rays);
+  for (int i = 0; i < max_iterations && fit.count > 0 && !is_splined(model); ++i) {
+    Eigen::MatrixXd damped = fit.normal;
+    damped.diagonal() *= 1 + damping;
+    const Eigen::VectorXd change = solve_symmetric(damped, fit.right);
+    std::vector<double> next = parameters;
+    for (std::size_t k = 0; k < next.size(); ++k) next[k] += change[static_cast<Eigen::Index>(k)];
+    const bool is_possible = change.allFinite() && next[0] > 0 && next[1] > 0;
+    LensFit trial = is_possible ? lens_fit_at(next, model, rays) : LensFit{};
+    const bool is_better = trial.count > 0 && trial.count >= fit.count &&
+                           (trial.count > fit.count || trial.squares < fit.squares);
+    if (!is_better) {
+      damping *= 10;
+      if (damping > max_damping) break;
+      continue;
+    }
+    const bool has_converged =
+        trial.count == fit.count && fit.squares - trial.squares <= function_tolerance * fit.squares;
+    parameters = next;
+    fit = std::move(trial);
+    damping = std::max(damping / 10, min_damping);
+    if (has_converged) break;
+  }
+  if (fit.count == 0 || !std::isfinite(fit.squares)) {
+    throw std::invalid_argument(std::string(name_of(model)) + " has no lens near " +
+                                std::string(name_of(camera.lens_model)));
+  }
+}
+
+/// Measures the largest difference between two lenses on a finer grid than that of the fit, and the
+/// fraction of the image that both project to.
+void compare_lenses(const Lens& from, const Lens& to, const std::array<int, 2>& imager_px,
+                    FittedCamera& fitted) {
+  constexpr int points_per_row = 201;
+  const auto pixels = pixel_grid(imager_px, points_per_row);
+  std::size_t shared = 0;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const auto ray = from.unproject(pixel);
+    const auto found = ray ? to.project(ray->direction) : std::nullopt;
+    if (!found) continue;
+    fitted.worst_px = std::max(fitted.worst_px, (*found - pixel).norm());
+    ++shared;
+  }
+  fitted.share = static_cast<double>(shared) / static_cast<double>(pixels.size());
+}
+
 }  // namespace
 
 AnyCamera read_any_camera(const fs::path& file) {
@@ -296,10 +354,6 @@ AnyCamera read_any_camera(const fs::path& file) {
 FittedCamera with_lens_model(const Camera& camera, LensModel model) {
   if (camera.lens_model == model) return {camera, 0, 1};
   const Lens from(camera.lens_model, camera.intrinsics);
-  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;
-  for (const Eigen::Vector2d& pixel : pixel_grid(camera.imager_px)) {
-    if (const auto ray = from.unproject(pixel)) rays.emplace_back(pixel, ray->direction);
-  }
   FittedCamera fitted{camera, 0, 0};
   fitted.camera.lens_model = model;
   auto& parameters = fitted.camera.intrinsics;
@@ -315,48 +369,8 @@ FittedCamera with_lens_model(const Camera& camera, LensModel model) {
     }
     parameters = *splined;
   }
-  constexpr int most_steps = 200;
-  constexpr double settled = 1e-12;
-  double damping = 1e-3;
-  LensFit at = lens_fit_at(parameters, model, rays);
-  for (int i = 0; i < most_steps && at.count > 0 && !is_splined(model); ++i) {
-    Eigen::MatrixXd damped = at.normal;
-    damped.diagonal() *= 1 + damping;
-    const Eigen::VectorXd change = solve_symmetric(damped, at.right);
-    std::vector<double> next = parameters;
-    for (std::size_t k = 0; k < next.size(); ++k) next[k] += change[static_cast<Eigen::Index>(k)];
-    const bool possible = change.allFinite() && next[0] > 0 && next[1] > 0;
-    LensFit trial = possible ? lens_fit_at(next, model, rays) : LensFit{};
-    const bool better = trial.count > 0 && trial.count >= at.count &&
-                        (trial.count > at.count || trial.squares < at.squares);
-    if (!better) {
-      damping *= 10;
-      if (damping > 1e12) break;
-      continue;
-    }
-    const bool done = trial.count == at.count && at.squares - trial.squares <= settled * at.squares;
-    parameters = next;
-    at = std::move(trial);
-    damping = std::max(damping / 10, 1e-12);
-    if (done) break;
-  }
-  if (at.count == 0 || !std::isfinite(at.squares)) {
-    throw std::invalid_argument(std::string(name_of(model)) + " has no lens near " +
-                                std::string(name_of(camera.lens_model)));
-  }
-  // Between the rays of the fit it may be farther off than at them.
-  constexpr int often = 201;
-  const Lens to(model, parameters);
-  const auto pixels = pixel_grid(camera.imager_px, often);
-  std::size_t shared = 0;
-  for (const Eigen::Vector2d& pixel : pixels) {
-    const auto ray = from.unproject(pixel);
-    const auto found = ray ? to.project(ray->direction) : std::nullopt;
-    if (!found) continue;
-    fitted.worst_px = std::max(fitted.worst_px, (*found - pixel).norm());
-    ++shared;
-  }
-  fitted.share = static_cast<double>(shared) / static_cast<double>(pixels.size());
+  fit_parameters(camera, from, model, parameters);
+  compare_lenses(from, Lens(model, parameters), camera.imager_px, fitted);
   return fitted;
 }
 

@@ -142,6 +142,42 @@ std::string wrong_count(const Board& board, const BoardLattice& lattice, std::si
   return words;
 }
 
+/// Part of a board that an image of mrcal's table stands for, and the name of the image itself. An
+/// image of a board of four parts stands four times, with -corner0 to -corner3 added to its name.
+struct PartOfImage {
+  std::string image;
+  std::size_t part;
+};
+
+PartOfImage parse_part(const BoardLattice& lattice, const CornerRows& table, std::size_t line,
+                       std::string_view name) {
+  PartOfImage found{std::string(name), 0};
+  if (lattice.parts() == 1) return found;
+  const auto ending = name.rfind("-corner");
+  if (ending == name.npos || ending + 8 != name.size() || name.back() < '0' || name.back() > '3') {
+    throw table.error(line,
+                      "an image of a board whose gaps are not as wide as its tags stands "
+                      "four times, as NAME-corner0 to NAME-corner3, as vlp-intrinsics "
+                      "writes it");
+  }
+  found.part = static_cast<std::size_t>(name.back() - '0');
+  found.image.resize(ending);
+  return found;
+}
+
+/// Throws InputError if the corners lie in rows of another length than the board's.
+void check_row_length(const Board& board, const BoardLattice& lattice, const CornerRows& table,
+                      const std::vector<LatticePixels>& images, std::size_t first_line) {
+  const auto stated = static_cast<std::size_t>(lattice.cols());
+  const std::size_t shown = row_shown(images, stated);
+  if (shown == stated) return;
+  const bool is_swapped = shown == static_cast<std::size_t>(lattice.rows());
+  throw table.error(first_line, fmt::format("the corners lie in rows of {}, but {}{}", shown,
+                                            counted(board, lattice),
+                                            is_swapped ? "; swap cols and rows of board.yaml"
+                                                       : "; is board.yaml that of the board?"));
+}
+
 }  // namespace
 
 std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,
@@ -160,20 +196,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
     if (!known.insert(name).second) {
       throw table.error(line, fmt::format("image '{}' stands twice", name));
     }
-    std::string image(name);
-    std::size_t part = 0;
-    if (lattice.parts() > 1) {
-      const auto ending = image.rfind("-corner");
-      if (ending == image.npos || ending + 8 != image.size() || image.back() < '0' ||
-          image.back() > '3') {
-        throw table.error(line,
-                          "an image of a board whose gaps are not as wide as its tags stands "
-                          "four times, as NAME-corner0 to NAME-corner3, as vlp-intrinsics "
-                          "writes it");
-      }
-      part = static_cast<std::size_t>(image.back() - '0');
-      image.resize(ending);
-    }
+    const auto [image, part] = parse_part(lattice, table, line, name);
     const auto [place, is_new] = view_of_image.try_emplace(image, views.size());
     if (is_new) views.push_back({image, imager_px, {}});
     BoardView& view = views[place->second];
@@ -199,15 +222,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
     std::sort(view.seen.points.begin(), view.seen.points.end(),
               [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
   }
-  const auto stated = static_cast<std::size_t>(lattice.cols());
-  const std::size_t shown = row_shown(images, stated);
-  if (shown != stated) {
-    throw table.error(first_line, fmt::format("the corners lie in rows of {}, but {}{}", shown,
-                                              counted(board, lattice),
-                                              shown == static_cast<std::size_t>(lattice.rows())
-                                                  ? "; swap cols and rows of board.yaml"
-                                                  : "; is board.yaml that of the board?"));
-  }
+  check_row_length(board, lattice, table, images, first_line);
   if (lattice.parts() == 1) {
     for (BoardView& view : views) {
       order_lattice(view.seen.points, lattice.cols(), lattice.rows(),

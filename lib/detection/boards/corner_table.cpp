@@ -127,61 +127,103 @@ bool too_many_outside(std::size_t outside, std::size_t corners) {
   return one_of * outside > corners;
 }
 
-std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
-                                         const std::array<int, 2>& imager_px) {
-  const CsvTable csv(file);
-  const auto image = csv.required("image"), number = csv.required("corner");
-  const auto u_px = csv.required("u_px"), v_px = csv.required("v_px");
-  const auto tag_id = board.has_squares() ? number : csv.required("tag");
-  const int last = board.has_squares() ? (board.cols - 1) * (board.rows - 1) - 1 : 3;
-  std::vector<ImageCorners> images;
-  std::unordered_map<std::string, std::size_t> index_of;
-  std::set<std::pair<std::size_t, std::size_t>> known;  // of points
-  std::size_t seen = 0, outside = 0;
-  std::optional<InputError> first_outside;
-  for (std::size_t row = 0; row < csv.rows(); ++row) {
-    const std::string name(csv.text(row, image));
-    if (name.empty()) throw csv.error(row, image, "is empty");
-    const auto [entry, is_new] = index_of.try_emplace(name, images.size());
-    if (is_new) images.push_back({name, {}, {}, {}});
-    const auto cells = {tag_id, number, u_px, v_px};
+namespace {
+
+/// Reads the rows of a table of corners.
+class CornerTableReader {
+ public:
+  CornerTableReader(const std::filesystem::path& file, const Board& board,
+                    const std::array<int, 2>& imager_px)
+      : csv_(file),
+        board_(board),
+        imager_px_(imager_px),
+        image_(csv_.required("image")),
+        number_(csv_.required("corner")),
+        u_px_(csv_.required("u_px")),
+        v_px_(csv_.required("v_px")),
+        tag_id_(board.has_squares() ? number_ : csv_.required("tag")) {}
+
+  std::vector<ImageCorners> read() {
+    for (std::size_t row = 0; row < csv_.rows(); ++row) read_row(row);
+    return std::move(images_);
+  }
+
+  /// Throws InputError if too many corners are outside the image.
+  void check_outside() const {
+    if (too_many_outside(outside_, corners_)) throw InputError(*first_outside_);
+  }
+
+ private:
+  void read_row(std::size_t row) {
+    const std::string name(csv_.text(row, image_));
+    if (name.empty()) throw csv_.error(row, image_, "is empty");
+    const auto [entry, is_new] = index_by_name_.try_emplace(name, images_.size());
+    if (is_new) images_.push_back({name, {}, {}, {}});
+    const auto cells = {tag_id_, number_, u_px_, v_px_};
     if (std::all_of(cells.begin(), cells.end(),
-                    [&](auto cell) { return csv.text(row, cell).empty(); })) {
-      continue;
+                    [&](auto cell) { return csv_.text(row, cell).empty(); })) {
+      return;  // an image without a corner
     }
-    const Eigen::Vector2d pixel(csv.number(row, u_px), csv.number(row, v_px));
-    ++seen;
-    if (const auto words = outside_words(pixel, imager_px); !words.empty()) {
-      if (outside++ == 0) first_outside = csv.error(row, u_px, words);
+    const Eigen::Vector2d pixel(csv_.number(row, u_px_), csv_.number(row, v_px_));
+    ++corners_;
+    if (const auto words = outside_words(pixel, imager_px_); !words.empty()) {
+      if (outside_++ == 0) first_outside_ = csv_.error(row, u_px_, words);
     }
-    const int corner = csv.integer(row, number);
-    if (corner < 0 || corner > last) {
-      throw csv.error(row, number,
-                      board.has_squares()
-                          ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
-                                        "squares; is board.yaml that of the board?",
-                                        last, board.cols, board.rows)
-                          : "should be within 0 and 3");
+    const int corner = read_number(row);
+    if (!add(row, corner, pixel, images_[entry->second])) {
+      throw csv_.error(row, number_, fmt::format("{} stands twice in image '{}'", corner, name));
     }
-    const auto twice = [&] {
-      return csv.error(row, number, fmt::format("{} stands twice in image '{}'", corner, name));
-    };
-    ImageCorners& corners = images[entry->second];
-    if (board.has_squares()) {
+  }
+
+  /// Reads the number of a corner in its tag, or on its board of squares.
+  int read_number(std::size_t row) const {
+    const int last = board_.has_squares() ? (board_.cols - 1) * (board_.rows - 1) - 1 : 3;
+    const int corner = csv_.integer(row, number_);
+    if (corner >= 0 && corner <= last) return corner;
+    throw csv_.error(row, number_,
+                     board_.has_squares()
+                         ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
+                                       "squares; is board.yaml that of the board?",
+                                       last, board_.cols, board_.rows)
+                         : "should be within 0 and 3");
+  }
+
+  /// Adds a corner to those of its image. Returns false if the image has it already.
+  bool add(std::size_t row, int corner, const Eigen::Vector2d& pixel, ImageCorners& corners) {
+    if (board_.has_squares()) {
       const auto index = static_cast<std::size_t>(corner);
-      if (!known.emplace(entry->second, index).second) throw twice();
-      corners.points.push_back({index, pixel});
-      continue;
+      const bool is_known = std::ranges::any_of(
+          corners.points, [&](const SeenPoint& point) { return point.index == index; });
+      if (!is_known) corners.points.push_back({index, pixel});
+      return !is_known;
     }
-    const int id = csv.integer(row, tag_id);
+    const int id = csv_.integer(row, tag_id_);
     const auto [tag, first] = corners.of_tag.try_emplace(id);
     if (first) corners.tags.push_back(id);
     auto& place = tag->second[static_cast<std::size_t>(corner)];
-    if (place) throw twice();
-    place = {pixel, bow_of(csv, row), sd_px_of(csv, row)};
+    if (place) return false;
+    place = {pixel, bow_of(csv_, row), sd_px_of(csv_, row)};
+    return true;
   }
+
+  CsvTable csv_;
+  const Board& board_;
+  std::array<int, 2> imager_px_;
+  CsvTable::Column image_, number_, u_px_, v_px_, tag_id_;
+  std::vector<ImageCorners> images_;
+  std::unordered_map<std::string, std::size_t> index_by_name_;
+  std::size_t corners_ = 0, outside_ = 0;
+  std::optional<InputError> first_outside_;
+};
+
+}  // namespace
+
+std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
+                                         const std::array<int, 2>& imager_px) {
+  CornerTableReader reader(file, board, imager_px);
+  std::vector<ImageCorners> images = reader.read();
   if (images.empty()) throw InputError(file, "holds no corner");
-  if (too_many_outside(outside, seen)) throw InputError(*first_outside);
+  reader.check_outside();
   if (board.has_squares()) {
     if (const auto words = wrong_rows(board, images); !words.empty()) throw InputError(file, words);
   }

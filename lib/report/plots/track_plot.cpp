@@ -45,39 +45,47 @@ std::string layers(const std::string& columns) {
          "title 'fitted line'\n";
 }
 
+/// Data of the plot, and what they cover: in the world, and along the commanded line.
+struct TrackData {
+  std::string commanded, fixes, fitted;
+  Eigen::AlignedBox2d floor, along{Eigen::Vector2d::Zero()};
+
+  explicit TrackData(const TrackPlot& plot, std::size_t step) {
+    const LineFrame frame(plot.commanded_m);
+    for (const auto& point_m : plot.commanded_m) {
+      commanded += row_of(frame, point_m);
+      floor.extend(point_m);
+      along.extend(frame.of(point_m));
+    }
+    for (std::size_t i = 0; i < plot.fixes_m.size(); i += step) {
+      fixes += row_of(frame, plot.fixes_m[i]);
+      floor.extend(plot.fixes_m[i]);
+      along.extend(frame.of(plot.fixes_m[i]));
+    }
+    // Drawn as far as the fixes go, wherever its two points are: a drive that ends early shows.
+    const LineFrame fitted_frame(plot.fitted_m);
+    const auto along_fitted_m = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+      return fitted_frame.of(a).x() < fitted_frame.of(b).x();
+    };
+    const auto [first, last] =
+        std::minmax_element(plot.fixes_m.begin(), plot.fixes_m.end(), along_fitted_m);
+    for (const auto& end_m : {*first, *last}) {
+      const Eigen::Vector2d foot_m =
+          fitted_frame.start_m + fitted_frame.of(end_m).x() * fitted_frame.along;
+      fitted += row_of(frame, foot_m);
+      floor.extend(foot_m);
+      along.extend(frame.of(foot_m));
+    }
+  }
+};
+
 }  // namespace
 
 Drawing drawing_of(const TrackPlot& plot) {
   assert(plot.commanded_m[0] != plot.commanded_m[1] && plot.fitted_m[0] != plot.fitted_m[1]);
   assert(!plot.fixes_m.empty());
-  const LineFrame frame(plot.commanded_m);
   const std::size_t step = thinning_step(plot.fixes_m.size(), kMostFixes);
-  std::string commanded, fixes, fitted;
-  Eigen::AlignedBox2d floor, along(Eigen::Vector2d::Zero());
-  for (const auto& point_m : plot.commanded_m) {
-    commanded += row_of(frame, point_m);
-    floor.extend(point_m);
-    along.extend(frame.of(point_m));
-  }
-  for (std::size_t i = 0; i < plot.fixes_m.size(); i += step) {
-    fixes += row_of(frame, plot.fixes_m[i]);
-    floor.extend(plot.fixes_m[i]);
-    along.extend(frame.of(plot.fixes_m[i]));
-  }
-  // Drawn as far as the fixes go, wherever its two points are: a drive that ends early shows.
-  const LineFrame fitted_frame(plot.fitted_m);
-  const auto along_fitted_m = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-    return fitted_frame.of(a).x() < fitted_frame.of(b).x();
-  };
-  const auto [first, last] =
-      std::minmax_element(plot.fixes_m.begin(), plot.fixes_m.end(), along_fitted_m);
-  for (const auto& end_m : {*first, *last}) {
-    const Eigen::Vector2d foot_m =
-        fitted_frame.start_m + fitted_frame.of(end_m).x() * fitted_frame.along;
-    fitted += row_of(frame, foot_m);
-    floor.extend(foot_m);
-    along.extend(frame.of(foot_m));
-  }
+  const auto [commanded, fixes, fitted, floor, along] = TrackData(plot, step);
   constexpr double margin = 0.1;
   const double around_m = margin * floor.sizes().maxCoeff();
   const Eigen::Vector2d low = floor.min().array() - around_m, high = floor.max().array() + around_m;
