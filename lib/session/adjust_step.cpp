@@ -111,10 +111,11 @@ AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& re
 void add_warnings(AdjustStepResult& result, const MapErrors& map_errors, bool noise_is_stated) {
   const AdjustmentResult& found = result.found;
   for (const auto& lamp : found.lamps) {
-    const bool is_known = std::any_of(
-        map_errors.errors.begin(), map_errors.errors.end(),
-        [&](const MapError& error) { return error.lamps == std::vector<int>{lamp.id}; });
-    if (!lamp.moved || is_known) continue;
+    if (!lamp.moved) continue;
+    // The adjustment knows more than the check of the map: heights, places, motion.
+    for (const MapError& error : map_errors.errors) {
+      if (error.lamps == std::vector<int>{lamp.id}) std::erase(result.warnings, describe(error));
+    }
     result.warnings.push_back(
         describe({MapErrorKind::moved, {lamp.id}, lamp.correction_m, lamp.sd_m}));
   }
@@ -168,13 +169,15 @@ void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& pa
 
 AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry) {
   AdjustStepResult result;
-  LampCaptures captures{{}, input.lamps, input.lamps_file, input.calibration};
-  for (const AdjustSet& set : input.sets) {
-    captures.frames.insert(captures.frames.end(), set.frames.begin(), set.frames.end());
-  }
   const Calibration alone = camera_alone(input.calibration);
   const AdjustmentInput all = adjustment_of(input, result);
-  captures.lamps = all.lamps;
+  // Inclined captures are left to the adjustment: the check takes all for level.
+  LampCaptures captures{{}, all.lamps, input.lamps_file, input.calibration};
+  for (const AdjustmentCapture& capture : all.captures) {
+    if (capture.inclination) continue;
+    captures.frames.push_back({capture.name, capture.detections});
+    captures.motions.push_back(capture.motion);
+  }
   const MapErrors map_errors = check_map(captures, alone, result);
   if (!result.ok()) return result;
   result.found = adjust_captures(all);

@@ -189,9 +189,10 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   }
   if (fit.status != DispersionStatus::ok) {
     result.fail(StepFailure::undetermined, std::move(why));
-    const bool is_of_yaws =
-        fit.status == DispersionStatus::one_yaw || fit.status == DispersionStatus::many_yaws;
-    if (!is_of_yaws) blame_map(input, levelled, result);
+    const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
+                                fit.status == DispersionStatus::one_yaw ||
+                                fit.status == DispersionStatus::many_yaws;
+    if (!is_of_captures) blame_map(input, levelled, result);
     return result;
   }
   if (!input.calibration.rotation_center) {

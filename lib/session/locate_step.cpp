@@ -237,6 +237,7 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
     frames.push_back(input.frames[i]);
     options.inclinations.push_back(body ? std::optional(body->inclination) : sensors.inclination);
   }
+  if (input.how.mount) options.yaw_in_robot_rad = input.how.mount->yaw_in_robot_rad;
   if (input.lamp_offsets) options.max_captures = std::max<std::size_t>(frames.size(), 1);
   return find_map_errors(frames, input.lamps, input.calibration, options);
 }

@@ -134,13 +134,28 @@ void add_metrics(RotationResult& result) {
   }
 }
 
-MapErrors find_errors_while_standing(const LampCaptures& input, const Calibration& calibration) {
+/// Finds errors of the map by the captures in which the camera stands. Of moving cameras, whose
+/// lamps are sheared by some millimetres, only errors of the map as a whole are found.
+MapErrors find_errors(const LampCaptures& input, const Calibration& calibration,
+                      double min_offset_px) {
   std::vector<Frame> frames;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     if (input.motions.empty() || !moves(input.motions[i])) frames.push_back(input.frames[i]);
   }
-  return find_map_errors(frames, input.lamps, calibration);
+  MapErrorOptions options;
+  options.min_offset_px = min_offset_px;
+  MapErrors found = find_map_errors(frames, input.lamps, calibration, options);
+  if (frames.size() == input.frames.size() || !found.errors.empty()) return found;
+  MapErrors all = find_map_errors(input.frames, input.lamps, calibration, options);
+  std::erase_if(all.errors, [](const MapError& error) {
+    return error.kind == MapErrorKind::moved || error.kind == MapErrorKind::unsteady;
+  });
+  found.errors = std::move(all.errors);
+  return found;
 }
+
+/// Smallest offset of a lamp that can make a step fail, as seen in the image.
+constexpr double kMinBlame_px = 2.5;
 
 }  // namespace
 
@@ -151,7 +166,7 @@ Calibration camera_alone(const Calibration& calibration) {
 }
 
 MapErrors check_map(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
-  MapErrors found = find_errors_while_standing(input, calibration);
+  MapErrors found = find_errors(input, calibration, MapErrorOptions().min_offset_px);
   if (found.is_unusable()) {
     result.fail(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
     return found;
@@ -163,10 +178,11 @@ MapErrors check_map(const LampCaptures& input, const Calibration& calibration, S
 }
 
 void blame_map(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
-  const MapErrors found = find_errors_while_standing(input, calibration);
+  const MapErrors found = find_errors(input, calibration, kMinBlame_px);
   const bool has_lamps = std::any_of(found.errors.begin(), found.errors.end(),
                                      [](const MapError& error) { return !error.lamps.empty(); });
   if (found.errors.empty() || (!has_lamps && result.failure == StepFailure::wrong_map)) return;
+  // A fit that diverges because of a lamp gives advice that does not help.
   result.fail(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
   for (const MapError& error : found.errors) std::erase(result.warnings, describe(error));
 }

@@ -168,7 +168,7 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
 /// Removes outliers and counts them per lamp. Removes the largest residual of each view, if it is
 /// half as large as the largest of all, since an outlier also changes the residuals of others.
 bool reject_outliers(std::vector<CeilingView>& views, const LampDisplacements& found,
-                     std::map<int, int>& outliers) {
+                     std::map<int, std::vector<double>>& outliers_m) {
   constexpr double max_sigmas = 6, numeric_tolerance_m = 1e-7;
   std::vector<double> squares_m2;
   for (const Eigen::VectorXd& residuals_m : found.residuals_m) {
@@ -192,7 +192,7 @@ bool reject_outliers(std::vector<CeilingView>& views, const LampDisplacements& f
     }
     if (residuals_m.segment<2>(worst).norm() <= limit_m) continue;
     const auto outlier = views[c].lamps.begin() + worst / 2;
-    ++outliers[outlier->lamp];
+    outliers_m[outlier->lamp].push_back(residuals_m.segment<2>(worst).norm());
     views[c].lamps.erase(outlier);
     any = true;
   }
@@ -204,16 +204,16 @@ bool reject_outliers(std::vector<CeilingView>& views, const LampDisplacements& f
 std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
                                                              std::vector<CeilingView> views,
                                                              bool tilt_is_free) {
-  std::map<int, int> outliers;
+  std::map<int, std::vector<double>> outliers_m;
   keep_tied(views);
   std::optional<LampDisplacements> found = solve(map, views, tilt_is_free);
-  while (found && reject_outliers(views, *found, outliers)) {
+  while (found && reject_outliers(views, *found, outliers_m)) {
     keep_tied(views);
     found = solve(map, views, tilt_is_free);
   }
   if (!found) return std::nullopt;
   found->height_m = views.front().lamps.front().above_camera_m;
-  for (const int lamp : found->lamps) found->outliers.push_back(outliers[lamp]);
+  found->outliers_m = std::move(outliers_m);
   return found;
 }
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -38,8 +39,11 @@ struct LampOffset {
 struct LampDisplacements {
   std::vector<int> lamps;
   std::vector<Eigen::Vector2d> map_m;
-  /// Captures per lamp that contribute, and detections per lamp that are rejected as outliers.
-  std::vector<int> captures, outliers;
+  /// Captures per lamp that contribute.
+  std::vector<int> captures;
+  /// Residuals of the detections that are rejected as outliers, by lamp, also of lamps that are not
+  /// in `lamps` because too few detections are left.
+  std::map<int, std::vector<double>> outliers_m = {};
   /// Two rows per lamp. `projector`: onto the displacements that are no similarity of the map.
   Eigen::VectorXd displacement_m;
   Eigen::MatrixXd covariance_m2, projector;

@@ -14,6 +14,7 @@
 
 #include "camera/lens.h"
 #include "geometry/frames.h"
+#include "geometry/median.h"
 #include "geometry/similarity.h"
 #include "geometry/symmetric.h"
 #include "positioning/correction.h"
@@ -32,15 +33,15 @@ struct LevelRay {
   Eigen::Vector2d z;
 };
 
-/// Returns the rays to the lamps of the map, or none if one of them is seen twice.
+/// Returns the rays to the lamps of the map. A lamp that is seen twice has none.
 std::vector<LevelRay> level_rays(const Frame& frame, const LampMap& map, const Lens& lens,
                                  const Eigen::Matrix3d& level_from_camera) {
   std::vector<LevelRay> rays;
-  std::set<int> ids;
+  std::map<int, int> counts;
+  for (const Detection& detection : frame.detections) ++counts[detection.lamp];
   for (const Detection& detection : frame.detections) {
     const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
-    if (lamp == nullptr) continue;
-    if (!ids.insert(lamp->id).second) return {};
+    if (lamp == nullptr || counts[lamp->id] > 1) continue;
     const auto ray = lens.unproject(detection.pixel);
     if (!ray) continue;
     const Eigen::Vector3d level = level_from_camera * ray->direction;
@@ -129,7 +130,8 @@ struct MapCaptures {
     for (std::size_t i = 0; i < frames.size(); i += stride) {
       const bool is_inclined = !inclinations.empty() && inclinations[i];
       const InclinationRotation lean =
-          is_inclined ? inclination_rotation(*inclinations[i], 0) : InclinationRotation();
+          is_inclined ? inclination_rotation(*inclinations[i], options.yaw_in_robot_rad)
+                      : InclinationRotation();
       const auto rays = level_rays(frames[i], map, lens, lean.level_from_base * base_from_camera);
       if (rays.size() < min_lamps) continue;
       if (auto view = project(rays, places_m)) views.push_back(std::move(*view));
@@ -365,8 +367,10 @@ std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap
 
 /// Finds the lamps that hang elsewhere: the largest set of which each is significant.
 std::vector<MapError> find_moved(const LampDisplacements& found, const DisplacementTest& test) {
+  constexpr std::size_t max_lamps = 8;  // more are an error of the whole map
   std::vector<std::size_t> free, moved;
-  while (2 * (free.size() + 1) < found.lamps.size() && test.rank() > 2 * std::ssize(free) + 2) {
+  while (free.size() < max_lamps && 2 * (free.size() + 1) < found.lamps.size() &&
+         test.rank() > 2 * std::ssize(free) + 2) {
     test.add_best(free, test.added_variance_m2(free));
     if (test.is_significant(free, test.added_variance_m2(free))) {
       moved = free;
@@ -377,7 +381,8 @@ std::vector<MapError> find_moved(const LampDisplacements& found, const Displacem
   const auto fit = test.fit(moved, test.added_variance_m2(moved));
   for (std::size_t k = 0; k < moved.size(); ++k) {
     const auto row = 2 * static_cast<Eigen::Index>(k);
-    MapError& error = errors.emplace_back(MapErrorKind::moved, std::vector{found.lamps[moved[k]]});
+    errors.push_back({MapErrorKind::moved, {found.lamps[moved[k]]}});
+    MapError& error = errors.back();
     // Exact, where the offset in d is linear.
     error.offset_m.head<2>() =
         offset_from_others(found, moved[k], moved).value_or(fit.offsets_m.segment<2>(row));
@@ -387,19 +392,30 @@ std::vector<MapError> find_moved(const LampDisplacements& found, const Displacem
 }
 
 /// Finds the lamp with most of the outliers, two or more, in more than a tenth of its captures.
-std::optional<MapError> find_unsteady(const LampDisplacements& found) {
-  constexpr int min_captures = 2, min_fraction_of = 10;
-  int all = 0;
-  for (const int count : found.outliers) all += count;
-  for (std::size_t i = 0; i < found.lamps.size(); ++i) {
-    const int outliers = found.outliers[i], captures = found.captures[i] + outliers;
-    if (outliers < min_captures || min_fraction_of * outliers <= captures) continue;
-    if (2 * outliers > all) {
-      MapError error{MapErrorKind::unsteady, {found.lamps[i]}};
-      error.contradicting = outliers;
-      error.captures = captures;
-      return error;
+/// Their median has to exceed `min_outlier_m`, and three standard deviations of the lamp's survey.
+std::optional<MapError> find_unsteady(const LampDisplacements& found, const LampMap& map,
+                                      double min_outlier_m) {
+  constexpr std::size_t min_outliers = 2;
+  constexpr double min_fraction = 0.1, max_survey_sigmas = 3;
+  std::size_t all = 0;
+  for (const auto& [lamp, outliers_m] : found.outliers_m) all += outliers_m.size();
+  for (const auto& [lamp, outliers_m] : found.outliers_m) {
+    const std::size_t count = outliers_m.size();
+    const auto at = std::find(found.lamps.begin(), found.lamps.end(), lamp);
+    const auto others = at == found.lamps.end()
+                            ? 0
+                            : found.captures[static_cast<std::size_t>(at - found.lamps.begin())];
+    const std::size_t captures = count + static_cast<std::size_t>(others);
+    const double survey_m = max_survey_sigmas * find_lamp(map.lamps, lamp)->sd_m.value_or(0);
+    if (count < min_outliers || 2 * count <= all ||
+        static_cast<double>(count) <= min_fraction * static_cast<double>(captures) ||
+        upper_median(outliers_m) < std::max(min_outlier_m, survey_m)) {
+      continue;
     }
+    MapError error{MapErrorKind::unsteady, {lamp}};
+    error.contradicting = static_cast<int>(count);
+    error.captures = static_cast<int>(captures);
+    return error;
   }
   return std::nullopt;
 }
@@ -436,8 +452,9 @@ std::string describe(const MapError& error) {
       return describe_offset(error.lamps[0], error.offset_m);
     case MapErrorKind::unsteady:
       return fmt::format(
-          "lamp {} contradicts the other lamps in {} of {} captures, in no one direction: another "
-          "light is taken for it, or it moved in between",
+          "lamp {} contradicts the other lamps in {} of {} captures, in varying directions: "
+          "another "
+          "light is taken for it, it moved in between, or its height is wrong",
           error.lamps[0], error.contradicting, error.captures);
     case MapErrorKind::swapped:
       return fmt::format(
@@ -448,8 +465,9 @@ std::string describe(const MapError& error) {
       return "the lamp map looks mirrored, as if drawn as seen from below: the captures fit its "
              "mirror image; turn the sign of x or of y of every lamp";
     case MapErrorKind::other_room:
-      return "most captures contradict it: is it the map of this room, and the calibration this "
-             "camera's?";
+      return "most captures contradict the lamp map: is it the map of this room, and the "
+             "calibration "
+             "this camera's?";
     case MapErrorKind::unseen:
       return fmt::format("lamp {} is never seen: is it lit, and not overexposed?", error.lamps[0]);
   }
@@ -492,7 +510,12 @@ MapErrors find_map_errors(std::span<const Frame> frames, const LampMap& map,
       options.min_offset_px * found->height_m / calibration.camera.focal_px().mean();
   std::erase_if(result.errors,
                 [&](const MapError& error) { return error.offset_m.norm() < min_offset_m; });
-  if (auto unsteady = find_unsteady(*found)) result.errors.push_back(std::move(*unsteady));
+  constexpr double min_outlier_ratio = 5;
+  auto unsteady = find_unsteady(*found, map, min_outlier_ratio * min_offset_m);
+  const bool is_named = unsteady && std::ranges::any_of(result.errors, [&](const MapError& error) {
+                          return error.lamps == unsteady->lamps;
+                        });
+  if (unsteady && !is_named) result.errors.push_back(std::move(*unsteady));
   if (result.errors.empty() && is_other_room(*found)) {
     result.errors.push_back({MapErrorKind::other_room});
   }

@@ -19,11 +19,11 @@
 namespace vlp {
 
 enum class MapErrorKind {
-  moved,     // a lamp hangs elsewhere
-  unsteady,  // a lamp contradicts the others in some captures, but is displaced in no one direction
-  swapped,   // two lamps have each other's place or id
-  mirrored,  // the map is the mirror image of the room
-  other_room,  // the lamps are nowhere near their places, for no reason above
+  moved,       // a lamp hangs elsewhere
+  unsteady,    // a lamp contradicts the others in some captures, in varying directions
+  swapped,     // two lamps have each other's place or id
+  mirrored,    // the map is the mirror image of the room
+  other_room,  // the lamps are nowhere near their places, without one of the causes above
   unseen       // a lamp is in no capture
 };
 
@@ -60,7 +60,10 @@ struct MapErrors {
 struct MapErrorOptions {
   /// Inclination of the base, in the order of the frames; empty: level.
   std::vector<std::optional<Inclination>> inclinations = {};
-  /// Smallest offset that is an error, as seen in the image: a good lens may be as wrong.
+  /// Yaw of the camera on the robot whose inclinations are given.
+  double yaw_in_robot_rad = 0;
+  /// Smallest offset that is an error, as seen in the image: a good lens may have errors of this
+  /// size. Outliers of an unsteady lamp have to be five times as large.
   double min_offset_px = 0.25;
   /// Every n-th capture is used if there are more. More captures hardly change the result.
   std::size_t max_captures = 500;
@@ -85,13 +88,16 @@ struct MapErrorOptions {
 /// p = 0.01 is the probability of a false alarm. N = binomial(lamps, k) sets are tested together.
 ///
 /// Small numbers: the bound is 800 for one of four lamps, 85 of five, 45 of six, 28 of eight; 12 to
-/// 13 with sd_m. None of three lamps can be named, and of n lamps fewer than n / 2.
+/// 13 with sd_m. None of three lamps can be named, and of n lamps fewer than n / 2 and eight at
+/// most.
 ///
 /// Two lamps are swapped, or the map is mirrored, if with such a map chi^2 is smaller by the bound
 /// with k = 0 and N = all pairs, and for two lamps also smaller than for any other two.
 ///
 /// Limits: horizontal errors only. Captures cannot determine scale, position and rotation of the
-/// map; an error of the focal length acts as one of the scale (station/lens_fault.h).
+/// map; an error of the focal length acts as one of the scale (station/lens_fault.h). Several lamps
+/// that are displaced alike can hide each other. With sd_m smaller than the true errors of the
+/// survey, false alarms are more frequent (3 to 5 % if the errors are twice as large).
 /// Returns no errors if too few captures tie the lamps together.
 MapErrors find_map_errors(std::span<const Frame> frames, const LampMap& map,
                           const Calibration& calibration, const MapErrorOptions& options = {});

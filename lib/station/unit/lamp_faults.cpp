@@ -23,8 +23,9 @@ std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMa
                                      const Calibration& calibration, double min_offset_px) {
   std::vector<std::string> faults;
   if (frames.size() < kMinFrames) return faults;
-  for (const MapError& error :
-       find_map_errors(frames, map, calibration, {{}, min_offset_px}).errors) {
+  MapErrorOptions options;
+  options.min_offset_px = min_offset_px;
+  for (const MapError& error : find_map_errors(frames, map, calibration, options).errors) {
     if (!error.lamps.empty() || error.kind == MapErrorKind::mirrored) {
       faults.push_back(describe(error));
     }

@@ -14,10 +14,11 @@
 namespace vlp {
 
 /// Describes the errors of the map of a station's lamps (calibration/map/map_errors.h), one line
-/// each. Requires three captures. Offsets count from `min_offset_px` on, as seen in the image: of a
-/// camera that is being calibrated a pixel, of a known camera less.
+/// each. Requires three captures. Offsets count from `min_offset_px` on, as seen in the image. For
+/// a camera that is being calibrated the default is large, so that a small error of the map does
+/// not excuse the camera; for a known camera it can be smaller.
 std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
-                                     const Calibration& calibration, double min_offset_px = 1);
+                                     const Calibration& calibration, double min_offset_px = 2.5);
 
 /// Describes the lamps of the map that no capture contains, one line each. Requires three captures.
 std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampMap& map);

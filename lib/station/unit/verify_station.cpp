@@ -87,8 +87,8 @@ class Verification {
       if (!figure.met()) causes_.push_back({cause_of(figure), figure.value.has_value()});
     }
     // Whatever the gates are of: this camera is known.
-    constexpr double fits_px = 0.25;
-    auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration, fits_px);
+    constexpr double min_offset_px = 0.6;
+    auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
     if (!causes_.empty()) {
       // Where all gates are met it is for them to say whether all lamps have to be seen.
       auto unseen = unseen_lamps(frames_, config_.lamps);

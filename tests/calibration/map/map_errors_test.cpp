@@ -47,7 +47,7 @@ class FindMapErrors : public testing::Test {
   void survey(double sd_m) {
     map = rig.map;
     for (Lamp& lamp : map.lamps) {
-      lamp.position_m.head<2>() += sd_m * Eigen::Vector2d(random.normal(), random.normal());
+      lamp.position_m += sd_m * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
     }
   }
   Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
@@ -102,6 +102,17 @@ TEST_F(FindMapErrors, NeedsLargeOffsetsOfFewLamps) {
   EXPECT_THAT(errors(), SizeIs(1)) << "the survey states its errors";
   place(0) = rig.map.lamps[0].position_m;
   EXPECT_THAT(errors(), IsEmpty());
+}
+
+/// Its detections contradict the others in all directions: they are rejected, the lamp is not lost.
+TEST_F(FindMapErrors, NamesALampOfWrongHeight) {
+  for (std::size_t i = 0; i < map.lamps.size(); ++i) {
+    map = rig.map;
+    place(i).z() -= 0.1;
+    const auto wrong = errors();
+    ASSERT_THAT(wrong, SizeIs(1)) << "lamp " << map.lamps[i].id << ": " << found();
+    EXPECT_EQ(wrong[0].lamps, std::vector<int>{map.lamps[i].id}) << found();
+  }
 }
 
 TEST_F(FindMapErrors, GivesFewFalseAlarms) {
@@ -191,7 +202,7 @@ TEST_F(FindMapErrors, NamesNoLampOfAnotherRoom) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.head<2>() = Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
   }
-  EXPECT_THAT(found(), HasSubstr("most captures contradict it"));
+  EXPECT_THAT(found(), HasSubstr("most captures contradict the lamp map"));
   for (Lamp& lamp : map.lamps) lamp.id += 100;
   EXPECT_EQ(found(), "");
   EXPECT_THAT(find_unseen_lamps(frames, map), SizeIs(map.lamps.size()));
