@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -31,6 +32,8 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kMovedChiSquared = 21.1;
 /// Standard deviations beyond which a place is wrong, and a detection an outlier.
 constexpr double kWrongPlace = 5, kOutlier = 4.5;
+/// Least noise of detections that state none, in pixels.
+constexpr double kMinNoise_px = 1e-4;
 
 /// All that is read from the input and does not change.
 struct Assembled {
@@ -77,6 +80,37 @@ std::optional<Pose> rough_pose(const std::vector<Sighting>& sightings,
   return status == FixStatus::ok ? std::optional(fix.pose) : std::nullopt;
 }
 
+/// Returns the translations, the yaw and the scale of the lamps seen, orthonormal, over the
+/// standard deviation with which they are held.
+Eigen::MatrixXd map_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
+                          const std::vector<bool>& seen) {
+  constexpr double held_sd_m = 1e-6;  // far below the sd of lamps, and far above rounding
+  Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (seen[i]) mean_m += lamps_m[i];
+  }
+  mean_m /= static_cast<double>(std::count(seen.begin(), seen.end(), true));
+  Eigen::MatrixXd gauge = Eigen::MatrixXd::Zero(3 * std::ssize(lamps_m), 5);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!seen[i]) continue;
+    const Eigen::Vector3d p = lamps_m[i] - mean_m;
+    auto of_lamp = gauge.middleRows<3>(3 * static_cast<Eigen::Index>(i));
+    of_lamp.leftCols<3>().setIdentity();
+    of_lamp.col(3) = Eigen::Vector3d(-p.y(), p.x(), 0);
+    of_lamp.col(4) = p;
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(gauge);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(gauge.rows(), 5) / held_sd_m;
+}
+
+/// Returns the derivative of a pixel of the undistorted image by the pixel of the ray.
+Eigen::Matrix2d undistorted_from_pixel(const Lens& lens, const Lens::Ray& ray) {
+  const Eigen::Vector2d z = ray.direction.hnormalized();
+  return lens.focal_px().asDiagonal() *
+         (ray.d_direction_d_pixel.topRows<2>() - z * ray.d_direction_d_pixel.row(2)) /
+         ray.direction.z();
+}
+
 /// A key by which captures share a place: their spot, or the place itself.
 using PlaceKey = std::tuple<std::string, double, double, double, PlaceOf>;
 
@@ -100,7 +134,8 @@ Assembled assemble(const AdjustmentInput& input) {
   for (const Lamp& lamp : input.lamps.lamps) {
     lamps_m.emplace_back(lamp.position_m - all.origin_m);
     problem.state().segment<3>(layout.lamp(lamps_m.size() - 1)) = lamps_m.back();
-    problem.lamps.push_back({lamps_m.back(), lamp.sd_m.value_or(0)});
+    problem.lamps.push_back(
+        {lamps_m.back(), input.frees_map_shape ? kInfinite : lamp.sd_m.value_or(0)});
   }
   all.lamp_seen.resize(lamps_m.size());
   Eigen::Vector2d zenith(0, 0), arm_m(0, 0);
@@ -135,7 +170,11 @@ Assembled assemble(const AdjustmentInput& input) {
       if (!(level.z() > 0)) continue;
       const double sigma_px = detection.sigma_px.value_or(1);
       if (!detection.sigma_px) all.noise_is_stated = false;
-      seen.push_back({problem.captures.size(), index, detection.pixel, sigma_px,
+      Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity() / sigma_px;
+      if (input.weighs_in_undistorted_image && !detection.sigma_px && ray->direction.z() > 0) {
+        whitening = undistorted_from_pixel(lens, *ray);
+      }
+      seen.push_back({problem.captures.size(), index, detection.pixel, sigma_px, whitening,
                       row_clock ? row_clock->time_s(detection.pixel) : 0});
       lamps.push_back(index);
       sightings.push_back(
@@ -183,6 +222,7 @@ Assembled assemble(const AdjustmentInput& input) {
     place.sd_m *= std::sqrt(static_cast<double>(all.places[place.place].captures));
   }
   problem.place_used.assign(all.places.size(), true);
+  if (input.frees_map_shape) problem.gauge = map_gauge(lamps_m, all.lamp_seen);
   for (std::size_t i = 0; i < axes_m.size(); ++i) {
     problem.state().segment<3>(layout.spot(i)) = axes_m[i] / std::max(1, spot_captures[i]);
   }
@@ -315,7 +355,7 @@ class Contradictions {
     std::size_t worst_lamp = sd_m_.size();
     double worst_chi = kMovedChiSquared;
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
-      if (!all_.lamp_seen[i] || !(sd_m_[i] > 0)) continue;
+      if (!all_.lamp_seen[i] || !(sd_m_[i] > 0) || std::isinf(sd_m_[i])) continue;
       const double chi = moved_chi_squared(all_.problem, covariance, i, sd_m_[i], !moved_[i]);
       if (moved_[i] && chi < kMovedChiSquared && !taken_back_.contains(i)) {
         taken_back_.insert(i);
@@ -399,6 +439,7 @@ Noise noise_of(const Assembled& all, const AdjustmentProblem::SharedCovariance& 
     freedom -= 3 - covariance.block<3, 3>(at.lamp(i), at.lamp(i)).trace() / (sd_m * sd_m);
   }
   freedom -= 3.0 * static_cast<double>(std::count(spot_used.begin(), spot_used.end(), true));
+  freedom += static_cast<double>(problem.gauge.cols());
   freedom += shared.determined_by_places;
   return {std::sqrt(squares / std::max(freedom, 1.0)), freedom};
 }
@@ -421,8 +462,8 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
       // Stated noise is taken for too small when chance makes it so once in a thousand.
       const double chance = 3 * std::sqrt(0.5 / noise.freedom);
       const bool larger = all.noise_is_stated && scale > 1 + chance;
-      constexpr double least = 1e-4;  // pixels
-      const double next = all.noise_is_stated ? (larger ? scale : 1) : std::max(scale, least);
+      const double next =
+          all.noise_is_stated ? (larger ? scale : 1) : std::max(scale, kMinNoise_px);
       constexpr double same = 0.01;
       if (std::abs(next / problem.noise_scale - 1) > same) {
         problem.noise_scale = next;
@@ -434,6 +475,18 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
   if (!problem.solve(false)) return false;
   covariance = problem.shared_covariance().matrix;
   return true;
+}
+
+/// Returns the covariance for equal noise in the image, and estimates that noise. The estimates
+/// stay, with the weights that they were solved with.
+Eigen::MatrixXd covariance_of_image_noise(Assembled& all) {
+  AdjustmentProblem& problem = all.problem;
+  for (auto& sighting : problem.sightings) {
+    sighting.whitening = Eigen::Matrix2d::Identity() / sighting.sigma_px;
+  }
+  const Noise noise = noise_of(all, problem.shared_covariance());
+  problem.noise_scale = std::max(problem.noise_scale * noise.ratio, kMinNoise_px);
+  return problem.shared_covariance().matrix;
 }
 
 std::string undetermined_by(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
@@ -500,13 +553,13 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
   for (std::size_t i = 0; i < at_start.size(); ++i) {
     problem.sightings[i].used = at_start[i] < kInfinite;
   }
-  bool converged = problem.solve(true) && problem.solve(true);
-  if (converged) {
+  bool converged = input.captures_are_checked || (problem.solve(true) && problem.solve(true));
+  if (converged && !input.captures_are_checked) {
     contradictions.leave_out_the_worst();
     const Noise noise = noise_of(all, problem.shared_covariance());
     leave_out_outliers(problem, all.noise_is_stated, noise.freedom);
-    converged = settle(all, contradictions, covariance, freedom);
   }
+  converged = converged && settle(all, contradictions, covariance, freedom);
   if (!converged) {
     result.undetermined =
         "no zenith and no places of the lamps fit the captures: is it the map of this room, and "
@@ -515,6 +568,9 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     return result;
   }
 
+  if (input.weighs_in_undistorted_image && !all.noise_is_stated) {
+    covariance = covariance_of_image_noise(all);
+  }
   const AdjustmentLayout& at = problem.layout();
   const Eigen::VectorXd& state = problem.state();
   double squares_px = 0, height_m = 0;

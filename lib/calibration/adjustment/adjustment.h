@@ -56,6 +56,18 @@ struct AdjustmentInput {
   /// Lens (IntrinsicsReport::covariance; without one it is exact) and where to start: the zenith,
   /// or a level camera.
   Calibration calibration;
+  /// Estimates the shape of the map whatever its sd_m. Captures do not determine its translation,
+  /// yaw and scale, which stay: the corrections d of the lamps seen, at p from their mean, have
+  ///   sum d = 0,   sum (p x d)_z = 0,   sum p . d = 0.
+  /// AdjustmentResult::surveyed_covariance is then not defined.
+  bool frees_map_shape = false;
+  /// Captures were checked one by one and have no gross outliers. Skips the robust start, which
+  /// rejects all detections of a lamp whose exact place in the map is wrong.
+  bool captures_are_checked = false;
+  /// Weighs detections without sigma_px alike in the undistorted image, as positioning does, so
+  /// that errors of map and lens move zenith and fixes alike. Covariances are for equal noise in
+  /// the image, without the loss of efficiency by these weights.
+  bool weighs_in_undistorted_image = false;
 };
 
 /// Standard deviations beyond which something counts as not determined.

@@ -166,7 +166,7 @@ std::optional<AdjustmentProblem::Linearized> AdjustmentProblem::linearize(const 
       turn_by_zenith(state_.segment<2>(layout_.zenith), capture.base_from_level * level);
   const auto seen = lens.project_with_jacobians(turn.x_in_camera);
   if (!seen) return std::nullopt;
-  const double weight = 1 / (sighting.sigma_px * noise_scale);
+  const Eigen::Matrix2d weight = sighting.whitening / noise_scale;
   const Matrix23 by_camera = -weight * seen->d_pixel_d_point;
   const Matrix23 by_level = by_camera * turn.camera_from_level * capture.base_from_level;
   Eigen::Matrix3d level_from_world;
@@ -211,9 +211,10 @@ AdjustmentProblem::MotionPrior AdjustmentProblem::motion_prior(const Capture& ca
 
 double AdjustmentProblem::told_of_motion(std::size_t index) const {
   const Capture& capture = captures[index];
-  const auto lens = this->lens();
   const Eigen::Index size = capture.motion_size();
-  if (size == 0 || !lens) return 0;
+  if (size == 0) return 0;
+  const auto lens = this->lens();
+  if (!lens) return 0;
   Eigen::MatrixXd own = Eigen::MatrixXd::Zero(capture.size(), capture.size());
   for (const Sighting& sighting : sightings) {
     if (!sighting.used || sighting.capture != index) continue;
@@ -350,6 +351,33 @@ struct AdjustmentCosts {
     double weight_;
   };
 
+  /// The held directions of the lamps. Blocks: all lamps.
+  class Gauge : public ceres::CostFunction {
+   public:
+    explicit Gauge(const AdjustmentProblem& problem) : problem_(problem) {
+      set_num_residuals(static_cast<int>(problem.gauge.cols()));
+      mutable_parameter_block_sizes()->assign(problem.lamps.size(), 3);
+    }
+    bool Evaluate(double const* const* lamps, double* residuals,
+                  double** jacobians) const override {
+      const Eigen::MatrixXd& gauge = problem_.gauge;
+      Eigen::Map<Eigen::VectorXd> held(residuals, gauge.cols());
+      held.setZero();
+      int block = 0;
+      for (std::size_t i = 0; i < problem_.lamps.size(); ++i) {
+        const Eigen::MatrixXd by_lamp =
+            gauge.middleRows<3>(3 * static_cast<Eigen::Index>(i)).transpose();
+        held +=
+            by_lamp * (Eigen::Map<const Eigen::Vector3d>(lamps[i]) - problem_.lamps[i].surveyed_m);
+        if (jacobians != nullptr) copy(jacobians, block, by_lamp);
+      }
+      return true;
+    }
+
+   private:
+    const AdjustmentProblem& problem_;
+  };
+
   /// What is known of a capture's motion. Block: the capture's own.
   class Moved : public ceres::CostFunction {
    public:
@@ -464,6 +492,14 @@ struct AdjustmentCosts {
         ceres.AddResidualBlock(new Prior(surveyed_m, sd_m), loss(), lamp);
       }
     }
+    if (problem.gauge.cols() > 0) {
+      std::vector<double*> blocks;
+      for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
+        blocks.push_back(add(layout.lamp(i), 3, 1));
+        if (!lamp_seen[i]) ceres.SetParameterBlockConstant(blocks.back());
+      }
+      ceres.AddResidualBlock(new Gauge(problem), nullptr, blocks);
+    }
     for (const auto& place : problem.places) {
       if (!problem.place_used[place.place]) continue;
       const auto& capture = problem.captures[place.capture];
@@ -481,6 +517,8 @@ struct AdjustmentCosts {
     options.linear_solver_type = ceres::DENSE_SCHUR;
     options.linear_solver_ordering = order;
     options.max_num_iterations = 100;
+    // Plain least squares starts near its solution: Gauss-Newton steps, hardly damped.
+    if (!robust) options.initial_trust_region_radius = 1e8;
     options.function_tolerance = robust ? 1e-5 : 1e-14;
     options.gradient_tolerance = 1e-14;
     options.parameter_tolerance = 1e-12;
@@ -591,6 +629,9 @@ AdjustmentProblem::SharedCovariance AdjustmentProblem::shared_covariance() const
     const double sd_m = lamps[i].sd_m;
     if (std::isinf(sd_m)) continue;
     information.diagonal().segment<3>(at.lamp(i)).setConstant(sd_m > 0 ? 1 / (sd_m * sd_m) : 1);
+  }
+  if (gauge.cols() > 0) {
+    information.block(at.lamps, at.lamps, gauge.rows(), gauge.rows()) += gauge * gauge.transpose();
   }
   std::vector<OwnBlock> own(captures.size());
   std::vector<bool> capture_used(captures.size());

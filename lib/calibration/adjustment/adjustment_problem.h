@@ -48,6 +48,8 @@ class AdjustmentProblem {
     std::size_t capture, lamp;
     Eigen::Vector2d pixel;
     double sigma_px;
+    /// Scales residuals in pixels to standard deviations.
+    Eigen::Matrix2d whitening;
     /// When it is read.
     double time_s;
     bool used = true;
@@ -99,6 +101,9 @@ class AdjustmentProblem {
   std::vector<Capture> captures;
   std::vector<Sighting> sightings;
   std::vector<LampPrior> lamps;
+  /// Directions of the lamps' coordinates that stay as surveyed, a column each, over the standard
+  /// deviation with which they do. Without columns, nothing is held.
+  Eigen::MatrixXd gauge;
   std::vector<PlaceSighting> places;
   std::vector<bool> place_used;
   /// Whether some residual depends on the lever arm.

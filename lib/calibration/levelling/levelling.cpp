@@ -2,89 +2,175 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/levelling/levelling.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
 
-#include "calibration/levelling/lamp_equations.h"
-#include "calibration/levelling/levelling_checks.h"
-#include "calibration/levelling/levelling_rounds.h"
-#include "calibration/levelling/measured_lamps.h"
-#include "camera/lens.h"
-#include "geometry/plane.h"
-#include "positioning/least_squares_fix.h"
+#include "calibration/adjustment/adjustment.h"
+#include "captures/number_text.h"
+#include "geometry/angles.h"
+#include "rig/find_lamp.h"
 
 namespace vlp {
 namespace {
 
-using Capture = LampBundle::Capture;
-using Observation = LampBundle::Observation;
+constexpr int kDigits = 3;
+constexpr double kOneYaw_rad = rad_from_deg(10);
+constexpr double kOnePlace = 0.1;  // of the lamps' height above the camera
+constexpr const char* kTooWeak =
+    "the captures do not determine it: the lamps they see are too few or in one line; add captures "
+    "that see more lamps, at other places and yaws";
 
-double square_px(const Lens& lens, const Eigen::Vector2d& z, const Eigen::Vector2d& expected) {
-  return lens.focal_px().cwiseProduct(z - expected).squaredNorm();
+/// Captures whose lamps agree with the map and with a camera at one zenith, and where they are.
+struct Placement {
+  std::vector<AdjustmentCapture> captures;
+  std::vector<Pose> poses;
+  /// Mean height of the lamps above the camera.
+  double height_m = 0;
+  /// Number of detections of each lamp of the map.
+  std::vector<int> times_seen;
+  /// Sum of the squared residuals in the undistorted image, each capture by itself.
+  double squares_px2 = 0;
+
+  int detections() const { return std::accumulate(times_seen.begin(), times_seen.end(), 0); }
+  int degrees_of_freedom() const { return 2 * detections() - 4 * static_cast<int>(poses.size()); }
+};
+
+/// Returns the captures of three lamps of the map or more, with the detections of those alone, and
+/// counts the others and the detections.
+std::vector<AdjustmentCapture> captures_of_three_lamps(std::span<const Frame> frames,
+                                                       const LampMap& map,
+                                                       const std::vector<KnownMotion>& motions,
+                                                       Levelling& result) {
+  std::vector<AdjustmentCapture> captures;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    AdjustmentCapture capture{frames[i].image, frames[i].detections};
+    std::erase_if(capture.detections, [&](const Detection& detection) {
+      return find_lamp(map.lamps, detection.lamp) == nullptr;
+    });
+    if (capture.detections.size() < 3) {
+      ++result.captures_of_few_lamps;
+      continue;
+    }
+    if (!motions.empty()) capture.motion = motions[i];
+    result.detections_rejected += static_cast<int>(capture.detections.size());
+    captures.push_back(std::move(capture));
+  }
+  return captures;
 }
 
-double residual_px(const LampBundle& bundle, const Lens& lens, double degrees_of_freedom) {
-  double sum = 0;
-  for (const Capture& capture : bundle.captures) {
-    for (const Observation& seen : capture.seen) {
-      const Eigen::Vector2d expected =
-          seen.z_in_camera - seen.whitening.inverse() * whitened_residual(bundle, capture, seen);
-      sum += square_px(lens, seen.z_in_camera, expected);
+/// Places each capture by itself, as a camera that stands, and leaves out lamps and captures that
+/// contradict the map.
+Placement place(const std::vector<AdjustmentCapture>& captures, LampMap map,
+                const Calibration& calibration) {
+  for (Lamp& lamp : map.lamps) lamp.sd_m.reset();
+  const Positioner positioner(map, calibration);
+  Placement placement;
+  placement.times_seen.resize(map.lamps.size());
+  std::vector<Detection> detections;
+  for (const AdjustmentCapture& capture : captures) {
+    // Residuals that the stated noise does not explain may come from the tilt that is sought.
+    detections = capture.detections;
+    for (Detection& detection : detections) detection.sigma_px.reset();
+    const Fix fix = positioner.locate(detections);
+    if (!fix.ok() || fix.lamps < 3) continue;
+    AdjustmentCapture placed = capture;
+    const auto rejected_end =
+        fix.rejected_ids.begin() +
+        std::min(static_cast<std::ptrdiff_t>(fix.rejected_lamps), std::ssize(fix.rejected_ids));
+    std::erase_if(placed.detections, [&](const Detection& detection) {
+      return std::find(fix.rejected_ids.begin(), rejected_end, detection.lamp) != rejected_end;
+    });
+    for (const Detection& detection : placed.detections) {
+      const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
+      ++placement.times_seen[static_cast<std::size_t>(lamp - map.lamps.data())];
+      placement.height_m += lamp->position_m.z() - fix.estimate.pose.position_m.z();
+    }
+    placement.squares_px2 += fix.lamps * fix.residual_px * fix.residual_px;
+    placement.poses.push_back(fix.estimate.pose);
+    placement.captures.push_back(std::move(placed));
+  }
+  placement.height_m /= std::max(1, placement.detections());
+  return placement;
+}
+
+struct Variety {
+  /// Root of the mean squared sine, about, of the yaws from their mean.
+  double yaw;
+  /// Root of the mean squared distance from the mean place over the height of the lamps.
+  double place;
+};
+
+Variety variety_of(const Placement& placement) {
+  Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
+  Eigen::Vector2d mean_heading = Eigen::Vector2d::Zero();
+  const double n = static_cast<double>(placement.poses.size());
+  for (const Pose& pose : placement.poses) {
+    mean_m += pose.position_m / n;
+    mean_heading += Eigen::Vector2d(std::cos(pose.yaw_rad), std::sin(pose.yaw_rad)) / n;
+  }
+  double square_m2 = 0;
+  for (const Pose& pose : placement.poses) {
+    square_m2 += (pose.position_m - mean_m).squaredNorm() / n;
+  }
+  return {std::sqrt(std::max(0.0, 1 - mean_heading.squaredNorm())),
+          std::sqrt(square_m2) / placement.height_m};
+}
+
+/// Returns why the captures, from where they were taken, cannot determine the tilt (and the map),
+/// and what to add; empty if they can.
+std::string undetermined_by(const Placement& placement, const LampMap& map, bool refine_map) {
+  if (placement.captures.size() < 2) {
+    return "two captures or more are needed that see three lamps of the map or more which agree "
+           "with it; there " +
+           std::string(placement.captures.empty() ? "is none" : "is one") +
+           ": add captures that see more lamps, or see that lamp map and camera are the right ones";
+  }
+  const Variety variety = variety_of(placement);
+  const bool one_yaw = variety.yaw < std::sin(kOneYaw_rad), one_place = variety.place < kOnePlace;
+  if (one_yaw && one_place) {
+    return "all captures are alike: from one place and yaw a lamp map that is a little off looks "
+           "like a tilt; turn the camera on the spot, or drive, and add those captures";
+  }
+  if (!refine_map) return "";
+  if (one_yaw) {
+    return "all captures are at one yaw: a tilt of all lamps cannot be told from the camera's; "
+           "turn the camera and add those captures, or leave the lamp map as it is";
+  }
+  if (one_place) {
+    return "all captures are from one place: the distances of the lamps do not show; add captures "
+           "from elsewhere, or leave the lamp map as it is";
+  }
+  const auto& times = placement.times_seen;
+  if (const auto once = std::find(times.begin(), times.end(), 1); once != times.end()) {
+    return "lamp " + std::to_string(map.lamps[static_cast<std::size_t>(once - times.begin())].id) +
+           " is in one capture only: add captures that see it, or leave the lamp map as it is";
+  }
+  const auto lamps = std::ssize(times) - std::count(times.begin(), times.end(), 0);
+  return placement.degrees_of_freedom() > 2 + 3 * lamps - 5 ? "" : kTooWeak;
+}
+
+/// Returns the same if a standard deviation is beyond the options' limits.
+std::string too_loose(const Levelling& result, const Eigen::Vector2d& focal_px,
+                      const LevellingOptions& options) {
+  const double sd_rad =
+      result.center.covariance->diagonal().cwiseSqrt().cwiseQuotient(focal_px).maxCoeff();
+  if (!(sd_rad <= options.max_sd_rad)) {
+    return "the tilt would be known to " + significant(deg_from_rad(sd_rad), kDigits) +
+           " degrees only: add captures, of more lamps, at other places and yaws";
+  }
+  for (const auto& lamp : result.corrections) {
+    const double sd_m = lamp.sd_m.maxCoeff();
+    if (!(sd_m <= options.max_lamp_sd_m)) {
+      return "lamp " + std::to_string(lamp.id) + " would be known to " +
+             significant(1e3 * sd_m, kDigits) +
+             " mm only: add captures that see it, at other places and yaws, or leave the lamp map "
+             "as it is";
     }
   }
-  return std::sqrt(sum / degrees_of_freedom);
-}
-
-/// Where a camera that stands there would see the lamp as this one does.
-Eigen::Vector3d where_seen(const Capture& capture, const Observation& seen,
-                           const Eigen::Vector3d& lamp_m) {
-  if (capture.velocity_m_per_s.isZero(0) && capture.yaw_rate_rad_per_s == 0) return lamp_m;
-  const Eigen::Vector3d level = x_in_level(capture, seen, lamp_m);
-  Eigen::Vector3d seen_m = lamp_m;
-  seen_m.head<2>() = capture.camera.position_m.head<2>() +
-                     complex_product(capture.camera.heading, level.head<2>());
-  return seen_m;
-}
-
-/// Of the same detections if the camera were level and the map as it was.
-double residual_before_px(const LampBundle& bundle, const std::vector<Eigen::Vector3d>& lamps_m,
-                          const Lens& lens) {
-  double sum = 0, degrees_of_freedom = 0;
-  std::vector<Sighting> sightings;
-  for (const Capture& capture : bundle.captures) {
-    sightings.clear();
-    for (const Observation& seen : capture.seen) {
-      sightings.push_back(
-          {where_seen(capture, seen, lamps_m[seen.lamp]), seen.z_in_camera, seen.whitening, 1});
-    }
-    const auto fix = fix_least_squares(sightings, capture.camera.pose());
-    if (!fix) continue;
-    const LevelPose camera(fix->pose);
-    for (const Sighting& sighting : sightings) {
-      sum += square_px(lens, sighting.z, predicted_z(camera, sighting.lamp_m));
-    }
-    degrees_of_freedom += 2 * static_cast<double>(sightings.size()) - 4;
-  }
-  return degrees_of_freedom > 0 ? std::sqrt(sum / degrees_of_freedom) : 0;
-}
-
-/// Of the image of the zenith u = level_from_camera^T e_z, which a tilt w moves by
-/// level_from_camera^T (e_z x w).
-RotationCenter center_of(const Eigen::Matrix3d& level_from_camera, const Matrix2& tilt_covariance,
-                         const Lens& lens) {
-  const Eigen::Vector3d zenith = level_from_camera.row(2).transpose();
-  const Eigen::Vector2d z = zenith.head<2>() / zenith.z();
-  Eigen::Matrix<double, 2, 3> d_z;
-  d_z << 1 / zenith.z(), 0, -z.x() / zenith.z(), 0, 1 / zenith.z(), -z.y() / zenith.z();
-  Eigen::Matrix<double, 3, 2> turn;
-  turn << 0, -1, 1, 0, 0, 0;
-  const Eigen::Matrix2d d_pixel =
-      lens.focal_px().asDiagonal() * d_z * level_from_camera.transpose() * turn;
-  Matrix2 covariance = d_pixel * tilt_covariance * d_pixel.transpose();
-  covariance(1, 0) = covariance(0, 1);
-  return {RotationModel::tilt, lens.center_px() + lens.focal_px().cwiseProduct(z),
-          zenith.normalized(), covariance};
+  return "";
 }
 
 bool all_stated(std::span<const Frame> frames) {
@@ -94,34 +180,38 @@ bool all_stated(std::span<const Frame> frames) {
   });
 }
 
-/// Covariance of tilt and lamps from pixel noise, which follows the residuals, and, if the map is
-/// held, from the errors that it states. Their part of the residuals is no noise.
-Eigen::MatrixXd covariance_of(const BundleFit& fit, const LampMap& map, bool noise_is_stated,
-                              bool refine_map) {
-  Eigen::VectorXd lamp_variances = Eigen::VectorXd::Zero(fit.covariance.rows() - 2);
-  for (std::size_t i = 0; i < map.lamps.size() && !refine_map; ++i) {
-    const double sd_m = map.lamps[i].sd_m.value_or(0);
-    lamp_variances.segment<3>(static_cast<Eigen::Index>(3 * i)).setConstant(sd_m * sd_m);
+/// Adjusts the captures that agree with the map. A capture that the map contradicts for a level
+/// camera may agree with it at the zenith that the others determine: it is then used, too.
+AdjustmentResult adjust_in_rounds(const std::vector<AdjustmentCapture>& captures,
+                                  AdjustmentInput& input, Levelling& result) {
+  constexpr int max_rounds = 6;
+  constexpr double no_limit = std::numeric_limits<double>::infinity();
+  AdjustmentResult found;
+  for (int round = 0, detections = 0; round < max_rounds; ++round) {
+    Placement placement = place(captures, input.lamps, input.calibration);
+    result.undetermined = undetermined_by(placement, input.lamps, input.frees_map_shape);
+    if (!result.undetermined.empty() || placement.detections() == detections) break;
+    detections = placement.detections();
+    if (round == 0) {
+      result.residual_before_px = std::sqrt(placement.squares_px2 / placement.degrees_of_freedom());
+    }
+    input.captures = std::move(placement.captures);
+    found = adjust_captures(input, {no_limit, no_limit});
+    if (!found.ok()) {
+      result.undetermined = kTooWeak;
+      break;
+    }
+    input.calibration.rotation_center = found.center;
   }
-  const double of_map = fit.d_chi_squared_d_lamp_squares.dot(lamp_variances);
-  const double noise =
-      std::max((fit.chi_squared - of_map) / fit.degrees_of_freedom, noise_is_stated ? 1.0 : 0.0);
-  Eigen::MatrixXd covariance = noise * fit.covariance;
-  covariance.topLeftCorner<2, 2>() +=
-      fit.d_tilt_d_lamps * lamp_variances.asDiagonal() * fit.d_tilt_d_lamps.transpose();
-  return covariance;
+  return found;
 }
 
-void report_lamps(Levelling& result, const LampBundle& bundle, const LampMap& map,
-                  const std::vector<Eigen::Vector3d>& lamps_m, const Eigen::MatrixXd& covariance) {
-  const std::vector<bool> seen = lamps_seen(bundle);
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (!seen[i]) continue;
-    const Eigen::Vector3d correction_m = bundle.lamps_m[i] - lamps_m[i];
-    const Eigen::Vector3d sd_m =
-        covariance.diagonal().segment<3>(static_cast<Eigen::Index>(2 + 3 * i)).cwiseSqrt();
-    result.map.lamps[i].position_m += correction_m;
-    result.corrections.push_back({map.lamps[i].id, correction_m, sd_m});
+void report_lamps(Levelling& result, const AdjustmentResult& found) {
+  for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {
+    result.corrections.push_back({id, correction_m, sd_m});
+  }
+  for (std::size_t i = 0; i < found.refined.lamps.size(); ++i) {
+    result.map.lamps[i].position_m = found.refined.lamps[i].position_m;
   }
 }
 
@@ -129,51 +219,25 @@ void report_lamps(Levelling& result, const LampBundle& bundle, const LampMap& ma
 
 Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, const Camera& camera,
                          const LevellingOptions& options) {
-  const Lens lens(camera.lens_model, camera.intrinsics);
   Levelling result;
   result.map = map;
-  // From their mean, so that a map in national coordinates loses no digits.
-  std::vector<Eigen::Vector3d> lamps_m;
-  lamps_m.reserve(map.lamps.size());
-  Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
-  for (const Lamp& lamp : map.lamps) mean_m += lamp.position_m - map.lamps.front().position_m;
-  mean_m = map.lamps.front().position_m + mean_m / static_cast<double>(map.lamps.size());
-  for (const Lamp& lamp : map.lamps) lamps_m.emplace_back(lamp.position_m - mean_m);
-  const auto row_clock = row_clock_of(camera);
-  std::vector<MeasuredCapture> measured;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    auto seen = measured_lamps(frames[i].detections, map, lens, row_clock);
-    if (!seen) {
-      ++result.captures_rejected;
-    } else if (seen->size() < 3) {
-      ++result.captures_of_few_lamps;
-    } else {
-      result.detections_rejected += static_cast<int>(seen->size());
-      measured.push_back(
-          {std::move(*seen), options.motions.empty() ? KnownMotion() : options.motions[i]});
-    }
-  }
-
-  const auto [bundle, fit] = solve_in_rounds(measured, map, lamps_m, options.refine_map);
-  result.captures = static_cast<int>(bundle.captures.size());
-  result.captures_rejected += static_cast<int>(measured.size()) - result.captures;
-  result.detections = static_cast<int>(detections_in(bundle));
-  result.detections_rejected -= result.detections;
-  result.undetermined = undetermined_by(bundle, map, options.refine_map);
+  const auto captures = captures_of_three_lamps(frames, map, options.motions, result);
+  AdjustmentInput input{{}, map, {}};
+  input.calibration.camera = camera;
+  input.frees_map_shape = options.refine_map;
+  input.captures_are_checked = true;
+  input.weighs_in_undistorted_image = true;
+  const AdjustmentResult found = adjust_in_rounds(captures, input, result);
+  result.captures = found.captures;
+  result.captures_rejected = static_cast<int>(captures.size()) - found.captures;
+  result.detections = found.detections;
+  result.detections_rejected -= found.detections;
   if (!result.undetermined.empty()) return result;
-  if (!fit || fit->degrees_of_freedom <= 0) {
-    result.undetermined = kTooWeak;
-    return result;
-  }
-  const double excess = fit->chi_squared / fit->degrees_of_freedom;
-  const bool stated = all_stated(frames);
-  const Eigen::MatrixXd covariance = covariance_of(*fit, map, stated, options.refine_map);
-  if (stated) result.excess = std::sqrt(excess);
-  result.center = center_of(bundle.level_from_camera, covariance.topLeftCorner<2, 2>(), lens);
-  result.residual_px = residual_px(bundle, lens, fit->redundancy);
-  result.residual_before_px = residual_before_px(bundle, lamps_m, lens);
-  if (options.refine_map) report_lamps(result, bundle, map, lamps_m, covariance);
-  result.undetermined = too_loose(result, covariance.topLeftCorner<2, 2>(), options);
+  if (all_stated(frames)) result.excess = found.noise_scale;
+  result.center = found.center;
+  result.residual_px = found.residual_px;
+  if (options.refine_map) report_lamps(result, found);
+  result.undetermined = too_loose(result, camera.focal_px(), options);
   return result;
 }
 

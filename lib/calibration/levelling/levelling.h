@@ -15,12 +15,9 @@
 namespace vlp {
 
 struct LevellingOptions {
-  /// Estimate corrections of the lamp map, too. Captures with free poses say nothing of where
-  /// the map as a whole is, how it is turned about the vertical, nor how large it is: those five
-  /// are held, so that the corrections d_i of the lamps seen have, with p_i from their mean,
-  ///   sum d_i = 0,   sum (p_i x d_i)_z = 0,   sum p_i . d_i = 0.
-  /// A tilt of the lamps as a whole is told from the camera's by captures at different yaws, the
-  /// distance of a lamp by captures at different places. Lamps that are not seen stay.
+  /// Estimates corrections of the lamp map, too (AdjustmentInput::frees_map_shape). Captures at
+  /// different yaws separate a tilt of all lamps from the camera's; captures at different places
+  /// determine the distances of the lamps. Lamps that are not seen stay.
   bool refine_map = false;
   /// How the camera moves in each of the frames; empty: it stands. What is not known of it is
   /// estimated with the capture's pose. Wants the camera's row time and read-out.
@@ -38,8 +35,8 @@ struct Levelling {
   /// far as they were reached.
   std::string undetermined;
 
-  /// Model `tilt`; the covariance, of the zenith's image, follows the residuals where they are
-  /// larger than what the detections state, and has the errors of a held map by its sd_m.
+  /// Model `tilt`. The covariance, of the zenith's image, follows the residuals where they are
+  /// larger than the detections state, and includes the errors of the map by its sd_m.
   RotationCenter center;
   /// With what was found added; as it was without `refine_map`.
   LampMap map;
@@ -55,21 +52,23 @@ struct Levelling {
   int captures = 0, captures_of_few_lamps = 0, captures_rejected = 0;
   /// Detections that it rests on, and those of captures of three lamps or more that it does not.
   int detections = 0, detections_rejected = 0;
-  /// Of the former, per axis in the undistorted image, degrees of freedom
-  /// taken off: sqrt(sum of squares / (2 detections - unknowns)). Before: of a level camera and
-  /// the map as it was.
-  double residual_before_px = 0, residual_px = 0;
-  /// Of the residuals, over what the detections state; 1 where not all of them state it.
+  /// Residual per axis of a level camera that stands and the map as it was, in the undistorted
+  /// image: sqrt(sum of squares / degrees of freedom).
+  double residual_before_px = 0;
+  /// The same of the detections used, in the image, with the result.
+  double residual_px = 0;
+  /// Residuals over the sigma_px of the detections, at least 1; 1 if not all of them state it.
   double excess = 1;
 };
 
 /// Levels the camera from identified lamps: three or more over-determine a fix unless the camera
-/// is level. Least squares over one tilt, a pose per capture and, maybe, the lamp map (see
-/// LampBundle); lamps weigh as in positioning (Positioner). Whatever contradicts the rest by more
-/// than five standard deviations, of the residuals' median, is left out, the worst of each capture
-/// first. The poses are not used beyond this. Not determined: fewer than two captures of three
-/// lamps, captures all from one place and yaw (from there a map that is a little off looks like a
-/// tilt), with `refine_map` all at one yaw or from one place.
+/// is level. A preset of adjust_captures(): the lens is exact, no place is known, the map counts by
+/// its sd_m (exact without one), detections without sigma_px weigh as in positioning. The lamps of
+/// each capture first have to agree with the map (Positioner); captures that do so at the zenith
+/// found, but not for a level camera, are taken in again. Outliers beyond 4.5 standard deviations
+/// of the residuals' scatter are then left out. Not determined: fewer than two captures
+/// of three lamps; captures all from one place and yaw (from there an error of the map looks like
+/// a tilt); with `refine_map` all at one yaw or from one place.
 Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, const Camera& camera,
                          const LevellingOptions& options = {});
 

@@ -42,8 +42,10 @@ void report(const Levelling& result, const Camera& camera) {
              result.captures_of_few_lamps, result.captures_rejected);
   fmt::print("detections  {} used, {} left out\n", result.detections, result.detections_rejected);
   print_center(result.center, camera);
-  fmt::print("residual    {:.4f} px per axis, {:.4f} px for a level camera{}\n", result.residual_px,
-             result.residual_before_px, result.corrections.empty() ? "" : " and the map as it was");
+  fmt::print(
+      "residual    {:.4f} px per axis; for a level camera{} {:.4f} px in the undistorted image\n",
+      result.residual_px, result.corrections.empty() ? "" : " and the map as it was",
+      result.residual_before_px);
   if (!result.corrections.empty()) print_corrections(result);
 }
 

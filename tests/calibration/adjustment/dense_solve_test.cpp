@@ -300,7 +300,8 @@ TEST_F(Derivatives, OfSightingsAreThoseOfDifferences) {
   const AdjustmentLayout& at = problem.layout();
   for (const std::size_t capture : {0U, 1U}) {
     for (const std::size_t lamp : {0U, 1U}) {
-      const AdjustmentProblem::Sighting sighting{capture, lamp, {400, 300}, 0.5, 0.012};
+      const AdjustmentProblem::Sighting sighting{
+          capture, lamp, {400, 300}, 0.5, Eigen::Matrix2d::Identity() / 0.5, 0.012};
       const auto residual = [&] { return problem.linearize(sighting, *problem.lens())->residual; };
       const auto found = problem.linearize(sighting, *problem.lens());
       ASSERT_TRUE(found);
