@@ -44,6 +44,7 @@ struct Assembled {
   std::vector<bool> lamp_seen = {};
   int captures_left_out = 0;
   bool noise_is_stated = true;
+  bool noise_follows_residuals = false;
 };
 
 Eigen::Vector3d mean_of(const LampMap& map) {
@@ -137,6 +138,7 @@ Assembled assemble(const AdjustmentInput& input) {
     problem.lamps.push_back(
         {lamps_m.back(), input.frees_map_shape ? kInfinite : lamp.sd_m.value_or(0)});
   }
+  all.noise_follows_residuals = input.noise_follows_residuals;
   all.lamp_seen.resize(lamps_m.size());
   Eigen::Vector2d zenith(0, 0), arm_m(0, 0);
   if (center) {
@@ -460,7 +462,7 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
     if (noise.freedom > 0) {
       const double scale = problem.noise_scale * noise.ratio;
       // Stated noise is taken for too small when chance makes it so once in a thousand.
-      const double chance = 3 * std::sqrt(0.5 / noise.freedom);
+      const double chance = all.noise_follows_residuals ? 0 : 3 * std::sqrt(0.5 / noise.freedom);
       const bool larger = all.noise_is_stated && scale > 1 + chance;
       const double next =
           all.noise_is_stated ? (larger ? scale : 1) : std::max(scale, kMinNoise_px);

@@ -64,6 +64,9 @@ struct AdjustmentInput {
   /// Captures were checked one by one and have no gross outliers. Skips the robust start, which
   /// rejects all detections of a lamp whose exact place in the map is wrong.
   bool captures_are_checked = false;
+  /// Takes stated noise for too small wherever the residuals are larger, and not only beyond
+  /// chance.
+  bool noise_follows_residuals = false;
   /// Weighs detections without sigma_px alike in the undistorted image, as positioning does, so
   /// that errors of map and lens move zenith and fixes alike. Covariances are for equal noise in
   /// the image, without the loss of efficiency by these weights.
