@@ -511,71 +511,60 @@ std::string undetermined_by(const AdjustmentProblem& problem, const Eigen::Matri
          "captures that see more lamps at other yaws";
 }
 
-}  // namespace
-
-MatrixX stated_lens_covariance(const Camera& camera, double sd_px) {
-  const Lens lens(camera.lens_model, camera.intrinsics);
-  constexpr int across = 16;
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(stated_intrinsics(camera));
-  int rays = 0;
-  for (int row = 0; row < across; ++row) {
-    for (int column = 0; column < across; ++column) {
-      const Eigen::Vector2d share((column + 0.5) / across, (row + 0.5) / across);
-      const auto ray = lens.unproject(
-          {share.x() * camera.imager_px[0] - 0.5, share.y() * camera.imager_px[1] - 0.5});
-      if (!ray) continue;
-      const auto seen = lens.project_with_jacobians(ray->direction);
-      if (!seen) continue;
-      squares += seen->d_pixel_d_parameters.colwise().squaredNorm().transpose() / 2;
-      ++rays;
-    }
-  }
-  // A lens that shows no ray of the image stays as it is.
-  const Eigen::ArrayXd variances = sd_px * sd_px * rays / squares.array();
-  return Eigen::MatrixXd((squares.array() > 0).select(variances, 0).matrix().asDiagonal());
-}
-
-AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentLimits& limits) {
-  AdjustmentResult result;
-  Assembled all = assemble(input);
-  AdjustmentProblem& problem = all.problem;
-  result.captures_left_out = all.captures_left_out;
-  result.detections_left_out = static_cast<int>(problem.sightings.size());
-  result.camera = input.calibration.camera;
-  result.refined = input.lamps;
-  if (problem.captures.empty()) {
-    result.undetermined = "no capture sees two lamps of the map well enough for a fix";
-    return result;
-  }
-  Contradictions contradictions(all);
+/// Unknowns after convergence: their covariance, and the degrees of freedom of the detections.
+struct AdjustedState {
   Eigen::MatrixXd covariance;
   double freedom = 0;
-  // A lamp taken for another can be where the lens has no image of it.
-  const std::vector<double> at_start = lengths_of(problem);
-  for (std::size_t i = 0; i < at_start.size(); ++i) {
-    problem.sightings[i].used = at_start[i] < kInfinite;
-  }
-  bool converged = input.captures_are_checked || (problem.solve(true) && problem.solve(true));
-  if (converged && !input.captures_are_checked) {
-    contradictions.leave_out_the_worst();
-    const Noise noise = noise_of(all, problem.shared_covariance());
-    leave_out_outliers(problem, all.noise_is_stated, noise.freedom);
-  }
-  converged = converged && settle(all, contradictions, covariance, freedom);
-  if (!converged) {
-    result.undetermined =
-        "no zenith and no places of the lamps fit the captures: is it the map of this room, and "
-        "the "
-        "calibration this camera's?";
-    return result;
-  }
+};
 
-  if (input.weighs_in_undistorted_image && !all.noise_is_stated) {
-    covariance = covariance_of_image_noise(all);
+/// Moves the problem to its robust solution and leaves out everything far from it. Returns false if
+/// it does not converge.
+bool start_robustly(Assembled& all, Contradictions& contradictions) {
+  AdjustmentProblem& problem = all.problem;
+  if (!problem.solve(true) || !problem.solve(true)) return false;
+  contradictions.leave_out_the_worst();
+  const Noise noise = noise_of(all, problem.shared_covariance());
+  leave_out_outliers(problem, all.noise_is_stated, noise.freedom);
+  return true;
+}
+
+/// Solves the problem, from a robust solution unless the captures are checked. Returns std::nullopt
+/// if it does not converge.
+std::optional<AdjustedState> solve_all(const AdjustmentInput& input, Assembled& all,
+                                       Contradictions& contradictions) {
+  // A lamp taken for another can be where the lens has no image of it.
+  const std::vector<double> at_start = lengths_of(all.problem);
+  for (std::size_t i = 0; i < at_start.size(); ++i) {
+    all.problem.sightings[i].used = at_start[i] < kInfinite;
   }
+  AdjustedState adjusted;
+  if (!input.captures_are_checked && !start_robustly(all, contradictions)) return std::nullopt;
+  if (!settle(all, contradictions, adjusted.covariance, adjusted.freedom)) return std::nullopt;
+  if (input.weighs_in_undistorted_image && !all.noise_is_stated) {
+    adjusted.covariance = covariance_of_image_noise(all);
+  }
+  return adjusted;
+}
+
+/// Returns the mean height of the lamps used above the camera.
+double mean_height_m(const AdjustmentProblem& problem) {
   const AdjustmentLayout& at = problem.layout();
   const Eigen::VectorXd& state = problem.state();
-  double squares_px = 0, height_m = 0;
+  double sum_m = 0;
+  int count = 0;
+  for (const auto& sighting : problem.sightings) {
+    if (!sighting.used) continue;
+    const auto& capture = problem.captures[sighting.capture];
+    sum_m += state[at.lamp(sighting.lamp) + 2] -
+             state[(capture.spot ? at.spot(*capture.spot) : capture.own) + 2];
+    ++count;
+  }
+  return sum_m / std::max(1, count);
+}
+
+/// Counts captures and detections, and states their residuals.
+void report_detections(const AdjustmentProblem& problem, double freedom, AdjustmentResult& result) {
+  double squares_px = 0;
   std::vector<bool> capture_used(problem.captures.size());
   const std::vector<double> lengths = lengths_of(problem);
   for (std::size_t i = 0; i < lengths.size(); ++i) {
@@ -584,20 +573,19 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     ++result.detections;
     capture_used[sighting.capture] = true;
     squares_px += std::pow(lengths[i] * sighting.sigma_px * problem.noise_scale, 2);
-    const auto& capture = problem.captures[sighting.capture];
-    height_m += state[at.lamp(sighting.lamp) + 2] -
-                state[(capture.spot ? at.spot(*capture.spot) : capture.own) + 2];
   }
   result.detections_left_out -= result.detections;
   result.captures = static_cast<int>(std::count(capture_used.begin(), capture_used.end(), true));
   result.captures_left_out += static_cast<int>(capture_used.size()) - result.captures;
-  height_m /= std::max(1, result.detections);
   result.residual_px = std::sqrt(squares_px / std::max(freedom, 1.0));
   result.noise_scale = problem.noise_scale;
-  bool has_lever_arm = false;
-  result.undetermined = undetermined_by(problem, covariance, height_m, limits, has_lever_arm);
+}
 
-  // The calibration.
+/// States lens, zenith and lever arm with their covariances.
+void report_center(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                   bool has_lever_arm, AdjustmentResult& result) {
+  const AdjustmentLayout& at = problem.layout();
+  const Eigen::VectorXd& state = problem.state();
   result.camera.intrinsics = problem.intrinsics();
   const Eigen::Vector2d focal_px = result.camera.focal_px();
   const Eigen::Vector2d zenith = state.segment<2>(at.zenith);
@@ -614,8 +602,13 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     arm_covariance(1, 0) = arm_covariance(0, 1);
     result.center.lever_arm_covariance = arm_covariance;
   }
+}
 
-  // The joint covariance: of the lens' directions that of its intrinsics, without the spots.
+/// States the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm
+/// and lamps, without the spots. That with the surveyed map lacks the lamps.
+void report_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                             bool has_lever_arm, AdjustmentResult& result) {
+  const AdjustmentLayout& at = problem.layout();
   const Eigen::Index intrinsics = stated_intrinsics(result.camera);
   const Eigen::Index rows = intrinsics + at.spots - at.zenith;
   Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.shared);
@@ -628,6 +621,15 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
   result.surveyed_covariance = result.refined_covariance;
   const Eigen::Index first_lamp = intrinsics + 4;
   result.surveyed_covariance.bottomRightCorner(rows - first_lamp, rows - first_lamp).setZero();
+}
+
+/// States the lamps with their covariances, in both joint covariances.
+void report_map(const Assembled& all, const Contradictions& contradictions,
+                AdjustmentResult& result) {
+  const AdjustmentProblem& problem = all.problem;
+  const AdjustmentLayout& at = problem.layout();
+  const Eigen::VectorXd& state = problem.state();
+  const Eigen::Index first_lamp = stated_intrinsics(result.camera) + 4;
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
     Lamp& lamp = result.refined.lamps[i];
     const Eigen::Index row = first_lamp + 3 * static_cast<Eigen::Index>(i);
@@ -657,13 +659,16 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     result.notes.emplace_back(
         "the captures contradict the survey of half the lamps or more: is its sd_m right?");
   }
+}
 
+/// States the known places and what of the map they leave to the survey.
+void report_places(Assembled& all, AdjustmentResult& result) {
   measure_places(all);
   result.places = all.places;
   std::size_t places_used = 0;
   for (std::size_t i = 0; i < all.places.size(); ++i) {
-    result.places[i].wrong = !problem.place_used[i];
-    if (problem.place_used[i]) ++places_used;
+    result.places[i].wrong = !all.problem.place_used[i];
+    if (all.problem.place_used[i]) ++places_used;
   }
   if (places_used < 3) {
     constexpr std::array<const char*, 3> held{
@@ -674,7 +679,13 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
         "{} known place{}: {} rests on the survey; captures at {} more known places would tell it",
         places_used, places_used == 1 ? "" : "s", held.at(places_used), 3 - places_used));
   }
+}
 
+/// Tests the correction of the lens against its covariance.
+void report_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                 AdjustmentResult& result) {
+  const AdjustmentLayout& at = problem.layout();
+  const Eigen::VectorXd& state = problem.state();
   const Eigen::VectorXd u = state.segment(at.lens, at.lens_size);
   if (at.lens_size > 0) {
     const auto told = symmetric_eigen(
@@ -691,6 +702,62 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     result.lens_contradicted =
         result.lens_chi_squared > n + t * std::sqrt(2 * n) + 2.0 / 3.0 * (t * t - 1);
   }
+}
+
+}  // namespace
+
+MatrixX stated_lens_covariance(const Camera& camera, double sd_px) {
+  const Lens lens(camera.lens_model, camera.intrinsics);
+  constexpr int across = 16;
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(stated_intrinsics(camera));
+  int rays = 0;
+  for (int row = 0; row < across; ++row) {
+    for (int column = 0; column < across; ++column) {
+      const Eigen::Vector2d share((column + 0.5) / across, (row + 0.5) / across);
+      const auto ray = lens.unproject(
+          {share.x() * camera.imager_px[0] - 0.5, share.y() * camera.imager_px[1] - 0.5});
+      if (!ray) continue;
+      const auto seen = lens.project_with_jacobians(ray->direction);
+      if (!seen) continue;
+      squares += seen->d_pixel_d_parameters.colwise().squaredNorm().transpose() / 2;
+      ++rays;
+    }
+  }
+  // A lens that shows no ray of the image stays as it is.
+  const Eigen::ArrayXd variances = sd_px * sd_px * rays / squares.array();
+  return Eigen::MatrixXd((squares.array() > 0).select(variances, 0).matrix().asDiagonal());
+}
+
+AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentLimits& limits) {
+  AdjustmentResult result;
+  Assembled all = assemble(input);
+  const AdjustmentProblem& problem = all.problem;
+  result.captures_left_out = all.captures_left_out;
+  result.detections_left_out = static_cast<int>(problem.sightings.size());
+  result.camera = input.calibration.camera;
+  result.refined = input.lamps;
+  if (problem.captures.empty()) {
+    result.undetermined = "no capture sees two lamps of the map well enough for a fix";
+    return result;
+  }
+  Contradictions contradictions(all);
+  const auto adjusted = solve_all(input, all, contradictions);
+  if (!adjusted) {
+    result.undetermined =
+        "no zenith and no places of the lamps fit the captures: is it the map of this room, and "
+        "the calibration this camera's?";
+    return result;
+  }
+  const Eigen::MatrixXd& covariance = adjusted->covariance;
+  report_detections(problem, adjusted->freedom, result);
+  bool has_lever_arm = false;
+  result.undetermined =
+      undetermined_by(problem, covariance, mean_height_m(problem), limits, has_lever_arm);
+  report_center(problem, covariance, has_lever_arm, result);
+  report_joint_covariance(problem, covariance, has_lever_arm, result);
+  report_map(all, contradictions, result);
+  report_places(all, result);
+  report_lens(problem, covariance, result);
   return result;
 }
 

@@ -616,23 +616,99 @@ void add_information(const Parts& parts, Eigen::MatrixXd& information) {
   }
 }
 
-}  // namespace
-
-AdjustmentProblem::SharedCovariance AdjustmentProblem::shared_covariance() const {
-  const AdjustmentLayout& at = layout_;
+/// Returns the information of what is known of the shared unknowns before any capture. Unknowns
+/// without a prior have that of a guess.
+Eigen::MatrixXd prior_information(const AdjustmentProblem& problem) {
+  const AdjustmentLayout& at = problem.layout();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(at.shared, at.shared);
   constexpr double guess_rad = 1, guess_m = 10;
   information.diagonal().segment(at.lens, at.lens_size).setOnes();
   information.diagonal().segment<2>(at.zenith).setConstant(1 / (guess_rad * guess_rad));
   information.diagonal().tail(at.shared - at.lever_arm).setConstant(1 / (guess_m * guess_m));
-  for (std::size_t i = 0; i < lamps.size(); ++i) {
-    const double sd_m = lamps[i].sd_m;
+  for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
+    const double sd_m = problem.lamps[i].sd_m;
     if (std::isinf(sd_m)) continue;
     information.diagonal().segment<3>(at.lamp(i)).setConstant(sd_m > 0 ? 1 / (sd_m * sd_m) : 1);
   }
+  const Eigen::MatrixXd& gauge = problem.gauge;
   if (gauge.cols() > 0) {
     information.block(at.lamps, at.lamps, gauge.rows(), gauge.rows()) += gauge * gauge.transpose();
   }
+  return information;
+}
+
+/// Puts the derivatives of a sighting by the shared unknowns into `parts`.
+void set_parts(const AdjustmentProblem& problem, const AdjustmentProblem::Sighting& sighting,
+               const AdjustmentProblem::Linearized& seen, Parts& parts) {
+  const AdjustmentLayout& at = problem.layout();
+  const auto& spot = problem.captures[sighting.capture].spot;
+  parts.clear();
+  if (at.lens_size > 0) parts.emplace_back(at.lens, seen.by_lens);
+  parts.emplace_back(at.zenith, seen.by_zenith);
+  if (problem.lamps[sighting.lamp].sd_m > 0) {
+    parts.emplace_back(at.lamp(sighting.lamp), seen.by_lamp);
+  }
+  if (spot) {
+    parts.emplace_back(at.lever_arm, seen.by_lever_arm);
+    parts.emplace_back(at.spot(*spot), seen.by_spot);
+  }
+}
+
+/// Adds the information of residuals with these derivatives to that of the shared unknowns and to
+/// that of the capture's own.
+void add_residuals(const Eigen::MatrixXd& by_own, const Parts& parts, Eigen::MatrixXd& information,
+                   OwnBlock& block) {
+  add_information(parts, information);
+  block.own.topLeftCorner(by_own.cols(), by_own.cols()) += by_own.transpose() * by_own;
+  for (const auto& [first, by_shared] : parts) block.add(by_own, first, by_shared);
+}
+
+/// Eliminates a capture's own unknowns from the information of the shared ones.
+/// Precondition: the capture is used.
+Elimination eliminate(const AdjustmentProblem& problem, const AdjustmentProblem::Capture& capture,
+                      const OwnBlock& block, Eigen::MatrixXd& information) {
+  const Eigen::Index size = capture.size(), n = std::ssize(block.columns);
+  CaptureMatrix known = block.own;
+  const Eigen::VectorXd weights = problem.motion_prior(capture).weights;
+  known.diagonal().segment(capture.pose_size(), weights.size()) += weights.cwiseAbs2();
+  Eigen::MatrixXd mixed(size, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    mixed.col(i) = block.mixed[static_cast<std::size_t>(i)].head(size);
+  }
+  const Elimination eliminated{known.topLeftCorner(size, size),
+                               solve_symmetric(known.topLeftCorner(size, size), mixed)};
+  const Eigen::MatrixXd taken = mixed.transpose() * eliminated.own_from_shared;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      information(block.columns[static_cast<std::size_t>(i)],
+                  block.columns[static_cast<std::size_t>(j)]) -= taken(i, j);
+    }
+  }
+  return eliminated;
+}
+
+/// Returns the inverse of the information, zero for exact lamps.
+Eigen::MatrixXd covariance_from_information(const AdjustmentProblem& problem,
+                                            const Eigen::MatrixXd& information) {
+  const AdjustmentLayout& at = problem.layout();
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  Eigen::MatrixXd covariance =
+      scale.asDiagonal() *
+      solve_symmetric(scaled, Eigen::MatrixXd::Identity(at.shared, at.shared)) * scale.asDiagonal();
+  covariance = 0.5 * (covariance + covariance.transpose()).eval();
+  for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
+    if (problem.lamps[i].sd_m > 0) continue;
+    covariance.middleRows<3>(at.lamp(i)).setZero();
+    covariance.middleCols<3>(at.lamp(i)).setZero();
+  }
+  return covariance;
+}
+
+}  // namespace
+
+AdjustmentProblem::SharedCovariance AdjustmentProblem::shared_covariance() const {
+  Eigen::MatrixXd information = prior_information(*this);
   std::vector<OwnBlock> own(captures.size());
   std::vector<bool> capture_used(captures.size());
   const auto lens = this->lens();
@@ -641,63 +717,21 @@ AdjustmentProblem::SharedCovariance AdjustmentProblem::shared_covariance() const
     if (!sighting.used || !lens) continue;
     const auto seen = linearize(sighting, *lens);
     if (!seen) continue;
-    const Capture& capture = captures[sighting.capture];
     capture_used[sighting.capture] = true;
-    parts.clear();
-    if (at.lens_size > 0) parts.emplace_back(at.lens, seen->by_lens);
-    parts.emplace_back(at.zenith, seen->by_zenith);
-    if (lamps[sighting.lamp].sd_m > 0) parts.emplace_back(at.lamp(sighting.lamp), seen->by_lamp);
-    if (capture.spot) {
-      parts.emplace_back(at.lever_arm, seen->by_lever_arm);
-      parts.emplace_back(at.spot(*capture.spot), seen->by_spot);
-    }
-    const Eigen::MatrixXd by_own = seen->by_own;
-    add_information(parts, information);
-    OwnBlock& block = own[sighting.capture];
-    block.own.topLeftCorner(by_own.cols(), by_own.cols()) += by_own.transpose() * by_own;
-    for (const auto& [first, by_shared] : parts) block.add(by_own, first, by_shared);
+    set_parts(*this, sighting, *seen, parts);
+    add_residuals(seen->by_own, parts, information, own[sighting.capture]);
   }
   for (const PlaceSighting& place : places) {
     if (!place_used[place.place] || !capture_used[place.capture]) continue;
     const Eigen::MatrixXd by_own = whitened_derivatives(*this, place, parts);
-    add_information(parts, information);
-    OwnBlock& block = own[place.capture];
-    block.own.topLeftCorner(by_own.cols(), by_own.cols()) += by_own.transpose() * by_own;
-    for (const auto& [first, by_shared] : parts) block.add(by_own, first, by_shared);
+    add_residuals(by_own, parts, information, own[place.capture]);
   }
   std::vector<Elimination> eliminated(captures.size());
   for (std::size_t k = 0; k < captures.size(); ++k) {
-    const OwnBlock& block = own[k];
-    const Eigen::Index size = captures[k].size(), n = std::ssize(block.columns);
-    if (n == 0) continue;
-    CaptureMatrix known = block.own;
-    const Eigen::VectorXd weights = motion_prior(captures[k]).weights;
-    known.diagonal().segment(captures[k].pose_size(), weights.size()) += weights.cwiseAbs2();
-    Eigen::MatrixXd mixed(size, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      mixed.col(i) = block.mixed[static_cast<std::size_t>(i)].head(size);
-    }
-    eliminated[k] = {known.topLeftCorner(size, size),
-                     solve_symmetric(known.topLeftCorner(size, size), mixed)};
-    const Eigen::MatrixXd taken = mixed.transpose() * eliminated[k].own_from_shared;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        information(block.columns[static_cast<std::size_t>(i)],
-                    block.columns[static_cast<std::size_t>(j)]) -= taken(i, j);
-      }
-    }
+    if (own[k].columns.empty()) continue;
+    eliminated[k] = eliminate(*this, captures[k], own[k], information);
   }
-  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-  Eigen::MatrixXd covariance =
-      scale.asDiagonal() *
-      solve_symmetric(scaled, Eigen::MatrixXd::Identity(at.shared, at.shared)) * scale.asDiagonal();
-  covariance = 0.5 * (covariance + covariance.transpose()).eval();
-  for (std::size_t i = 0; i < lamps.size(); ++i) {
-    if (lamps[i].sd_m > 0) continue;
-    covariance.middleRows<3>(at.lamp(i)).setZero();
-    covariance.middleCols<3>(at.lamp(i)).setZero();
-  }
+  const Eigen::MatrixXd covariance = covariance_from_information(*this, information);
   double determined_by_places = 0;
   for (const PlaceSighting& place : places) {
     if (!place_used[place.place] || !capture_used[place.capture]) continue;
