@@ -249,6 +249,11 @@ LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, Hist
     blame_map(input, alone, result);
     return result;
   }
+  if (levelling.captures_rejected > levelling.captures) {
+    result.fail(StepFailure::wrong_map, describe(MapError{MapErrorKind::other_room}),
+                input.lamps_file);
+    return result;
+  }
   const auto center_with = [&](const Camera& camera) {
     const Levelling other = levelled(camera);
     return other.undetermined.empty() ? std::optional(other.center) : std::nullopt;

@@ -19,6 +19,12 @@ namespace {
 
 using SeenLamp = CeilingView::SeenLamp;
 
+std::size_t count_detections(const std::vector<CeilingView>& views) {
+  std::size_t count = 0;
+  for (const CeilingView& view : views) count += view.lamps.size();
+  return count;
+}
+
 /// Removes detections that tie no lamp to others.
 void keep_tied(std::vector<CeilingView>& views) {
   constexpr std::size_t min_lamps = 3;
@@ -206,6 +212,7 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
                                                              bool tilt_is_free) {
   std::map<int, std::vector<double>> outliers_m;
   keep_tied(views);
+  const std::size_t detections = count_detections(views);
   std::optional<LampDisplacements> found = solve(map, views, tilt_is_free);
   while (found && reject_outliers(views, *found, outliers_m)) {
     keep_tied(views);
@@ -214,6 +221,8 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
   if (!found) return std::nullopt;
   found->height_m = views.front().lamps.front().above_camera_m;
   found->outliers_m = std::move(outliers_m);
+  found->inlier_fraction =
+      static_cast<double>(count_detections(views)) / static_cast<double>(detections);
   return found;
 }
 

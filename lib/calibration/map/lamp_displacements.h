@@ -57,6 +57,8 @@ struct LampDisplacements {
   double degrees_of_freedom = 0;
   /// Height of a lamp above the camera, in the first capture.
   double height_m = 0;
+  /// Fraction of the detections that is not rejected as outliers.
+  double inlier_fraction = 1;
 
   /// Returns the displaced place of a lamp, up to a similarity of all.
   Eigen::Vector2d displaced_m(std::size_t lamp) const {

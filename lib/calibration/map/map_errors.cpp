@@ -337,17 +337,28 @@ std::vector<OtherMap> swapped_maps(const LampDisplacements& found, const LampMap
   return maps;
 }
 
+/// Returns true if most detections are outliers, so that the lamps that are left prove nothing.
+bool is_contradicted(const std::optional<LampDisplacements>& found) {
+  constexpr double min_inlier_fraction = 0.5;
+  return !found || found->inlier_fraction < min_inlier_fraction;
+}
+
 /// Finds two lamps that are swapped, or a mirrored map. With it the captures have to fit far better
 /// than with the map, and with two lamps swapped better than with any other two.
 std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap& map,
                                       const std::optional<LampDisplacements>& found) {
   std::vector<OtherMap> others;
   if (found) others = swapped_maps(*found, map);
-  if (found && others.empty()) return std::nullopt;
+  if (!is_contradicted(found) && others.empty()) return std::nullopt;
   LampMap mirrored = map;
   for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
   others.push_back({{MapErrorKind::mirrored}, std::move(mirrored)});
   for (OtherMap& other : others) other.found = captures.displacements(other.map);
+  if (is_contradicted(found)) {
+    const auto fits = std::ranges::find_if(
+        others, [](const OtherMap& other) { return !is_contradicted(other.found); });
+    return fits == others.end() ? std::nullopt : std::optional(fits->error);
+  }
   // The mirror image of a square is one with two corners swapped.
   const bool is_mirrored = others.back().size_m() <= 2 * others.front().size_m();
   const std::size_t best = is_mirrored ? others.size() - 1 : 0;
@@ -504,6 +515,11 @@ MapErrors find_map_errors(std::span<const Frame> frames, const LampMap& map,
     return result;
   }
   if (!found) return result;
+  if (is_contradicted(found)) {
+    result.offsets.clear();
+    result.errors.push_back({MapErrorKind::other_room});
+    return result;
+  }
   const DisplacementTest test(*found, map);
   result.errors = find_moved(*found, test);
   const double min_offset_m =

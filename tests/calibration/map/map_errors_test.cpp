@@ -115,6 +115,41 @@ TEST_F(FindMapErrors, NamesALampOfWrongHeight) {
   }
 }
 
+/// In a large room few captures share lamps. With a mirrored map most detections are outliers, and
+/// those that are left may fit.
+TEST_F(FindMapErrors, ReturnsThatTheMapOfALargeRoomIsMirrored) {
+  constexpr int rows = 10;
+  constexpr double distance_m = 1.2, height_m = 2.5, reach_m = 1.9;
+  map.lamps.clear();
+  for (int i = 0; i < rows * rows; ++i) {
+    Lamp lamp;
+    lamp.id = i + 1;
+    lamp.position_m = {distance_m * (i % rows), distance_m * (i / rows), height_m};
+    map.lamps.push_back(lamp);
+  }
+  const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
+  frames.clear();
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3d camera_m(random.uniform(0, (rows - 1) * distance_m),
+                                   random.uniform(0, (rows - 1) * distance_m), 0);
+    Frame frame{std::to_string(i), {}};
+    for (const Lamp& lamp : map.lamps) {
+      const Eigen::Vector3d ray = lamp.position_m - camera_m;
+      const auto pixel = ray.head<2>().norm() < reach_m ? lens.project(ray) : std::nullopt;
+      if (pixel) frame.detections.push_back({lamp.id, *pixel, 0.05});
+    }
+    frames.push_back(frame);
+  }
+  EXPECT_EQ(found(), "");
+  for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
+  EXPECT_THAT(found(), HasSubstr("the lamp map looks mirrored"));
+  for (Lamp& lamp : map.lamps) {
+    lamp.position_m.x() = random.uniform(0, rows * distance_m);
+    lamp.position_m.y() = random.uniform(0, rows * distance_m);
+  }
+  EXPECT_THAT(found(), HasSubstr("most captures contradict the lamp map"));
+}
+
 TEST_F(FindMapErrors, GivesFewFalseAlarms) {
   constexpr int maps = 400, max_alarms = 10;  // 4 are to be expected of p = 0.01
   for (const std::size_t lamps : {5U, 8U}) {
