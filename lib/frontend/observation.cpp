@@ -29,6 +29,8 @@ std::string_view remedy_for(RejectionReason reason) {
       return ": more exposure, gain or light";
     case RejectionReason::overexposed:
       return ": less exposure, gain or light";
+    case RejectionReason::blurred:
+      return ": focus the lens, or keep camera and board still";
     default:
       return "";
   }

@@ -118,5 +118,42 @@ TEST_F(MovedLamp, IsNoneOfARightMap) {
   }
 }
 
+/// Captures of a large room tie few of its lamps together. The captures that fit a mirrored map by
+/// chance must not pass for all.
+TEST(SolveLevelling, FailsIfMostCapturesContradictTheMap) {
+  constexpr int rows = 10;
+  constexpr double distance_m = 1.2, height_m = 2.5, focal_px = 520, noise_px = 0.05;
+  LampCaptures input{{}, {}, "lamps.yaml", {}};
+  Camera& camera = input.calibration.camera = synthetic_camera();
+  camera.lens_model = LensModel::pinhole;
+  camera.intrinsics = {focal_px, focal_px, 399.5, 299.5};
+  for (int i = 0; i < rows * rows; ++i) {
+    Lamp lamp;
+    lamp.id = i + 1;
+    lamp.position_m = {distance_m * (i / rows), distance_m * (i % rows), height_m};
+    input.lamps.lamps.push_back(lamp);
+  }
+  Random random(4);
+  for (int i = 0; i < 300; ++i) {
+    const Eigen::Vector2d camera_m(random.uniform(0, rows * distance_m),
+                                   random.uniform(0, rows * distance_m));
+    const Eigen::Rotation2Dd turn(random.uniform(-3.1, 3.1));
+    Frame frame{std::to_string(i), {}};
+    for (const Lamp& lamp : input.lamps.lamps) {
+      const Eigen::Vector2d from_camera_m = turn * (lamp.position_m.head<2>() - camera_m);
+      Eigen::Vector2d pixel = focal_px / height_m * from_camera_m;
+      pixel += Eigen::Vector2d(399.5, 299.5);
+      if (pixel.minCoeff() < 0 || pixel.x() > 799 || pixel.y() > 599) continue;
+      pixel += noise_px * Eigen::Vector2d(random.normal(), random.normal());
+      frame.detections.push_back({lamp.id, pixel, noise_px});
+    }
+    input.frames.push_back(frame);
+  }
+  EXPECT_TRUE(solve_levelling(input, false, {}).ok());
+  for (Lamp& lamp : input.lamps.lamps) lamp.position_m.y() *= -1;
+  const LevellingResult result = solve_levelling(input, false, {});
+  EXPECT_EQ(result.failure, StepFailure::wrong_map) << result.why;
+}
+
 }  // namespace
 }  // namespace vlp

@@ -235,7 +235,7 @@ class DisplacementTest {
     return high;
   }
 
-  /// Returns the bound of a drop of chi^2, of so many that are tested together.
+  /// Returns the bound of a drop of chi^2 if `tests` sets of `free` lamps are tested together.
   double bound(std::size_t free, double tests) const {
     const double exponent = -2 * std::log(kFalseAlarm / tests);
     if (variance_is_known_) return exponent;

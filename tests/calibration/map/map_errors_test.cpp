@@ -115,8 +115,7 @@ TEST_F(FindMapErrors, NamesALampOfWrongHeight) {
   }
 }
 
-/// In a large room few captures share lamps. With a mirrored map most detections are outliers, and
-/// those that are left may fit.
+/// In a large room each capture contains few of the lamps.
 TEST_F(FindMapErrors, ReturnsThatTheMapOfALargeRoomIsMirrored) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, reach_m = 1.9;
