@@ -106,8 +106,8 @@ ViewEquations equations_of(const CeilingView& view, const std::map<int, Eigen::I
 Eigen::MatrixXd gauge_basis(const std::vector<Eigen::Vector2d>& map_m) {
   Eigen::Vector2d mean_m(0, 0);
   for (const Eigen::Vector2d& lamp_m : map_m) mean_m += lamp_m / static_cast<double>(map_m.size());
-  std::vector<Eigen::Vector2d> centered_m;
-  for (const Eigen::Vector2d& lamp_m : map_m) centered_m.emplace_back(lamp_m - mean_m);
+  std::vector<Eigen::Vector2d> centered_m = map_m;
+  for (Eigen::Vector2d& lamp_m : centered_m) lamp_m -= mean_m;
   return similarity_basis(centered_m, std::vector<double>(centered_m.size(), 1));
 }
 
