@@ -19,13 +19,31 @@ double full_scale(const cv::Mat& image) {
   return image.depth() == CV_8U ? full_8 : full_16;
 }
 
-/// Returns the value that a fraction of the pixels does not exceed.
-double quantile(std::vector<float>& values, double fraction) {
-  const auto at = values.begin() +
-                  static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return double(*at);
-}
+/// Histogram of an image whose values are not negative.
+class Histogram {
+ public:
+  explicit Histogram(const cv::Mat1f& image) : counts_(kBins + 1), pixels_(image.total()) {
+    double max = 0;
+    cv::minMaxLoc(image, nullptr, &max);
+    if (max > 0) bins_per_value_ = static_cast<float>(kBins / max);
+    for (const float value : image) ++counts_[static_cast<std::size_t>(value * bins_per_value_)];
+  }
+
+  /// Returns the value that a fraction of the pixels does not exceed, to 1/2^14 of the largest.
+  double quantile(double fraction) const {
+    const double before = fraction * static_cast<double>(pixels_ - 1);
+    std::size_t bin = 0, pixels = counts_[0];
+    while (static_cast<double>(pixels) <= before) pixels += counts_[++bin];
+    constexpr double middle = 0.5;
+    return (static_cast<double>(bin) + middle) / static_cast<double>(bins_per_value_);
+  }
+
+ private:
+  static constexpr std::size_t kBins = 1 << 14;
+  std::vector<std::size_t> counts_;
+  std::size_t pixels_;
+  float bins_per_value_ = 1;
+};
 
 /// Returns the standard deviation of a pixel's noise, in levels.
 double estimate_noise(const cv::Mat& image) {
@@ -61,13 +79,12 @@ ImageBlur measure_blur(const cv::Mat& image) {
   cv::Mat1f smooth, along_x, along_y;
   image.convertTo(smooth, CV_32F, 1 / full_scale(image));
   cv::GaussianBlur(smooth, smooth, {}, smoothing_px);
-  std::vector<float> values(smooth.begin(), smooth.end());
-  const double bright = quantile(values, 0.99), dark = quantile(values, 0.01);
+  const Histogram levels(smooth);
+  const double bright = levels.quantile(0.99), dark = levels.quantile(0.01);
   cv::Scharr(smooth, along_x, CV_32F, 1, 0, 1.0 / 32);
   cv::Scharr(smooth, along_y, CV_32F, 0, 1, 1.0 / 32);
   cv::magnitude(along_x, along_y, along_x);
-  values.assign(along_x.begin(), along_x.end());
-  const double steepest = quantile(values, 0.999);
+  const double steepest = Histogram(along_x).quantile(0.999);
   constexpr double min_contrast = 0.02;
   if (bright - dark < min_contrast || steepest <= 0) {
     return {std::numeric_limits<double>::infinity(), bright};

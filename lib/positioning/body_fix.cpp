@@ -148,8 +148,8 @@ Matrix23 d_pixel(const BodySighting& sighting, const LampResidual& residual) {
 template <typename S>
 struct Linearized : Normal<S::kCount> {
   double chi_squared = 0;
-  /// Of the pixels' residuals.
-  double sum_px2 = 0;
+  /// Parts of the pixels' residuals.
+  double pixels_chi_squared = 0, sum_px2 = 0;
   bool lamps_ahead = true;
 
   Linearized(std::span<const BodySighting> sightings, const Eigen::Vector3d& arm_m,
@@ -173,6 +173,7 @@ struct Linearized : Normal<S::kCount> {
       chi_squared += square;
       sum_px2 += sighting.sigma_px * sighting.sigma_px * square;
     }
+    pixels_chi_squared = chi_squared;
     const BodyVector deviations = deviations_of(at.state, prior, weights);
     constexpr auto indices = S::indices();
     for (std::size_t i = 2; i < S::kCount; ++i) {
@@ -201,6 +202,7 @@ BodyFix finished(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
   fix.state = state;
   fix.state.pose.yaw_rad = wrapped_rad(state.pose.yaw_rad);
   fix.chi_squared = normal.chi_squared;
+  fix.pixels_chi_squared = normal.pixels_chi_squared;
   fix.residual_px = std::sqrt(normal.sum_px2 / lamps);
   fix.redundancy = 2 * lamps - static_cast<double>(S::kCount);
   constexpr auto indices = S::indices();

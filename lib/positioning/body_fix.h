@@ -71,7 +71,8 @@ struct BodyFix {
   BodyCovariance covariance = BodyCovariance::Zero();
   /// Of pixels and priors, over their variances: its mean is 2n - 4, with a known height 2n - 3.
   double chi_squared = 0;
-  /// Of the pixels' part of it: the mean that follows from the covariance.
+  /// The part of the pixels, and its mean, which follows from the covariance.
+  double pixels_chi_squared = 0;
   double redundancy = 0;
   /// Root of the mean squared distance, in the image, of the lamps from where the fix sees them.
   double residual_px = 0;

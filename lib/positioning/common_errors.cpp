@@ -303,6 +303,60 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::covariance
   return sum;
 }
 
+template <int States>
+double CommonErrors::expected_square(std::size_t i, const Effect& effect,
+                                     const Eigen::Matrix<double, 2, States>& by_state,
+                                     const GainOf<States>& gain) const {
+  GainOf<2> residual(shared());
+  residual.by_shared = effect.by_shared - by_state.lazyProduct(gain.by_shared);
+  for (std::size_t j = 0; j < gain.size; ++j) {
+    Eigen::Matrix<double, 2, 3> by_lamp = -by_state * gain.by_lamp[j];
+    if (i == j) by_lamp += effect.by_lamp;
+    residual.add(gain.lamps[j], by_lamp);
+  }
+  return covariance_of(residual).trace();
+}
+
+double CommonErrors::expected_chi_squared(std::span<const Sighting> sightings,
+                                          const PoseEstimate& camera, const Gain& gain,
+                                          const Lens& lens,
+                                          const Eigen::Matrix3d& level_from_base) const {
+  const LevelPose pose(camera.pose);
+  double sum = 0;
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const Sighting& sighting = sightings[i];
+    const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
+    Effect effect = effect_on(sighting, pose, lens, level_from_base);
+    effect.by_shared = (whitening * effect.by_shared).eval();
+    effect.by_lamp = (whitening * effect.by_lamp).eval();
+    const Eigen::Matrix<double, 2, 4> by_state =
+        whitening * predict(pose, sighting.lamp_m).d_z_d_state;
+    sum += expected_square<4>(i, effect, by_state, gain);
+  }
+  return sum;
+}
+
+double CommonErrors::expected_chi_squared(std::span<const BodySighting> sightings,
+                                          const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                          const BodyGain& gain, const Lens& lens,
+                                          const Eigen::Matrix3d& body_from_base) const {
+  const PosedBody body(fix.state);
+  double sum = 0;
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const BodySighting& seen = sightings[i];
+    const Eigen::Matrix<double, 2, 3> d_pixel =
+        d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
+    const Eigen::Matrix<double, 2, kBodyStates> by_state =
+        d_pixel.lazyProduct(body.d_lamp_in_body(seen.lamp_m, seen.time_s));
+    const Eigen::Matrix<double, 2, 3> by_ray = seen.whitened_pixel_from_ray * body_from_base;
+    const Effect effect{
+        by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens)),
+        by_state.leftCols<3>()};
+    sum += expected_square<kBodyStates>(i, effect, by_state, gain);
+  }
+  return sum;
+}
+
 template Matrix4 CommonErrors::covariance_of(const Gain& gain) const;
 template BodyCovariance CommonErrors::covariance_of(const BodyGain& gain) const;
 

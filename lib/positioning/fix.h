@@ -85,6 +85,12 @@ struct Fix {
   /// Degrees of freedom that the pixels' residuals have: 2n - 4 for three lamps and more that are
   /// seen from a body that stands and whose lean is known, less by what else they determine.
   double redundancy = 0;
+  /// Sum of the squared residuals of the pixels over their variances. Its expectation is
+  /// `redundancy` plus common_chi_squared.
+  double chi_squared = 0;
+  /// Expected contribution of the errors of calibration and lamp map to chi_squared, as far as they
+  /// are stated. 0 without PositionerOptions::expects_residuals.
+  double common_chi_squared = 0;
   /// Where Sensors let it move or lean.
   std::optional<BodyEstimate> body;
   /// That of the Sensors: the middle of the exposure of the image's middle row, of which the fix

@@ -150,10 +150,16 @@ class Positioner::Impl {
   std::size_t index_of(int id) const;
   void reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
                           ConsistentFix& solution) const;
+  /// Returns G C G', and states what C adds to the residuals of the fix if that is asked for.
   Matrix4 common_covariance(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
-                            const PoseEstimate& camera) const;
+                            Fix& fix) const;
   BodyCovariance common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
-                                   const BodyFix& fix) const;
+                                   const BodyFix& solution, Fix& fix) const;
+  /// States covariance and redundancy for equal noise in the image instead of noise that is equal
+  /// in the undistorted image, by which the fix of least squares weighs its sightings:
+  ///   A = N^-1 J' W,   cov = A V A',   redundancy = tr(W V) - tr(N cov),   N = J' W J.
+  void state_image_noise(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
+                         Fix& fix) const;
   /// Adds the covariances of a fix of lamps, and transfers it to the robot if there is a mount.
   void add_covariances(const SightedFrame& frame, const InclinationRotation& lean,
                        const InclinationJacobian& by_lean, double sigma_rad, Fix& fix) const;
@@ -174,6 +180,7 @@ class Positioner::Impl {
   Eigen::Matrix3d body_from_base_, body_from_camera_;
   double max_residual_share_;
   double unstated_sigma_px_;
+  bool expects_residuals_;
   /// Nothing when the calibration lacks the row time or the read-out.
   std::optional<RowClock> row_clock_;
 };
@@ -190,6 +197,7 @@ Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
       body_from_camera_(body_from_base_ * base_from_camera_),
       max_residual_share_(options.max_residual_share),
       unstated_sigma_px_(options.unstated_sigma_px),
+      expects_residuals_(options.expects_residuals),
       row_clock_(row_clock_of(calibration.camera)) {
   for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
   for (const Lamp& lamp : lamps_) nearest_m_.push_back(distance_to_nearest(lamps_, lamp));
@@ -267,20 +275,30 @@ void Positioner::Impl::reject_unexplained(SightedFrame& frame,
 
 Matrix4 Positioner::Impl::common_covariance(const SightedFrame& frame,
                                             const Eigen::Matrix3d& level_from_base,
-                                            const PoseEstimate& camera) const {
+                                            Fix& fix) const {
   std::array<std::size_t, max_lamps> lamps;
   for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = index_of(frame.ids[i]);
-  return common_.covariance_of(
-      common_.gain_of(frame.span(), {lamps.data(), frame.size}, camera, lens_, level_from_base));
+  const CommonErrors::Gain gain = common_.gain_of(frame.span(), {lamps.data(), frame.size},
+                                                  fix.estimate, lens_, level_from_base);
+  if (expects_residuals_ && fix.redundancy > 0) {
+    fix.common_chi_squared =
+        common_.expected_chi_squared(frame.span(), fix.estimate, gain, lens_, level_from_base);
+  }
+  return common_.covariance_of(gain);
 }
 
 BodyCovariance Positioner::Impl::common_covariance(const BodyFrame& frame,
                                                    const Eigen::Vector3d& arm_m,
-                                                   const BodyFix& fix) const {
+                                                   const BodyFix& solution, Fix& fix) const {
   std::array<std::size_t, max_lamps> lamps;
   for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = index_of(frame.ids[i]);
-  return common_.covariance_of(common_.gain_of(frame.span(), {lamps.data(), frame.size}, arm_m, fix,
-                                               lens_, body_from_base_));
+  const CommonErrors::BodyGain gain = common_.gain_of(frame.span(), {lamps.data(), frame.size},
+                                                      arm_m, solution, lens_, body_from_base_);
+  if (expects_residuals_ && fix.redundancy > 0) {
+    fix.common_chi_squared =
+        common_.expected_chi_squared(frame.span(), arm_m, solution, gain, lens_, body_from_base_);
+  }
+  return common_.covariance_of(gain);
 }
 
 FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
@@ -296,7 +314,11 @@ FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
     const Eigen::Matrix2d d_z_d_pixel =
         (d_direction.topRows<2>() - z * d_direction.row(2)) / direction.z();
     frame.sightings[frame.size] = {lamp.position_m, z, lens_.focal_px().asDiagonal(), sigma_px};
-    if (detection.sigma_px) frame.sightings[frame.size].d_pixel_d_z = d_z_d_pixel.inverse();
+    if (detection.sigma_px) {
+      frame.sightings[frame.size].d_pixel_d_z = d_z_d_pixel.inverse();
+    } else {
+      frame.is_weighed_by_noise = false;
+    }
     return FixStatus::ok;
   };
   return look_up(detections, frame, frame.unknown_lamps, add);
@@ -349,13 +371,14 @@ std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> dete
   const auto [status, solution] = fix_body_frame(frame, arm_m, prior, max_residual_share_);
   if (status != FixStatus::ok) return refused(status, fix.unknown_lamps);
   fix.status = status;
-  fix.body = in_world(solution, common_.stated() ? common_covariance(frame, arm_m, solution)
+  fix.redundancy = solution.redundancy;
+  fix.chi_squared = solution.pixels_chi_squared;
+  fix.body = in_world(solution, common_.stated() ? common_covariance(frame, arm_m, solution, fix)
                                                  : BodyCovariance(BodyCovariance::Zero()));
   fix.noise_covariance = fix.body->noise_covariance.topLeftCorner<4, 4>();
   fix.estimate = {solution.state.pose, fix.body->covariance.topLeftCorner<4, 4>()};
   fix.estimate.pose.position_m += origin_m_;
   fix.residual_px = solution.residual_px;
-  fix.redundancy = solution.redundancy;
   fix.lamps = static_cast<int>(frame.now);
   fix.sightings = static_cast<int>(frame.size);
   name_rejected(frame, fix);
@@ -373,12 +396,38 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   return locate(detections, sensors);
 }
 
+void Positioner::Impl::state_image_noise(const SightedFrame& frame,
+                                         const Eigen::Matrix3d& level_from_base, Fix& fix) const {
+  const LevelPose pose(fix.estimate.pose);
+  const Eigen::Matrix3d camera_from_level = (level_from_base * base_from_camera_).transpose();
+  const Matrix4 by_weights = fix.estimate.covariance;
+  Matrix4 covariance = Matrix4::Zero();
+  double expected_squares = 0;
+  for (const Sighting& sighting : frame.span()) {
+    const auto seen = lens_.project_with_jacobians(camera_from_level * sighting.z.homogeneous());
+    if (!seen) return;
+    const Eigen::Matrix2d d_pixel_d_z = seen->d_pixel_d_point * camera_from_level.leftCols<2>();
+    const Eigen::Matrix2d z_by_noise = sighting.sigma_px * d_pixel_d_z.inverse();
+    const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
+    const Eigen::Matrix2d residual_by_noise = whitening * z_by_noise;
+    const Eigen::Matrix<double, 4, 2> fix_by_noise =
+        by_weights * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
+        whitening.transpose() * residual_by_noise;
+    covariance += fix_by_noise * fix_by_noise.transpose();
+    expected_squares += residual_by_noise.squaredNorm();
+  }
+  if (fix.redundancy > 0) {
+    fix.redundancy = expected_squares - (by_weights.inverse() * covariance).trace();
+  }
+  fix.estimate.covariance = covariance;
+}
+
 void Positioner::Impl::add_covariances(const SightedFrame& frame, const InclinationRotation& lean,
                                        const InclinationJacobian& by_lean, double sigma_rad,
                                        Fix& fix) const {
-  const Matrix4 common = common_.stated()
-                             ? common_covariance(frame, lean.level_from_base, fix.estimate)
-                             : Matrix4(Matrix4::Zero());
+  const Matrix4 common = common_.stated() ? common_covariance(frame, lean.level_from_base, fix)
+                                          : Matrix4(Matrix4::Zero());
+  if (!frame.is_weighed_by_noise) state_image_noise(frame, lean.level_from_base, fix);
   // The error of the inclination is of this frame, too.
   if (mount_) {
     PoseEstimate whole = fix.estimate;
@@ -421,6 +470,7 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
     if (status != FixStatus::ok) return refused(status, frame.unknown_lamps);
     fix.estimate = {solution.pose, solution.covariance};
     fix.residual_px = solution.residual_px;
+    fix.chi_squared = solution.chi_squared;
     if (sigma_rad > 0) by_lean = rotation_effect(frame.span(), solution) * lean.error_axes;
   } else if (frame.size == 1 && sensors.height_and_yaw) {
     const Sighting& sighting = frame.sightings.front();

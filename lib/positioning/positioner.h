@@ -32,14 +32,14 @@ struct PositionerOptions {
   /// the spread (rms) of all lamps in the image (or too near to another lamp, see fix_robustly).
   /// Noise, lens and a tilt of 5 degrees that nothing corrects put it off by 0.05 or less.
   double max_residual_share = 0.1;
-  /// For detections that do not state their sigma_px: the standard deviation per axis in the
-  /// undistorted image, f * (x/z, y/z) + c of the level camera. Stated noise is of the image as
-  /// taken, and weighs a lamp by how the lens squeezes the image there; where nothing is known
-  /// of it, lamps weigh alike in direction, as in the closed forms. Poses do not depend on this
-  /// figure, unless something is known of motion or lean with a standard deviation, against which
-  /// it weighs the pixels; their covariance does, and whether lamps close together are
-  /// `degenerate`.
+  /// Standard deviation per axis, in the image, of detections that do not state their sigma_px. It
+  /// scales the covariance, and decides whether lamps close together are `degenerate`. Poses do not
+  /// depend on it, unless motion, inclination or height is known with a standard deviation.
+  /// Of a camera that stands, such lamps weigh alike in direction, as in the closed forms, which
+  /// errors of lens, lean and map disturb less than weights by the image as taken.
   double unstated_sigma_px = 1;
+  /// Computes Fix::common_chi_squared, which takes several times as long as the fix.
+  bool expects_residuals = false;
 };
 
 /// How a robot, or, without a mount, a camera, moves while an image is read: normal about these

@@ -9,15 +9,35 @@
 
 namespace vlp {
 
-std::optional<double> residual_noise_px(std::span<const Fix> fixes) {
-  double sum_of_squares = 0, degrees_of_freedom = 0;
+ResidualSums sum_residuals(std::span<const Fix> fixes) {
+  ResidualSums sums;
   for (const Fix& fix : fixes) {
     if (!fix.ok() || !(fix.redundancy > 0)) continue;
-    sum_of_squares += fix.sightings * fix.residual_px * fix.residual_px;
-    degrees_of_freedom += fix.redundancy;
+    sums.squares_px2 += fix.sightings * fix.residual_px * fix.residual_px;
+    sums.chi_squared += fix.chi_squared;
+    sums.common_chi_squared += fix.common_chi_squared;
+    sums.degrees_of_freedom += fix.redundancy;
   }
-  if (!(degrees_of_freedom > 0)) return std::nullopt;
-  return std::clamp(std::sqrt(sum_of_squares / degrees_of_freedom), kMinSigma_px, kMaxSigma_px);
+  return sums;
+}
+
+std::optional<double> residual_noise_px(const ResidualSums& sums) {
+  if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
+  return std::clamp(std::sqrt(sums.squares_px2 / sums.degrees_of_freedom), kMinSigma_px,
+                    kMaxSigma_px);
+}
+
+std::optional<double> estimate_noise_factor(const ResidualSums& sums) {
+  if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
+  return std::sqrt(std::max(0.0, sums.chi_squared - sums.common_chi_squared) /
+                   sums.degrees_of_freedom);
+}
+
+double noise_understatement(const ResidualSums& sums) {
+  constexpr double min_degrees_of_freedom = 12;
+  if (sums.degrees_of_freedom < min_degrees_of_freedom) return 1;
+  const double own = sums.chi_squared - 2 * sums.common_chi_squared;
+  return std::sqrt(std::max(1.0, own / sums.degrees_of_freedom));
 }
 
 }  // namespace vlp

@@ -57,6 +57,8 @@ struct SightedFrame {
   std::size_t size = 0;
   /// Whether every sigma_px is one that a detector stated.
   bool noise_is_stated = true;
+  /// False if sightings are weighed in the undistorted image, which has other noise.
+  bool is_weighed_by_noise = true;
   int unknown_lamps = 0;
   int rejected_lamps = 0;
   std::array<int, kMaxSightings> rejected_ids;

@@ -57,7 +57,7 @@ typedef struct vlp_options {
   double mount_yaw_rad;
   /* PositionerOptions::max_residual_share, 0.1 when 0. */
   double max_residual_share;
-  /* Standard deviation of detections that state none, in the undistorted image; 1 when 0. */
+  /* Standard deviation per axis of detections that state none, in pixels; 1 when 0. */
   double unstated_sigma_px;
 } vlp_options;
 

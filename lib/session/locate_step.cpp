@@ -158,15 +158,62 @@ void warn_of_noise(LocateResult& result, const std::vector<Frame>& frames) {
     }
   }
   constexpr double too_noisy = 3;
-  const auto shown_px = residual_noise_px(result.fixes);
+  const auto shown_px = residual_noise_px(sum_residuals(result.fixes));
   if (shown_px && stated_px > 0) {
     result.metrics.push_back({"residual_ratio", *shown_px / stated_px});
   }
   if (!shown_px || *shown_px <= too_noisy * stated_px) return;
   result.warnings.push_back(fmt::format(
-      "the residuals show {:.2g} px of noise, {:.2g} px are stated: sd is too small; are "
+      "the residuals show {:.2g} px of noise, {:.2g} px are stated: sd follows the residuals; are "
       "calibration and lamp map right and complete?",
       *shown_px, stated_px));
+}
+
+/// Locates all frames and computes what stated errors of calibration and map add to the residuals.
+std::vector<Fix> locate_with_expected_residuals(const LocateInput& input) {
+  PositionerOptions how = input.how;
+  how.expects_residuals = true;
+  return locate_all(input, how);
+}
+
+/// Multiplies the stated noise of all detections.
+LocateInput with_noise_factor(LocateInput input, double factor) {
+  for (Frame& frame : input.frames) {
+    for (Detection& detection : frame.detections) {
+      detection.sigma_px = std::min(*detection.sigma_px * factor, kMaxSigma_px);
+    }
+  }
+  return input;
+}
+
+/// Locates all frames, with the noise that the residuals show: in place of noise that is not
+/// stated, and where stated noise is too small. Returns true if the noise is known.
+bool locate_with_noise(const LocateInput& input, LocateResult& result) {
+  result.fixes = locate_with_expected_residuals(input);
+  const ResidualSums residuals = sum_residuals(result.fixes);
+  if (std::all_of(input.frames.begin(), input.frames.end(), states_sigma)) {
+    warn_of_noise(result, input.frames);
+    const double factor = noise_understatement(residuals);
+    const double chance = 3 * std::sqrt(0.5 / residuals.degrees_of_freedom);
+    if (factor > 1 + chance) {
+      result.notes.push_back(
+          fmt::format("residuals are {:.2f} times the stated noise: sd follows them", factor));
+    }
+    if (factor > 1) result.fixes = locate_all(with_noise_factor(input, factor), input.how);
+    return true;
+  }
+  const auto factor = estimate_noise_factor(residuals);
+  if (!factor) {
+    result.warnings.emplace_back(
+        "sigma_px is not stated and no residuals show it: sd columns are empty");
+    return false;
+  }
+  PositionerOptions how = input.how;
+  how.unstated_sigma_px = std::clamp(how.unstated_sigma_px * *factor, kMinSigma_px, kMaxSigma_px);
+  result.notes.push_back(fmt::format("sigma_px is not stated: {:.3g} px taken from the residuals",
+                                     how.unstated_sigma_px));
+  result.fixes = locate_all(input, how);
+  return true;
 }
 
 void warn_of_map(LocateResult& result, const LocateInput& input) {
@@ -283,23 +330,7 @@ LocateResult locate_frames(const LocateInput& input) {
   if (input.sigma_px) return locate_frames(with_sigma(input));
   check_motion(input);
   LocateResult result;
-  PositionerOptions how = input.how;
-  result.fixes = locate_all(input, how);
-  const bool stated = std::all_of(input.frames.begin(), input.frames.end(), states_sigma);
-  bool noise_known = stated;
-  if (!stated) {
-    if (const auto noise_px = residual_noise_px(result.fixes)) {
-      result.notes.push_back(
-          fmt::format("sigma_px is not stated: {:.3g} px taken from the residuals", *noise_px));
-      how.unstated_sigma_px = *noise_px;
-      noise_known = true;
-      result.fixes = locate_all(input, how);
-    } else {
-      result.warnings.emplace_back(
-          "sigma_px is not stated and no residuals show it: sd columns are empty");
-    }
-  }
-  if (stated) warn_of_noise(result, input.frames);
+  const bool noise_known = locate_with_noise(input, result);
   result.rows.reserve(result.fixes.size());
   for (std::size_t i = 0; i < result.fixes.size(); ++i) {
     result.rows.push_back(row_of(input.frames[i], input.captures, result.fixes[i], noise_known));

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 
 #include "session/adjust_step.h"
@@ -37,9 +38,10 @@ class MovedLamp : public testing::Test {
     for (int i = 0; i < count; ++i) {
       rig.camera = {place_m, 2 * std::numbers::pi * (i + 0.1 * random.uniform(0, 1)) / count};
       std::vector<Detection> seen = with_noise(seen_from(rig, 0.006), random);
-      const auto [width_px, height_px] = rig.calibration.camera.imager_px;
+      const std::array<int, 2> imager_px = rig.calibration.camera.imager_px;
       std::erase_if(seen, [&](const Detection& one) {
-        return one.pixel.minCoeff() < 0 || one.pixel.x() > width_px || one.pixel.y() > height_px;
+        return one.pixel.minCoeff() < 0 || one.pixel.x() > imager_px[0] ||
+               one.pixel.y() > imager_px[1];
       });
       frames.push_back({std::to_string(frames.size()), seen});
     }

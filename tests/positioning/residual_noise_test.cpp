@@ -1,0 +1,111 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/residual_noise.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "positioning/positioner.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kPixelSd_px = 0.3;
+
+Fix fix_with(double chi_squared, double common_chi_squared, double degrees_of_freedom) {
+  Fix fix;
+  fix.status = FixStatus::ok;
+  fix.chi_squared = chi_squared;
+  fix.common_chi_squared = common_chi_squared;
+  fix.redundancy = degrees_of_freedom;
+  fix.sightings = 4;
+  fix.residual_px = 0.5;
+  return fix;
+}
+
+TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
+  const std::vector<Fix> fixes{fix_with(12, 2, 8), Fix(), fix_with(5, 1, 0), fix_with(6, 0, 4)};
+  const ResidualSums sums = sum_residuals(fixes);
+  EXPECT_EQ(sums.degrees_of_freedom, 12);
+  EXPECT_EQ(sums.chi_squared, 18);
+  EXPECT_EQ(sums.common_chi_squared, 2);
+  EXPECT_EQ(sums.squares_px2, 2);
+}
+
+TEST(EstimateNoiseFactor, SubtractsCommonErrors) {
+  EXPECT_DOUBLE_EQ(*estimate_noise_factor({.chi_squared = 36, .degrees_of_freedom = 9}), 2);
+  EXPECT_DOUBLE_EQ(*estimate_noise_factor(
+                       {.chi_squared = 36, .common_chi_squared = 27, .degrees_of_freedom = 9}),
+                   1);
+  EXPECT_EQ(
+      *estimate_noise_factor({.chi_squared = 9, .common_chi_squared = 27, .degrees_of_freedom = 9}),
+      0);
+  EXPECT_FALSE(estimate_noise_factor({}));
+}
+
+TEST(NoiseUnderstatement, IsOneWhereResidualsAreNotLarger) {
+  EXPECT_EQ(noise_understatement({.chi_squared = 10, .degrees_of_freedom = 20}), 1);
+  EXPECT_EQ(noise_understatement({.chi_squared = 40, .degrees_of_freedom = 10}), 1);
+  EXPECT_DOUBLE_EQ(noise_understatement({.chi_squared = 80, .degrees_of_freedom = 20}), 2);
+  EXPECT_EQ(
+      noise_understatement({.chi_squared = 80, .common_chi_squared = 30, .degrees_of_freedom = 20}),
+      1);
+}
+
+/// Mean of chi_squared over fixes of a rig whose lamps hang at drawn distances from the map.
+class ExpectedChiSquared : public testing::Test {
+ protected:
+  void SetUp() override {
+    rig.map = synthetic_lamps();
+    for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
+  }
+
+  void expect_mean(const Sensors& sensors) {
+    constexpr int draws = 4000;
+    PositionerOptions options;
+    options.expects_residuals = true;
+    options.max_residual_share = std::numeric_limits<double>::max();
+    const Positioner positioner(rig.map, rig.calibration, options);
+    double found = 0, expected = 0, common = 0;
+    for (int i = 0; i < draws; ++i) {
+      SyntheticRig real = rig;
+      for (Lamp& lamp : real.map.lamps) {
+        for (double& coordinate : lamp.position_m) coordinate += *lamp.sd_m * random.normal();
+      }
+      const double sd_rad = sensors.inclination_sigma_rad;
+      real.inclination = Inclination{sd_rad * random.normal(), sd_rad * random.normal()};
+      const Fix fix = positioner.locate(with_noise(seen_from(real, kPixelSd_px), random), sensors);
+      // The draws that are refused or lose a lamp have the largest residuals: 1 in 10,000.
+      if (!fix.ok() || fix.rejected_lamps > 0) continue;
+      found += fix.chi_squared;
+      expected += fix.redundancy + fix.common_chi_squared;
+      common += fix.common_chi_squared;
+    }
+    EXPECT_GT(common, 0.2 * expected);
+    EXPECT_NEAR(found / expected, 1, 0.03);
+  }
+
+  SyntheticRig rig{{}, {synthetic_camera(), {}, {}, {}, {}}, {{0.1, -0.05, 0}, 0.4}, {}};
+  Random random{5};
+};
+
+TEST_F(ExpectedChiSquared, IsMeanOfFixesOfStandingCamera) { expect_mean({}); }
+
+TEST_F(ExpectedChiSquared, IsMeanOfFixesWithEstimatedLean) {
+  Sensors sensors;
+  sensors.inclination_sigma_rad = 0.01;
+  expect_mean(sensors);
+}
+
+TEST_F(ExpectedChiSquared, IsZeroUnlessRequested) {
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, kPixelSd_px));
+  ASSERT_TRUE(fix.ok());
+  EXPECT_EQ(fix.common_chi_squared, 0);
+}
+
+}  // namespace
+}  // namespace vlp

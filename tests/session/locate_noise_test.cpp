@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Standard deviations of fixes whose detections state no noise, or too little of it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "session/locate_step.h"
+#include "support/synthetic_rig.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kNoise_px = 0.3;
+
+enum class Noise { stated, not_stated, too_small };
+
+struct Case {
+  const char* name;
+  double map_sd_m;
+  Noise noise;
+};
+
+/// Prints a case as its name, in place of its bytes.
+void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
+
+class LocateNoise : public testing::TestWithParam<Case> {
+ protected:
+  /// Draws three captures, under lamps at drawn distances from the map.
+  LocateInput draw_captures() {
+    SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
+    LocateInput input{{}, rig.map, rig.calibration};
+    for (std::size_t i = 0; i < rig.map.lamps.size(); ++i) {
+      input.lamps.lamps[i].sd_m = GetParam().map_sd_m;
+      for (double& coordinate : rig.map.lamps[i].position_m) {
+        coordinate += GetParam().map_sd_m * random.normal();
+      }
+    }
+    truth.clear();
+    for (int k = 0; k < 3; ++k) {
+      rig.camera = {{random.uniform(-0.3, 0.3), random.uniform(-0.2, 0.2), 0},
+                    random.uniform(-3, 3)};
+      truth.push_back(rig.camera);
+      std::vector<Detection> seen = with_noise(seen_from(rig, kNoise_px), random);
+      std::erase_if(seen, [](const Detection& one) {
+        return one.pixel.minCoeff() < 0 || one.pixel.x() > 800 || one.pixel.y() > 600;
+      });
+      for (Detection& detection : seen) {
+        if (GetParam().noise == Noise::not_stated) detection.sigma_px.reset();
+        if (GetParam().noise == Noise::too_small) detection.sigma_px = kNoise_px / 1.4;
+      }
+      input.frames.push_back({std::to_string(k), seen});
+    }
+    return input;
+  }
+
+  Random random{17};
+  std::vector<Pose> truth;
+};
+
+TEST_P(LocateNoise, StandardDeviationsMatchTheErrors) {
+  constexpr int draws = 500;
+  Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+  int fixes = 0, within = 0;
+  for (int i = 0; i < draws; ++i) {
+    const LocateResult found = locate_frames(draw_captures());
+    ASSERT_TRUE(found.ok());
+    for (std::size_t k = 0; k < truth.size(); ++k) {
+      const auto& fix = found.rows[k].fix;
+      if (!fix) continue;
+      ASSERT_TRUE(fix->sd);
+      Eigen::Vector4d error;
+      error << fix->pose.position_m - truth[k].position_m,
+          std::remainder(fix->pose.yaw_rad - truth[k].yaw_rad, 2 * M_PI);
+      const Eigen::Array4d normalized = error.array() / fix->sd->array();
+      squares += normalized.square().matrix();
+      within += static_cast<int>((normalized.abs() <= 1.96).count());
+      ++fixes;
+    }
+  }
+  ASSERT_GT(fixes, 0.95 * 3 * draws);
+  const Eigen::Vector4d ratio = (squares / fixes).cwiseSqrt();
+  const double coverage = within / (4.0 * fixes);
+  EXPECT_GT(ratio.minCoeff(), 0.85) << ratio.transpose();
+  EXPECT_LT(ratio.maxCoeff(), 1.2) << ratio.transpose();
+  EXPECT_GT(coverage, 0.93);
+  EXPECT_LT(coverage, 0.97);
+}
+
+INSTANTIATE_TEST_SUITE_P(Rooms, LocateNoise,
+                         testing::Values(Case{"Stated", 0, Noise::stated},
+                                         Case{"NotStated", 0, Noise::not_stated},
+                                         Case{"TooSmall", 0, Noise::too_small},
+                                         Case{"MapErrors", 0.002, Noise::stated},
+                                         Case{"MapErrorsNotStated", 0.002, Noise::not_stated}),
+                         [](const auto& one) { return one.param.name; });
+
+TEST(LocateNoise, NotesResidualsThatExceedStatedNoise) {
+  SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
+  Random random(3);
+  LocateInput input{{}, rig.map, rig.calibration};
+  for (int k = 0; k < 12; ++k) {
+    rig.camera = {{0.05 * k - 0.3, 0, 0}, 0.5 * k};
+    input.frames.push_back({std::to_string(k), with_noise(seen_from(rig, kNoise_px), random)});
+    for (Detection& detection : input.frames.back().detections) detection.sigma_px = kNoise_px / 2;
+  }
+  const LocateResult found = locate_frames(input);
+  ASSERT_TRUE(found.ok());
+  ASSERT_EQ(found.notes.size(), 1U);
+  EXPECT_NE(found.notes[0].find("times the stated noise: sd follows them"), std::string::npos)
+      << found.notes[0];
+}
+
+}  // namespace
+}  // namespace vlp
