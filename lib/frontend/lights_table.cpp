@@ -17,7 +17,7 @@ namespace {
 std::string_view outline_name(const Light& light) {
   if (light.kind == LightKind::formless) return "";
   if (light.glows) return "glow";
-  if (is_rectangle(light)) return "rectangle";
+  if (!is_disc(light)) return traits_of(light.shape).name;
   return light.uneven ? "rim" : "edge";
 }
 
@@ -138,7 +138,7 @@ std::string line_of(const Light& light) {
   const Stripes& stripes = light.stripes;
   line +=
       fmt::format(", {} {:.0f} % {}, contrast {:.2f}", outline_name(light), 100 * light.roundness,
-                  is_rectangle(light) ? "straight" : "round", stripes.contrast);
+                  traits_of(light.shape).is_round ? "round" : "straight", stripes.contrast);
   if (!(stripes.period_lines > 0)) return line;
   return line + fmt::format(", {:.1f} periods of {:.2f} lines, clarity {:.2f}, coherence {:.2f}",
                             stripes.periods, stripes.period_lines, stripes.clarity,

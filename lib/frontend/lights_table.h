@@ -38,7 +38,7 @@ std::string explanation_of(LightReason reason);
 std::string line_of(const Light& light);
 
 /// Writes `lights.csv`, whole or not at all, a row a light: image, kind, reason (name_of() both),
-/// lamp, u_px, v_px, sigma_px, radius_px, outline (edge, rim, glow or rectangle), rise_px,
+/// lamp, u_px, v_px, sigma_px, radius_px, outline (edge, rim, glow or shape), rise_px,
 /// roundness, contrast, period_lines, periods, clarity, coherence, duty; see Light and Stripes.
 /// What a light does not have is empty: a lamp, stripes, an outline. Throws InputError.
 void write_lights(const std::filesystem::path& file, std::span<const Observation> images);

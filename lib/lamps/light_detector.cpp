@@ -3,6 +3,7 @@
 #include "lamps/light_detector.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -28,6 +29,14 @@
 namespace vlp {
 
 namespace {
+
+/// Fits a light to a blob with the outline of outline_of(), for lamps of one shape with the sizes
+/// `sizes_m`; std::nullopt if it has another shape. See rectangle_of().
+using ShapeDetector = decltype(&rectangle_of);
+
+/// Detectors of all shapes but discs, see LightShape, in the order in which they are tried.
+constexpr auto kShapeDetectors =
+    std::to_array<std::pair<ShapeKind, ShapeDetector>>({{ShapeKind::rectangle, &rectangle_of}});
 
 /// Returns the largest number of lines without light between two stripes of a lamp.
 int max_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_time_s) {
@@ -138,7 +147,7 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
       classifier_(std::move(classifier)),
       max_dark_rows_(max_dark_rows_of(lamps, camera.row_time_s)) {
   for (const Lamp& lamp : lamps_.lamps) {
-    if (lamp.rectangle) rectangle_sizes_m_.push_back(lamp.rectangle->size_m);
+    if (lamp.shape.size_m) sizes_m_[lamp.shape.kind].push_back(*lamp.shape.size_m);
   }
   if (!camera_.row_time_s || classifier_) return;
   for (const Lamp& lamp : lamps_.lamps) {
@@ -181,8 +190,11 @@ std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blo
   const PixelBox box = blob.box();
   std::vector<LightPart> parts;
   auto rest = outline_of(lines, blob, background);
-  if (!rectangle_sizes_m_.empty()) {
-    if (auto light = rectangle_of(lines, blob, rest, background, shape_, rectangle_sizes_m_)) {
+  for (const auto& [kind, detect] : kShapeDetectors) {
+    const auto sizes_m = sizes_m_.find(kind);
+    if (sizes_m == sizes_m_.end()) continue;
+    if (auto light = detect(lines, blob, rest, background, shape_, sizes_m->second)) {
+      light->shape = kind;
       return {{std::move(light), {}, box}};
     }
   }
@@ -257,14 +269,13 @@ void LightDetector::measure(const ImageView& lines, const Background& background
     light.stripes = stripes_of(signal);
     light.peak = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
     if (light.stripes.period_lines > 0) {
-      const auto chords = is_rectangle(light)
-                              ? chords_within(shape_.turned(light.face), lines.size())
-                              : chords_of(from, to, lines.size());
+      const auto chords = is_disc(light) ? chords_of(from, to, lines.size())
+                                         : chords_within(shape_.turned(light.face), lines.size());
       light.coherence = coherence_of(lines, chords, background, light.stripes.period_lines);
     }
     if (light.stripes.contrast < kMinContrast) light.clipped = clipped_fraction(lines, from, to);
   };
-  if (is_rectangle(light)) {
+  if (!is_disc(light)) {
     const auto chords = chords_within(shape_.turned(light.face), lines.size());
     return judge(line_signal(lines, chords, background.level));
   }
@@ -323,8 +334,8 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
 
 namespace {
 
-/// Adds the error of a partly hidden rectangle to its sigma. If its ratio of sides is not that of
-/// the lamp, something may hide one end: the centre of the visible part has half of that offset.
+/// Adds the error of a partly hidden light to its sigma. If its ratio of axes is not that of the
+/// lamp, something may hide one end: the centre of the visible part has half of that offset.
 void add_hidden_end(double off, double leaned_off, Light& light) {
   constexpr double clear = 3;
   if (!(off > leaned_off + clear * light.aspect_sd)) return;
@@ -419,10 +430,9 @@ std::optional<double> LightDetector::shape_off(const Light& light, int lamp) con
   // An unknown lens changes the ratio of the sides by more than a lean.
   const double max_off = shape_.has_lens() ? 2 * kLeanedOff : 0.3;
   const Lamp* mapped = find_lamp(lamps_.lamps, lamp);  // a classifier may know others
-  const auto rectangle = mapped != nullptr ? mapped->rectangle : std::nullopt;
-  if (rectangle.has_value() != is_rectangle(light)) return std::nullopt;
-  if (!rectangle) return 0;
-  const double aspect = rectangle->size_m.maxCoeff() / rectangle->size_m.minCoeff();
+  const LampShape shape = mapped != nullptr ? mapped->shape : LampShape();
+  if (shape.kind != light.shape) return std::nullopt;
+  const double aspect = shape.size_m ? shape.size_m->maxCoeff() / shape.size_m->minCoeff() : 1;
   const double off = std::abs(std::log(light.aspect / aspect));
   return off < max_off ? std::optional(off) : std::nullopt;
 }
@@ -449,7 +459,7 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
     const auto off = shape_off(light, *light.lamp);
     if (!off) {
       refuse(light, LightReason::wrong_shape);
-    } else if (is_rectangle(light) && shape_.has_lens()) {
+    } else if (shape_.has_lens()) {
       add_hidden_end(*off, shape_.knows_level() ? 0 : kLeanedOff, light);
     }
     if (light.lamp && !light.glows) brightest = std::max(brightest, light.peak);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -26,9 +27,9 @@ DetectorCamera detector_camera(const Calibration& calibration);
 /// Finds and identifies the lamps of a map in images of a rolling shutter. Const and safe to share
 /// between threads.
 ///
-/// Centre: from the outline of the lit lines, never from brightness, see LightShape. Rectangles are
-/// searched if the map has one, see rectangle_of(). Where no light with a clear outline is
-/// identified, lights are found by their modulation, whatever their shape, see
+/// Centre: from the outline of the lit lines, never from brightness, see LightShape. Other
+/// shapes are searched if the map has them, see ShapeDetector. Where no light with a clear outline
+/// is identified, lights are found by their modulation, whatever their shape, see
 /// find_modulated_lights(). Their centre is that of their rim, see rim_of(), or, without a clear
 /// one, of the area that they light.
 ///
@@ -64,8 +65,8 @@ class LightDetector {
   /// Corrects the centres of partly visible lights for the motion of the camera, see Shear.
   void correct_shear(std::vector<Light>& lights) const;
   void identify(std::vector<Light>& lights, const ImageSize& size) const;
-  /// Returns the difference between the logarithms of the ratios of sides of a light and a lamp, 0
-  /// for discs; std::nullopt if the light has another shape.
+  /// Returns the difference between the logarithms of the ratios of axes of a light and a lamp;
+  /// std::nullopt if the light has another shape.
   std::optional<double> shape_off(const Light& light, int lamp) const;
   /// Returns the lamp with these stripes; std::nullopt if none or two agree.
   std::optional<int> lamp_of(const Stripes& stripes) const;
@@ -75,8 +76,8 @@ class LightDetector {
   LightShape shape_;
   std::optional<LampClassifier> classifier_;
   int max_dark_rows_;
-  /// Sizes of the map's rectangles.
-  std::vector<Eigen::Vector2d> rectangle_sizes_m_;
+  /// Sizes of the map's lamps of each shape.
+  std::map<ShapeKind, std::vector<Eigen::Vector2d>> sizes_m_;
   /// Different periods of the map's lamps, in lines, and the lamp of each; std::nullopt where
   /// several lamps share it. Empty where the row time is not known or a classifier decides.
   std::vector<double> lamp_periods_;

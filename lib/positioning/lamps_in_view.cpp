@@ -3,8 +3,6 @@
 #include "positioning/lamps_in_view.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 namespace vlp {
 
@@ -20,18 +18,8 @@ std::vector<std::size_t> lamps_in_view(const LampMap& map, const Lens& lens,
   const auto seen_whole = [&](const Lamp& lamp) {
     if (lamp.position_m.z() <= level.position_m.z()) return false;
     if (!in_image(lamp.position_m)) return false;
-    if (lamp.rectangle) {
-      const auto corners = corners_of(*lamp.rectangle, lamp.position_m);
-      return std::all_of(corners.begin(), corners.end(), in_image);
-    }
-    constexpr int rim_points = 16;
-    const double radius_m = lamp.diameter_m.value_or(0) / 2;
-    for (int i = 0; i < rim_points && radius_m > 0; ++i) {
-      const double angle_rad = 2 * std::numbers::pi * i / rim_points;
-      const Eigen::Vector3d rim(std::cos(angle_rad), std::sin(angle_rad), 0);
-      if (!in_image(lamp.position_m + radius_m * rim)) return false;
-    }
-    return true;
+    const auto outline_m = outline_of(lamp.shape, lamp.position_m);
+    return std::all_of(outline_m.begin(), outline_m.end(), in_image);
   };
   std::vector<std::size_t> seen;
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {

@@ -3,7 +3,6 @@
 #include "rig/lamp_map.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "rig/file.h"
@@ -16,8 +15,6 @@ namespace {
 
 constexpr const char* kLampsFormat = "vlp-lamps/1";
 constexpr double kTooHigh_m = 200;  // a ceiling above this was given in millimetres
-constexpr double kSmallest_m = 1e-3, kLargest_m = 10;  // of a lamp
-constexpr double kLargestYaw_rad = 6.3;                // a turn; beyond it was given in degrees
 constexpr double kCoincident_m = 1e-3;
 constexpr double kWorstSurvey_m = 1;  // beyond it was given in millimetres
 
@@ -29,46 +26,17 @@ std::optional<double> optional_within(YamlMap& map, const std::string& key, doub
 
 }  // namespace
 
-std::optional<LampRectangle> read_rectangle(YamlMap& map) {
-  const auto shape = map.optional("shape");
-  const auto size = map.optional("size_m"), yaw = map.optional("yaw_rad");
-  const std::string word = shape ? shape->text() : "disc";
-  if (word == "disc") {
-    if (!size && !yaw) return std::nullopt;
-    throw(size ? size : yaw)->error("is of a rectangle: say 'shape: rectangle', too");
-  }
-  if (word != "rectangle") throw shape->unknown("disc, rectangle");
-  if (const auto diameter = map.optional("diameter_m")) {
-    throw diameter->error("is of a disc, and this is a rectangle: it has a size_m");
-  }
-  const YamlValue sides = map.required("size_m");
-  const LampRectangle rectangle{
-      Eigen::Vector2d(sides.numbers(2).data()),
-      yaw ? yaw->number_within(-kLargestYaw_rad, kLargestYaw_rad, "rad") : 0};
-  for (const YamlValue& side : sides.list()) side.number_within(kSmallest_m, kLargest_m, "m");
-  return rectangle;
-}
-
 Lamp read_lamp(YamlMap& map) {
   Lamp lamp;
   lamp.id = map.required("id").integer_within(0, std::numeric_limits<int>::max());
   const auto position = map.required("position_m");
   lamp.position_m = Eigen::Vector3d(position.numbers(3).data());
   position.list()[2].number_within(-kTooHigh_m, kTooHigh_m, "m");
-  lamp.diameter_m = optional_within(map, "diameter_m", kSmallest_m, kLargest_m, "m");
+  lamp.shape = read_shape(map);
   lamp.frequency_hz = optional_within(map, "frequency_hz", 50, 1e6, "Hz");
   lamp.duty = optional_within(map, "duty", 0.01, 0.99, "(a share of the period)");
   lamp.sd_m = optional_within(map, "sd_m", 0, kWorstSurvey_m, "m");
-  lamp.rectangle = read_rectangle(map);
   return lamp;
-}
-
-std::array<Eigen::Vector3d, 4> corners_of(const LampRectangle& rectangle,
-                                          const Eigen::Vector3d& center_m) {
-  const double cosine = std::cos(rectangle.yaw_rad), sine = std::sin(rectangle.yaw_rad);
-  const Eigen::Vector3d a = rectangle.size_m.x() / 2 * Eigen::Vector3d(cosine, sine, 0);
-  const Eigen::Vector3d b = rectangle.size_m.y() / 2 * Eigen::Vector3d(-sine, cosine, 0);
-  return {center_m - a - b, center_m + a - b, center_m + a + b, center_m - a + b};
 }
 
 void check_lamp(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item) {
@@ -116,12 +84,7 @@ void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {
     out << YAML::Flow << YAML::BeginMap;
     emit_integer(out, "id", lamp.id);
     emit_numbers(out, "position_m", lamp.position_m);
-    if (lamp.diameter_m) emit_number(out, "diameter_m", *lamp.diameter_m);
-    if (lamp.rectangle) {
-      emit_word(out, "shape", "rectangle");
-      emit_numbers(out, "size_m", lamp.rectangle->size_m);
-      emit_number(out, "yaw_rad", lamp.rectangle->yaw_rad);
-    }
+    emit_shape(out, lamp.shape);
     if (lamp.frequency_hz) emit_number(out, "frequency_hz", *lamp.frequency_hz);
     if (lamp.duty) emit_number(out, "duty", *lamp.duty);
     if (lamp.sd_m) emit_number(out, "sd_m", *lamp.sd_m);

@@ -15,10 +15,13 @@ namespace vlp {
 /// fields of what it returns and leaves finish() to the caller, who may have keys of its own.
 /// Throws InputError.
 Lamp read_lamp(YamlMap& map);
-/// The keys of a shape, see datasets/README.md; nothing of a disc, which has none of a rectangle's.
-std::optional<LampRectangle> read_rectangle(YamlMap& map);
+/// Its size is unknown if it is a disc without diameter_m.
+LampShape read_shape(YamlMap& map);
 Board read_board(YamlMap& map);
 Camera read_camera(YamlMap& map);
+
+/// Writes the keys that read_shape() reads.
+void emit_shape(YAML::Emitter& out, const LampShape& shape);
 
 /// Refuses a lamp that has the id or the place of an earlier one.
 void check_lamp(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item);

@@ -23,8 +23,7 @@ Reflection read_reflection(YamlMap map, const std::vector<SceneLamp>& lamps, con
   const auto lamp = std::find_if(lamps.begin(), lamps.end(),
                                  [&](const SceneLamp& each) { return each.id == wanted; });
   if (lamp == lamps.end()) throw id.error("there is no lamp " + std::to_string(wanted));
-  Reflection reflection{read_glow(map, room, read_rectangle(map)),
-                        std::size_t(lamp - lamps.begin())};
+  Reflection reflection{read_glow(map, room), std::size_t(lamp - lamps.begin())};
   reflection.glow.edge_share = 0;
   map.finish();
   return reflection;
@@ -75,9 +74,8 @@ SquareWave read_pwm(YamlMap map) {
 }
 
 ForeignLight read_foreign_light(YamlMap map, const Room& room) {
-  const auto rectangle = read_rectangle(map);
-  ForeignLight light{read_glow(map, room, rectangle), {}, {}};
-  if (!rectangle) read_profile(map, light.glow);
+  ForeignLight light{read_glow(map, room), {}, {}};
+  read_profile(map, light.glow);
   const auto pwm = map.optional("pwm"), mains = map.optional("mains");
   if (pwm.has_value() == mains.has_value()) throw map.error("needs one of the keys pwm and mains");
   if (pwm) {

@@ -8,13 +8,15 @@
 
 namespace vlp {
 
-/// A disc around the origin with the radiance 1 - (1 - edge_share) (r / radius)^2.
+/// A disc around the origin with the radiance 1 - (1 - edge_share) (r / radius)^2, or an ellipse
+/// with its axes along x and y, which is a disc in units of the half axes.
 class Disc {
  public:
-  Disc(double radius_m, double edge_share) : radius_m_(radius_m), fall_(1 - edge_share) {}
+  Disc(const Eigen::Vector2d& half_axes_m, double edge_share)
+      : half_axes_m_(half_axes_m), fall_(1 - edge_share) {}
 
   Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
-    return plane_hit(origin, direction) / radius_m_;
+    return plane_hit(origin, direction).cwiseQuotient(half_axes_m_);
   }
 
   Eigen::AlignedBox2d bounds() const {
@@ -30,7 +32,8 @@ class Disc {
   double triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
   double sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
-  double radius_m_, fall_;
+  Eigen::Vector2d half_axes_m_;
+  double fall_;
 };
 
 }  // namespace vlp

@@ -72,16 +72,16 @@ double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d
 }
 
 double reach_m(const Glow& glow) {
-  return glow.diameter_m / 2 + (glow.halo ? kHaloLengths * glow.halo->length_m : 0);
+  return glow.radius_m() + (glow.halo ? kHaloLengths * glow.halo->length_m : 0);
 }
 
 void add_downlight(const PixelRays& rays, const PixelWindow& window,
                    const TargetFromCamera& glow_from_camera, const Glow& glow, cv::Mat1f& image) {
-  const double radius_m = glow.diameter_m / 2;
+  const double radius_m = glow.radius_m();
   cv::Mat1f inside = window.image(0);
-  add_shape(rays, window, glow_from_camera, Disc(radius_m, 1), 1, inside);
+  add_shape(rays, window, glow_from_camera, Disc(*glow.shape.size_m / 2, 1), 1, inside);
   if (!glow.recess) {
-    add_shape(rays, window, glow_from_camera, Disc(radius_m, glow.edge_share),
+    add_shape(rays, window, glow_from_camera, Disc(*glow.shape.size_m / 2, glow.edge_share),
               glow.radiance_e_per_s, image);
   }
   for (int line = window.line_begin; line < window.line_end; ++line) {

@@ -210,7 +210,7 @@ class LampFrame {
   }
   /// `target` is the window's part of an image.
   void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
-    if (glow.rectangle) {
+    if (!traits_of(glow.shape.kind).is_round) {
       const Panel panel = panel_of(glow);
       if (glow.edge_share == 1) return draw(panel, glow.radiance_e_per_s, window, target);
       cv::Mat1f own = window.image(0);
@@ -219,13 +219,15 @@ class LampFrame {
       target += own;
       return;
     }
-    const Eigen::Isometry3d glow_from_world(Eigen::Translation3d(-glow.position_m));
-    const TargetFromCamera glow_from_camera = target_from_camera(glow_from_world);
+    const Eigen::Isometry3d world_from_glow =
+        Eigen::Translation3d(glow.position_m) *
+        Eigen::AngleAxisd(glow.shape.yaw_rad, Eigen::Vector3d::UnitZ());
+    const TargetFromCamera glow_from_camera = target_from_camera(world_from_glow.inverse());
     if (glow.recess || glow.chips || !glow.hot_spots.empty() || glow.halo) {
       add_downlight(rays_, window, glow_from_camera, glow, target);
       return;
     }
-    add_shape(rays_, window, glow_from_camera, Disc(glow.diameter_m / 2, glow.edge_share),
+    add_shape(rays_, window, glow_from_camera, Disc(*glow.shape.size_m / 2, glow.edge_share),
               glow.radiance_e_per_s, target);
   }
   /// See Glow; what is left is taken at each pixel's middle.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "geometry/angles.h"
 #include "simulation/downlight.h"
@@ -56,21 +55,15 @@ PixelWindow intersection(const PixelWindow& a, const PixelWindow& b) {
 }
 
 Panel panel_of(const Glow& glow) {
-  const auto corners_m = corners_of(*glow.rectangle, glow.position_m);
-  return {corners_m[0], corners_m[1] - corners_m[0], corners_m[3] - corners_m[0],
-          glow.radiance_e_per_s};
+  const auto at = [&](double x, double y) {
+    return world_from_shape(glow.shape, glow.position_m, {x, y});
+  };
+  const Eigen::Vector3d corner_m = at(-1, -1);
+  return {corner_m, at(1, -1) - corner_m, at(-1, 1) - corner_m, glow.radiance_e_per_s};
 }
 
 std::vector<Eigen::Vector3d> outline_of(const Glow& glow) {
-  if (glow.rectangle) return outline_of(panel_of(glow));
-  constexpr int count = 48;
-  std::vector<Eigen::Vector3d> points_m;
-  for (int i = 0; i < count; ++i) {
-    const double angle = 2 * std::numbers::pi * i / count;
-    points_m.push_back(glow.position_m +
-                       reach_m(glow) * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
-  }
-  return points_m;
+  return outline_of(glow.halo ? make_disc(2 * reach_m(glow)) : glow.shape, glow.position_m, 96);
 }
 
 std::vector<Eigen::Vector3d> outline_of(const Panel& panel) {

@@ -38,7 +38,7 @@ PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const Carri
 /// Returns the pixels that are in both.
 PixelWindow intersection(const PixelWindow& a, const PixelWindow& b);
 
-/// Of a glow that is a rectangle.
+/// Returns the box around a glow.
 Panel panel_of(const Glow& glow);
 
 /// Points around the light of a glow (its rim, or where its halo ends), or along the edges of a

@@ -14,7 +14,7 @@ namespace {
 void draw_hot_spots(cv::RNG random, Glow& glow) {
   if (!glow.random_chips) return;
   const RandomChips& chips = *glow.random_chips;
-  const double radius_m = glow.diameter_m / 2;
+  const double radius_m = glow.radius_m();
   glow.hot_spots.clear();
   for (int i = 0; i < chips.count; ++i) {
     const double angle = random.uniform(0.0, 2 * std::numbers::pi);

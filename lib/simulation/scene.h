@@ -88,23 +88,26 @@ struct RandomChips {
   double min_excess, max_excess;
 };
 
-/// A horizontal disc of light. Its radiance at the distance r of its centre is
-///   radiance (1 - (1 - edge_share) (2 r / diameter)^2),
-/// and its chips add to it; or that of its recess, of which the disc is the rim. Or a rectangle,
-/// with such a factor for the distance from the middle along each of its sides, and nothing else of
-/// what a disc has.
+/// A horizontal light of the shape of a lamp. The radiance of a round one at the fraction r of the
+/// way from its centre to its outline is
+///   radiance (1 - (1 - edge_share) r^2),
+/// and the chips of a disc add to it; or that of its recess, of which the disc is the rim. Other
+/// shapes have such a factor for the distance from the middle along each of their axes. Only discs
+/// have a recess, chips, hot spots or a halo.
 struct Glow {
   Eigen::Vector3d position_m;
-  double diameter_m;
+  LampShape shape;
   double radiance_e_per_s;
   double edge_share;
   std::optional<Recess> recess = {};
   std::optional<Halo> halo = {};
-  std::optional<LampRectangle> rectangle = {};
   std::optional<Chips> chips = {};
   std::optional<RandomChips> random_chips = {};
   /// Drawn from random_chips by draw_random_parts().
   std::vector<HotSpot> hot_spots = {};
+
+  /// Half of the first axis: the radius of a disc.
+  double radius_m() const { return shape.size_m->x() / 2; }
 };
 
 /// A lamp of the lamp map: a glow that a square wave switches.

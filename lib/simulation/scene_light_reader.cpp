@@ -18,7 +18,7 @@ Recess read_recess(YamlMap map, const Glow& rim) {
   recess.depth_m = map.required("depth_m").number_within(0, 2, "m");
   const YamlValue source = map.required("source_diameter_m");
   recess.source_diameter_m = source.number_within(1e-3, 10, "m");
-  if (recess.source_diameter_m > rim.diameter_m) {
+  if (recess.source_diameter_m > 2 * rim.radius_m()) {
     throw source.error("is larger than the rim, diameter_m");
   }
   recess.reflector_share = read_share(map, "reflector_share");
@@ -47,7 +47,7 @@ Chips read_chips(YamlMap map, const Glow& disc) {
   chips.share = read_share(map, "share");
   const YamlValue pitch = map.required("pitch_m");
   chips.pitch_m = pitch.number_within(1e-3, 10, "m");
-  if (chips.pitch_m > disc.diameter_m) throw pitch.error("is larger than the disc, diameter_m");
+  if (chips.pitch_m > 2 * disc.radius_m()) throw pitch.error("is larger than the disc, diameter_m");
   const YamlValue width = map.required("width_m");
   chips.width_m = width.number_within(1e-4, 10, "m");
   if (chips.width_m > 2 * chips.pitch_m) {
@@ -72,12 +72,11 @@ RandomChips read_random_chips(YamlMap map) {
 
 }  // namespace
 
-Glow read_glow(YamlMap& map, const Room& room, const std::optional<LampRectangle>& rectangle) {
+Glow read_glow(YamlMap& map, const Room& room) {
   const YamlValue position = map.required("position_m");
-  Glow glow{read_point(position), 0, 0, rectangle ? 1.0 : 0.0};
-  if (!rectangle) glow.diameter_m = map.required("diameter_m").number_within(1e-3, 10, "m");
+  Glow glow{read_point(position), read_shape(map), 0, 1};
+  if (!glow.shape.size_m) map.required("diameter_m");
   glow.radiance_e_per_s = read_radiance(map, "radiance_e_per_s");
-  glow.rectangle = rectangle;
   const Eigen::Array3d at = glow.position_m.array();
   if ((at < room.min_m.array()).any() || (at > room.max_m.array()).any()) {
     throw position.error("is outside the room");
@@ -86,6 +85,7 @@ Glow read_glow(YamlMap& map, const Room& room, const std::optional<LampRectangle
 }
 
 void read_profile(YamlMap& map, Glow& glow) {
+  if (glow.shape.kind != ShapeKind::disc) return;
   if (const auto recess = map.optional("recess")) {
     glow.recess = read_recess(recess->map(), glow);
   } else {
@@ -114,12 +114,12 @@ std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room)
     check_lamp(earlier, lamp, item);
     earlier.push_back(lamp);
     SceneLamp read{lamp.id,
-                   read_glow(map, room, lamp.rectangle),
+                   read_glow(map, room),
                    map.required("frequency_hz").number(),
                    map.required("duty").number(),
                    {},
                    Eigen::Vector3d::Zero()};
-    if (!lamp.rectangle) read_profile(map, read.glow);
+    read_profile(map, read.glow);
     if (const auto phase = map.optional("phase")) {
       read.phase = phase->number_within(0, 1, "(of a period)");
     }

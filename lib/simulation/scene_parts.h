@@ -35,9 +35,10 @@ void check_count(double captures, const Place& where) {
 /// Lights are checked against the room.
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room);
 Clutter read_clutter(YamlMap map, const std::vector<SceneLamp>& lamps, const Room& room);
-/// A glow's keys but those of read_profile(); without a rectangle it is a disc.
-Glow read_glow(YamlMap& map, const Room& room, const std::optional<LampRectangle>& rectangle = {});
-/// How its brightness is spread: recess or edge_share, and halo.
+/// Reads a glow's keys but those of read_profile().
+Glow read_glow(YamlMap& map, const Room& room);
+/// Reads how the brightness of a disc is spread: recess or edge_share, and halo. Other shapes are
+/// evenly bright.
 void read_profile(YamlMap& map, Glow& glow);
 Picture read_picture(YamlMap map, const Sensor& sensor);
 SceneBoard read_scene_board(YamlMap map);

@@ -63,30 +63,24 @@ struct GlowPoints {
 };
 
 GlowPoints points_of(const Glow& glow) {
-  GlowPoints points;
-  if (glow.rectangle) {
-    constexpr int per_side = 14;
-    const Panel panel = panel_of(glow);
-    for (int i = 0; i < per_side * per_side; ++i) {
-      const int row = i / per_side, column = i % per_side;
-      const double a = (row + 0.5) / per_side, b = (column + 0.5) / per_side;
-      points.face_m.push_back(panel.corner_m + a * panel.edge_a_m + b * panel.edge_b_m);
-    }
-    points.rim_m = outline_of(panel);
-    return points;
-  }
-  constexpr int count = 200, rim_points = 120;
+  constexpr int count = 200, per_side = 14, rim_points = 120;
   constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
-  const auto at = [&](double radius_m, double angle) -> Eigen::Vector3d {
-    return glow.position_m + radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+  GlowPoints points;
+  const auto add = [&](const Eigen::Vector2d& at) {
+    points.face_m.push_back(world_from_shape(glow.shape, glow.position_m, at));
   };
-  for (int i = 0; i < count; ++i) {
-    points.face_m.push_back(
-        at(glow.diameter_m / 2 * std::sqrt((i + 0.5) / count), golden_angle * i));
+  if (traits_of(glow.shape.kind).is_round) {
+    for (int i = 0; i < count; ++i) {
+      const double radius = std::sqrt((i + 0.5) / count), angle = golden_angle * i;
+      add(radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+    }
+  } else {
+    for (int i = 0; i < per_side * per_side; ++i) {
+      const Eigen::Array2d cell(i % per_side, i / per_side);
+      add(2 * (cell + 0.5) / per_side - 1);
+    }
   }
-  for (int i = 0; i < rim_points; ++i) {
-    points.rim_m.push_back(at(glow.diameter_m / 2, 2 * std::numbers::pi / rim_points * i));
-  }
+  points.rim_m = outline_of(glow.shape, glow.position_m, rim_points);
   return points;
 }
 
@@ -226,10 +220,7 @@ LampMap lamp_map_of(const Scene& scene, bool surveyed) {
   for (const SceneLamp& lamp : scene.lamps) {
     Eigen::Vector3d position_m = lamp.glow.position_m;
     if (surveyed) position_m += lamp.map_error_m;
-    Lamp mapped{lamp.id, position_m, {}, lamp.frequency_hz, lamp.duty};
-    mapped.rectangle = lamp.glow.rectangle;
-    if (!mapped.rectangle) mapped.diameter_m = lamp.glow.diameter_m;
-    map.lamps.push_back(mapped);
+    map.lamps.push_back({lamp.id, position_m, lamp.glow.shape, lamp.frequency_hz, lamp.duty});
   }
   return map;
 }

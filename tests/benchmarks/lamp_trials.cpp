@@ -68,7 +68,7 @@ std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector
   Glow rim = lamp;
   rim.halo.reset();
   if (!lamp.recess) return outline_of(rim);
-  const double radius_m = lamp.diameter_m / 2;
+  const double radius_m = lamp.radius_m();
   std::vector<std::pair<double, Eigen::Vector3d>> shares;
   double greatest = 0;
   for (int i = 0; i < steps * steps; ++i) {
@@ -284,7 +284,7 @@ class ForeignScene {
     scene_.lamps.clear();
     constexpr std::array frequencies_hz = {1100, 1400, 1800, 2300, 2900, 3500, 4100, 4700};
     for (int i = 0; i < 8; ++i) {
-      Glow glow{{-0.75 + 0.5 * (i % 4), i < 4 ? -0.3 : 0.3, kCeilingM}, 0.18, 2e8, 0.9};
+      Glow glow{{-0.75 + 0.5 * (i % 4), i < 4 ? -0.3 : 0.3, kCeilingM}, make_disc(0.18), 2e8, 0.9};
       scene_.lamps.push_back(
           {i + 1, glow, double(frequencies_hz[std::size_t(i)]), 0.5, {}, Eigen::Vector3d::Zero()});
     }
@@ -357,13 +357,14 @@ class ForeignScene {
   }
 
   void draw_foreign_light() {
-    Glow glow{{0, 0, kCeilingM}, 0, draw_log(4e7, 4e8), random_.uniform(0.4, 1.0)};
+    Glow glow{{0, 0, kCeilingM}, {}, draw_log(4e7, 4e8), random_.uniform(0.4, 1.0)};
     const double length_m = random_.uniform(0.08, 0.35);
     if (draw_chance(0.5)) {
-      glow.diameter_m = length_m;
+      glow.shape = make_disc(length_m);
     } else {
-      glow.rectangle = LampRectangle{{length_m, length_m * random_.uniform(0.15, 1.0)},
-                                     random_.uniform(0.0, std::numbers::pi)};
+      const double width_m = length_m * random_.uniform(0.15, 1.0);
+      glow.shape = {ShapeKind::rectangle, Eigen::Vector2d(length_m, width_m),
+                    random_.uniform(0.0, std::numbers::pi)};
     }
     const auto place_m = draw_place(0.7 * length_m);
     if (!place_m) return;
@@ -409,14 +410,14 @@ class ForeignScene {
     Clutter& clutter = scene_.clutter = {};
     taken_.clear();
     for (const SceneLamp& lamp : scene_.lamps) {
-      taken_.push_back({lamp.glow.position_m.head<2>(), lamp.glow.diameter_m / 2});
+      taken_.push_back({lamp.glow.position_m.head<2>(), lamp.glow.radius_m()});
     }
     const int lights = random_.uniform(1, 5);
     for (int i = 0; i < lights; ++i) draw_foreign_light();
     if (draw_chance(0.5)) {
       if (const auto place_m = draw_place(0.1)) {
         clutter.steady_lamps.push_back(
-            {{place_m->x(), place_m->y(), kCeilingM}, 0.2, draw_log(5e7, 4e8), 0.8});
+            {{place_m->x(), place_m->y(), kCeilingM}, make_disc(0.2), draw_log(5e7, 4e8), 0.8});
       }
     }
     if (draw_chance(0.3)) {

@@ -43,7 +43,9 @@ TEST(Panels, AreFoundWithoutATilt) {
 TEST(Panels, LeaveDiscsAsTheyAre) {
   const Captures captures("panels", "check");
   LampMap discs = captures.lamps();
-  for (Lamp& lamp : discs.lamps) lamp.rectangle.reset();
+  for (Lamp& lamp : discs.lamps) {
+    if (lamp.shape.kind == ShapeKind::rectangle) lamp.shape = {};
+  }
   const LightDetector without(discs, detector_camera(captures.calibration()));
   int compared = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
@@ -67,13 +69,13 @@ TEST(Panels, AreNoLampsOfAnotherShape) {
   const Captures captures("panels", "check");
   LampMap swapped = captures.lamps();
   for (Lamp& lamp : swapped.lamps) {
-    if (lamp.rectangle) lamp.rectangle->size_m = Eigen::Vector2d(0.6, 0.2);
+    if (lamp.shape.kind == ShapeKind::rectangle) lamp.shape.size_m = Eigen::Vector2d(0.6, 0.2);
   }
   const LightDetector detector(swapped, detector_camera(captures.calibration()));
   int refused = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     for (const Light& light : detector.detect(image_view(captures.image(captures.shot(i))))) {
-      if (!is_rectangle(light)) continue;
+      if (is_disc(light)) continue;
       EXPECT_FALSE(light.lamp);
       EXPECT_EQ(light.kind, LightKind::unknown);
       refused += light.reason == LightReason::wrong_shape;
@@ -91,7 +93,7 @@ TEST(Panels, AreFoundWithoutALensByWhatTheirBowsTellOfIt) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
     for (const Light& light : detector.detect(image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      if (light.kind != LightKind::lamp || is_disc(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(),
                                      [&](const TrueLamp& one) { return one.id == light.lamp; });
       ASSERT_NE(lamp, truth.end());
@@ -112,8 +114,8 @@ Scene panels_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/panels/scene.
 TEST(Panels, LeaveSmallDiscsBesideThemDiscs) {
   Scene scene = panels_scene();
   for (SceneLamp& lamp : scene.lamps) {
-    if (lamp.glow.rectangle) continue;
-    lamp.glow.diameter_m = 0.095;  // 10 to 12 px
+    if (lamp.glow.shape.kind == ShapeKind::rectangle) continue;
+    lamp.glow.shape = make_disc(0.095);  // 10 to 12 px
     lamp.frequency_hz = 6100 + 1200 * (lamp.id - 5);
   }
   const Captures captures(std::move(scene), "check");
@@ -140,7 +142,7 @@ TEST(Panels, HiddenInPartAreAsSureAsTheyState) {
     const LampShot shot = captures.shot(i);
     const auto truth = captures.truth(shot);
     for (const Light& light : captures.detector().detect(image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      if (light.kind != LightKind::lamp || is_disc(light)) continue;
       const auto lamp = std::find_if(truth.begin(), truth.end(),
                                      [&](const TrueLamp& one) { return one.id == light.lamp; });
       ASSERT_NE(lamp, truth.end());
@@ -198,7 +200,7 @@ TEST(Panels, GiveFixes) {
     const LampShot shot = captures.shot(i);
     std::vector<Detection> detections;
     for (const Light& light : captures.detector().detect(image_view(captures.image(shot)))) {
-      if (light.kind != LightKind::lamp || !is_rectangle(light)) continue;
+      if (light.kind != LightKind::lamp || is_disc(light)) continue;
       detections.push_back({*light.lamp, light.pixel, light.sigma_px});
     }
     if (detections.size() < 3) continue;

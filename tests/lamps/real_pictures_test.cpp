@@ -18,7 +18,7 @@ LampMap map_of_five() {
   LampMap map;
   for (const double frequency_hz : {2000.0, 2500.0, 3012.0, 3521.0, 3968.0}) {
     const int id = static_cast<int>(map.lamps.size()) + 1;
-    map.lamps.push_back({id, {0.5 * id, 0, 2}, 0.15, frequency_hz, {}});
+    map.lamps.push_back({id, {0.5 * id, 0, 2}, make_disc(0.15), frequency_hz, {}});
   }
   return map;
 }

@@ -43,7 +43,7 @@ TEST(VisibleLamps, EndAtTheImagesEdge) {
 TEST(VisibleLamps, AreSeenWholeWhenTheirDiameterIsKnown) {
   LampMap map = lamp_map_of({{0.75, 0, 1}, {0, 0, 1}});
   EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 2);
-  map.lamps[0].diameter_m = map.lamps[1].diameter_m = 0.2;
+  map.lamps[0].shape = map.lamps[1].shape = make_disc(0.2);
   const auto visible = visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0});
   ASSERT_EQ(visible.size(), 1);
   EXPECT_THAT(visible[0], IsNear(Eigen::Vector3d(0, 0, 1), 0));

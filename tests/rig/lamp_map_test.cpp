@@ -51,9 +51,10 @@ lamps:
 )";
   const LampMap map = read_lamp_map(folder.file("lamps.yaml", yaml));
   ASSERT_EQ(map.lamps.size(), 3U);
-  EXPECT_EQ(map.lamps[0].rectangle->size_m, Eigen::Vector2d(1.2, 0.1));
-  EXPECT_EQ(map.lamps[0].rectangle->yaw_rad, 0.3);
-  EXPECT_FALSE(map.lamps[2].rectangle);
+  EXPECT_EQ(map.lamps[0].shape.kind, ShapeKind::rectangle);
+  EXPECT_EQ(map.lamps[0].shape.size_m, Eigen::Vector2d(1.2, 0.1));
+  EXPECT_EQ(map.lamps[0].shape.yaw_rad, 0.3);
+  EXPECT_EQ(map.lamps[2].shape.kind, ShapeKind::disc);
   write_lamp_map(folder / "written.yaml", map);
   EXPECT_EQ(folder.content_of(folder / "written.yaml"), yaml);
   const auto read_as = [&](const std::string& from, const std::string& to) {
@@ -61,14 +62,6 @@ lamps:
   };
   expect_same(read_as(", yaw_rad: 0}", "}"), map);
   expect_same(read_as("2.1], diameter_m", "2.1], shape: disc, diameter_m"), map);
-}
-
-TEST(LampMap, KnowsTheCornersOfARectangle) {
-  const auto corners = corners_of({{1.2, 0.4}, std::acos(-1) / 2}, {1, 2, 3});
-  EXPECT_LT((corners[0] - Eigen::Vector3d(1.2, 1.4, 3)).norm(), 1e-12);
-  EXPECT_LT((corners[1] - Eigen::Vector3d(1.2, 2.6, 3)).norm(), 1e-12);
-  EXPECT_LT((corners[2] - Eigen::Vector3d(0.8, 2.6, 3)).norm(), 1e-12);
-  EXPECT_LT((corners[3] - Eigen::Vector3d(0.8, 1.4, 3)).norm(), 1e-12);
 }
 
 TEST(LampMap, FindsALampByItsId) {

@@ -13,14 +13,12 @@ void expect_same(const LampMap& found, const LampMap& expected) {
     SCOPED_TRACE(i);
     EXPECT_EQ(found.lamps[i].id, expected.lamps[i].id);
     EXPECT_EQ(found.lamps[i].position_m, expected.lamps[i].position_m);
-    EXPECT_EQ(found.lamps[i].diameter_m, expected.lamps[i].diameter_m);
+    EXPECT_EQ(found.lamps[i].shape.kind, expected.lamps[i].shape.kind);
+    EXPECT_EQ(found.lamps[i].shape.size_m, expected.lamps[i].shape.size_m);
+    EXPECT_EQ(found.lamps[i].shape.yaw_rad, expected.lamps[i].shape.yaw_rad);
     EXPECT_EQ(found.lamps[i].frequency_hz, expected.lamps[i].frequency_hz);
     EXPECT_EQ(found.lamps[i].duty, expected.lamps[i].duty);
     EXPECT_EQ(found.lamps[i].sd_m, expected.lamps[i].sd_m);
-    ASSERT_EQ(found.lamps[i].rectangle.has_value(), expected.lamps[i].rectangle.has_value());
-    if (!found.lamps[i].rectangle) continue;
-    EXPECT_EQ(found.lamps[i].rectangle->size_m, expected.lamps[i].rectangle->size_m);
-    EXPECT_EQ(found.lamps[i].rectangle->yaw_rad, expected.lamps[i].rectangle->yaw_rad);
   }
 }
 

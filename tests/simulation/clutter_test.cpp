@@ -62,8 +62,8 @@ TEST_F(ClutterTest, AWindowIsARectangleOfItsRadiance) {
 }
 
 TEST_F(ClutterTest, SteadyLampsHaveNoStripesAndReflectionsTheirLamps) {
-  scene_.clutter.steady_lamps = {{{-0.3, 0, 1.6}, 0.12, 3e7, 1}};
-  scene_.clutter.reflections = {{{{0.3, 0, 1.6}, 0.12, 2e7, 0}, 0}};
+  scene_.clutter.steady_lamps = {{{-0.3, 0, 1.6}, make_disc(0.12), 3e7, 1}};
+  scene_.clutter.reflections = {{{{0.3, 0, 1.6}, make_disc(0.12), 2e7, 0}, 0}};
   const cv::Mat1f always = rendered(), switched = rendered(0.5);
   for (int line = 285; line < 315; ++line) {
     EXPECT_EQ(switched(line, 300), always(line, 300));
@@ -76,8 +76,8 @@ TEST_F(ClutterTest, SteadyLampsHaveNoStripesAndReflectionsTheirLamps) {
 }
 
 TEST_F(ClutterTest, ReflectionsOfRectanglesFadeTowardsTheirSides) {
-  Glow glow{{0.3, 0, 1.6}, 0, 2e7, 0};
-  glow.rectangle = LampRectangle{{0.12, 0.06}, std::numbers::pi / 2};
+  const LampShape shape{ShapeKind::rectangle, Eigen::Vector2d(0.12, 0.06), std::numbers::pi / 2};
+  const Glow glow{{0.3, 0, 1.6}, shape, 2e7, 0};
   scene_.lamps[0].glow.radiance_e_per_s = 0;
   scene_.clutter.reflections = {{glow, 0}};
   const cv::Mat1f image = rendered();

@@ -222,7 +222,7 @@ TEST(DrawRandomParts, DrawsHotSpotsWithinTheirBoundsByTheSeed) {
 TEST_F(Downlight, MayBeASteadyLampBehindSomething) {
   scene_.lamps[0].glow.radiance_e_per_s = 0;
   scene_.clutter.steady_lamps = {
-      {{0, 0, 1.6}, 0.18, 1e9, 0, Recess{0.05, 0.04, 0.2, {}}, Halo{0.1, 0.02}}};
+      {{0, 0, 1.6}, make_disc(0.18), 1e9, 0, Recess{0.05, 0.04, 0.2, {}}, Halo{0.1, 0.02}}};
   const cv::Mat1f open = rendered();
   scene_.clutter.occluders = {{{-0.2, -0.2, 0.85}, {0.2, 0, 0}, {0, 0.4, 0}, 0}};
   const cv::Mat1f image = rendered();

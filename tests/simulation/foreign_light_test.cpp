@@ -59,7 +59,8 @@ TEST(RectifiedSine, IsTheMeanOfItsEquation) {
 
 TEST_F(ForeignLightTest, DimmedByASquareWaveHasItsFrequencyAndDutyInRows) {
   // 500 Hz are 66.7 rows; the light is 400 rows high.
-  scene_.clutter.foreign_lights = {{{{0, 0, 1.6}, 1.2, 1e9, 1}, SquareWave{500, 0.3, 0}, 0.25}};
+  scene_.clutter.foreign_lights = {
+      {{{0, 0, 1.6}, make_disc(1.2), 1e9, 1}, SquareWave{500, 0.3, 0}, 0.25}};
   const cv::Mat1f image = rendered();
   std::vector<double> rises;
   double lit = 0;
@@ -77,7 +78,8 @@ TEST_F(ForeignLightTest, DimmedByASquareWaveHasItsFrequencyAndDutyInRows) {
 }
 
 TEST_F(ForeignLightTest, OnTheMainsHasTheBrightnessOfItsEquationInEachRow) {
-  scene_.clutter.foreign_lights = {{{{0, 0, 1.6}, 1.2, 1e9, 1}, RectifiedSine{100, 0.6, 0}, 0.2}};
+  scene_.clutter.foreign_lights = {
+      {{{0, 0, 1.6}, make_disc(1.2), 1e9, 1}, RectifiedSine{100, 0.6, 0}, 0.2}};
   LampShot long_shot = shot();
   long_shot.exposure_s = 5e-4;
   const cv::Mat1f image = rendered(long_shot);
@@ -90,8 +92,7 @@ TEST_F(ForeignLightTest, OnTheMainsHasTheBrightnessOfItsEquationInEachRow) {
 }
 
 TEST_F(ForeignLightTest, MayBeARectangle) {
-  Glow tube{{0.1, 0, 1.6}, 0, 1e9, 1};
-  tube.rectangle = LampRectangle{{0.9, 0.06}, 0};
+  const Glow tube{{0.1, 0, 1.6}, {ShapeKind::rectangle, Eigen::Vector2d(0.9, 0.06)}, 1e9, 1};
   scene_.clutter.foreign_lights = {{tube, RectifiedSine{120, 0, 0}, {}}};
   EXPECT_NEAR(brightness_of(rendered()).sum, 300 * 20 * 5e4, 1e-4 * 300 * 20 * 5e4);
 }
@@ -172,9 +173,10 @@ TEST_F(ForeignLightTest, ASignHasLettersOfItsRadianceByTheSeed) {
 }
 
 TEST_F(ForeignLightTest, IsInTheTruthOfOtherLightsOnly) {
-  scene_.clutter.foreign_lights = {{{{0.3, 0, 1.6}, 0.12, 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
-                                   {{{-0.3, 0, 1.6}, 0.12, 1e9, 1}, RectifiedSine{100, 1, 0}, {}},
-                                   {{{5, 0, 1.6}, 0.12, 1e9, 1}, RectifiedSine{100, 1, 0}, {}}};
+  scene_.clutter.foreign_lights = {
+      {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
+      {{{-0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}},
+      {{{5, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}}};
   const FrameRenderer renderer(scene_);
   const auto lights = true_other_lights(scene_, renderer, shot());
   ASSERT_EQ(lights.size(), 2U) << "the third is out of view";
@@ -199,7 +201,8 @@ TEST_F(ForeignLightTest, IsInATableOfItsOwn) {
   const TemporaryFolder folder;
   write_truth(scene_, FrameRenderer(scene_), set, folder / "");
   EXPECT_FALSE(std::filesystem::exists(folder / "true_other_lights.csv")) << "there are none";
-  scene_.clutter.foreign_lights = {{{{0.3, 0, 1.6}, 0.12, 1e9, 1}, SquareWave{500, 0.3, 0}, {}}};
+  scene_.clutter.foreign_lights = {
+      {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}}};
   scene_.clutter.mirrors = {{{{0.4, -1, 0}, {0, 2, 0}, {0, 0, 1.7}, 0}, 0.2}};
   write_truth(scene_, FrameRenderer(scene_), set, folder / "");
   const std::string table = TemporaryFolder::content_of(folder / "true_other_lights.csv");
@@ -220,8 +223,9 @@ TEST(ShotsOfForeignLights, HaveFreePhasesAndLeaveTheOtherDrawsAsTheyAre) {
   set.lamps->repeat = 3;
   set.lamps->interval_s = 0.25;
   const LampShot without = lamp_shot(scene, set, 1);
-  scene.clutter.foreign_lights = {{{{0.3, 0, 1.6}, 0.12, 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
-                                  {{{0, 0.3, 1.6}, 0.12, 1e9, 1}, RectifiedSine{101, 1, 0}, 0.5}};
+  scene.clutter.foreign_lights = {
+      {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
+      {{{0, 0.3, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{101, 1, 0}, 0.5}};
   scene.clutter.ambient_flicker = RectifiedSine{100, 0.5, 0};
   const LampShot with = lamp_shot(scene, set, 1), next = lamp_shot(scene, set, 2);
   EXPECT_EQ(with.waves.at(0).phase, without.waves.at(0).phase);

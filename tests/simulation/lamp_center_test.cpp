@@ -84,7 +84,7 @@ TEST_P(LampCenter, OfTheRenderedAreaIsThatOfTheProjectedOutline) {
     for (int i = 0; i < rim_points; ++i) {
       const double angle = 2 * std::numbers::pi * i / rim_points;
       rim_m.push_back(glow.position_m +
-                      glow.diameter_m / 2 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
+                      glow.radius_m() * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0));
     }
     const auto outline = projected(shot, rim_m);
     // The centroid of a polygon.

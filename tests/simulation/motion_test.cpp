@@ -34,7 +34,7 @@ double slope_of(const std::vector<double>& values) {
 TEST(MotionSkew, IsRowTimeTimesSpeed) {
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
-  scene.lamps[0].glow.diameter_m = 0.3;  // 100 px
+  scene.lamps[0].glow.shape = make_disc(0.3);  // 100 px
   const FrameRenderer renderer(scene);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
   ASSERT_NEAR(slope_of(middles(renderer.lamp_electrons(shot), 260, 80)), 0, 1e-6);
@@ -49,7 +49,7 @@ TEST(MotionSkew, IsRowTimeTimesSpeed) {
 TEST(MotionSkew, OfATurningCameraIsRowTimeTimesTurnRate) {
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
-  scene.lamps[0].glow.diameter_m = 0.3;
+  scene.lamps[0].glow.shape = make_disc(0.3);
   scene.lamps[0].glow.position_m = {0, 0.3, 1.6};  // 100 px below the middle
   const FrameRenderer renderer(scene);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
@@ -72,7 +72,7 @@ TEST(MotionSkew, OfATurningCameraIsRowTimeTimesTurnRate) {
 
 TEST(Motion, MovesTheTrueCentreAsTheImage) {
   Scene scene = plain_scene();
-  scene.lamps[0].glow.diameter_m = 0.1;
+  scene.lamps[0].glow.shape = make_disc(0.1);
   const FrameRenderer renderer(scene);
   for (const Eigen::Vector2d& velocity : {Eigen::Vector2d(2, 0), Eigen::Vector2d(-1, 2)}) {
     LampShot shot = shot_at(scene, {0.05, -0.4, 0.1}, 0.2);

@@ -31,7 +31,8 @@ Scene plain_scene() {
   scene.camera = paper_rig_camera();
   scene.sensor = {16, 1, 0, 60000, 0, false, {}};
   scene.mount = {Eigen::Matrix3d::Identity(), Eigen::Vector2d::Zero()};
-  scene.lamps = {{1, {{0, 0, 1.6}, 0.18, 1e9, 1}, 1000, 1, 0.0, Eigen::Vector3d::Zero()}};
+  scene.lamps = {
+      {1, {{0, 0, 1.6}, make_disc(0.18), 1e9, 1}, 1000, 1, 0.0, Eigen::Vector3d::Zero()}};
   return scene;
 }
 

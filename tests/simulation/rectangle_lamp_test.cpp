@@ -15,11 +15,11 @@ namespace vlp {
 namespace {
 
 /// A panel and a tube, turned, and what a camera that leans by two degrees sees of each.
-class RectangleLamp : public testing::TestWithParam<LampRectangle> {
+class RectangleLamp : public testing::TestWithParam<LampShape> {
  protected:
   RectangleLamp() {
     scene_.mount.level_from_camera = level_from_inclination({rad_from_deg(2), rad_from_deg(-1)});
-    scene_.lamps[0].glow.rectangle = GetParam();
+    scene_.lamps[0].glow.shape = GetParam();
   }
   std::vector<Eigen::Vector2d> projected(const LampShot& shot,
                                          const std::vector<Eigen::Vector3d>& points_m) const {
@@ -39,7 +39,7 @@ TEST_P(RectangleLamp, CoversWhatItsProjectedSidesEnclose) {
   const FrameRenderer renderer(scene_);
   const Glow& glow = scene_.lamps[0].glow;
   // Written out, not taken from what the renderer uses.
-  const Eigen::Vector2d size_m = GetParam().size_m;  // Clang 14 captures no binding
+  const Eigen::Vector2d size_m = *GetParam().size_m;  // Clang 14 captures no binding
   const double yaw_rad = GetParam().yaw_rad;
   const Eigen::Vector3d along(std::cos(yaw_rad), std::sin(yaw_rad), 0);
   const Eigen::Vector3d across(-along.y(), along.x(), 0);
@@ -109,12 +109,11 @@ TEST_P(RectangleLamp, IsPartlyInViewWhereTheImageEnds) {
   EXPECT_LT(truth[0].in_view, 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, RectangleLamp,
-                         testing::Values(LampRectangle{{0.5, 0.4}, 0.3},
-                                         LampRectangle{{0.7, 0.08}, -0.6}),
-                         [](const auto& instance) {
-                           return instance.index == 0 ? "Panel" : "Tube";
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Shapes, RectangleLamp,
+    testing::Values(LampShape{ShapeKind::rectangle, Eigen::Vector2d(0.5, 0.4), 0.3},
+                    LampShape{ShapeKind::rectangle, Eigen::Vector2d(0.7, 0.08), -0.6}),
+    [](const auto& instance) { return instance.index == 0 ? "Panel" : "Tube"; });
 
 }  // namespace
 }  // namespace vlp

@@ -241,7 +241,7 @@ TEST(SceneFigures, OfARectangleAreThoseOfTheLampMap) {
 TEST(SceneFigures, OfARecessStandInPlaceOfAnEdgeShare) {
   EXPECT_EQ(refusal_with("recess: {", "edge_share: 1, recess: {"),
             "scene.yaml:13: clutter.steady_lamps[1]: key 'edge_share' is unknown here; the keys "
-            "are: position_m, diameter_m, radiance_e_per_s, recess, halo");
+            "are: position_m, shape, diameter_m, size_m, yaw_rad, radiance_e_per_s, recess, halo");
 }
 
 TEST(SceneFigures, OfThePictureAreChecked) {

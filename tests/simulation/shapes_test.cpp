@@ -48,9 +48,9 @@ std::array<Eigen::Vector2d, 3> random_triangle(Random& random, double reach) {
 
 TEST(Disc, IntegratesToItsWholeOverAnythingThatHoldsIt) {
   const std::array<Eigen::Vector2d, 3> triangle{{{-5, -4}, {7, -3}, {0, 9}}};
-  EXPECT_NEAR(integral_over(Disc(1, 1), triangle), std::numbers::pi, 1e-12);
+  EXPECT_NEAR(integral_over(Disc({1, 1}, 1), triangle), std::numbers::pi, 1e-12);
   // 1 - fall r^2 over the unit disc: pi (1 - fall / 2)
-  EXPECT_NEAR(integral_over(Disc(1, 0.4), triangle), std::numbers::pi * 0.7, 1e-12);
+  EXPECT_NEAR(integral_over(Disc({1, 1}, 0.4), triangle), std::numbers::pi * 0.7, 1e-12);
 }
 
 // Sampling takes long where tests are not optimised.
@@ -63,7 +63,7 @@ constexpr int kTriangles = 20;
 TEST(Disc, IntegratesOverAnyTriangle) {
   Random random(1);
   const double edge_share = 0.3;
-  const Disc disc(1, edge_share);
+  const Disc disc({1, 1}, edge_share);
   for (int i = 0; i < kTriangles; ++i) {
     const auto triangle = random_triangle(random, 1.5);
     const double expected = sampled_integral(
@@ -77,7 +77,7 @@ TEST(Disc, IntegratesOverAnyTriangle) {
 }
 
 TEST(Disc, IsNothingElsewhere) {
-  EXPECT_NEAR(integral_over(Disc(1, 1), {{{2, 0}, {3, 0}, {2, 50}}}), 0, 1e-14);
+  EXPECT_NEAR(integral_over(Disc({1, 1}, 1), {{{2, 0}, {3, 0}, {2, 50}}}), 0, 1e-14);
 }
 
 TEST(Mosaic, IntegratesOverAnyTriangle) {

@@ -14,7 +14,7 @@ namespace {
 /// The lit share of each line that crosses a large lamp: switched / always on, along the middle.
 std::vector<double> lit_lines(Scene scene, double frequency_hz, double duty, double exposure_s) {
   scene.camera = pinhole_camera();
-  scene.lamps[0].glow.diameter_m = 1.2;
+  scene.lamps[0].glow.shape = make_disc(1.2);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
   shot.exposure_s = exposure_s;
   const FrameRenderer renderer(scene);
@@ -98,7 +98,7 @@ TEST(StripeTiming, IsThatOfTheLinesExposure) {
   // At 1 kHz half a period is 16.67 lines; the middle line's exposure is centred at time 0.
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
-  scene.lamps[0].glow.diameter_m = 1.2;
+  scene.lamps[0].glow.shape = make_disc(1.2);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
   const FrameRenderer renderer(scene);
   const cv::Mat1f always = renderer.lamp_electrons(shot);

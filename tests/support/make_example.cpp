@@ -20,7 +20,7 @@ LampMap example_lamps() {
   LampMap map = lamp_map_of(
       {{-0.6, -0.35, 1.6}, {0.6, -0.35, 1.6}, {0.6, 0.35, 1.6}, {-0.6, 0.35, 1.6}, {0.05, 0, 1.5}});
   for (Lamp& lamp : map.lamps) {
-    lamp.diameter_m = 0.1;
+    lamp.shape = make_disc(0.1);
     lamp.frequency_hz = 1000 + 500 * lamp.id;
     lamp.duty = 0.5;
   }

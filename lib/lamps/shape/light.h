@@ -9,6 +9,7 @@
 #include "lamps/shape/outline.h"
 #include "lamps/shape/shear.h"
 #include "lamps/signal/stripes.h"
+#include "rig/lamp_shape.h"
 
 namespace vlp {
 
@@ -45,7 +46,9 @@ struct Light {
   Eigen::Vector2d pixel;
   /// Standard deviation of `pixel` per axis. Without a lens unknown_lens_sd_px() is included.
   double sigma_px;
-  /// Radius; for a rectangle that of the disc of equal area.
+  /// Shape of its outline; a disc if it has none.
+  ShapeKind shape;
+  /// Radius; for other shapes than discs that of the disc of equal area.
   double radius_px;
   /// Outline of a round light in the plane of LightShape: |unit_from_plane (p - plane_center)| = 1.
   Eigen::Vector2d plane_center;
@@ -73,12 +76,11 @@ struct Light {
   bool uneven;
   /// Width of the edge from 25 % to 75 % of the level.
   double rise_px;
-  /// Rectangles only, see rectangle_of(): polygon within the edges, (u, v); empty for other lights.
+  /// Polygon within the edges, (u, v); empty for discs.
   std::vector<Eigen::Vector2d> face;
-  /// Rectangles only: long side over short side behind the lens, and the standard deviation of its
-  /// logarithm. It includes a quarter of the blur of the edges, by which a tone curve may move
-  /// them.
-  double aspect, aspect_sd;
+  /// Long axis over short axis behind the lens, and the standard deviation of its logarithm; for
+  /// discs 1 and 0.
+  double aspect = 1, aspect_sd = 0;
   /// Fraction of the blob's edge that lies on the circle. Rectangles: fraction of the pixels along
   /// the worst edge that agree with an edge.
   double roundness;
@@ -94,7 +96,7 @@ struct Light {
 /// Minimum Light::roundness of an identified lamp.
 inline constexpr double kMinRoundness = 0.45;
 
-inline bool is_rectangle(const Light& light) { return !light.face.empty(); }
+inline bool is_disc(const Light& light) { return light.shape == ShapeKind::disc; }
 
 /// Returns whether a light may be a lamp, of this map or another.
 inline bool flickers(const Light& light) {

@@ -6,13 +6,12 @@
 #include <utility>
 
 #include "geometry/polygon.h"
-#include "lamps/shape/rectangle.h"
 
 namespace vlp {
 namespace {
 
 bool covers(const Light& light, const Eigen::Vector2d& pixel) {
-  if (is_rectangle(light)) return polygon_contains(light.face, pixel);
+  if (!is_disc(light)) return polygon_contains(light.face, pixel);
   return (light.pixel - pixel).norm() < light.radius_px;
 }
 
@@ -26,7 +25,7 @@ bool near(const PixelBox& a, const PixelBox& b) {
 
 /// Returns whether a part is no piece of a light that an occluder splits.
 bool whole(const LightPart& part) {
-  return part.light && (part.light->glows || part.light->uneven || is_rectangle(*part.light));
+  return part.light && (part.light->glows || part.light->uneven || !is_disc(*part.light));
 }
 
 std::size_t points_of(const LightPart& part) { return part.light ? part.light->outline.size() : 0; }
@@ -55,7 +54,7 @@ LightReason reason_of(const LightPart& part, const ImageSize& size) {
 }
 
 bool overlap(const Light& a, const Light& b) {
-  if (!is_rectangle(a) && !is_rectangle(b)) {
+  if (is_disc(a) && is_disc(b)) {
     return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
   }
   return covers(a, b.pixel) || covers(b, a.pixel);

@@ -29,9 +29,9 @@ double period_sd_of(const Lamp& lamp, const StripeConditions& conditions) {
 
 std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions) {
   const double above_m = lamp.position_m.z() - conditions.camera_height_m;
-  const auto size_m = lamp.rectangle ? lamp.rectangle->size_m.minCoeff() : lamp.diameter_m;
+  const auto& size_m = lamp.shape.size_m;
   if (!size_m || !conditions.focal_px || !(above_m > 0)) return std::nullopt;
-  return *size_m * *conditions.focal_px / above_m;
+  return size_m->minCoeff() * *conditions.focal_px / above_m;
 }
 
 double period_sd(double period_lines, double lines, double exposure_lines) {

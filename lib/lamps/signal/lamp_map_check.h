@@ -21,9 +21,9 @@ struct StripeConditions {
   std::optional<double> exposure_s;
 };
 
-/// Lines of the image on the lamp, of which kUsedHeight are used: diameter focal / height above the
-/// camera. Of a rectangle the shorter side counts, which crosses the lines at worst. Nothing
-/// without a size or a focal length, or when the lamp is not above the camera.
+/// Computes the number of lines of the image on the lamp, of which kUsedHeight are used: size focal
+/// / height above the camera, with the shorter axis of the lamp, which crosses the lines at worst.
+/// Returns std::nullopt without a size or a focal length, or if the lamp is not above the camera.
 std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions);
 
 /// Relative standard deviation of the period that stripes_of() measures on so many lines. A period

@@ -57,14 +57,17 @@ void add_lamps(LampMap map, Lines& lines) {
                {"x_m", lamp.position_m.x()},
                {"y_m", lamp.position_m.y()},
                {"z_m", lamp.position_m.z()}});
-    lines.add("diameter_m", lamp.diameter_m);
+    const LampShape& shape = lamp.shape;
+    const bool is_disc = shape.kind == ShapeKind::disc;
+    if (is_disc && shape.size_m) lines.add("diameter_m", shape.size_m->x());
     lines.add("frequency_hz", lamp.frequency_hz);
     lines.add("duty", lamp.duty);
     lines.add("sd_m", lamp.sd_m);
-    if (!lamp.rectangle) continue;
-    lines.add({{"length_m", lamp.rectangle->size_m.x()},
-               {"width_m", lamp.rectangle->size_m.y()},
-               {"yaw_rad", lamp.rectangle->yaw_rad}});
+    if (is_disc) continue;
+    lines.add("shape", std::string(traits_of(shape.kind).name));
+    lines.add({{"length_m", shape.size_m->x()},
+               {"width_m", shape.size_m->y()},
+               {"yaw_rad", shape.yaw_rad}});
   }
 }
 

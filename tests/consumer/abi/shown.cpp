@@ -17,7 +17,8 @@ using FromName = std::optional<LensModel>(std::string_view);
 struct Types {
   LampMap map;
   Lamp lamp;
-  LampRectangle lamp_rectangle;
+  LampShape lamp_shape;
+  ShapeTraits shape_traits;
   Calibration calibration;
   Camera camera;
   IntrinsicsReport report;

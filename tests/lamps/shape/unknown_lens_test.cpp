@@ -104,7 +104,7 @@ TEST(UnknownLens, GrowsWithTheDiscAndWithItsDistanceFromTheMiddle) {
   EXPECT_GT(off_axis, 3 * in_the_middle);
   light.radius_px = 60;
   EXPECT_DOUBLE_EQ(unknown_lens_sd_px(light, kUnknownLensImage), 4 * off_axis);
-  light.face = {{0, 0}, {9, 0}, {9, 9}, {0, 9}};
+  light.shape = ShapeKind::rectangle;
   EXPECT_EQ(unknown_lens_sd_px(light, kUnknownLensImage), 0) << "a rectangle's edges say it";
 }
 

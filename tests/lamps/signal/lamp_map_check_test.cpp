@@ -14,7 +14,7 @@ namespace {
 constexpr StripeConditions kConditions{3e-5, 520, 0, 5e-5};
 
 Lamp lamp(int id, double frequency_hz, std::optional<double> duty = 0.5) {
-  return {id, {double(id), 0, 1.6}, 0.18, frequency_hz, duty};
+  return {id, {double(id), 0, 1.6}, make_disc(0.18), frequency_hz, duty};
 }
 
 /// Of many measurements, over what period_sd() says.
@@ -59,7 +59,7 @@ TEST(PeriodSd, IsInfiniteWithoutAPeriod) {
 TEST(LampMapCheck, CountsTheLinesOnALamp) {
   EXPECT_NEAR(lines_on(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
   Lamp unknown = lamp(1, 2000);
-  unknown.diameter_m.reset();
+  unknown.shape.size_m.reset();
   EXPECT_FALSE(lines_on(unknown, kConditions));
   StripeConditions above = kConditions;
   above.camera_height_m = 2;

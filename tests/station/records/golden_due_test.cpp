@@ -106,7 +106,7 @@ TEST_F(GoldenDue, NotAtAVerdictForWhatRanOutMeanwhile) {
   note("unit", "PASS");
   EXPECT_THAT(problem(), StartsWith("2 units since"));
   EXPECT_EQ(at_verdict(), "");
-  config.lamps.lamps.push_back({1, {0, 0, 2}, 0.18, 1600, 0.5});
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
   EXPECT_THAT(at_verdict(), StartsWith("what measures in station.yaml"));
   note("golden", "FAIL");
   EXPECT_THAT(at_verdict(), StartsWith("the golden unit failed"));
@@ -126,7 +126,7 @@ TEST_F(GoldenDue, AfterTheStationWasChanged) {
   ASSERT_EQ(problem(), "");
   config.sha256 = "of other comments";
   EXPECT_EQ(problem(), "");
-  config.lamps.lamps.push_back({1, {0, 0, 2}, 0.18, 1600, 0.5});
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
   EXPECT_EQ(problem(),
             "what measures in station.yaml or a file that it names was changed since the golden "
             "unit was measured (run RUN): 'vlp-station verify' is due");
@@ -134,7 +134,7 @@ TEST_F(GoldenDue, AfterTheStationWasChanged) {
   EXPECT_THAT(problem(), StartsWith("what measures in station.yaml"));
   config.lamps.lamps.clear();
   EXPECT_EQ(problem(), "") << "as it was again";
-  config.lamps.lamps.push_back({1, {0, 0, 2}, 0.18, 1600, 0.5});
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
   note("golden", "PASS");
   EXPECT_EQ(problem(), "");
 }

@@ -1,0 +1,90 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/lamp_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "rig/yaml_parts.h"
+#include "rig/yaml_writer.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kMinSize_m = 1e-3, kMaxSize_m = 10;
+constexpr double kMaxYaw_rad = 6.3;  // a turn; larger values were given in degrees
+
+/// Lists the names of all shapes, or of the oblong ones.
+std::string list_names(bool only_oblong) {
+  std::string names;
+  for (const ShapeTraits& traits : kShapeTraits) {
+    if (only_oblong && !traits.is_oblong) continue;
+    names.append(names.empty() ? "" : ", ").append(traits.name);
+  }
+  return names;
+}
+
+}  // namespace
+
+Eigen::Vector3d world_from_shape(const LampShape& shape, const Eigen::Vector3d& center_m,
+                                 const Eigen::Vector2d& point) {
+  const double cosine = std::cos(shape.yaw_rad), sine = std::sin(shape.yaw_rad);
+  const Eigen::Vector2d half_m = *shape.size_m / 2;
+  return center_m + point.x() * (half_m.x() * Eigen::Vector3d(cosine, sine, 0)) +
+         point.y() * (half_m.y() * Eigen::Vector3d(-sine, cosine, 0));
+}
+
+std::vector<Eigen::Vector3d> outline_of(const LampShape& shape, const Eigen::Vector3d& center_m,
+                                        int count) {
+  std::vector<Eigen::Vector3d> points_m;
+  for (int i = 0; i < count && shape.size_m; ++i) {
+    const double angle_rad = 2 * std::numbers::pi * i / count;
+    Eigen::Vector2d point(std::cos(angle_rad), std::sin(angle_rad));
+    if (!traits_of(shape.kind).is_round) point /= point.cwiseAbs().maxCoeff();
+    points_m.push_back(world_from_shape(shape, center_m, point));
+  }
+  return points_m;
+}
+
+LampShape read_shape(YamlMap& map) {
+  LampShape shape;
+  const auto word = map.optional("shape");
+  if (word) {
+    const std::string name = word->text();
+    const auto* traits = std::ranges::find(kShapeTraits, name, &ShapeTraits::name);
+    if (traits == kShapeTraits.end()) throw word->unknown(list_names(false));
+    shape.kind = static_cast<ShapeKind>(traits - kShapeTraits.begin());
+  }
+  const ShapeTraits& traits = traits_of(shape.kind);
+  const auto diameter = map.optional("diameter_m");
+  const auto size = map.optional("size_m"), yaw = map.optional("yaw_rad");
+  if (!traits.is_oblong) {
+    if (size || yaw) {
+      const std::string names = list_names(true);
+      throw(size ? size : yaw)->error("is of a " + names + ": say 'shape: " + names + "', too");
+    }
+    return diameter ? make_disc(diameter->number_within(kMinSize_m, kMaxSize_m, "m")) : shape;
+  }
+  if (diameter) {
+    throw diameter->error("is of a disc, and this is a " + std::string(traits.name) +
+                          ": it has a size_m");
+  }
+  const YamlValue sides = map.required("size_m");
+  shape.size_m = Eigen::Vector2d(sides.numbers(2).data());
+  if (yaw) shape.yaw_rad = yaw->number_within(-kMaxYaw_rad, kMaxYaw_rad, "rad");
+  for (const YamlValue& side : sides.list()) side.number_within(kMinSize_m, kMaxSize_m, "m");
+  return shape;
+}
+
+void emit_shape(YAML::Emitter& out, const LampShape& shape) {
+  if (!shape.size_m) return;
+  const ShapeTraits& traits = traits_of(shape.kind);
+  if (!traits.is_oblong) return emit_number(out, "diameter_m", shape.size_m->x());
+  emit_word(out, "shape", traits.name);
+  emit_numbers(out, "size_m", *shape.size_m);
+  emit_number(out, "yaw_rad", shape.yaw_rad);
+}
+
+}  // namespace vlp

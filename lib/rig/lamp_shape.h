@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace vlp {
+
+/// Shape of a lamp: a figure in a horizontal plane, with two axes at right angles.
+enum class ShapeKind { disc, rectangle };
+
+/// Properties of a shape.
+struct ShapeTraits {
+  /// Name in lamps.yaml and lights.csv.
+  std::string_view name;
+  /// Whether the outline is the ellipse with these axes; otherwise it is the box around that.
+  bool is_round;
+  /// Whether lamps.yaml has size_m and yaw_rad of it; otherwise diameter_m, the length of both
+  /// axes.
+  bool is_oblong;
+};
+
+/// Properties of all shapes, in the order of ShapeKind.
+inline constexpr auto kShapeTraits = std::to_array<ShapeTraits>({
+    {"disc", true, false},
+    {"rectangle", false, true},
+});
+
+inline const ShapeTraits& traits_of(ShapeKind kind) {
+  return kShapeTraits[static_cast<std::size_t>(kind)];
+}
+
+struct LampShape {
+  ShapeKind kind = ShapeKind::disc;
+  /// Lengths of the two axes; std::nullopt for a disc of unknown diameter.
+  std::optional<Eigen::Vector2d> size_m = {};
+  /// Angle from the world's x axis to the first axis, counter-clockwise seen from above.
+  double yaw_rad = 0;
+};
+
+inline LampShape make_disc(double diameter_m) {
+  return {ShapeKind::disc, Eigen::Vector2d::Constant(diameter_m)};
+}
+
+/// Converts a point from units of the half axes of a shape to the world frame.
+/// @pre The shape has a size.
+Eigen::Vector3d world_from_shape(const LampShape& shape, const Eigen::Vector3d& center_m,
+                                 const Eigen::Vector2d& point);
+
+/// Computes points of the outline in the world frame, counter-clockwise seen from above; none if
+/// the size is unknown. Those of a box include its corners if `count` is a multiple of 8.
+std::vector<Eigen::Vector3d> outline_of(const LampShape& shape, const Eigen::Vector3d& center_m,
+                                        int count = 16);
+
+}  // namespace vlp
