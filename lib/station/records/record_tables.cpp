@@ -57,8 +57,8 @@ std::vector<std::string> tables() {
           kImagesByDigest};
 }
 
-/// Of the figures of version 1, which did not keep them. It stays as it is, whatever becomes of the
-/// figures.
+/// Units of the figures of version 1, which did not keep them. It stays as it is, whatever becomes
+/// of the figures.
 constexpr const char* kUnitsOfVersion1 =
     "UPDATE figures SET unit = CASE "
     "WHEN name IN ('blur_px', 'center_px', 'nominal_px', 'rms_px', 'uncertainty_px', 'halves_px', "
@@ -68,15 +68,17 @@ constexpr const char* kUnitsOfVersion1 =
     "'check_worst_mm', 'check_offset_mm', 'check_height_mm') THEN 'mm' "
     "WHEN name = 'tilt_deg' THEN 'deg' WHEN name = 'focal_percent' THEN '%' ELSE '' END";
 
+/// Adds the units of figures.
 void from_1_to_2(soci::session& sql) {
   sql << "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT ''";
   sql << kUnitsOfVersion1;
 }
 
-/// An older program, which counts what is INVALID as failed, is refused from here on.
+/// Adds the index of images by their digest, and refuses older programs, which count INVALID as
+/// failed.
 void from_2_to_3(soci::session& sql) { sql << kImagesByDigest; }
 
-/// Nor can an older program tell what gates with guard bands say.
+/// Adds guard bands, which older programs cannot judge.
 void from_3_to_4(soci::session& sql) {
   sql << "ALTER TABLE figures ADD COLUMN uncertainty DOUBLE PRECISION";
   sql << "ALTER TABLE figures ADD COLUMN guard_k DOUBLE PRECISION";
@@ -87,7 +89,8 @@ constexpr const char* kEventsOfVersion5 =
     "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
     "text TEXT NOT NULL)";
 
-/// An older program would bring runs here without their events, and take them from the spool.
+/// Adds events, operator and shift. An older program would bring runs here without their events,
+/// and take them from the spool.
 void from_4_to_5(soci::session& sql) {
   sql << kEventsOfVersion5;
   sql << kEventsByRun;
@@ -95,7 +98,8 @@ void from_4_to_5(soci::session& sql) {
   sql << "ALTER TABLE runs ADD COLUMN shift TEXT NOT NULL DEFAULT ''";
 }
 
-/// An older program would keep runs without an entry in the trail.
+/// Adds the authors of events, and the trail, without an entry in which an older program would keep
+/// runs.
 void from_5_to_6(soci::session& sql) {
   sql << "ALTER TABLE events ADD COLUMN who TEXT NOT NULL DEFAULT ''";
   sql << kTrail;
@@ -104,7 +108,6 @@ constexpr int kFirstWithTrail = 6;
 
 /// From each version to the next; the first is of version 1.
 constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4, from_4_to_5, from_5_to_6};
-static_assert(kMigrations.size() + 1 == kSchemaVersion);
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
 
@@ -128,6 +131,8 @@ int version_of(soci::session& sql) {
 }
 
 }  // namespace
+
+const int kSchemaVersion = static_cast<int>(kMigrations.size()) + 1;
 
 bool has_record_tables(soci::session& sql) {
   // Versions only grow. Without a lock, so that who may only read can.

@@ -6,10 +6,8 @@
 
 namespace vlp {
 
-/// The present version of the tables, which vlp_schema holds. Version 2: a figure has its unit.
-/// Version 3: images are found by their digest; a verdict can be INVALID. Version 4: guard bands.
-/// Version 5: events, operator and shift. Version 6: who of events; the trail.
-inline constexpr int kSchemaVersion = 6;
+/// Present version of the tables, which vlp_schema holds: it counts the migrations.
+extern const int kSchemaVersion;
 
 /// Whether the tables are those of the present version; looks without a lock. Throws as
 /// make_record_tables().
