@@ -40,12 +40,13 @@ class ReportTest : public testing::Test {
          in("calibration.yaml") + " --plot" + in("dispersion.svg"));
     must("vlp-locate " + kExample + "detections.csv" + rig(kExample + "calibration.yaml") + " -o" +
          in("fixes.csv"));
-    draw_intrinsics_plot(folder / "camera.svg",
-                         {"unit 7",
-                          {800, 600},
-                          {{{10, 20}, {0.1, 0.2}, false}, {{700, 500}, {-0.1, 0.1}, false}},
-                          2,
-                          {0.1, 0.2, 0.3, 0.4}});
+    draw(
+        folder / "camera.svg",
+        drawing_of(IntrinsicsPlot{"unit 7",
+                                  {800, 600},
+                                  {{{10, 20}, {0.1, 0.2}, false}, {{700, 500}, {-0.1, 0.1}, false}},
+                                  2,
+                                  {0.1, 0.2, 0.3, 0.4}}));
     folder.file("track.csv",
                 "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,"
                 "lamps,residual_px\n0,ok,0,0.001,0,0,,,,,3,0.1\n"

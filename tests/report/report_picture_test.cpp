@@ -17,9 +17,10 @@ using testing::Not;
 
 TEST(ReportPicture, KnowsWhatTheProgramsDraw) {
   const TemporaryFolder folder;
-  draw_rotation_plot(folder / "a.svg", {"", {}, {203, 198}, {210, 190}});
+  draw(folder / "a.svg", drawing_of(RotationPlot{"", {}, {203, 198}, {210, 190}}));
   EXPECT_EQ(read_report_picture(folder / "a.svg").part, ReportPart::rotation);
-  draw_dispersion_plot(folder / "b.svg", {"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}});
+  draw(folder / "b.svg",
+       drawing_of(DispersionPlot{"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
   const ReportPicture picture = read_report_picture(folder / "b.svg");
   EXPECT_EQ(picture.part, ReportPart::dispersion);
   EXPECT_EQ(picture.image, TemporaryFolder::content_of(folder / "b.svg"));

@@ -118,11 +118,6 @@ BoardPose BoardLattice::pose_of_part(const BoardPose& camera_from_board, std::si
           camera_from_board.translation_m + turned(camera_from_board, origins_m_[part])};
 }
 
-BoardPose BoardLattice::pose_of_board(const BoardPose& camera_from_part) const {
-  return {camera_from_part.rotation,
-          camera_from_part.translation_m - turned(camera_from_part, origins_m_[0])};
-}
-
 bool BoardLattice::enough_points(const std::vector<SeenPoint>& seen) const {
   constexpr std::size_t least = 12, least_of_parts = 6;  // of a part, where there are four
   std::vector<std::map<std::size_t, int>> in_row(parts_);

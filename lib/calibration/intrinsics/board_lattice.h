@@ -64,9 +64,8 @@ class BoardLattice {
   std::vector<Corner> bent(std::vector<Corner> corners,
                            const Eigen::Vector2d& warp_of_part_m) const;
 
-  /// The pose of a part from that of the board, and of the board from that of its first part.
+  /// Computes the pose of a part from that of the board.
   BoardPose pose_of_part(const BoardPose& camera_from_board, std::size_t part) const;
-  BoardPose pose_of_board(const BoardPose& camera_from_part) const;
   /// Corners that fix every part's pose: twelve of a board in one part (all, when it has no more),
   /// six of each of four parts; two or more in each of two rows.
   bool enough(const SeenBoard& seen) const;

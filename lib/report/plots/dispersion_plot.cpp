@@ -62,8 +62,4 @@ Drawing drawing_of(const DispersionPlot& plot) {
   return {"dispersion", 720, 720, commands};
 }
 
-void draw_dispersion_plot(const std::filesystem::path& picture, const DispersionPlot& plot) {
-  draw(picture, drawing_of(plot));
-}
-
 }  // namespace vlp

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -25,9 +24,7 @@ struct DispersionPlot {
   std::vector<Eigen::Vector2d> outliers_m;
 };
 
-/// Draws it in millimetres, .png or .svg by the ending. Throws InputError, see draw().
-void draw_dispersion_plot(const std::filesystem::path& picture, const DispersionPlot& plot);
-/// The same before it is drawn.
+/// Makes the plot, in millimetres, for draw().
 Drawing drawing_of(const DispersionPlot& plot);
 
 }  // namespace vlp

@@ -156,8 +156,4 @@ Drawing drawing_of(const IntrinsicsPlot& plot) {
   return {"intrinsics", 900, 280 + 720 * height / width, commands};
 }
 
-void draw_intrinsics_plot(const std::filesystem::path& picture, const IntrinsicsPlot& plot) {
-  draw(picture, drawing_of(plot));
-}
-
 }  // namespace vlp

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -35,10 +34,8 @@ struct IntrinsicsPlot {
 /// for no residuals.
 double residual_magnification(double rms_px, int width_px);
 
-/// Draws side by side the corners, their residuals enlarged, and the projection's standard
-/// deviation; .png or .svg by the ending. Throws InputError, see draw().
-void draw_intrinsics_plot(const std::filesystem::path& picture, const IntrinsicsPlot& plot);
-/// The same before it is drawn.
+/// Makes the plot for draw(): side by side the corners, their residuals enlarged, and the standard
+/// deviation of the projection.
 Drawing drawing_of(const IntrinsicsPlot& plot);
 
 }  // namespace vlp

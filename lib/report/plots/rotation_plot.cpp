@@ -68,8 +68,4 @@ Drawing drawing_of(const RotationPlot& plot) {
   return {"rotation", 1000, 560, commands};
 }
 
-void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot& plot) {
-  draw(picture, drawing_of(plot));
-}
-
 }  // namespace vlp

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -28,10 +27,8 @@ struct RotationPlot {
   Eigen::Vector2d principal_point_px;
 };
 
-/// Draws the traces, and beside them, enlarged, the centres of the ellipses, the rotation centre
-/// and the principal point; .png or .svg by the ending. Throws InputError, see draw().
-void draw_rotation_plot(const std::filesystem::path& picture, const RotationPlot& plot);
-/// The same before it is drawn.
+/// Makes the plot for draw(): the traces, and beside them, enlarged, the centres of the ellipses,
+/// the rotation centre and the principal point.
 Drawing drawing_of(const RotationPlot& plot);
 
 }  // namespace vlp

@@ -23,7 +23,7 @@ class DispersionPlotTest : public testing::Test {
                       {}};
 
   std::string drawn(const char* name) {
-    draw_dispersion_plot(folder / name, plot);
+    draw(folder / name, drawing_of(plot));
     return TemporaryFolder::content_of(folder / name);
   }
 };
@@ -32,7 +32,7 @@ TEST_F(DispersionPlotTest, IsAPngOrAnSvgByItsEndingAndTheSameTwice) {
   EXPECT_THAT(drawn("a.png"), StartsWith("\x89PNG"));
   EXPECT_EQ(drawn("a.png"), drawn("a.png"));
   EXPECT_THAT(drawn("a.svg"), HasSubstr("a 'title'"));
-  EXPECT_THAT(refusal_of([&] { draw_dispersion_plot(folder / "a.gif", plot); }),
+  EXPECT_THAT(refusal_of([&] { draw(folder / "a.gif", drawing_of(plot)); }),
               HasSubstr("a.gif: a picture's name should end in"));
 }
 

@@ -23,7 +23,7 @@ class IntrinsicsPlotTest : public testing::Test {
   /// What gnuplot says, on stderr, is for whoever runs the program: nothing.
   std::string svg_of(const IntrinsicsPlot& drawn) const {
     testing::internal::CaptureStderr();
-    draw_intrinsics_plot(folder / "a.svg", drawn);
+    draw(folder / "a.svg", drawing_of(drawn));
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
     return TemporaryFolder::content_of(folder / "a.svg");
   }
@@ -51,13 +51,13 @@ TEST_F(IntrinsicsPlotTest, SaysWhatIsDrawnAndHowLarge) {
 }
 
 TEST_F(IntrinsicsPlotTest, IsAPngOrAnSvgTheSameBytesTwice) {
-  draw_intrinsics_plot(folder / "a.png", plot);
+  draw(folder / "a.png", drawing_of(plot));
   const std::string first = TemporaryFolder::content_of(folder / "a.png");
   EXPECT_THAT(first, StartsWith("\x89PNG"));
-  draw_intrinsics_plot(folder / "a.png", plot);
+  draw(folder / "a.png", drawing_of(plot));
   EXPECT_EQ(TemporaryFolder::content_of(folder / "a.png"), first);
   EXPECT_EQ(svg_of(plot), svg_of(plot));
-  EXPECT_THAT(refusal_of([&] { draw_intrinsics_plot(folder / "a.gif", plot); }),
+  EXPECT_THAT(refusal_of([&] { draw(folder / "a.gif", drawing_of(plot)); }),
               HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 

@@ -19,13 +19,13 @@ TEST(RotationPlot, ShowsLampsCirclesCentreAndPrincipalPoint) {
                            {43, {{150, 200}, {250, 200}, {200, 250}}, {201, 199}, {50, 50.5}}},
                           {203, 198},
                           {210, 190}};
-  draw_rotation_plot(folder / "a.svg", plot);
+  draw(folder / "a.svg", drawing_of(plot));
   const std::string svg = TemporaryFolder::content_of(folder / "a.svg");
   for (const char* part : {"unit 'seven'", ">42<", ">43<", "principal point", "rotation centre"}) {
     EXPECT_THAT(svg, HasSubstr(part));
   }
   EXPECT_THAT(svg, Not(HasSubstr(">44<")));
-  draw_rotation_plot(folder / "b.svg", plot);
+  draw(folder / "b.svg", drawing_of(plot));
   EXPECT_EQ(TemporaryFolder::content_of(folder / "b.svg"), svg);
 }
 
