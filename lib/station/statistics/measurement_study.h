@@ -41,10 +41,9 @@ struct MeasurementStudy {
   /// e: EV of the manual. Station and both: AV and INT, 0 with one station, of which the study
   /// knows nothing.
   double repeatability = 0, of_station = 0, of_both = 0;
-  /// GRR: sqrt(EV^2 + AV^2 + INT^2); PV; TV: of all.
+  /// GRR: sqrt(EV^2 + AV^2 + INT^2); PV; TV: of all. 100 GRR / TV up to 10 is good, above 30 bad
+  /// (the manual's rule).
   double measuring = 0, of_unit = 0, total = 0;
-  /// 100 GRR / TV. Up to 10 % is good, above 30 % bad (the manual's rule).
-  double percent_of_total() const { return total > 0 ? 100 * measuring / total : 0; }
   /// ndc: 1.41 PV / GRR, whole, and at least 1. Five are asked for. Nothing when GRR is 0.
   std::optional<int> distinct_categories() const;
   /// P/T in percent: 600 GRR / (U - L), or with one limit, of the room between mean and limit, 300
