@@ -74,6 +74,7 @@ void run(const CLI::App& app, const Options& options) {
   input.lamps_file = images.lamps;
   input.calibration = read_calibration(images.calibration);
   input.calibration_file = images.calibration;
+  if (images.frontend.readout) input.calibration.camera.readout = images.frontend.readout;
   input.map_sd_m = options.map_sd_m;
   input.place_sd_m = options.place_sd_m;
   input.lens_sd_px = options.lens_sd_px;

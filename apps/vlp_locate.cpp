@@ -42,7 +42,7 @@ struct Options {
   bool one_lamp = false;
   MotionOptions motion;
   std::optional<double> yaw_rate_sd_deg_per_s;
-  std::optional<double> lean_sd_deg, height_sd_m;
+  std::optional<double> lean_sd_deg, height_sd_m, yaw_sd_deg;
   int frames_together = 1;
 };
 
@@ -72,6 +72,9 @@ CapturesTable captures_of(const Options& options) {
       throw std::invalid_argument("--frames needs time_s in captures.csv");
     }
   }
+  if (options.yaw_sd_deg && !some([](const Capture& one) { return one.yaw_rad.has_value(); })) {
+    throw std::invalid_argument("--yaw-sd-deg needs yaw_rad in captures.csv");
+  }
   if (options.height_sd_m && !some([](const Capture& one) { return one.z_m.has_value(); })) {
     throw std::invalid_argument("--height-sd-m needs z_m in captures.csv");
   }
@@ -84,6 +87,9 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
                     read_lamp_map(options.images.lamps),
                     read_calibration(options.images.calibration),
                     captures};
+  if (const auto& readout = options.images.frontend.readout) {
+    input.calibration.camera.readout = readout;
+  }
   input.sigma_px = options.sigma_px;
   input.how.correction = kCorrections.at(options.correction);
   if (const auto& mount = options.camera_on_robot) {
@@ -92,6 +98,7 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
   }
   input.inclination_sigma_rad = rad_from_deg(options.inclination_sigma_deg.value_or(0));
   input.one_lamp = options.one_lamp;
+  input.yaw_sd_rad = rad_from_deg(options.yaw_sd_deg.value_or(0));
   input.motion = options.motion.motion();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
   input.lean_sd_rad = rad_from_deg(options.lean_sd_deg.value_or(0));
@@ -149,8 +156,8 @@ void add_options(CLI::App& app, Options& options) {
       ->option_text("none|rotation|dispersion|all");
   app.add_option(
          "--sigma-px", options.sigma_px,
-         "Standard deviation of the lamps' pixels; taken from the residuals when neither it "
-         "nor a column says it")
+         "Standard deviation of the lamps' pixels, raised if the residuals are larger; taken from "
+         "the residuals if neither it nor a column states it")
       ->check(CLI::Range(kMinSigma_px, kMaxSigma_px));
   app.add_option(
       "--captures", options.captures,
@@ -168,8 +175,14 @@ void add_options(CLI::App& app, Options& options) {
          "The camera's place and yaw on the robot: the fixes are then of the robot's centre")
       ->check(finite())
       ->option_text("X_M Y_M Z_M YAW_DEG");
-  app.add_flag("--one-lamp", options.one_lamp,
-               "Where one lamp is seen, take z_m and yaw_rad from captures.csv");
+  CLI::Option* const one_lamp =
+      app.add_flag("--one-lamp", options.one_lamp,
+                   "Where one lamp is seen, take z_m and yaw_rad from captures.csv");
+  app.add_option("--yaw-sd-deg", options.yaw_sd_deg,
+                 "Standard deviation of yaw_rad in captures.csv, for --one-lamp (default: exact); "
+                 "that of z_m is --height-sd-m")
+      ->check(finite_not_negative())
+      ->needs(one_lamp);
   add_motion_options(
       app, options.motion,
       "The camera drives, so fast at most: its velocity is estimated from each image (default: as "
@@ -181,9 +194,11 @@ void add_options(CLI::App& app, Options& options) {
          "and pitch are estimated from each image of three lamps or more; 90: by any "
          "(default: level, or as captures.csv says)")
       ->check(finite_not_negative());
-  app.add_option("--height-sd-m", options.height_sd_m,
-                 "z_m in captures.csv is known to this, which tells apart where three lamps fit "
-                 "several leans")
+  app.add_option(
+         "--height-sd-m", options.height_sd_m,
+         "Standard deviation of z_m in captures.csv, which then counts in all fixes: it tells "
+         "apart where three lamps fit several leans, and is the error of the height for "
+         "--one-lamp")
       ->check(finite_positive());
   app.add_option(
          "--frames", options.frames_together,

@@ -25,12 +25,14 @@ class Histogram {
   explicit Histogram(const cv::Mat1f& image) : counts_(kBins + 1), pixels_(image.total()) {
     double max = 0;
     cv::minMaxLoc(image, nullptr, &max);
-    if (max > 0) bins_per_value_ = static_cast<float>(kBins / max);
+    if (!(max > 0)) return;
+    bins_per_value_ = static_cast<float>(kBins / max);
     for (const float value : image) ++counts_[static_cast<std::size_t>(value * bins_per_value_)];
   }
 
   /// Returns the value that a fraction of the pixels does not exceed, to 1/2^14 of the largest.
   double quantile(double fraction) const {
+    if (!(bins_per_value_ > 0)) return 0;
     const double before = fraction * static_cast<double>(pixels_ - 1);
     std::size_t bin = 0, pixels = counts_[0];
     while (static_cast<double>(pixels) <= before) pixels += counts_[++bin];
@@ -42,7 +44,7 @@ class Histogram {
   static constexpr std::size_t kBins = 1 << 14;
   std::vector<std::size_t> counts_;
   std::size_t pixels_;
-  float bins_per_value_ = 1;
+  float bins_per_value_ = 0;
 };
 
 /// Returns the standard deviation of a pixel's noise, in levels.

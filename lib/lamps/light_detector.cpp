@@ -30,8 +30,8 @@ namespace vlp {
 
 namespace {
 
-/// Fits a light to a blob with the outline of outline_of(), for lamps of one shape with the sizes
-/// `sizes_m`; std::nullopt if it has another shape. See rectangle_of().
+/// Function that fits a light to a blob with the outline of outline_of(), for lamps of one shape
+/// with the sizes `sizes_m`; std::nullopt if it has another shape. See rectangle_of().
 using ShapeDetector = decltype(&rectangle_of);
 
 /// Detectors of all shapes but discs, see LightShape, in the order in which they are tried.

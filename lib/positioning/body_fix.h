@@ -71,8 +71,9 @@ struct BodyFix {
   BodyCovariance covariance = BodyCovariance::Zero();
   /// Of pixels and priors, over their variances: its mean is 2n - 4, with a known height 2n - 3.
   double chi_squared = 0;
-  /// The part of the pixels, and its mean, which follows from the covariance.
+  /// Part of chi_squared from the pixels.
   double pixels_chi_squared = 0;
+  /// Expectation of pixels_chi_squared, which follows from the covariance.
   double redundancy = 0;
   /// Root of the mean squared distance, in the image, of the lamps from where the fix sees them.
   double residual_px = 0;

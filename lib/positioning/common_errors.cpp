@@ -303,44 +303,29 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::covariance
   return sum;
 }
 
-template <int States>
-double CommonErrors::expected_square(std::size_t i, const Effect& effect,
-                                     const Eigen::Matrix<double, 2, States>& by_state,
-                                     const GainOf<States>& gain) const {
-  GainOf<2> residual(shared());
-  residual.by_shared = effect.by_shared - by_state.lazyProduct(gain.by_shared);
-  for (std::size_t j = 0; j < gain.size; ++j) {
-    Eigen::Matrix<double, 2, 3> by_lamp = -by_state * gain.by_lamp[j];
-    if (i == j) by_lamp += effect.by_lamp;
-    residual.add(gain.lamps[j], by_lamp);
-  }
-  return covariance_of(residual).trace();
-}
-
 double CommonErrors::expected_chi_squared(std::span<const Sighting> sightings,
-                                          const PoseEstimate& camera, const Gain& gain,
+                                          std::span<const std::size_t> lamps,
+                                          const PoseEstimate& camera, const Matrix4& common,
                                           const Lens& lens,
                                           const Eigen::Matrix3d& level_from_base) const {
   const LevelPose pose(camera.pose);
-  double sum = 0;
+  double sum = -(camera.covariance.inverse() * common).trace();
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const Sighting& sighting = sightings[i];
-    const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
-    Effect effect = effect_on(sighting, pose, lens, level_from_base);
-    effect.by_shared = (whitening * effect.by_shared).eval();
-    effect.by_lamp = (whitening * effect.by_lamp).eval();
-    const Eigen::Matrix<double, 2, 4> by_state =
-        whitening * predict(pose, sighting.lamp_m).d_z_d_state;
-    sum += expected_square<4>(i, effect, by_state, gain);
+    const Eigen::Matrix2d whitening = sightings[i].d_pixel_d_z / sightings[i].sigma_px;
+    const Effect effect = effect_on(sightings[i], pose, lens, level_from_base);
+    sum += (whitening * covariance_of(effect, lamps[i]) * whitening.transpose()).trace();
   }
   return sum;
 }
 
 double CommonErrors::expected_chi_squared(std::span<const BodySighting> sightings,
+                                          std::span<const std::size_t> lamps,
                                           const Eigen::Vector3d& arm_m, const BodyFix& fix,
-                                          const BodyGain& gain, const Lens& lens,
+                                          const BodyCovariance& common, const Lens& lens,
                                           const Eigen::Matrix3d& body_from_base) const {
   const PosedBody body(fix.state);
+  Eigen::Matrix<double, kBodyStates, kBodyStates> information;
+  information.setZero();
   double sum = 0;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const BodySighting& seen = sightings[i];
@@ -352,9 +337,17 @@ double CommonErrors::expected_chi_squared(std::span<const BodySighting> sighting
     const Effect effect{
         by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens)),
         by_state.leftCols<3>()};
-    sum += expected_square<kBodyStates>(i, effect, by_state, gain);
+    sum += covariance_of(effect, lamps[i]).trace();
+    information += by_state.transpose() * by_state;
   }
-  return sum;
+  // States that are not estimated have no variance, and `common` is zero there.
+  Eigen::Matrix<double, kBodyStates, kBodyStates> covariance = fix.covariance;
+  for (int i = 0; i < kBodyStates; ++i) {
+    if (!(covariance(i, i) > 0)) covariance(i, i) = 1;
+  }
+  const Eigen::Matrix<double, kBodyStates, kBodyStates> with_priors =
+      2 * covariance.inverse() - information;
+  return sum - (with_priors * common).trace();
 }
 
 template Matrix4 CommonErrors::covariance_of(const Gain& gain) const;

@@ -104,14 +104,17 @@ class CommonErrors {
   BodyGain gain_of(std::span<const BodySighting> sightings, std::span<const std::size_t> lamps,
                    const Eigen::Vector3d& arm_m, const BodyFix& fix, const Lens& lens,
                    const Eigen::Matrix3d& body_from_base) const;
-  /// Expected sum of the squared residuals over their variances that the errors cause:
-  ///   tr(R C R'),   R = W^1/2 (J_c - J G),
-  /// for the gain of the same fix. Takes several times as long as the fix.
-  double expected_chi_squared(std::span<const Sighting> sightings, const PoseEstimate& camera,
-                              const Gain& gain, const Lens& lens,
+  /// Computes the sum of the squared residuals over their variances that the errors cause on
+  /// average, from the common covariance `common` = G C G' of the fix:
+  ///   tr(R C R') = tr(W J_c C J_c') - tr(N common),   R = W^1/2 (J_c - J G),   N = J' W J.
+  /// For a body with priors of information P, N + 2 P takes the place of N.
+  double expected_chi_squared(std::span<const Sighting> sightings,
+                              std::span<const std::size_t> lamps, const PoseEstimate& camera,
+                              const Matrix4& common, const Lens& lens,
                               const Eigen::Matrix3d& level_from_base) const;
-  double expected_chi_squared(std::span<const BodySighting> sightings, const Eigen::Vector3d& arm_m,
-                              const BodyFix& fix, const BodyGain& gain, const Lens& lens,
+  double expected_chi_squared(std::span<const BodySighting> sightings,
+                              std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
+                              const BodyFix& fix, const BodyCovariance& common, const Lens& lens,
                               const Eigen::Matrix3d& body_from_base) const;
   /// G C G', of one or the other.
   template <int States>
@@ -127,13 +130,6 @@ class CommonErrors {
   Eigen::Index shared() const { return intrinsics_ + std::ssize(turns_); }
 
  private:
-  /// Returns the part of the expected chi-squared of sighting `i`, whose whitened pixel moves with
-  /// the errors by `effect` and with the states of the fix by `by_state`.
-  template <int States>
-  double expected_square(std::size_t i, const Effect& effect,
-                         const Eigen::Matrix<double, 2, States>& by_state,
-                         const GainOf<States>& gain) const;
-
   /// How many intrinsics, and where the offset stands.
   Eigen::Index intrinsics_, offset_ = 0;
   Eigen::Matrix3d base_from_camera_, camera_from_base_;

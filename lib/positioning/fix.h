@@ -67,8 +67,8 @@ struct Fix {
   /// (X, Y, Z, yaw) is all that is known of its error: noise_covariance, and what calibration and
   /// lamp map got wrong, as far as they state it (common_errors.h).
   PoseEstimate estimate;
-  /// The part that is of this frame alone and averages out: that of the pixel noise (and of the
-  /// inclination, when its noise is given).
+  /// The part of the pixel noise, of the inclination, and, for one lamp, of height, yaw and motion.
+  /// It averages out over frames as far as these errors are independent between them.
   Matrix4 noise_covariance = Matrix4::Zero();
   /// Root of the mean squared distance between the lamps' pixels and where the fix sees them. Zero,
   /// to rounding, with one or two lamps.
@@ -83,13 +83,14 @@ struct Fix {
   /// Detections whose id is not in the lamp map; they are left out. Holds whatever the status.
   int unknown_lamps = 0;
   /// Degrees of freedom that the pixels' residuals have: 2n - 4 for three lamps and more that are
-  /// seen from a body that stands and whose lean is known, less by what else they determine.
+  /// seen from a body that stands and whose lean is known, less by what else they determine. If
+  /// sigma_px is not stated, the expectation of chi_squared for unit noise in the image.
   double redundancy = 0;
   /// Sum of the squared residuals of the pixels over their variances. Its expectation is
   /// `redundancy` plus common_chi_squared.
   double chi_squared = 0;
   /// Expected contribution of the errors of calibration and lamp map to chi_squared, as far as they
-  /// are stated. 0 without PositionerOptions::expects_residuals.
+  /// are stated. 0 without PositionerOptions::computes_common_chi_squared.
   double common_chi_squared = 0;
   /// Where Sensors let it move or lean.
   std::optional<BodyEstimate> body;

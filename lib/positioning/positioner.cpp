@@ -66,7 +66,8 @@ bool finite(const Sensors& sensors) {
   return is_sd(sensors.inclination_sigma_rad) && (!sensors.motion || finite(*sensors.motion)) &&
          (!height || (std::isfinite(height->z_m) && is_sd(height->sd_m) && height->sd_m > 0)) &&
          (!lean || (std::isfinite(lean->roll_rad) && std::isfinite(lean->pitch_rad))) &&
-         (!known || (std::isfinite(known->z_m) && std::isfinite(known->yaw_rad)));
+         (!known || (std::isfinite(known->z_m) && std::isfinite(known->yaw_rad) &&
+                     is_sd(known->z_sd_m) && is_sd(known->yaw_sd_rad)));
 }
 
 /// The mean of the lamps' places, so that a map in national coordinates loses no digits.
@@ -150,19 +151,24 @@ class Positioner::Impl {
   std::size_t index_of(int id) const;
   void reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
                           ConsistentFix& solution) const;
-  /// Returns G C G', and states what C adds to the residuals of the fix if that is asked for.
+  /// Returns G C G'. Sets fix.common_chi_squared if PositionerOptions require it.
   Matrix4 common_covariance(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
                             Fix& fix) const;
   BodyCovariance common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
                                    const BodyFix& solution, Fix& fix) const;
-  /// States covariance and redundancy for equal noise in the image instead of noise that is equal
-  /// in the undistorted image, by which the fix of least squares weighs its sightings:
+  /// Replaces covariance and redundancy for equal noise in the undistorted image, by which the fix
+  /// weighs its sightings, by those for equal noise in the image:
   ///   A = N^-1 J' W,   cov = A V A',   redundancy = tr(W V) - tr(N cov),   N = J' W J.
-  void state_image_noise(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
-                         Fix& fix) const;
+  void convert_to_image_noise(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
+                              Fix& fix) const;
+  /// Returns the motion of the camera when a lamp is read, or std::nullopt if it moves and the row
+  /// time is not known.
+  std::optional<MotionAtReadout> motion_at_readout(std::span<const Detection> detections, int lamp,
+                                                   const Sensors& sensors) const;
   /// Adds the covariances of a fix of lamps, and transfers it to the robot if there is a mount.
   void add_covariances(const SightedFrame& frame, const InclinationRotation& lean,
-                       const InclinationJacobian& by_lean, double sigma_rad, Fix& fix) const;
+                       const InclinationJacobian& by_lean, const Sensors& sensors,
+                       const Matrix4& by_height_and_yaw, Fix& fix) const;
   FixStatus sight_from_body(std::span<const Detection> detections, double time_s, BodyFrame& frame,
                             int& unknown_lamps) const;
   /// Nothing when fewer than two lamps of the map are seen.
@@ -180,7 +186,7 @@ class Positioner::Impl {
   Eigen::Matrix3d body_from_base_, body_from_camera_;
   double max_residual_share_;
   double unstated_sigma_px_;
-  bool expects_residuals_;
+  bool computes_common_chi_squared_;
   /// Nothing when the calibration lacks the row time or the read-out.
   std::optional<RowClock> row_clock_;
 };
@@ -197,7 +203,7 @@ Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
       body_from_camera_(body_from_base_ * base_from_camera_),
       max_residual_share_(options.max_residual_share),
       unstated_sigma_px_(options.unstated_sigma_px),
-      expects_residuals_(options.expects_residuals),
+      computes_common_chi_squared_(options.computes_common_chi_squared),
       row_clock_(row_clock_of(calibration.camera)) {
   for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
   for (const Lamp& lamp : lamps_) nearest_m_.push_back(distance_to_nearest(lamps_, lamp));
@@ -278,13 +284,14 @@ Matrix4 Positioner::Impl::common_covariance(const SightedFrame& frame,
                                             Fix& fix) const {
   std::array<std::size_t, max_lamps> lamps;
   for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = index_of(frame.ids[i]);
-  const CommonErrors::Gain gain = common_.gain_of(frame.span(), {lamps.data(), frame.size},
-                                                  fix.estimate, lens_, level_from_base);
-  if (expects_residuals_ && fix.redundancy > 0) {
-    fix.common_chi_squared =
-        common_.expected_chi_squared(frame.span(), fix.estimate, gain, lens_, level_from_base);
+  const std::span<const std::size_t> in_map(lamps.data(), frame.size);
+  const Matrix4 common = common_.covariance_of(
+      common_.gain_of(frame.span(), in_map, fix.estimate, lens_, level_from_base));
+  if (computes_common_chi_squared_ && fix.redundancy > 0) {
+    fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, fix.estimate,
+                                                          common, lens_, level_from_base);
   }
-  return common_.covariance_of(gain);
+  return common;
 }
 
 BodyCovariance Positioner::Impl::common_covariance(const BodyFrame& frame,
@@ -292,13 +299,14 @@ BodyCovariance Positioner::Impl::common_covariance(const BodyFrame& frame,
                                                    const BodyFix& solution, Fix& fix) const {
   std::array<std::size_t, max_lamps> lamps;
   for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = index_of(frame.ids[i]);
-  const CommonErrors::BodyGain gain = common_.gain_of(frame.span(), {lamps.data(), frame.size},
-                                                      arm_m, solution, lens_, body_from_base_);
-  if (expects_residuals_ && fix.redundancy > 0) {
-    fix.common_chi_squared =
-        common_.expected_chi_squared(frame.span(), arm_m, solution, gain, lens_, body_from_base_);
+  const std::span<const std::size_t> in_map(lamps.data(), frame.size);
+  const BodyCovariance common = common_.covariance_of(
+      common_.gain_of(frame.span(), in_map, arm_m, solution, lens_, body_from_base_));
+  if (computes_common_chi_squared_ && fix.redundancy > 0) {
+    fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, arm_m, solution,
+                                                          common, lens_, body_from_base_);
   }
-  return common_.covariance_of(gain);
+  return common;
 }
 
 FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
@@ -396,8 +404,9 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   return locate(detections, sensors);
 }
 
-void Positioner::Impl::state_image_noise(const SightedFrame& frame,
-                                         const Eigen::Matrix3d& level_from_base, Fix& fix) const {
+void Positioner::Impl::convert_to_image_noise(const SightedFrame& frame,
+                                              const Eigen::Matrix3d& level_from_base,
+                                              Fix& fix) const {
   const LevelPose pose(fix.estimate.pose);
   const Eigen::Matrix3d camera_from_level = (level_from_base * base_from_camera_).transpose();
   const Matrix4 by_weights = fix.estimate.covariance;
@@ -405,8 +414,8 @@ void Positioner::Impl::state_image_noise(const SightedFrame& frame,
   double expected_squares = 0;
   for (const Sighting& sighting : frame.span()) {
     const auto seen = lens_.project_with_jacobians(camera_from_level * sighting.z.homogeneous());
-    if (!seen) return;
-    const Eigen::Matrix2d d_pixel_d_z = seen->d_pixel_d_point * camera_from_level.leftCols<2>();
+    Eigen::Matrix2d d_pixel_d_z = sighting.d_pixel_d_z;
+    if (seen) d_pixel_d_z = seen->d_pixel_d_point * camera_from_level.leftCols<2>();
     const Eigen::Matrix2d z_by_noise = sighting.sigma_px * d_pixel_d_z.inverse();
     const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
     const Eigen::Matrix2d residual_by_noise = whitening * z_by_noise;
@@ -423,11 +432,13 @@ void Positioner::Impl::state_image_noise(const SightedFrame& frame,
 }
 
 void Positioner::Impl::add_covariances(const SightedFrame& frame, const InclinationRotation& lean,
-                                       const InclinationJacobian& by_lean, double sigma_rad,
-                                       Fix& fix) const {
+                                       const InclinationJacobian& by_lean, const Sensors& sensors,
+                                       const Matrix4& by_height_and_yaw, Fix& fix) const {
+  const double sigma_rad = sensors.inclination_sigma_rad;
   const Matrix4 common = common_.stated() ? common_covariance(frame, lean.level_from_base, fix)
                                           : Matrix4(Matrix4::Zero());
-  if (!frame.is_weighed_by_noise) state_image_noise(frame, lean.level_from_base, fix);
+  if (!frame.is_weighed_by_noise) convert_to_image_noise(frame, lean.level_from_base, fix);
+  fix.estimate.covariance += by_height_and_yaw;
   // The error of the inclination is of this frame, too.
   if (mount_) {
     PoseEstimate whole = fix.estimate;
@@ -444,6 +455,23 @@ void Positioner::Impl::add_covariances(const SightedFrame& frame, const Inclinat
   }
 }
 
+std::optional<MotionAtReadout> Positioner::Impl::motion_at_readout(
+    std::span<const Detection> detections, int lamp, const Sensors& sensors) const {
+  MotionAtReadout readout;
+  if (!sensors.motion || !moves(*sensors.motion)) return readout;
+  if (!row_clock_) return std::nullopt;
+  const auto detection = std::find_if(detections.begin(), detections.end(),
+                                      [&](const Detection& one) { return one.lamp == lamp; });
+  readout.motion = *sensors.motion;
+  readout.time_s = row_clock_->time_s(detection->pixel);
+  if (mount_) {
+    const Eigen::Rotation2Dd camera_from_robot(-mount_->yaw_in_robot_rad);
+    readout.motion.velocity_m_per_s = camera_from_robot * sensors.motion->velocity_m_per_s;
+    readout.arm_m = camera_from_robot * mount_->position_in_robot_m.head<2>();
+  }
+  return readout;
+}
+
 Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensors& sensors) const {
   if (!finite(sensors)) return refused(FixStatus::not_finite, 0);
   if (needs_body(sensors) && detections.size() > 1) {
@@ -458,7 +486,7 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   if (seen != FixStatus::ok) return refused(seen, frame.unknown_lamps);
 
   Fix fix;
-  const double sigma_rad = sensors.inclination_sigma_rad;
+  Matrix4 by_height_and_yaw = Matrix4::Zero();
   InclinationJacobian by_lean = InclinationJacobian::Zero();
   if (frame.size > 1) {
     // Where all that is uncertain is stated, noise alone decides nothing.
@@ -471,13 +499,18 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
     fix.estimate = {solution.pose, solution.covariance};
     fix.residual_px = solution.residual_px;
     fix.chi_squared = solution.chi_squared;
-    if (sigma_rad > 0) by_lean = rotation_effect(frame.span(), solution) * lean.error_axes;
+    if (sensors.inclination_sigma_rad > 0)
+      by_lean = rotation_effect(frame.span(), solution) * lean.error_axes;
   } else if (frame.size == 1 && sensors.height_and_yaw) {
+    const auto readout = motion_at_readout(detections, frame.ids.front(), sensors);
+    if (!readout) return refused(FixStatus::row_time_unknown, frame.unknown_lamps);
     const Sighting& sighting = frame.sightings.front();
-    const HeightAndYaw& known = *sensors.height_and_yaw;
-    const auto pose = fix_one_lamp(sighting, {known.z_m - origin_m_.z(), known.yaw_rad});
+    HeightAndYaw known = *sensors.height_and_yaw;
+    known.z_m -= origin_m_.z();
+    const auto pose = fix_one_lamp(sighting, known, *readout);
     if (!pose) return refused(FixStatus::lamp_below_camera, frame.unknown_lamps);
     fix.estimate = {*pose, one_lamp_covariance(sighting, *pose)};
+    by_height_and_yaw = compute_one_lamp_sensor_covariance(sighting, *pose, known, *readout);
     by_lean = one_lamp_rotation_effect(sighting, *pose) * lean.error_axes;
   } else {
     return refused(FixStatus::too_few_lamps, frame.unknown_lamps);
@@ -488,7 +521,7 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   fix.time_s = sensors.time_s;
   name_rejected(frame, fix);
   fix.unknown_lamps = frame.unknown_lamps;
-  add_covariances(frame, lean, by_lean, sigma_rad, fix);
+  add_covariances(frame, lean, by_lean, sensors, by_height_and_yaw, fix);
   fix.estimate.pose.position_m += origin_m_;
   return fix;
 }

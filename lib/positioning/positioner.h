@@ -35,11 +35,11 @@ struct PositionerOptions {
   /// Standard deviation per axis, in the image, of detections that do not state their sigma_px. It
   /// scales the covariance, and decides whether lamps close together are `degenerate`. Poses do not
   /// depend on it, unless motion, inclination or height is known with a standard deviation.
-  /// Of a camera that stands, such lamps weigh alike in direction, as in the closed forms, which
-  /// errors of lens, lean and map disturb less than weights by the image as taken.
+  /// If the camera stands, such lamps have equal weights in the undistorted image, as in the closed
+  /// forms. Errors of lens, tilt and map disturb these weights less than weights by the image.
   double unstated_sigma_px = 1;
-  /// Computes Fix::common_chi_squared, which takes several times as long as the fix.
-  bool expects_residuals = false;
+  /// Computes Fix::common_chi_squared.
+  bool computes_common_chi_squared = false;
 };
 
 /// How a robot, or, without a mount, a camera, moves while an image is read: normal about these
@@ -66,9 +66,10 @@ struct Sensors {
   /// two lamps or more, roll and pitch are then estimated along with the pose. 0: just so. 1 or
   /// more is nothing known.
   double inclination_sigma_rad = 0;
-  /// Of the camera. Makes a fix of a single lamp; not used when two or more are seen.
+  /// Height and yaw of the camera. Makes a fix of a single lamp; not used when two or more are
+  /// seen.
   std::optional<HeightAndYaw> height_and_yaw;
-  /// None: it stands. Not used for a single lamp.
+  /// None: it stands.
   std::optional<KnownMotion> motion = {};
   /// Of the robot's centre, or, without a mount, of the camera. Not used for a single lamp.
   std::optional<KnownHeight> height = {};

@@ -4,15 +4,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <vector>
 
 #include "rig/detection.h"
 
 namespace vlp {
 
+namespace {
+
+bool has_redundancy(const Fix& fix) { return fix.ok() && fix.redundancy > 0; }
+
+/// Returns the median of chi_squared over its degrees of freedom.
+double median_reduced_chi_squared(std::span<const Fix> fixes) {
+  std::vector<double> ratios;
+  for (const Fix& fix : fixes) {
+    if (has_redundancy(fix)) ratios.push_back(fix.chi_squared / fix.redundancy);
+  }
+  if (ratios.empty()) return 0;
+  const auto middle = ratios.begin() + std::ssize(ratios) / 2;
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
+}  // namespace
+
 ResidualSums sum_residuals(std::span<const Fix> fixes) {
+  // Five standard deviations of the others: no fix of normal noise, but one with a wrong lamp.
+  constexpr double max_ratio = 25;
+  const double max_reduced = max_ratio * median_reduced_chi_squared(fixes);
   ResidualSums sums;
   for (const Fix& fix : fixes) {
-    if (!fix.ok() || !(fix.redundancy > 0)) continue;
+    if (!has_redundancy(fix) || fix.chi_squared > max_reduced * fix.redundancy) continue;
     sums.squares_px2 += fix.sightings * fix.residual_px * fix.residual_px;
     sums.chi_squared += fix.chi_squared;
     sums.common_chi_squared += fix.common_chi_squared;
@@ -21,7 +44,7 @@ ResidualSums sum_residuals(std::span<const Fix> fixes) {
   return sums;
 }
 
-std::optional<double> residual_noise_px(const ResidualSums& sums) {
+std::optional<double> estimate_noise_px(const ResidualSums& sums) {
   if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
   return std::clamp(std::sqrt(sums.squares_px2 / sums.degrees_of_freedom), kMinSigma_px,
                     kMaxSigma_px);
@@ -29,15 +52,17 @@ std::optional<double> residual_noise_px(const ResidualSums& sums) {
 
 std::optional<double> estimate_noise_factor(const ResidualSums& sums) {
   if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
-  return std::sqrt(std::max(0.0, sums.chi_squared - sums.common_chi_squared) /
-                   sums.degrees_of_freedom);
+  constexpr double min_fraction = 0.25;
+  const double noise_chi_squared =
+      std::max(sums.chi_squared - sums.common_chi_squared, min_fraction * sums.chi_squared);
+  return std::sqrt(noise_chi_squared / sums.degrees_of_freedom);
 }
 
-double noise_understatement(const ResidualSums& sums) {
+double estimate_birge_ratio(const ResidualSums& sums) {
   constexpr double min_degrees_of_freedom = 12;
   if (sums.degrees_of_freedom < min_degrees_of_freedom) return 1;
-  const double own = sums.chi_squared - 2 * sums.common_chi_squared;
-  return std::sqrt(std::max(1.0, own / sums.degrees_of_freedom));
+  const double noise_chi_squared = sums.chi_squared - 2 * sums.common_chi_squared;
+  return std::sqrt(std::max(1.0, noise_chi_squared / sums.degrees_of_freedom));
 }
 
 }  // namespace vlp

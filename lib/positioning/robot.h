@@ -14,10 +14,13 @@ struct CameraMount {
   double yaw_in_robot_rad;
 };
 
-/// Its camera's height and heading.
+/// Height and yaw of the camera, with their standard deviations; 0: exact. Fixes take the errors of
+/// different frames as independent.
 struct HeightAndYaw {
   double z_m;
   double yaw_rad;
+  double z_sd_m = 0;
+  double yaw_sd_rad = 0;
 };
 
 /// A height known with a standard deviation.

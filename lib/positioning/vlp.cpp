@@ -69,7 +69,8 @@ Sensors sensors_of(const vlp_sensors& sensors) {
   }
   result.inclination_sigma_rad = sensors.inclination_sigma_rad;
   if (sensors.has_height_and_yaw != 0) {
-    result.height_and_yaw = HeightAndYaw{sensors.camera_z_m, sensors.camera_yaw_rad};
+    result.height_and_yaw = HeightAndYaw{sensors.camera_z_m, sensors.camera_yaw_rad,
+                                         sensors.camera_z_sd_m, sensors.camera_yaw_sd_rad};
   }
   if (sensors.has_motion != 0) {
     result.motion =
@@ -165,10 +166,31 @@ ImageView view_of(const vlp_image& image) {
           image.bits};
 }
 
-/// The room of a frame's detections, not made before it is filled.
-union Room {
-  Room() {}
-  std::array<Detection, Positioner::max_lamps> detections;
+/// Detections of one or more frames, without memory from the heap.
+class DetectionBuffer {
+ public:
+  DetectionBuffer() {}
+
+  bool has_room_for(std::size_t count) const { return count <= Positioner::max_lamps - size_; }
+
+  /// Copies the detections of a frame.
+  /// @pre has_room_for(count)
+  std::span<const Detection> add(const vlp_detection* from, std::size_t count) {
+    Detection* const first = detections_.data() + size_;
+    for (std::size_t i = 0; i < count; ++i) {
+      Detection& to = *new (first + i) Detection{from[i].lamp, {from[i].u_px, from[i].v_px}, {}};
+      if (from[i].sigma_px != 0) to.sigma_px = from[i].sigma_px;
+    }
+    size_ += count;
+    return {first, count};
+  }
+
+ private:
+  /// Not constructed before it is filled.
+  union {
+    std::array<Detection, Positioner::max_lamps> detections_;
+  };
+  std::size_t size_ = 0;
 };
 
 }  // namespace
@@ -228,23 +250,37 @@ int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
 
 int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detections, size_t count,
                    const vlp_sensors* sensors, vlp_fix* fix) {
+  return vlp_locate_with_earlier(positioner, detections, count, sensors, nullptr, 0, fix);
+}
+
+int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_detection* detections,
+                                size_t count, const vlp_sensors* sensors,
+                                const vlp_earlier_frame* earlier, size_t earlier_count,
+                                vlp_fix* fix) {
   using namespace vlp;
   if (fix == nullptr) return VLP_BAD_ARGUMENT;
   *fix = {};
   if (sensors != nullptr) fix->stamp = sensors->stamp;
-  if (positioner == nullptr || (detections == nullptr && count > 0)) {
+  if (positioner == nullptr || (detections == nullptr && count > 0) ||
+      (earlier == nullptr && earlier_count > 0)) {
     return fix->status = VLP_BAD_ARGUMENT;
   }
-  if (count > Positioner::max_lamps) return fix->status = VLP_TOO_MANY_LAMPS;
-  Room room;
-  for (std::size_t i = 0; i < count; ++i) {
-    const vlp_detection& seen = detections[i];
-    Detection& detection =
-        *new (&room.detections[i]) Detection{seen.lamp, {seen.u_px, seen.v_px}, {}};
-    if (seen.sigma_px != 0) detection.sigma_px = seen.sigma_px;
+  DetectionBuffer buffer;
+  if (!buffer.has_room_for(count)) return fix->status = VLP_TOO_MANY_LAMPS;
+  const std::span<const Detection> frame = buffer.add(detections, count);
+  std::array<EarlierFrame, Positioner::max_lamps> before;
+  std::size_t frames = 0;
+  for (std::size_t i = 0; i < earlier_count; ++i) {
+    const vlp_earlier_frame& one = earlier[i];
+    if (one.count == 0) continue;
+    if (one.detections == nullptr) return fix->status = VLP_BAD_ARGUMENT;
+    if (!buffer.has_room_for(one.count)) return fix->status = VLP_TOO_MANY_LAMPS;
+    before[frames++] = {buffer.add(one.detections, one.count), one.before_s};
   }
   const Sensors known = sensors != nullptr ? sensors_of(*sensors) : Sensors();
-  fill(positioner->positioner.locate({room.detections.data(), count}, known), known, *fix);
+  const Positioner& with = positioner->positioner;
+  fill(frames > 0 ? with.locate(frame, known, {before.data(), frames}) : with.locate(frame, known),
+       known, *fix);
   return fix->status;
 }
 

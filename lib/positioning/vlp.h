@@ -94,9 +94,11 @@ typedef struct vlp_sensors {
   /* Of each of the two, or of a lean about level that no sensor reads: with two lamps or more roll
    * and pitch are then estimated. 0: just so. 1 or more: nothing is known. */
   double inclination_sigma_rad;
-  /* The camera's; makes a fix of a single lamp. */
+  /* Height and yaw of the camera and their standard deviations (0: exact), for fixes of one lamp.
+   */
   int32_t has_height_and_yaw;
   double camera_z_m, camera_yaw_rad;
+  double camera_z_sd_m, camera_yaw_sd_rad;
   /* Velocity in the level frame; standard deviations per component, 0: just so. */
   int32_t has_motion;
   double velocity_m_per_s[2];
@@ -107,6 +109,14 @@ typedef struct vlp_sensors {
   int32_t has_height;
   double z_m, z_sd_m;
 } vlp_sensors;
+
+/* A frame that the same camera saw shortly before, on the same straight way. */
+typedef struct vlp_earlier_frame {
+  const vlp_detection* detections;
+  size_t count;
+  /* Time from this frame to that of the fix. */
+  double before_s;
+} vlp_earlier_frame;
 
 typedef struct vlp_fix {
   /* As vlp_locate() gave it. What follows `stamp` is zero unless this is VLP_OK. */
@@ -161,6 +171,14 @@ int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
 /* The fix of one frame, and its status; `sensors` may be null. It allocates nothing. */
 int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detections, size_t count,
                    const vlp_sensors* sensors, vlp_fix* fix);
+
+/* As vlp_locate(), with frames from shortly before, which determine one velocity, yaw rate and lean
+ * together with this one (Positioner::locate with EarlierFrame). VLP_TOO_MANY_LAMPS if the frames
+ * have more than VLP_MAX_LAMPS detections in total. */
+int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_detection* detections,
+                                size_t count, const vlp_sensors* sensors,
+                                const vlp_earlier_frame* earlier, size_t earlier_count,
+                                vlp_fix* fix);
 
 /* What a status or an error means and what to do, in a line. Never null. */
 const char* vlp_explanation(int32_t code);

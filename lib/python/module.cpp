@@ -18,6 +18,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -166,14 +167,17 @@ Positioner positioner_of(const LampMap& map, const Calibration& calibration,
 }
 
 Sensors sensors_of(const std::optional<Pair>& inclination_rad, double inclination_sigma_rad,
-                   const std::optional<Pair>& height_and_yaw,
+                   const std::optional<Pair>& height_and_yaw, const Pair& height_and_yaw_sd,
                    const std::optional<Pair>& velocity_m_per_s, double velocity_sd_m_per_s,
                    double yaw_rate_rad_per_s, double yaw_rate_sd_rad_per_s,
                    const std::optional<Pair>& height_m, const std::optional<double>& time_s) {
   Sensors sensors;
   if (inclination_rad) sensors.inclination = {(*inclination_rad)[0], (*inclination_rad)[1]};
   sensors.inclination_sigma_rad = inclination_sigma_rad;
-  if (height_and_yaw) sensors.height_and_yaw = {(*height_and_yaw)[0], (*height_and_yaw)[1]};
+  if (height_and_yaw) {
+    sensors.height_and_yaw = {(*height_and_yaw)[0], (*height_and_yaw)[1], height_and_yaw_sd[0],
+                              height_and_yaw_sd[1]};
+  }
   if (velocity_m_per_s || velocity_sd_m_per_s != 0 || yaw_rate_rad_per_s != 0 ||
       yaw_rate_sd_rad_per_s != 0) {
     const Pair velocity = velocity_m_per_s.value_or(Pair{0, 0});
@@ -199,9 +203,21 @@ std::vector<Detection> detections_of(const Integers& lamps, const Doubles& pixel
   return detections;
 }
 
+/// Lamps, pixels, sigma_px of an earlier frame, and the time from it to the frame of the fix.
+using EarlierArrays = std::tuple<py::object, Doubles, std::optional<Doubles>, double>;
+
 Fix locate(const Positioner& positioner, const py::object& lamps, const Doubles& pixels,
-           const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
-  return positioner.locate(detections_of(integers_of(lamps, "lamps"), pixels, sigma_px), sensors);
+           const std::optional<Doubles>& sigma_px, const Sensors& sensors,
+           const std::vector<EarlierArrays>& earlier) {
+  const auto detections = detections_of(integers_of(lamps, "lamps"), pixels, sigma_px);
+  if (earlier.empty()) return positioner.locate(detections, sensors);
+  std::vector<std::vector<Detection>> before;
+  std::vector<EarlierFrame> frames;
+  for (const auto& [ids, at, sigma, before_s] : earlier) {
+    before.push_back(detections_of(integers_of(ids, "lamps"), at, sigma));
+    frames.push_back({before.back(), before_s});  // the detections of a frame stay where they are
+  }
+  return positioner.locate(detections, sensors, frames);
 }
 
 /// Where each run of equal numbers begins, and the end.
@@ -507,7 +523,26 @@ void define_fix(py::module_& m) {
       .def_property_readonly("residual_px",
                              [](const Fix& fix) { return fix.ok() ? fix.residual_px : kNone; })
       .def_readonly("lamps", &Fix::lamps, "That the fix rests on.")
+      .def_property_readonly(
+          "body_covariance",
+          [](const Fix& fix) -> py::object {
+            if (!fix.body) return py::none();
+            Doubles rows = doubles({kBodyStates, kBodyStates});
+            Eigen::Map<BodyCovariance>(rows.mutable_data()) = fix.body->covariance;  // symmetric
+            return rows;
+          },
+          "Covariance of (x, y, z, yaw, vx, vy, yaw rate, roll, pitch), where motion or lean was "
+          "estimated.")
       .def_readonly("rejected_lamps", &Fix::rejected_lamps)
+      .def_property_readonly(
+          "rejected_ids",
+          [](const Fix& fix) {
+            const auto count =
+                std::min(static_cast<std::size_t>(fix.rejected_lamps), fix.rejected_ids.size());
+            return std::vector<int>(fix.rejected_ids.begin(),
+                                    fix.rejected_ids.begin() + static_cast<std::ptrdiff_t>(count));
+          },
+          "Lamps that were left out because the others contradict them, the first 32.")
       .def_readonly("unknown_lamps", &Fix::unknown_lamps)
       .def_readonly("time_s", &Fix::time_s)
       .def("__repr__", &shown);
@@ -519,11 +554,12 @@ void define_positioner(py::module_& m) {
   py::class_<Sensors>(m, "Sensors", "What a robot knows of a frame besides the image.")
       .def(py::init(&sensors_of), py::kw_only(), "inclination_rad"_a = py::none(),
            "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
-           "velocity_m_per_s"_a = py::none(), "velocity_sd_m_per_s"_a = 0.0,
-           "yaw_rate_rad_per_s"_a = 0.0, "yaw_rate_sd_rad_per_s"_a = 0.0, "height_m"_a = py::none(),
-           "time_s"_a = py::none(),
+           "height_and_yaw_sd"_a = Pair{0, 0}, "velocity_m_per_s"_a = py::none(),
+           "velocity_sd_m_per_s"_a = 0.0, "yaw_rate_rad_per_s"_a = 0.0,
+           "yaw_rate_sd_rad_per_s"_a = 0.0, "height_m"_a = py::none(), "time_s"_a = py::none(),
            "inclination_rad: (roll, pitch), and its standard deviation, with which they are\n"
-           "estimated. height_and_yaw: of the camera, for fixes of one lamp. velocity_m_per_s: in\n"
+           "estimated. height_and_yaw: (z, yaw) of the camera, for fixes of one lamp;\n"
+           "height_and_yaw_sd: their standard deviations. velocity_m_per_s: in\n"
            "the level frame; with standard deviations it is estimated. height_m: (z, sd), with a\n"
            "standard deviation that is positive.");
 
@@ -533,8 +569,10 @@ void define_positioner(py::module_& m) {
            "max_residual_share"_a = 0.1,
            "mount: (x, y, z, yaw) of the camera on the robot, whose fixes it then makes.")
       .def("locate", &locate, "lamps"_a, "pixels"_a, "sigma_px"_a = py::none(),
-           "sensors"_a = Sensors(),
-           "The Fix of one frame, from ids (n), pixels (n, 2), their standard deviations (n).")
+           "sensors"_a = Sensors(), py::kw_only(), "earlier"_a = std::vector<EarlierArrays>(),
+           "The Fix of one frame, from ids (n), pixels (n, 2), their standard deviations (n).\n"
+           "earlier: frames from shortly before, (lamps, pixels, sigma_px, before_s) each, which\n"
+           "determine velocity, yaw rate and lean together with this one.")
       .def(
           "locate_frames", &locate_frames, "frames"_a, "lamps"_a, "pixels"_a,
           "sigma_px"_a = py::none(), "sensors"_a = Sensors(),

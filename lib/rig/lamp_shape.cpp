@@ -3,6 +3,7 @@
 #include "rig/lamp_shape.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -16,11 +17,11 @@ namespace {
 constexpr double kMinSize_m = 1e-3, kMaxSize_m = 10;
 constexpr double kMaxYaw_rad = 6.3;  // a turn; larger values were given in degrees
 
-/// Lists the names of all shapes, or of the oblong ones.
-std::string list_names(bool only_oblong) {
+/// Lists the names of all shapes, or of those with two sizes.
+std::string list_names(bool only_two_sizes) {
   std::string names;
   for (const ShapeTraits& traits : kShapeTraits) {
-    if (only_oblong && !traits.is_oblong) continue;
+    if (only_two_sizes && !traits.has_two_sizes) continue;
     names.append(names.empty() ? "" : ", ").append(traits.name);
   }
   return names;
@@ -55,12 +56,12 @@ LampShape read_shape(YamlMap& map) {
     const std::string name = word->text();
     const auto* traits = std::ranges::find(kShapeTraits, name, &ShapeTraits::name);
     if (traits == kShapeTraits.end()) throw word->unknown(list_names(false));
-    shape.kind = static_cast<ShapeKind>(traits - kShapeTraits.begin());
+    shape.kind = traits->kind;
   }
   const ShapeTraits& traits = traits_of(shape.kind);
   const auto diameter = map.optional("diameter_m");
   const auto size = map.optional("size_m"), yaw = map.optional("yaw_rad");
-  if (!traits.is_oblong) {
+  if (!traits.has_two_sizes) {
     if (size || yaw) {
       const std::string names = list_names(true);
       throw(size ? size : yaw)->error("is of a " + names + ": say 'shape: " + names + "', too");
@@ -79,9 +80,10 @@ LampShape read_shape(YamlMap& map) {
 }
 
 void emit_shape(YAML::Emitter& out, const LampShape& shape) {
+  assert(shape.size_m || !traits_of(shape.kind).has_two_sizes);
   if (!shape.size_m) return;
   const ShapeTraits& traits = traits_of(shape.kind);
-  if (!traits.is_oblong) return emit_number(out, "diameter_m", shape.size_m->x());
+  if (!traits.has_two_sizes) return emit_number(out, "diameter_m", shape.size_m->x());
   emit_word(out, "shape", traits.name);
   emit_numbers(out, "size_m", *shape.size_m);
   emit_number(out, "yaw_rad", shape.yaw_rad);

@@ -16,20 +16,26 @@ enum class ShapeKind { disc, rectangle };
 
 /// Properties of a shape.
 struct ShapeTraits {
+  ShapeKind kind;
   /// Name in lamps.yaml and lights.csv.
   std::string_view name;
-  /// Whether the outline is the ellipse with these axes; otherwise it is the box around that.
+  /// True if the outline is the ellipse with these axes; otherwise it is the box around that.
   bool is_round;
-  /// Whether lamps.yaml has size_m and yaw_rad of it; otherwise diameter_m, the length of both
-  /// axes.
-  bool is_oblong;
+  /// True if lamps.yaml states size_m and yaw_rad; otherwise diameter_m, the length of both axes.
+  bool has_two_sizes;
 };
 
 /// Properties of all shapes, in the order of ShapeKind.
 inline constexpr auto kShapeTraits = std::to_array<ShapeTraits>({
-    {"disc", true, false},
-    {"rectangle", false, true},
+    {ShapeKind::disc, "disc", true, false},
+    {ShapeKind::rectangle, "rectangle", false, true},
 });
+static_assert([] {
+  for (std::size_t i = 0; i < kShapeTraits.size(); ++i) {
+    if (kShapeTraits[i].kind != static_cast<ShapeKind>(i)) return false;
+  }
+  return true;
+}());
 
 inline const ShapeTraits& traits_of(ShapeKind kind) {
   return kShapeTraits[static_cast<std::size_t>(kind)];

@@ -46,7 +46,7 @@ void check_row_time(const Camera& camera) {
   if (camera.row_time_s && camera.readout) return;
   throw std::invalid_argument(
       "a camera that moves needs row_time_s and readout in its calibration: vlp-intrinsics takes "
-      "--row-time-s and --readout");
+      "--row-time-s and --readout, and programs that read captures --readout");
 }
 
 }  // namespace vlp

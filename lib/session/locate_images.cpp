@@ -157,6 +157,7 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
   LocatedImages result;
   Observations& seen = result.seen;
   const LampIntake intake(images, use, options, seen);
+  if (!input.calibration.camera.readout) input.calibration.camera.readout = intake.readout();
   const auto files = list_lamp_images(images.images);
   Observations first = intake.observe_all(files, progress);
   seen.images = std::move(first.images);

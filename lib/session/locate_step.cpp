@@ -15,6 +15,7 @@
 #include "geometry/polygon.h"
 #include "positioning/known_motion.h"
 #include "positioning/residual_noise.h"
+#include "positioning/row_clock.h"
 #include "rig/find_lamp.h"
 #include "session/capture_motion.h"
 
@@ -34,7 +35,8 @@ Sensors sensors_of(const std::string& image, const LocateInput& input) {
     sensors.inclination_sigma_rad = input.inclination_sigma_rad;
   }
   if (input.one_lamp && capture.z_m && capture.yaw_rad) {
-    sensors.height_and_yaw = HeightAndYaw{*capture.z_m, *capture.yaw_rad};
+    sensors.height_and_yaw = HeightAndYaw{*capture.z_m, *capture.yaw_rad,
+                                          input.height_sd_m.value_or(0), input.yaw_sd_rad};
   }
   if (input.height_sd_m && capture.z_m) {
     // The table's is the camera's.
@@ -150,7 +152,9 @@ FixRow row_of(const Frame& frame, const CapturesTable& captures, const Fix& fix,
   return row;
 }
 
-void warn_of_noise(LocateResult& result, const std::vector<Frame>& frames) {
+/// Warns if the residuals are much larger than the stated noise, and returns true. `factor` is that
+/// by which standard deviations are scaled.
+bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, double factor) {
   double stated_px = 0;
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
@@ -158,62 +162,160 @@ void warn_of_noise(LocateResult& result, const std::vector<Frame>& frames) {
     }
   }
   constexpr double too_noisy = 3;
-  const auto shown_px = residual_noise_px(sum_residuals(result.fixes));
+  const auto shown_px = estimate_noise_px(sum_residuals(result.fixes));
   if (shown_px && stated_px > 0) {
     result.metrics.push_back({"residual_ratio", *shown_px / stated_px});
   }
-  if (!shown_px || *shown_px <= too_noisy * stated_px) return;
+  if (!shown_px || *shown_px <= too_noisy * stated_px) return false;
   result.warnings.push_back(fmt::format(
-      "the residuals show {:.2g} px of noise, {:.2g} px are stated: sd follows the residuals; are "
-      "calibration and lamp map right and complete?",
-      *shown_px, stated_px));
+      "the residuals show {:.2g} px of noise, {:.2g} px are stated: {}; are calibration and lamp "
+      "map "
+      "right and complete?",
+      *shown_px, stated_px, factor > 1 ? "sd follows the residuals" : "sd is too small"));
+  return true;
+}
+
+/// Returns true if nothing is stated about the motion of the camera.
+bool is_taken_to_stand(const LocateInput& input) {
+  return std::none_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
+    return sensors_of(frame.image, input).motion.has_value();
+  });
+}
+
+std::size_t count_fixes(const std::vector<Fix>& fixes) {
+  return static_cast<std::size_t>(
+      std::count_if(fixes.begin(), fixes.end(), [](const Fix& fix) { return fix.ok(); }));
+}
+
+/// Returns the median speed of fixes whose velocity is estimated, if that is significant.
+std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
+  std::vector<double> speeds, sigmas;
+  for (const Fix& fix : fixes) {
+    if (!fix.ok() || !fix.body) continue;
+    const Eigen::Vector2d& velocity = fix.body->velocity_m_per_s;
+    const double variance =
+        fix.body->covariance.block<2, 2>(kBodyVelocity, kBodyVelocity).trace() / 2;
+    speeds.push_back(velocity.norm());
+    sigmas.push_back(velocity.norm() / std::sqrt(variance));
+  }
+  const auto median = [](std::vector<double>& values) {
+    const auto middle = values.begin() + std::ssize(values) / 2;
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  constexpr double min_sigmas = 3;
+  if (speeds.empty() || median(sigmas) < min_sigmas) return std::nullopt;
+  return median(speeds);
+}
+
+/// Warns if motion explains failed frames or residuals of a camera that is taken to stand.
+/// Criterion: half as many failures, or half the residual.
+void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
+  const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
+  if (!row_clock_of(input.calibration.camera) || !is_taken_to_stand(input) ||
+      (!is_noisy && 2 * failed < input.frames.size())) {
+    return;
+  }
+  constexpr double max_speed_m_per_s = 3, max_yaw_rate_rad_per_s = 2;
+  LocateInput moving = input;
+  moving.motion = KnownMotion::up_to(max_speed_m_per_s, max_yaw_rate_rad_per_s);
+  const std::vector<Fix> fixes = locate_all(moving, input.how);
+  const auto standing_px = estimate_noise_px(sum_residuals(result.fixes));
+  const auto moving_px = estimate_noise_px(sum_residuals(fixes));
+  const std::size_t still_failed = input.frames.size() - count_fixes(fixes);
+  const bool fits =
+      is_noisy ? moving_px && *moving_px < *standing_px / 2 : 2 * still_failed < failed;
+  const auto speed_m_per_s = find_speed_m_per_s(fixes);
+  // Velocity and yaw rate take up what few residuals leave.
+  constexpr double min_degrees_of_freedom = 12;
+  if (!fits || !speed_m_per_s || *speed_m_per_s > max_speed_m_per_s ||
+      sum_residuals(fixes).degrees_of_freedom < min_degrees_of_freedom) {
+    return;
+  }
+  result.warnings.push_back(fmt::format(
+      "the images fit a camera that moves, at {:.2g} m/s: state velocities in captures.csv, or "
+      "--max-speed-m-per-s",
+      *speed_m_per_s));
 }
 
 /// Locates all frames and computes what stated errors of calibration and map add to the residuals.
 std::vector<Fix> locate_with_expected_residuals(const LocateInput& input) {
   PositionerOptions how = input.how;
-  how.expects_residuals = true;
+  how.computes_common_chi_squared = true;
   return locate_all(input, how);
 }
 
-/// Multiplies the stated noise of all detections.
-LocateInput with_noise_factor(LocateInput input, double factor) {
-  for (Frame& frame : input.frames) {
-    for (Detection& detection : frame.detections) {
+/// Multiplies the stated noise of all detections, and leaves out those that `fixes` reject.
+LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes, double factor) {
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    const Fix& fix = fixes[i];
+    const auto rejected_end =
+        fix.rejected_ids.begin() +
+        std::min(static_cast<std::ptrdiff_t>(fix.rejected_lamps), std::ssize(fix.rejected_ids));
+    std::vector<Detection>& detections = input.frames[i].detections;
+    std::erase_if(detections, [&](const Detection& one) {
+      return std::find(fix.rejected_ids.begin(), rejected_end, one.lamp) != rejected_end;
+    });
+    for (Detection& detection : detections) {
+      if (!detection.sigma_px) continue;
       detection.sigma_px = std::min(*detection.sigma_px * factor, kMaxSigma_px);
     }
   }
   return input;
 }
 
+/// Locates frames again, with scaled noise, from the lamps that their fixes rest on.
+void locate_again(const LocateInput& input, const PositionerOptions& how, double factor,
+                  std::vector<Fix>& fixes) {
+  std::vector<Fix> again = locate_all(scale_stated_noise(input, fixes, factor), how);
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (!fixes[i].ok() || !again[i].ok()) continue;
+    again[i].rejected_lamps = fixes[i].rejected_lamps;
+    again[i].rejected_ids = fixes[i].rejected_ids;
+    again[i].unknown_lamps = fixes[i].unknown_lamps;
+    fixes[i] = again[i];
+  }
+}
+
 /// Locates all frames, with the noise that the residuals show: in place of noise that is not
 /// stated, and where stated noise is too small. Returns true if the noise is known.
 bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   result.fixes = locate_with_expected_residuals(input);
-  const ResidualSums residuals = sum_residuals(result.fixes);
-  if (std::all_of(input.frames.begin(), input.frames.end(), states_sigma)) {
-    warn_of_noise(result, input.frames);
-    const double factor = noise_understatement(residuals);
-    const double chance = 3 * std::sqrt(0.5 / residuals.degrees_of_freedom);
-    if (factor > 1 + chance) {
-      result.notes.push_back(
-          fmt::format("residuals are {:.2f} times the stated noise: sd follows them", factor));
-    }
-    if (factor > 1) result.fixes = locate_all(with_noise_factor(input, factor), input.how);
-    return true;
+  std::vector<Fix> stated, unstated;
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    (states_sigma(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
   }
-  const auto factor = estimate_noise_factor(residuals);
-  if (!factor) {
-    result.warnings.emplace_back(
-        "sigma_px is not stated and no residuals show it: sd columns are empty");
-    return false;
+  const ResidualSums residuals = sum_residuals(stated);
+  const double factor = estimate_birge_ratio(residuals);
+  bool is_noisy = false;
+  if (unstated.empty()) is_noisy = warn_of_noise(result, input.frames, factor);
+  warn_of_motion(result, input, is_noisy);
+  constexpr double chance_sds = 3;
+  if (!is_noisy && factor > 1 + chance_sds * std::sqrt(0.5 / residuals.degrees_of_freedom)) {
+    result.notes.push_back(fmt::format(
+        "residuals are {:.2f} times the stated noise: sd follows the residuals", factor));
   }
   PositionerOptions how = input.how;
-  how.unstated_sigma_px = std::clamp(how.unstated_sigma_px * *factor, kMinSigma_px, kMaxSigma_px);
-  result.notes.push_back(fmt::format("sigma_px is not stated: {:.3g} px taken from the residuals",
-                                     how.unstated_sigma_px));
-  result.fixes = locate_all(input, how);
-  return true;
+  bool is_known = true;
+  if (!unstated.empty()) {
+    auto unstated_factor = estimate_noise_factor(sum_residuals(unstated));
+    // Few frames without stated noise may have no redundancy: the others show the noise in pixels.
+    if (!unstated_factor) unstated_factor = estimate_noise_px(sum_residuals(result.fixes));
+    is_known = unstated_factor.has_value();
+    if (is_known) {
+      how.unstated_sigma_px =
+          std::clamp(how.unstated_sigma_px * *unstated_factor, kMinSigma_px, kMaxSigma_px);
+      result.notes.push_back(fmt::format(
+          "sigma_px is not stated: {:.3g} px taken from the residuals", how.unstated_sigma_px));
+    } else {
+      result.warnings.emplace_back(
+          "sigma_px is not stated and no residuals show it: sd columns are empty");
+    }
+  }
+  if (factor > 1 || (is_known && !unstated.empty())) {
+    locate_again(input, how, factor, result.fixes);
+  }
+  return is_known;
 }
 
 void warn_of_map(LocateResult& result, const LocateInput& input) {

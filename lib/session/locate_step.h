@@ -27,8 +27,10 @@ struct LocateInput {
   std::optional<double> sigma_px = {};
   /// Standard deviation of the inclination's angles; 0 leaves it out.
   double inclination_sigma_rad = 0;
-  /// Where one lamp is seen, take height and yaw from `captures`.
+  /// Takes height and yaw from `captures` if one lamp is seen.
   bool one_lamp = false;
+  /// Standard deviation of that yaw; 0: exact. That of the height is height_sd_m.
+  double yaw_sd_rad = 0;
   /// Cameras that move and lean. Where `captures` has no velocity: how fast the camera, or the
   /// robot, can drive and turn; nothing: it stands. Velocities in `captures` count wherever there
   /// are some, with that standard deviation of the yaw rate.

@@ -9,6 +9,7 @@
 #include "positioning/initial_pose.h"
 #include "positioning/positioner.h"
 #include "positioning/two_lamp_fix.h"
+#include "support/body_rig.h"
 #include "support/scatter.h"
 #include "support/synthetic_rig.h"
 
@@ -195,6 +196,59 @@ TEST(Covariance, OfOneLampIsTheScatter) {
     scatter.add(positioner.locate(with_noise(exact, random), known).estimate.pose);
   }
   EXPECT_LT(scatter.excess().head<2>().cwiseAbs().maxCoeff(), kScatterTolerance);
+}
+
+/// One lamp with height, yaw and inclination of given standard deviations, and the motion.
+TEST(OneLampSensorCovariance, MatchesScatter) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.15, -0.1, 0.1}, 0.9}, {}}, {}};
+  rig.map.lamps.resize(1);
+  const double sigma_rad = 0.002, sigma_px = 0.2;
+  Sensors sensors;
+  sensors.inclination_sigma_rad = sigma_rad;
+  sensors.height_and_yaw = HeightAndYaw{0.1, 0.9, 0.005, rad_from_deg(1)};
+  sensors.motion = KnownMotion{{0.8, -0.3}, 0.4, 0.2, 0.3};
+  const Positioner positioner(rig.map, rig.calibration);
+  rig.body.motion = {sensors.motion->velocity_m_per_s, sensors.motion->yaw_rate_rad_per_s, {0, 0}};
+  sensors.inclination = Inclination{0, 0};
+  const Fix reported = positioner.locate(seen_from(rig, sigma_px), sensors);
+  ASSERT_TRUE(reported.ok());
+  EXPECT_LT((reported.estimate.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
+  Scatter scatter(rig.body.pose, reported.estimate.covariance);
+  Random random(21);
+  for (int i = 0; i < kDraws; ++i) {
+    rig.body.motion = {{0.8 + 0.2 * random.normal(), -0.3 + 0.2 * random.normal()},
+                       0.4 + 0.3 * random.normal(),
+                       {0, 0}};
+    sensors.height_and_yaw->z_m = 0.1 + 0.005 * random.normal();
+    sensors.height_and_yaw->yaw_rad = 0.9 + rad_from_deg(1) * random.normal();
+    sensors.inclination = Inclination{sigma_rad * random.normal(), sigma_rad * random.normal()};
+    const Fix fix = positioner.locate(with_noise(seen_from(rig, sigma_px), random), sensors);
+    ASSERT_TRUE(fix.ok());
+    scatter.add(fix.estimate.pose);
+  }
+  expect_efficient(scatter);
+}
+
+TEST(PositionerLocate, RefusesOneMovingLampWithoutRowTime) {
+  const SyntheticRig rig = rig_of(1);
+  Sensors sensors;
+  sensors.height_and_yaw = HeightAndYaw{0.1, 0.9};
+  sensors.motion = KnownMotion{{0.8, 0}, 0, 0, 0};
+  EXPECT_EQ(Positioner(rig.map, rig.calibration).locate(seen_from(rig), sensors).status,
+            FixStatus::row_time_unknown);
+}
+
+TEST(FixOneLamp, IsExactForRotatingRobot) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.15, -0.1, 0.1}, 0.9}, {}}, {}};
+  rig.map.lamps.resize(1);
+  rig.mount = CameraMount{{0.3, -0.2, 0.5}, 0.7};
+  rig.body.motion = {{0.5, 0.2}, 1.5, {0, 0}};
+  Sensors sensors;
+  sensors.height_and_yaw = HeightAndYaw{0.6, 0.9 + 0.7};
+  sensors.motion = KnownMotion{{0.5, 0.2}, 1.5, 0, 0};
+  const Fix fix = rig.positioner().locate(seen_from(rig, 0.1), sensors);
+  ASSERT_TRUE(fix.ok());
+  EXPECT_LT((fix.estimate.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
 }
 
 /// Under a pinhole lens all pixels weigh alike, and the closed forms are the least-squares fix.

@@ -36,23 +36,28 @@ TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
   EXPECT_EQ(sums.squares_px2, 2);
 }
 
+TEST(SumResiduals, LeavesOutFixWithWrongLamp) {
+  const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(3000, 0, 4)};
+  EXPECT_EQ(sum_residuals(fixes).chi_squared, 9);
+}
+
 TEST(EstimateNoiseFactor, SubtractsCommonErrors) {
   EXPECT_DOUBLE_EQ(*estimate_noise_factor({.chi_squared = 36, .degrees_of_freedom = 9}), 2);
   EXPECT_DOUBLE_EQ(*estimate_noise_factor(
                        {.chi_squared = 36, .common_chi_squared = 27, .degrees_of_freedom = 9}),
                    1);
-  EXPECT_EQ(
-      *estimate_noise_factor({.chi_squared = 9, .common_chi_squared = 27, .degrees_of_freedom = 9}),
-      0);
+  EXPECT_EQ(*estimate_noise_factor(
+                {.chi_squared = 36, .common_chi_squared = 35, .degrees_of_freedom = 9}),
+            1);
   EXPECT_FALSE(estimate_noise_factor({}));
 }
 
-TEST(NoiseUnderstatement, IsOneWhereResidualsAreNotLarger) {
-  EXPECT_EQ(noise_understatement({.chi_squared = 10, .degrees_of_freedom = 20}), 1);
-  EXPECT_EQ(noise_understatement({.chi_squared = 40, .degrees_of_freedom = 10}), 1);
-  EXPECT_DOUBLE_EQ(noise_understatement({.chi_squared = 80, .degrees_of_freedom = 20}), 2);
+TEST(EstimateBirgeRatio, IsOneWhereResidualsAreNotLarger) {
+  EXPECT_EQ(estimate_birge_ratio({.chi_squared = 10, .degrees_of_freedom = 20}), 1);
+  EXPECT_EQ(estimate_birge_ratio({.chi_squared = 40, .degrees_of_freedom = 10}), 1);
+  EXPECT_DOUBLE_EQ(estimate_birge_ratio({.chi_squared = 80, .degrees_of_freedom = 20}), 2);
   EXPECT_EQ(
-      noise_understatement({.chi_squared = 80, .common_chi_squared = 30, .degrees_of_freedom = 20}),
+      estimate_birge_ratio({.chi_squared = 80, .common_chi_squared = 30, .degrees_of_freedom = 20}),
       1);
 }
 
@@ -67,7 +72,7 @@ class ExpectedChiSquared : public testing::Test {
   void expect_mean(const Sensors& sensors) {
     constexpr int draws = 4000;
     PositionerOptions options;
-    options.expects_residuals = true;
+    options.computes_common_chi_squared = true;
     options.max_residual_share = std::numeric_limits<double>::max();
     const Positioner positioner(rig.map, rig.calibration, options);
     double found = 0, expected = 0, common = 0;

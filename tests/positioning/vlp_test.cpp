@@ -156,7 +156,10 @@ TEST_F(CInterface, LocatesByOneLampAndEveryKnownFigure) {
   sensors.velocity_m_per_s[0] = 2;
   sensors.yaw_rate_rad_per_s = 0.1;
   sensors.yaw_rate_sd_rad_per_s = 0.2;
-  const Sensors same{Inclination{0.06, -0.08}, 0.01, HeightAndYaw{0, 0.4}};
+  sensors.camera_z_sd_m = 0.005;
+  sensors.camera_yaw_sd_rad = 0.02;
+  Sensors same{Inclination{0.06, -0.08}, 0.01, HeightAndYaw{0, 0.4, 0.005, 0.02}};
+  same.motion = KnownMotion{{2, 0}, 0.1, 0, 0.2};
   const vlp_fix fix = located(open().get(), &sensors);
   expect_same(fix, rig.positioner().locate(seen, same));
   EXPECT_EQ(fix.roll_rad, 0.06);
@@ -165,6 +168,52 @@ TEST_F(CInterface, LocatesByOneLampAndEveryKnownFigure) {
   EXPECT_DOUBLE_EQ(fix.velocity_m_per_s[0], 2 * std::cos(0.4));
   EXPECT_DOUBLE_EQ(fix.velocity_m_per_s[1], 2 * std::sin(0.4));
   EXPECT_DOUBLE_EQ(fix.velocity_covariance[8], 0.04);
+}
+
+TEST_F(CInterface, LocatesTogetherWithEarlierFrames) {
+  vlp_sensors sensors = {};
+  sensors.has_motion = 1;
+  sensors.velocity_sd_m_per_s = 1;
+  Sensors same;
+  same.motion = KnownMotion{{0, 0}, 0, 1, 0};
+  rig.body.motion.velocity_m_per_s.setZero();
+  const std::vector<Detection> before = seen_from(rig, 0.1);
+  std::vector<vlp_detection> given_before;
+  for (const Detection& one : before) {
+    given_before.push_back({one.lamp, one.pixel.x(), one.pixel.y(), *one.sigma_px});
+  }
+  rig.body.motion = {};
+  seen = seen_from(rig, 0.1);
+  given = given_before;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    given[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(), 0.1};
+  }
+  sensors.inclination_sigma_rad = same.inclination_sigma_rad = 0.2;
+  const EarlierFrame frame{before, 0.05};
+  const vlp_earlier_frame given_frame{given_before.data(), given_before.size(), 0.05};
+  const Handle positioner = open();
+  vlp_fix fix;
+  ASSERT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), &sensors,
+                                    &given_frame, 1, &fix),
+            VLP_OK);
+  expect_same(fix, rig.positioner().locate(seen, same, {&frame, 1}));
+}
+
+TEST_F(CInterface, RefusesNullOrTooManyEarlierFrames) {
+  const Handle positioner = open();
+  vlp_fix fix;
+  const vlp_earlier_frame null{nullptr, 3, 0.05};
+  EXPECT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), nullptr, &null, 1,
+                                    &fix),
+            VLP_BAD_ARGUMENT);
+  EXPECT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), nullptr, nullptr,
+                                    1, &fix),
+            VLP_BAD_ARGUMENT);
+  const std::vector<vlp_detection> many(VLP_MAX_LAMPS, given.front());
+  const vlp_earlier_frame large{many.data(), many.size(), 0.05};
+  EXPECT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), nullptr, &large,
+                                    1, &fix),
+            VLP_TOO_MANY_LAMPS);
 }
 
 TEST_F(CInterface, KnowsAHeight) {

@@ -76,6 +76,40 @@ class Module(unittest.TestCase):
         mounted = vlp.Positioner(self.lamps, self.calibration, mount=(0, 0, 0.5, 0)).locate(*seen)
         self.assertAlmostEqual(mounted.position_m[2], fix.position_m[2] - 0.5)
 
+    def test_one_lamp_has_a_regular_covariance_from_stated_errors(self):
+        seen = [self.seen[name][:1] for name in ("lamps", "pixels", "sigma_px")]
+        exact = self.positioner.locate(*seen, vlp.Sensors(height_and_yaw=(0, 0)))
+        stated = self.positioner.locate(
+            *seen, vlp.Sensors(height_and_yaw=(0, 0), height_and_yaw_sd=(0.005, 0.02))
+        )
+        self.assertTrue(exact.ok and stated.ok)
+        self.assertEqual(exact.covariance[2, 2], 0)
+        self.assertAlmostEqual(stated.covariance[2, 2], 0.005**2)
+        self.assertGreater(np.linalg.eigvalsh(stated.covariance).min(), 0)
+        self.assertEqual(stated.rejected_ids, [])
+        self.assertIsNone(stated.body_covariance)
+
+    def test_names_rejected_lamps(self):
+        of_3 = self.seen["frames"] == 3
+        lamps, pixels, sigma_px = (
+            self.seen[name][of_3].copy() for name in ("lamps", "pixels", "sigma_px")
+        )
+        self.assertEqual(len(lamps), 5)
+        pixels[0, 0] += 60
+        fix = self.positioner.locate(lamps, pixels, sigma_px)
+        self.assertEqual(fix.rejected_ids, [lamps[0]])
+
+    def test_earlier_frames_determine_the_velocity(self):
+        of_3 = self.seen["frames"] == 3
+        seen = [self.seen[name][of_3] for name in ("lamps", "pixels", "sigma_px")]
+        sensors = vlp.Sensors(velocity_sd_m_per_s=1)
+        alone = self.positioner.locate(*seen, sensors)
+        together = self.positioner.locate(*seen, sensors, earlier=[(*seen, 0.05)])
+        self.assertTrue(alone.ok and together.ok)
+        self.assertEqual(together.body_covariance.shape, (9, 9))
+        self.assertLess(together.body_covariance[4, 4], 0.01 * alone.body_covariance[4, 4])
+        self.assertLess(np.abs(together.velocity_m_per_s).max(), 0.01)
+
     def test_says_why_there_is_no_fix(self):
         fix = self.positioner.locate([1], [[400.0, 300]])
         self.assertFalse(fix.ok)

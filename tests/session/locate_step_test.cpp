@@ -15,6 +15,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 LocateInput example() {
   return {read_detections(kExample + "detections.csv"), read_lamp_map(kExample + "lamps.yaml"),
@@ -44,6 +45,40 @@ TEST(LocateFrames, CountsTheCapturesThatALampIsLeftOutOf) {
   EXPECT_EQ(captures, 3);
   EXPECT_THAT(found.warnings,
               testing::Contains(HasSubstr("3 detections that contradict the others")));
+}
+
+/// Input with captures of a camera that drives at 1 m/s, about which nothing is stated.
+LocateInput drive_without_stated_motion(double sigma_px) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  LocateInput input{{}, rig.map, rig.calibration};
+  for (int i = 0; i < 12; ++i) {
+    rig.body.pose = {{0.05 * i - 0.3, -0.02 * i, 0}, 0.5 * i};
+    rig.body.motion = {{0.6, -0.8}, 0, {0, 0}};
+    input.frames.push_back({std::to_string(i), seen_from(rig, sigma_px)});
+  }
+  return input;
+}
+
+TEST(LocateFrames, NamesUnstatedMotionAsCauseOfResiduals) {
+  LocateInput input = drive_without_stated_motion(0.02);
+  const LocateResult found = locate_frames(input);
+  EXPECT_THAT(found.warnings,
+              testing::Contains(
+                  HasSubstr("the images fit a camera that moves, at 1 m/s: state velocities in "
+                            "captures.csv, or --max-speed-m-per-s")));
+  input.motion = KnownMotion::up_to(3, 0);
+  EXPECT_THAT(locate_frames(input).warnings, Not(testing::Contains(HasSubstr("moves"))));
+}
+
+TEST(LocateFrames, DoesNotNameMotionOfCameraThatStands) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  LocateInput input{{}, rig.map, rig.calibration};
+  input.lamps.lamps.front().position_m.x() += 0.02;
+  for (int i = 0; i < 12; ++i) {
+    rig.body.pose = {{0.05 * i - 0.3, -0.02 * i, 0}, 0.5 * i};
+    input.frames.push_back({std::to_string(i), seen_from(rig, 0.02)});
+  }
+  EXPECT_THAT(locate_frames(input).warnings, Not(testing::Contains(HasSubstr("moves"))));
 }
 
 TEST(LocateFrames, SeesALampThatMovedWhereItIs) {

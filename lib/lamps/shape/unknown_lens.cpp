@@ -11,7 +11,7 @@ namespace vlp {
 
 double unknown_lens_sd_px(const Light& light, const ImageSize& image) {
   constexpr double max_lean_rad = rad_from_deg(10);
-  if (!is_disc(light)) return 0;
+  if (light.shape == ShapeKind::rectangle) return 0;
   const double focal_px = std::hypot(image.width, image.height) / 2;
   const Eigen::Vector2d middle((image.width - 1) / 2.0, (image.height - 1) / 2.0);
   const double off_axis = (light.pixel - middle).norm() / focal_px;

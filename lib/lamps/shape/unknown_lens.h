@@ -24,7 +24,7 @@ namespace vlp {
 /// The bound is an equidistant lens of 115 degrees from corner to corner, so that f is half of the
 /// image's diagonal, on a camera tilted by 10 degrees, and it is taken for one standard deviation
 /// of the shift. Lenses of consumer cameras distort less, a fisheye of 180 degrees up to 2.5 times
-/// as much. 0 for other shapes, because the bow of their edges determines it.
+/// as much. 0 for rectangles, because the bow of their edges determines it.
 double unknown_lens_sd_px(const Light& light, const ImageSize& image);
 
 }  // namespace vlp

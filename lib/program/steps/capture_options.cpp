@@ -170,6 +170,8 @@ Observations observe_captures(const CaptureOptions& options, ImageUse use, const
 LampCaptures read_captures_of(const CaptureOptions& options, ImageUse use) {
   LampCaptures captures{
       {}, read_lamp_map(options.lamps), options.lamps, read_calibration(options.calibration)};
+  const std::optional<Readout>& readout = options.frontend.readout;
+  if (readout) captures.calibration.camera.readout = readout;
   captures.frames =
       std::filesystem::is_directory(options.images)
           ? kept_frames(observe_captures(options, use, captures.lamps, captures.calibration).images)
@@ -185,10 +187,9 @@ std::vector<Frame> read_detections_of(const CaptureOptions& options) {
         "the times of its frames");
   }
   const FrontendOptions& frontend = options.frontend;
-  const std::array<std::pair<const char*, bool>, 4> image_options{
+  const std::array<std::pair<const char*, bool>, 3> image_options{
       {{"--classifier", !frontend.classifier.empty()},
        {"--annotate", !frontend.annotate.empty()},
-       {"--readout", frontend.readout.has_value()},
        {"--exposure-s", frontend.exposure_s.has_value()}}};
   for (const auto& [name, is_given] : image_options) {
     if (!is_given) continue;

@@ -52,6 +52,7 @@ class Sensors:
         inclination_rad: tuple[float, float] | None = None,
         inclination_sigma_rad: float = 0.0,
         height_and_yaw: tuple[float, float] | None = None,
+        height_and_yaw_sd: tuple[float, float] = (0.0, 0.0),
         velocity_m_per_s: tuple[float, float] | None = None,
         velocity_sd_m_per_s: float = 0.0,
         yaw_rate_rad_per_s: float = 0.0,
@@ -84,7 +85,11 @@ class Fix:
     @property
     def lamps(self) -> int: ...
     @property
+    def body_covariance(self) -> _Doubles | None: ...
+    @property
     def rejected_lamps(self) -> int: ...
+    @property
+    def rejected_ids(self) -> list[int]: ...
     @property
     def unknown_lamps(self) -> int: ...
     @property
@@ -118,6 +123,8 @@ class Positioner:
         pixels: npt.ArrayLike,
         sigma_px: npt.ArrayLike | None = None,
         sensors: Sensors = ...,
+        *,
+        earlier: list[tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike | None, float]] = ...,
     ) -> Fix: ...
     def locate_frames(
         self,

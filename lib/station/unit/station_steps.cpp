@@ -161,6 +161,7 @@ StepResult check_fixes(const StationConfig& config, const Calibration& calibrati
   add_shares(located, known.frames, config.lamps, result);
   result.lamps_left_out = located.lamps_left_out;
   result.warnings = located.warnings;
+  result.notes = located.notes;
   if (!located.ok()) return result;
   EvaluationInput input;
   input.fixes = {"check", located.rows};

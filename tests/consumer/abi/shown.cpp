@@ -55,6 +55,7 @@ struct Types {
   vlp_detection c_detection;
   vlp_sensors c_sensors;
   vlp_fix c_fix;
+  vlp_earlier_frame c_earlier;
 };
 
 struct Functions {
@@ -68,6 +69,8 @@ struct Functions {
   decltype(&parameter_count) parameters = &parameter_count;
   decltype(&read_lamp_map) read_map = &read_lamp_map;
   decltype(&write_lamp_map) write_map = &write_lamp_map;
+  decltype(&world_from_shape) from_shape = &world_from_shape;
+  decltype(&outline_of) outline = &outline_of;
   decltype(&parameter_names) names = &parameter_names;
   decltype(&read_calibration) read = &read_calibration;
   decltype(&write_calibration) write = &write_calibration;
@@ -84,6 +87,7 @@ struct Functions {
   decltype(&vlp_close) c_close = &vlp_close;
   decltype(&vlp_detect) c_detect = &vlp_detect;
   decltype(&vlp_locate) c_locate = &vlp_locate;
+  decltype(&vlp_locate_with_earlier) c_locate_with_earlier = &vlp_locate_with_earlier;
   decltype(&vlp_explanation) c_explanation = &vlp_explanation;
   decltype(&vlp_last_error) c_last_error = &vlp_last_error;
 };
