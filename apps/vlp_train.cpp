@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
-#include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"
@@ -59,7 +59,8 @@ Inputs read_inputs(const Options& options) {
   inputs.lamps = read_lamp_map(options.lamps);
   if (!options.calibration.empty()) inputs.calibration = read_calibration(options.calibration);
   for (const std::string& folder : options.folders) {
-    for (const fs::path& image : images_in(folder)) check_output(options.output, {image.string()});
+    for (const fs::path& image : list_images(folder))
+      check_output(options.output, {image.string()});
     inputs.labels.push_back(labels_in(folder, options.labels, !options.row_time));
   }
   {

@@ -24,6 +24,8 @@ namespace vlp {
 ///   fx fy cx cy  then, for OPENCVn, the first n of  k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4,
 ///   for OPENCV_FISHEYE  k1 k2 k3 k4,  for splined lenses the control points, x and y in turn, row
 ///   by row.
+/// To add a model: an enumerator here, its row in lens_table.cpp, its equation in a header, and its
+/// class in family_of() of lens.cpp.
 enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv12, fisheye };
 
 /// mrcal's name, for example "LENSMODEL_OPENCV8", or "OPENCV_FISHEYE". It stays where it is.

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/image_file.h"
 
-#include <algorithm>
-#include <cctype>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
@@ -44,34 +42,6 @@ void check_size(const fs::path& file, std::int64_t width, std::int64_t height, d
                 shortest(max_mpx) +
                 " million that are allowed; --max-mpx of vlp-detect and vlp-intrinsics "
                 "allows more");
-}
-
-bool is_image_name(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}) {
-    if (extension == known) return true;
-  }
-  return false;
-}
-
-std::vector<fs::path> images_in(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_directory(folder, error)) throw InputError(folder, "is not a folder of images");
-  std::vector<fs::path> images;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    std::error_code no_file;  // a folder, a pipe, a link that leads nowhere
-    if (entry->is_regular_file(no_file) && is_image_name(entry->path()))
-      images.push_back(entry->path());
-  }
-  if (error) throw InputError(folder, "cannot be read: " + error.message());
-  if (images.empty()) {
-    throw InputError(folder, "holds no image (.png, .jpg, .bmp, .tif or .pgm)");
-  }
-  std::sort(images.begin(), images.end());
-  return images;
 }
 
 cv::Mat read_image(const fs::path& file, double max_mpx) {

@@ -6,17 +6,8 @@
 #include <filesystem>
 #include <limits>
 #include <opencv2/core.hpp>
-#include <string>
-#include <vector>
 
 namespace vlp {
-
-/// Whether the name is that of an image, by its ending: PNG, JPEG, BMP, TIFF and PGM.
-bool is_image_name(const std::filesystem::path& file);
-
-/// The images in a folder by name: PNG, JPEG, BMP, TIFF and PGM. Throws InputError when it is no
-/// folder or holds none.
-std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
 
 /// Throws InputError if an image has more than `max_mpx` megapixels.
 void check_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,

@@ -72,19 +72,6 @@ std::optional<SourceImage> ImageSource::next() {
   return {};
 }
 
-std::vector<std::filesystem::path> expand_folders(const std::vector<std::string>& names) {
-  std::vector<std::filesystem::path> files;
-  for (const std::string& name : names) {
-    if (!std::filesystem::is_directory(name)) {
-      files.emplace_back(name);
-      continue;
-    }
-    const auto inside = images_in(name);
-    files.insert(files.end(), inside.begin(), inside.end());
-  }
-  return files;
-}
-
 void for_each_image(ImageSource& source, int threads,
                     const std::function<void(const SourceImage&)>& task) {
   const auto workers = static_cast<std::size_t>(threads);

@@ -69,9 +69,6 @@ class ImageSource {
   std::mutex taking_;
 };
 
-/// Replaces each name of a folder by the images in it, by name. Throws InputError.
-std::vector<std::filesystem::path> expand_folders(const std::vector<std::string>& names);
-
 /// Calls task(image) for each image of the source on several threads, as images_in_parallel().
 void for_each_image(ImageSource& source, int threads,
                     const std::function<void(const SourceImage&)>& task);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "frontend/annotate.h"
+#include "frontend/image_folder.h"
 #include "frontend/image_quality.h"
 #include "frontend/lights_table.h"
 #include "frontend/mat_view.h"
@@ -341,7 +342,7 @@ Observations LampIntake::observe_all(const std::vector<fs::path>& files,
 }
 
 std::vector<fs::path> list_lamp_images(const fs::path& images) {
-  return is_video_name(images) ? std::vector{images} : images_in(images);
+  return is_video_name(images) ? std::vector{images} : list_images(images);
 }
 
 Observations observe_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,

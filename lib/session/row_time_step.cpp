@@ -8,7 +8,7 @@
 #include <map>
 #include <utility>
 
-#include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "frontend/lamp_intake.h"
 #include "session/position_cost.h"
 #include "session/skipped_images.h"
@@ -96,7 +96,7 @@ SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps
   std::vector<std::vector<fs::path>> images;
   std::vector<fs::path> all;
   for (const fs::path& folder : folders) {
-    images.push_back(images_in(folder));
+    images.push_back(list_images(folder));
     all.insert(all.end(), images.back().begin(), images.back().end());
   }
   Observations remarks;

@@ -14,6 +14,7 @@
 #include "captures/digest.h"
 #include "evaluation/evaluation_files.h"
 #include "frontend/board_intake.h"
+#include "frontend/image_folder.h"
 #include "frontend/lamp_intake.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
@@ -277,7 +278,7 @@ class SessionRun {
       input.board_file = session_.board();
       FrontendOptions options = options_.frontend;
       options.corner_cache = results_.corners();
-      input.seen = observe_boards(images_in(session_.boards()), input.board, session_.board(),
+      input.seen = observe_boards(list_images(session_.boards()), input.board, session_.board(),
                                   options, observer_.progress);
       input.camera.id = options_.camera_id;
       input.camera.lens_model = options_.lens_model;

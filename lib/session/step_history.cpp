@@ -5,7 +5,7 @@
 #include <fmt/core.h>
 
 #include "captures/digest.h"
-#include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -22,7 +22,7 @@ const std::string& InputDigests::of_file(const std::filesystem::path& file) {
 
 std::string InputDigests::of_images(const std::filesystem::path& folder) {
   std::string digests;
-  for (const auto& image : images_in(folder)) {
+  for (const auto& image : list_images(folder)) {
     digests += fmt::format("{}  {}\n", of_file(image), image.filename().string());
   }
   return sha256_of_text(digests);

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "support/datasets.h"
 #include "support/refused.h"
 #include "support/temporary_folder.h"
@@ -42,7 +43,7 @@ struct BoardImages : testing::Test {
         .observe(SourceImage(write("image.png", image)));
   }
   Observations observe_all() const {
-    return observe_boards(images_in(folder / ""), board, "board.yaml", options);
+    return observe_boards(list_images(folder / ""), board, "board.yaml", options);
   }
 };
 
@@ -130,7 +131,7 @@ TEST_F(BoardImages, GivesTheSameForAnyNumberOfThreads) {
   std::size_t last = 0;
   const Observations one = observe_all();
   options.threads = 4;
-  const Observations four = observe_boards(images_in(folder / ""), board, "board.yaml", options,
+  const Observations four = observe_boards(list_images(folder / ""), board, "board.yaml", options,
                                            [&](std::size_t done, std::size_t total) {
                                              last = done;
                                              EXPECT_EQ(total, 6U);

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "frontend/lamp_intake.h"
 
 namespace vlp {
@@ -14,7 +14,7 @@ const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample"
 
 std::vector<Observation> sample_lights() {
   const LightDetector detector({}, {Readout::rows, {}, {}});
-  return LampIntake(detector, ImageUse::fixes, {}, {}).observe_all(images_in(kSample)).images;
+  return LampIntake(detector, ImageUse::fixes, {}, {}).observe_all(list_images(kSample)).images;
 }
 
 TEST(LabelledLights, AreThoseThatTheTableNames) {

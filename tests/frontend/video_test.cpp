@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "frontend/board_intake.h"
+#include "frontend/image_folder.h"
 #include "frontend/lamp_intake.h"
 #include "rig/lamp_map.h"
 #include "support/datasets.h"
@@ -154,7 +155,7 @@ TEST_F(Videos, ThatAreNoneAreRefused) {
 }
 
 TEST_F(Videos, ShowTheLampsOfTheSameImages) {
-  const auto files = images_in(kRig + "/sample");
+  const auto files = list_images(kRig + "/sample");
   std::vector<cv::Mat> images;
   for (const auto& file : files) images.push_back(read_image(file));
   ASSERT_TRUE(write_video(film, images));

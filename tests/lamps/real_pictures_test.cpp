@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "support/real_data.h"
@@ -45,7 +46,7 @@ TEST(RealPictures, OfABoardShowNoLampWhateverTheRowTime) {
   const auto folder = real_data("kalibr-aprilgrid-stereo");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   for (const char* camera : {"cam0", "cam1"}) {
-    const auto images = images_in(folder / camera);
+    const auto images = list_images(folder / camera);
     // One of four, for time. Of the others one shows what passes for a lamp along columns, at 8 and
     // at 12 us: squares and gaps between tags, 2.54 periods in the lines' time.
     for (std::size_t i = 1; i < images.size(); i += 4) {

@@ -9,6 +9,7 @@
 
 #include "captures/captures_table.h"
 #include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "pipeline/intrinsics_program.h"
 #include "support/datasets.h"
 #include "support/write_video.h"
@@ -24,7 +25,7 @@ using testing::StartsWith;
 /// A video of the images in a folder, each so many times.
 bool film_of(const fs::path& file, const fs::path& folder, int times, const char* codec = "FFV1") {
   std::vector<cv::Mat> frames;
-  for (const auto& image : images_in(folder)) {
+  for (const auto& image : list_images(folder)) {
     for (int i = 0; i < times; ++i) frames.push_back(read_image(image));
   }
   return write_video(file, frames, codec);

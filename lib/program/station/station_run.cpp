@@ -11,7 +11,7 @@
 #include <stdexcept>
 
 #include "captures/printable.h"
-#include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "program/app.h"
 #include "program/station/station_guide.h"
 #include "rig/input_error.h"
@@ -116,7 +116,7 @@ void add_folders(Unit& unit, const fs::path& folder) {
   for (const StationStep step : kStationSteps) {
     if (!fs::is_directory(folder / name_of(step))) continue;
     any = true;
-    unit.add(step, images_in(folder / name_of(step)));
+    unit.add(step, list_images(folder / name_of(step)));
   }
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }

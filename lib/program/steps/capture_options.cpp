@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "camera/lens_model.h"
-#include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "frontend/lights_table.h"
 #include "frontend/video.h"
 #include "geometry/angles.h"
@@ -135,7 +135,7 @@ LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
 
 void check_image_outputs(const CaptureOptions& options) {
   if (is_video_name(options.images)) return;
-  for (const auto& image : images_in(options.images)) {
+  for (const auto& image : list_images(options.images)) {
     check_output(options.output, {image.string()});
     if (!options.lights.empty()) check_output(options.lights, {image.string()});
   }

@@ -9,7 +9,7 @@
 #include <iterator>
 
 #include "frontend/board_intake.h"
-#include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "frontend/images_in_parallel.h"
 #include "frontend/lamp_intake.h"
 #include "frontend/selection.h"
@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 UnitStep observe_folder(const fs::path& folder, int threads, ImageUse use,
                         const FrontendOptions& options,
                         const std::function<Observation(const SourceImage&)>& observe) {
-  const auto files = images_in(folder);
+  const auto files = list_images(folder);
   std::vector<UnitImage> images(files.size());
   images_in_parallel(files.size(), threads,
                      [&](std::size_t i) { images[i] = observe_unit_image(files[i], observe); });

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/unit/watched_folder.h"
 
-#include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 
 namespace vlp {
 

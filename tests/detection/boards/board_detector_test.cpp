@@ -14,6 +14,7 @@
 #include "captures/csv_reader.h"
 #include "detection/boards/board_view.h"
 #include "frontend/image_file.h"
+#include "frontend/image_folder.h"
 #include "support/real_data.h"
 
 namespace vlp {
@@ -128,7 +129,7 @@ TEST(BoardDetector, RefusesAFamilyThatArucoLacks) {
 std::map<std::size_t, int> images_by_tags(const fs::path& folder, const fs::path& board) {
   std::map<std::size_t, int> counts;
   const BoardDetector detector(read_board(board));
-  for (const fs::path& image : images_in(folder)) {
+  for (const fs::path& image : list_images(folder)) {
     ++counts[detector.detect(read_image(image)).tags.size()];
   }
   return counts;

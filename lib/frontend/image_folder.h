@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace vlp {
+
+/// Returns true if the extension is that of an image: PNG, JPEG, BMP, TIFF or PGM.
+bool is_image_name(const std::filesystem::path& file);
+
+/// Lists the images in a folder, sorted by name. Throws InputError if it is no folder or holds
+/// none.
+std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder);
+
+/// Replaces each folder among the names by the images in it. Throws InputError as list_images().
+std::vector<std::filesystem::path> expand_folders(const std::vector<std::string>& names);
+
+}  // namespace vlp
