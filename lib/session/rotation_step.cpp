@@ -111,6 +111,11 @@ void add_warnings(RotationResult& result) {
         "estimates both",
         heights.size()));
   }
+  if (!result.fit.center.covariance) {
+    result.warnings.emplace_back(
+        "the captures leave no residuals, and the centre has no standard deviation: add captures, "
+        "four or more at each height");
+  }
   constexpr double too_noisy = 3;
   const auto& stated_px = result.spot.stated_px;
   if (stated_px && result.fit.residual_px > too_noisy * *stated_px) {
@@ -209,6 +214,13 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
   }
   result.circles = fit_circle_centers(result.spot, camera);
   result.fit = fit_of(result.spot, camera, method);
+  if (method == RotationMethod::circle && !result.fit.converged &&
+      result.circles.undetermined > 0) {
+    result.fail(StepFailure::undetermined,
+                "within their noise the captures are at two yaws, which determine no circle: add "
+                "captures at a third yaw, twelve over a full turn are good");
+    return result;
+  }
   if (!result.fit.converged) {
     result.fail(StepFailure::undetermined,
                 "no rotation centre fits the captures: take them on one spot at each height, over "

@@ -7,6 +7,7 @@
 
 #include "rig/lamp_map.h"
 #include "rotation_program.h"
+#include "support/synthetic_rig.h"
 
 namespace vlp {
 namespace {
@@ -47,6 +48,24 @@ TEST_F(RotationRefusal, RefusesWhatDoesNotDetermineIt) {
   expect_refusal(rotation(written(alike)), 3, "all alike: turn the camera");
   for (Frame& frame : frames) frame.detections.resize(1);
   expect_refusal(rotation(written(frames)), 3, "add lamps");
+}
+
+/// Captures that differ by their noise alone, at two yaws of the turn or at three.
+TEST_F(RotationRefusal, RefusesCirclesAtTwoOppositeYaws) {
+  const auto turn = read_detections(kExample + "turning.csv");
+  const std::size_t half = turn.size() / 2, quarter = turn.size() / 4;
+  const auto repeated = [&](const std::vector<std::size_t>& captures) {
+    Random random(5);
+    std::vector<Frame> frames;
+    for (const std::size_t i : captures) {
+      frames.push_back({std::to_string(frames.size()), with_noise(turn[i].detections, random)});
+    }
+    return written(frames);
+  };
+  expect_refusal(rotation(repeated({0, half, 0, half, 0, half}), "--method circle"), 3,
+                 "captures are at two yaws, which determine no circle: add captures at a third");
+  EXPECT_EQ(rotation(repeated({0, half, quarter, 0, half, quarter}), "--method circle").exit_code,
+            0);
 }
 
 TEST_F(RotationRefusal, RefusesTheMapOfAnotherRoom) {

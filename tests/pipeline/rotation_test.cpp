@@ -116,6 +116,18 @@ TEST_F(Rotation, HasTheOtherMethods) {
   EXPECT_EQ(rotation(kExample + "turning.csv", "--method guess").exit_code, 2);
 }
 
+TEST_F(Rotation, SaysThatThreePointsOfACircleLeaveNoStandardDeviation) {
+  const auto result =
+      rotation(captures([](std::size_t i) { return i % 4 == 0; }), "--method circle");
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_FALSE(found().covariance);
+  EXPECT_THAT(result.errors, HasSubstr("no standard deviation: add captures"));
+  const auto full = rotation(kExample + "turning.csv", "--method circle");
+  ASSERT_EQ(full.exit_code, 0) << full.errors;
+  EXPECT_TRUE(found().covariance);
+  EXPECT_THAT(full.errors, testing::Not(HasSubstr("no standard deviation")));
+}
+
 TEST_F(Rotation, NamesAMisidentifiedLamp) {
   auto frames = read_detections(kExample + "turning.csv");
   std::swap(frames[5].detections[0].pixel, frames[5].detections[1].pixel);

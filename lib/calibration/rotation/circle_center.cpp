@@ -12,8 +12,10 @@
 #include <utility>
 
 #include "calibration/rotation/fit_parts.h"
+#include "calibration/rotation/joint_center.h"
 #include "geometry/median.h"
 #include "geometry/robust_scatter.h"
+#include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
@@ -142,31 +144,95 @@ std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
   return fit;
 }
 
+/// Returns true if the points determine the centre of their circle, rather than their noise.
+///
+/// With unit vectors u from the centre, M = sum of (u - mean u)(u - mean u)' is the information on
+/// the centre for unit noise. Noise of sd s turns each u by s / R and so adds
+/// (s / R)^2 sum of (t . w)^2 along w, where t is the tangent. Of points at two opposite yaws the
+/// smallest eigenvalue of M is noise alone.
+///
+/// @param noise  standard deviation of a coordinate, in the unit of the points
+bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& points, double noise) {
+  // A standard deviation from M is then at most 1 / sqrt(1 - 0.25) = 1.15 times too small.
+  constexpr double max_noise_fraction = 0.25;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const auto& point : points) mean += (point - circle.center).normalized();
+  mean /= static_cast<double>(points.size());
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero(), tangents = Eigen::Matrix2d::Zero();
+  for (const auto& point : points) {
+    const Eigen::Vector2d radial = (point - circle.center).normalized();
+    const Eigen::Vector2d tangent(-radial.y(), radial.x());
+    information += (radial - mean) * (radial - mean).transpose();
+    tangents += tangent * tangent.transpose();
+  }
+  const auto [values, axes] = symmetric_eigen(information);
+  const double variance = noise * noise / (circle.radius * circle.radius);
+  for (Eigen::Index i = 0; i < 2; ++i) {
+    const double from_noise = variance * axes.col(i).dot(tangents * axes.col(i));
+    if (!(from_noise <= max_noise_fraction * values[i])) return false;
+  }
+  return true;
+}
+
+/// Estimates the noise of a coordinate in units of the focal length. The joint fit has degrees of
+/// freedom left where three captures leave a circle none.
+double estimate_noise(const SpotCaptures& spot, const Camera& camera) {
+  const RotationFit joint = fit_joint_center(spot, camera);
+  const double noise_px = joint.converged ? joint.residual_px : spot.stated_px.value_or(0);
+  return noise_px / camera.focal_px().x();
+}
+
+/// Circles of all lamps at one height.
+struct HeightCircles {
+  std::vector<LampCircle> circles;
+  int undetermined = 0;
+  /// Sum of the squared distances from the circles, and its degrees of freedom.
+  double squares = 0, freedom = 0;
+};
+
+HeightCircles fit_circles(const SpotCaptures& spot, std::size_t height, double focal_px,
+                          double noise, std::vector<SpotOutlier>& outliers) {
+  HeightCircles result;
+  for (std::size_t lamp = 0; lamp < spot.lamps.size(); ++lamp) {
+    Trace trace = trace_of(spot, lamp, height);
+    const auto fit = trimmed_circle(trace, focal_px, outliers);
+    if (trace.points.size() < 3) continue;
+    if (!fit || !fit->converged || !is_determined(fit->circle, trace.points, noise)) {
+      ++result.undetermined;
+      continue;
+    }
+    const double count = static_cast<double>(trace.points.size());
+    result.circles.push_back({lamp, height, *fit});
+    result.squares += fit->rms * fit->rms * count;
+    result.freedom += count - 3;
+  }
+  return result;
+}
+
 }  // namespace
 
 CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera) {
   assert(spot.status == SpotStatus::ok);
   CircleCenters result;
   const double focal_px = camera.focal_px().x();
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  const double noise = estimate_noise(spot, camera);
   double squares = 0, freedom = 0;
   for (std::size_t height = 0; height < spot.heights.size(); ++height) {
-    for (std::size_t lamp = 0; lamp < spot.lamps.size(); ++lamp) {
-      Trace trace = trace_of(spot, lamp, height);
-      const auto fit = trimmed_circle(trace, focal_px, result.mean.outliers);
-      if (!fit || !fit->converged) continue;
-      result.circles.push_back({lamp, height, *fit});
-      sum += fit->circle.center;
-      covariance += fit->center_covariance;
-      squares += fit->rms * fit->rms * static_cast<double>(trace.points.size());
-      freedom += static_cast<double>(trace.points.size()) - 3;
-    }
+    HeightCircles at = fit_circles(spot, height, focal_px, noise, result.mean.outliers);
+    result.undetermined += at.undetermined;
+    if (std::ssize(at.circles) <= at.undetermined) continue;
+    result.circles.insert(result.circles.end(), at.circles.begin(), at.circles.end());
+    squares += at.squares;
+    freedom += at.freedom;
   }
   if (result.circles.empty()) return result;
   const double count = static_cast<double>(result.circles.size());
-  const Eigen::Vector2d mean = sum / count;
-  covariance /= count * count;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  for (const LampCircle& circle : result.circles) {
+    mean += circle.fit.circle.center / count;
+    covariance += circle.fit.center_covariance / (count * count);
+  }
   std::optional<Matrix2> measured;
   if (covariance.allFinite()) measured = covariance;
   double spread = 0;

@@ -26,6 +26,8 @@ struct CircleCenters {
   /// the circles, each of which has three unknowns.
   RotationFit mean;
   std::vector<LampCircle> circles;
+  /// Number of lamps and heights with three sightings or more that determine no circle.
+  int undetermined = 0;
   /// Root of the mean squared distance of the centres from their mean: a symptom of tilt.
   double spread_px = 0;
 };
@@ -37,7 +39,9 @@ struct CircleCenters {
 /// so that the circles disagree, and their mean is too far out. Of eight points or more on a
 /// circle, those beyond 4.5 standard deviations are rejected: against the median of the distances,
 /// then each against the circle through the others, with Student's t (robust_scatter.h). Needs
-/// three sightings of a lamp at a height; not converged when no lamp has them. The model is
+/// three sightings of a lamp at a height that determine the centre rather than their noise: those
+/// at two opposite yaws do not. All lamps of a height share its yaws: it counts only if most of
+/// their circles are determined. Not converged when no height counts. The model is
 /// RotationModel::shift.
 CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera);
 

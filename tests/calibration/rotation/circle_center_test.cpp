@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/spot.h"
@@ -86,6 +89,62 @@ TEST(CircleCenter, LeavesOutAPointThatIsWrong) {
   const SpotObservation& outlier = spot.sightings[found.mean.outliers[0].sighting];
   EXPECT_EQ(spot.captures[outlier.capture].image, "3.png");
   EXPECT_EQ(spot.lamps[outlier.lamp].id, frames[3].detections[2].lamp);
+}
+
+/// Returns captures of a level camera at these yaws, with noise of 0.3 px.
+SpotCaptures captures_at(const std::vector<double>& yaws_rad, bool noise_is_stated,
+                         Random& random) {
+  SpotScene scene;
+  scene.captures = 1;
+  std::vector<Frame> frames;
+  for (const double yaw_rad : yaws_rad) {
+    scene.first_rad = yaw_rad;
+    Frame frame = with_noise(scene.frames(0.3), random).front();
+    frame.image = std::to_string(frames.size());
+    for (Detection& detection : frame.detections) {
+      if (!noise_is_stated) detection.sigma_px.reset();
+    }
+    frames.push_back(std::move(frame));
+  }
+  SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
+  EXPECT_EQ(spot.status, SpotStatus::ok);
+  return spot;
+}
+
+/// The noise of captures at two opposite yaws alone makes a triangle of the places of a lamp.
+TEST(CircleCenter, DoesNotConvergeAtTwoOppositeYaws) {
+  constexpr int draws = 25;
+  Random random(31);
+  for (const int count : {3, 6, 12, 40}) {
+    for (const bool noise_is_stated : {true, false}) {
+      for (int i = 0; i < draws; ++i) {
+        const double yaw_rad = random.uniform(-M_PI, M_PI);
+        std::vector<double> yaws_rad;
+        for (int k = 0; k < count; ++k) yaws_rad.push_back(yaw_rad + k % 2 * M_PI);
+        const SpotCaptures spot = captures_at(yaws_rad, noise_is_stated, random);
+        ASSERT_EQ(spot.status, SpotStatus::ok);
+        const CircleCenters found = fit_circle_centers(spot, SpotScene().camera);
+        EXPECT_FALSE(found.mean.converged) << count << " captures, draw " << i;
+        EXPECT_GT(found.undetermined, 0);
+      }
+    }
+  }
+}
+
+TEST(CircleCenter, ConvergesWithCapturesAtAThirdYaw) {
+  constexpr int draws = 25;
+  Random random(32);
+  for (int i = 0; i < draws; ++i) {
+    const double yaw_rad = random.uniform(-M_PI, M_PI);
+    const SpotCaptures spot = captures_at(
+        {yaw_rad, yaw_rad + M_PI, yaw_rad, yaw_rad + M_PI, yaw_rad + M_PI / 2, yaw_rad + M_PI / 2},
+        true, random);
+    ASSERT_EQ(spot.status, SpotStatus::ok);
+    const CircleCenters found = fit_circle_centers(spot, SpotScene().camera);
+    ASSERT_TRUE(found.mean.converged);
+    ASSERT_TRUE(found.mean.center.covariance);
+    EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(SpotScene()), 2));
+  }
 }
 
 TEST(JointCenter, IsTheLeverArmsOfALevelCamera) {
