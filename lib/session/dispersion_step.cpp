@@ -198,6 +198,13 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   if (!input.calibration.rotation_center) {
     result.warnings.emplace_back("the calibration has no rotation_center: run vlp-rotation first");
   }
+  constexpr int min_captures_for_noise = 4;  // three leave two degrees of freedom
+  if (method == DispersionMethod::camera && !fit.noise_is_stated &&
+      fit.dispersion.captures < min_captures_for_noise) {
+    result.warnings.emplace_back(
+        "three captures hardly show their noise, and the standard deviation of the offset may be "
+        "wrong several times over: add captures, or state sigma_px");
+  }
   if (!of_axis) warn_of_lever_arm(result, places, input.lamps, levelled);
   constexpr double millimetres = 1e3;
   result.metrics = {{"dispersion_mm", millimetres * fit.dispersion.radius_m},

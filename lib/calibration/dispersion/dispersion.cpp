@@ -40,8 +40,8 @@ bool all_stated(std::span<const StationCapture> captures) {
 }
 
 void fit_paper(DispersionFit& fit, const StationFixes& station, const Eigen::Vector2d& focal_px,
-               bool noise_is_stated, DispersionCircle kind) {
-  const PaperOffset found = find_paper_offset(station, focal_px, kind, noise_is_stated);
+               DispersionCircle kind) {
+  const PaperOffset found = find_paper_offset(station, focal_px, kind, fit.noise_is_stated);
   fit.status = found.status;
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
@@ -49,8 +49,7 @@ void fit_paper(DispersionFit& fit, const StationFixes& station, const Eigen::Vec
   apply(fit, station, found.used, kind);
 }
 
-void fit_camera(DispersionFit& fit, const StationFixes& station, bool noise_is_stated,
-                DispersionCircle kind) {
+void fit_camera(DispersionFit& fit, const StationFixes& station, DispersionCircle kind) {
   const auto separation = separate_offsets(station);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
@@ -65,13 +64,15 @@ void fit_camera(DispersionFit& fit, const StationFixes& station, bool noise_is_s
     fit.status = DispersionStatus::one_yaw;
     return;
   }
-  const double excess = noise_is_stated ? std::max(1.0, separation->excess) : separation->excess;
+  const double factor =
+      variance_factor(separation->excess, separation->freedom, fit.noise_is_stated);
   fit.dispersion.offset_px = separation->offset_px;
-  Matrix2 covariance = excess * separation->covariance.topLeftCorner<2, 2>();
+  Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>() +
+                       separation->offset_covariance_from_map;
   covariance(1, 0) = covariance(0, 1);
   fit.dispersion.covariance = covariance;
   fit.world_offset_m = separation->world_m;
-  fit.world_covariance = excess * separation->covariance.bottomRightCorner<2, 2>();
+  fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>();
   apply(fit, station, separation->used, kind);
 }
 
@@ -87,6 +88,7 @@ DispersionFit fit_dispersion(std::span<const StationCapture> captures, const Lam
   DispersionFit fit;
   fit.captures_without_fix = static_cast<int>(std::ssize(fixes) - count);
   fit.no_fix_status = station.first_refusal();
+  fit.noise_is_stated = all_stated(captures);
   if (count == 0) return fit;
   const bool paper = method == DispersionMethod::paper;
   const std::vector<bool> all(fixes.size(), true);
@@ -100,9 +102,9 @@ DispersionFit fit_dispersion(std::span<const StationCapture> captures, const Lam
     fit.status = DispersionStatus::ok;
     const Eigen::Vector2d focal_px = calibration.camera.focal_px();
     if (paper) {
-      fit_paper(fit, station, focal_px, all_stated(captures), circle);
+      fit_paper(fit, station, focal_px, circle);
     } else {
-      fit_camera(fit, station, all_stated(captures), circle);
+      fit_camera(fit, station, circle);
     }
   }
   return fit;

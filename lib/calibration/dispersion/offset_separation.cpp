@@ -20,6 +20,8 @@ struct Equation {
   std::size_t capture;
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 4> jacobian;
+  /// Inverse of the lower Cholesky factor of the fix's covariance.
+  Eigen::Matrix2d whitening;
 };
 
 std::vector<Equation> linearize(const StationFixes& fixes, const OffsetSeparation& at) {
@@ -32,12 +34,13 @@ std::vector<Equation> linearize(const StationFixes& fixes, const OffsetSeparatio
   equations.reserve(here.size());
   for (std::size_t i = 0; i < here.size(); ++i) {
     if (!here[i] || !right[i] || !left[i] || !down[i] || !up[i]) continue;
-    const Eigen::LLT<Eigen::Matrix2d> factor(here[i]->covariance);
+    const Eigen::Matrix2d root = here[i]->covariance.llt().matrixL();
+    const Eigen::Matrix2d whitening = root.inverse();
     Eigen::Matrix<double, 2, 4> jacobian;
     jacobian << (right[i]->error_m - left[i]->error_m) / (2 * step_px),
         (down[i]->error_m - up[i]->error_m) / (2 * step_px), -Eigen::Matrix2d::Identity();
-    equations.push_back({i, factor.matrixL().solve(here[i]->error_m - at.world_m),
-                         factor.matrixL().solve(jacobian)});
+    equations.push_back(
+        {i, whitening * (here[i]->error_m - at.world_m), whitening * jacobian, whitening});
   }
   return equations;
 }
@@ -57,7 +60,7 @@ std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
   double chi_squared = 0;
   int count = 0;
   for (std::size_t i = 0; i < equations.size(); ++i) {
-    const auto& [capture, residual, jacobian] = equations[i];
+    const auto& [capture, residual, jacobian, whitening] = equations[i];
     information += weights[i] * jacobian.transpose() * jacobian;
     gradient -= weights[i] * jacobian.transpose() * residual;
     chi_squared += weights[i] * residual.squaredNorm();
@@ -69,7 +72,8 @@ std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
   at.offset_px += step.head<2>();
   at.world_m += step.tail<2>();
   at.covariance = information.inverse();
-  at.excess = count > 2 ? chi_squared / (2 * count - 4) : 0;
+  at.freedom = 2 * count - 4;
+  at.excess = at.freedom > 0 ? chi_squared / at.freedom : 0;
   return step;
 }
 
@@ -127,6 +131,20 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
   return std::nullopt;
 }
 
+/// Propagates errors of the map: the solution moves by -(J'WJ)^-1 J'W d, d being the fixes' moves.
+Eigen::Matrix2d propagate_map(const StationFixes& fixes, const OffsetSeparation& at) {
+  const Eigen::MatrixXd moves_m = fixes.moves_by_map(at.offset_px);
+  if (moves_m.cols() == 0) return Eigen::Matrix2d::Zero();
+  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, moves_m.cols());
+  for (const Equation& equation : linearize(fixes, at)) {
+    if (!at.used[equation.capture]) continue;
+    const auto row = 2 * static_cast<Eigen::Index>(equation.capture);
+    gradient += equation.jacobian.transpose() * equation.whitening * moves_m.middleRows<2>(row);
+  }
+  const Eigen::MatrixXd offset_px = at.covariance.topRows<2>() * gradient;
+  return offset_px * offset_px.transpose();
+}
+
 }  // namespace
 
 std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes) {
@@ -139,6 +157,7 @@ std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes) {
     if (!changed) return std::nullopt;
     if (!*changed) break;
   }
+  result.offset_covariance_from_map = propagate_map(fixes, result);
   return result;
 }
 

@@ -16,8 +16,12 @@ struct OffsetSeparation {
   Eigen::Vector2d world_m = Eigen::Vector2d::Zero();
   /// Of both when the fixes scatter as their covariances say.
   Eigen::Matrix4d covariance;
+  /// Covariance of offset_px from the map's sd_m.
+  Eigen::Matrix2d offset_covariance_from_map = Eigen::Matrix2d::Zero();
   /// Squared residuals over what those let expect; zero when as many fixes as unknowns are used.
   double excess;
+  /// Number of rows of the fixes that are used, minus the unknowns.
+  int freedom = 0;
   /// Of each capture.
   std::vector<bool> used;
 };

@@ -66,29 +66,41 @@ Eigen::Matrix2d noise_of_fixes(const OptionalFixes& fixes, const std::vector<boo
 /// Estimates the covariance of the mean of n errors from their scatter and their noise.
 ///
 /// Few errors do not determine a covariance: two give one of rank 1. The sample covariance counts
-/// with n - 1, its isotropic mean with isotropic_weight. The sum is multiplied by
-/// (t(2 n - 2) / 1.96)^2, so that 1.96 sd cover 95 %, and is at least the noise along each axis.
+/// with n - 1, its isotropic mean with isotropic_weight. In coordinates in which the noise is the
+/// unit matrix, variance_factor() makes the variance along each axis of it.
 Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
                                    const Eigen::Matrix2d& noise) {
   constexpr double isotropic_weight = 2;  // as three errors
-  constexpr double sigmas_of_95_percent = 1.96;
   const Eigen::Vector2d mean = mean_of(errors);
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   for (const auto& error : errors) squares += (error - mean) * (error - mean).transpose();
   const double n = static_cast<double>(errors.size());
   const double isotropic = squares.trace() / (2 * (n - 1));
-  const double factor = student_bound(sigmas_of_95_percent, 2 * n - 2) /
-                        (sigmas_of_95_percent * sigmas_of_95_percent);
+  const double freedom = 2 * n - 2;
   const Eigen::Matrix2d scatter =
-      factor / (n - 1 + isotropic_weight) *
-      (squares + isotropic_weight * isotropic * Eigen::Matrix2d::Identity());
-  // The larger of both, in coordinates in which the noise is the unit matrix.
+      (squares + isotropic_weight * isotropic * Eigen::Matrix2d::Identity()) /
+      (n - 1 + isotropic_weight);
   const Eigen::LLT<Eigen::Matrix2d> root(noise);
-  if (root.info() != Eigen::Success) return scatter / n;
+  if (root.info() != Eigen::Success) return variance_factor(1, freedom, false) * scatter / n;
   const Eigen::Matrix2d l = root.matrixL(), l_inverse = l.inverse();
-  const auto [values, axes] =
+  auto [values, axes] =
       symmetric_eigen(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
-  return l * axes * values.cwiseMax(1).asDiagonal() * axes.transpose() * l.transpose() / n;
+  for (double& value : values) value = variance_factor(value, freedom, true);
+  return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
+}
+
+/// Returns the covariance of the mean fix from errors of the map, which all captures have in
+/// common.
+Eigen::Matrix2d covariance_from_map(const Eigen::MatrixXd& moves_m, const std::vector<bool>& used) {
+  Eigen::MatrixXd mean_m = Eigen::MatrixXd::Zero(2, moves_m.cols());
+  double count = 0;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    mean_m += moves_m.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+    ++count;
+  }
+  mean_m /= count;
+  return mean_m * mean_m.transpose();
 }
 
 }  // namespace
@@ -129,8 +141,10 @@ PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d
     PaperOffset found{DispersionStatus::ok, offset_px, {}, used};
     if (kind == DispersionCircle::mean) {
       const Eigen::Matrix2d noise_m2 = noise_of_fixes(station.at(offset_px), used, noise_is_stated);
-      Matrix2 covariance =
-          image_from_floor * covariance_of_mean(errors_m, noise_m2) * image_from_floor.transpose();
+      const Eigen::Matrix2d mean_covariance_m2 =
+          covariance_of_mean(errors_m, noise_m2) +
+          covariance_from_map(station.moves_by_map(offset_px), used);
+      Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);
       found.covariance = covariance;
     }

@@ -18,8 +18,8 @@ struct PaperOffset {
   /// `ok`, many_yaws or diverged; otherwise there is nothing below.
   DispersionStatus status;
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
-  /// Covariance from the scatter of the fixes, at least that of their noise. std::nullopt for the
-  /// enclosing circle.
+  /// Covariance from the scatter of the fixes, at least that of their noise, and from the map's
+  /// sd_m. std::nullopt for the enclosing circle.
   std::optional<Matrix2> covariance = {};
   /// Of each capture.
   std::vector<bool> used = {};

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/dispersion/station_fixes.h"
 
+#include <set>
+
 #include "positioning/positioner.h"
 #include "rig/find_lamp.h"
 
@@ -42,9 +44,14 @@ StationFixes::StationFixes(std::span<const StationCapture> captures, const LampM
 
 std::vector<std::optional<StationFixes::At>> StationFixes::at(
     const Eigen::Vector2d& offset_px) const {
+  return at(offset_px, map_);
+}
+
+std::vector<std::optional<StationFixes::At>> StationFixes::at(const Eigen::Vector2d& offset_px,
+                                                              const LampMap& map) const {
   Calibration calibration = calibration_;
   calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1, {}};
-  const Positioner positioner(map_, calibration);
+  const Positioner positioner(map, calibration);
   std::vector<std::optional<At>> fixes(captures_.size());
   for (std::size_t i = 0; i < captures_.size(); ++i) {
     const Fix fix = fix_of(positioner, captures_[i]);
@@ -53,11 +60,41 @@ std::vector<std::optional<StationFixes::At>> StationFixes::at(
     fixes[i] = At{pose.position_m.head<2>() - captures_[i].station_m,
                   fix.noise_covariance.topLeftCorner<2, 2>(),
                   pose.yaw_rad,
-                  lamps_height(captures_[i], map_) - pose.position_m.z(),
+                  lamps_height(captures_[i], map) - pose.position_m.z(),
                   fix.residual_px * fix.residual_px * fix.lamps,
                   2 * fix.lamps - 4};
   }
   return fixes;
+}
+
+Eigen::MatrixXd StationFixes::moves_by_map(const Eigen::Vector2d& offset_px) const {
+  std::set<int> detected;
+  for (const StationCapture& capture : captures_) {
+    for (const Detection& detection : capture.detections) detected.insert(detection.lamp);
+  }
+  std::vector<std::size_t> uncertain;
+  for (std::size_t i = 0; i < map_.lamps.size(); ++i) {
+    const Lamp& lamp = map_.lamps[i];
+    if (lamp.sd_m.value_or(0) > 0 && detected.contains(lamp.id)) uncertain.push_back(i);
+  }
+  Eigen::MatrixXd moves_m =
+      Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
+  if (uncertain.empty()) return moves_m;
+  const auto here = at(offset_px);
+  LampMap moved = map_;
+  for (Eigen::Index column = 0; column < moves_m.cols(); ++column) {
+    const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
+    double& coordinate_m = moved.lamps[lamp].position_m[column % 3];
+    coordinate_m += *map_.lamps[lamp].sd_m;
+    const auto there = at(offset_px, moved);
+    coordinate_m = map_.lamps[lamp].position_m[column % 3];
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      if (!here[i] || !there[i]) continue;
+      moves_m.block<2, 1>(2 * static_cast<Eigen::Index>(i), column) =
+          there[i]->error_m - here[i]->error_m;
+    }
+  }
+  return moves_m;
 }
 
 }  // namespace vlp

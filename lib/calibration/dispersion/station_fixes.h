@@ -32,10 +32,18 @@ class StationFixes {
 
   /// Of each capture; nothing where there is no fix.
   std::vector<std::optional<At>> at(const Eigen::Vector2d& offset_px) const;
+  /// Computes the moves of the fixes by errors of the map of one standard deviation (Lamp::sd_m),
+  /// in m, by a difference each.
+  ///
+  /// @return  two rows for each capture, zero without a fix; a column for each coordinate of each
+  ///          lamp that is detected and is not exact
+  Eigen::MatrixXd moves_by_map(const Eigen::Vector2d& offset_px) const;
   /// Of captures without one.
   FixStatus first_refusal() const { return first_refusal_; }
 
  private:
+  std::vector<std::optional<At>> at(const Eigen::Vector2d& offset_px, const LampMap& map) const;
+
   std::span<const StationCapture> captures_;
   const LampMap& map_;
   Calibration calibration_;

@@ -15,6 +15,21 @@ namespace {
 
 constexpr double kFar = 0.2;  // of the lamps' height
 
+/// Computes q of variance_factor().
+double student_factor(double degrees_of_freedom) {
+  constexpr double sigmas_of_95_percent = 1.96;
+  return student_bound(sigmas_of_95_percent, degrees_of_freedom) /
+         (sigmas_of_95_percent * sigmas_of_95_percent);
+}
+
+/// Computes the ratio that chi-squared over its degrees of freedom exceeds in 10 % of all cases
+/// (Wilson and Hilferty).
+double unlikely_ratio(double degrees_of_freedom) {
+  constexpr double quantile = 1.2816;
+  const double part = 2 / (9 * degrees_of_freedom);
+  return std::pow(1 - part + quantile * std::sqrt(part), 3);
+}
+
 }  // namespace
 
 double TypicalFix::yaw_variety() const {
@@ -53,6 +68,15 @@ bool far_from_all(const OptionalFixes& fixes) {
   return std::all_of(fixes.begin(), fixes.end(), [](const auto& fix) {
     return !fix || fix->error_m.norm() > kFar * fix->height_m;
   });
+}
+
+double variance_factor(double ratio, double nu, bool noise_is_stated) {
+  const double from_residuals = ratio * student_factor(nu);
+  if (!noise_is_stated) return from_residuals;
+  const double all = kStatedFreedom + nu;
+  const double combined = (kStatedFreedom + nu * ratio) / all * student_factor(all);
+  const double factor = std::max(1.0, combined);
+  return ratio > unlikely_ratio(nu) ? std::max(factor, from_residuals) : factor;
 }
 
 std::vector<bool> near_median(const OptionalFixes& fixes) {

@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <cstdio>
+#include <optional>
+#include <vector>
 
 #include "calibration/dispersion/station.h"
 
@@ -116,8 +118,11 @@ TEST_P(DispersionOfFew, ByThePaperCoversTheErrorAsStated) {
   }
   const double ratio = std::sqrt(squares), fraction = beyond / (2.0 * kStations);
   std::printf("%s: e/sd %.2f, beyond 95 %%: %.1f %%\n", few.name, ratio, 100 * fraction);
-  EXPECT_LT(ratio, 1.2);
-  EXPECT_GT(ratio, 0.6);
+  // Two captures have two degrees of freedom: without the noise, t^2 has no mean.
+  if (few.count > 2 || few.placement_sd_m == 0) {
+    EXPECT_LT(ratio, 1.2);
+  }
+  EXPECT_GT(ratio, 0.75);
   EXPECT_LT(fraction, 0.07);
 }
 
@@ -131,6 +136,100 @@ INSTANTIATE_TEST_SUITE_P(Paper, DispersionOfFew,
                                          FewCaptures{"ThreePlacedBadly", 3, true, 2e-3},
                                          FewCaptures{"EightPlacedBadly", 8, true, 2e-3}),
                          [](const auto& few) { return few.param.name; });
+
+/// Captures by a station under a map with errors of its sd_m, and how noise is stated.
+struct Captures {
+  const char* name;
+  DispersionMethod method;
+  int count;
+  double map_sd_m;
+  /// Stated noise over the noise; std::nullopt if it is not stated.
+  std::optional<double> stated_ratio;
+  /// Whether the captures are at two opposite yaws, each at a height of its own.
+  bool has_tied_heights = false;
+};
+
+std::vector<StationCapture> make_captures(Station& station, const Captures& captures) {
+  constexpr double noise_px = 0.3;
+  if (captures.method == DispersionMethod::paper) {
+    return station.captures_at(0.7, captures.count, noise_px);
+  }
+  std::vector<StationCapture> made;
+  for (int k = 0; k < captures.count; ++k) {
+    const bool second = k % 2 == 1;
+    const double yaw_rad =
+        captures.has_tied_heights ? (second ? M_PI : 0.0) : 2 * M_PI * k / captures.count;
+    station.rig.camera = {{0.05, -0.1, second ? 0.3 : 0.0}, 0.7 + yaw_rad};
+    made.push_back({seen_from(station.rig, noise_px), station.rig.camera.position_m.head<2>()});
+  }
+  return made;
+}
+
+class DispersionSd : public testing::TestWithParam<Captures> {};
+
+/// 600 draws of two axes know an rms to 3 % and the fraction of 5 % to 0.6 %.
+TEST_P(DispersionSd, CoversTheErrorAsStated) {
+  const Captures& cell = GetParam();
+  Station station(0.01);
+  const auto exact = make_captures(station, cell);
+  const auto truth = fit_dispersion(exact, station.rig.map, station.believed, cell.method);
+  ASSERT_EQ(truth.status, DispersionStatus::ok);
+  Random random(44);
+  double squares = 0;
+  int beyond = 0;
+  for (int i = 0; i < kStations; ++i) {
+    LampMap surveyed = station.rig.map;
+    for (Lamp& lamp : surveyed.lamps) {
+      lamp.sd_m = cell.map_sd_m;
+      for (double& coordinate : lamp.position_m) coordinate += cell.map_sd_m * random.normal();
+    }
+    auto captures = exact;
+    for (auto& capture : captures) {
+      capture.detections = with_noise(capture.detections, random);
+      for (auto& detection : capture.detections) {
+        detection.sigma_px = cell.stated_ratio
+                                 ? std::optional(*cell.stated_ratio * *detection.sigma_px)
+                                 : std::nullopt;
+      }
+    }
+    const auto fit = fit_dispersion(captures, surveyed, station.believed, cell.method);
+    ASSERT_EQ(fit.status, DispersionStatus::ok);
+    ASSERT_TRUE(fit.dispersion.covariance);
+    for (Eigen::Index axis = 0; axis < 2; ++axis) {
+      const double error = fit.dispersion.offset_px[axis] - truth.dispersion.offset_px[axis];
+      const double square = error * error / (*fit.dispersion.covariance)(axis, axis);
+      squares += square / (2 * kStations);
+      beyond += square > 1.96 * 1.96 ? 1 : 0;
+    }
+  }
+  const double ratio = std::sqrt(squares), fraction = beyond / (2.0 * kStations);
+  std::printf("%s: e/sd %.2f, beyond 95 %%: %.1f %%\n", cell.name, ratio, 100 * fraction);
+  // Three captures whose noise is not stated have two degrees of freedom: t^2 has no mean.
+  if (cell.count > 3 || cell.stated_ratio) {
+    EXPECT_LT(ratio, 1.2);
+    EXPECT_GT(ratio, 0.8);
+  }
+  EXPECT_LT(fraction, 0.08);
+  EXPECT_GT(fraction, 0.01);
+}
+
+constexpr DispersionMethod kCamera = DispersionMethod::camera, kPaper = DispersionMethod::paper;
+INSTANTIATE_TEST_SUITE_P(
+    Captures, DispersionSd,
+    testing::Values(Captures{"PaperThreeUnderMapErrors", kPaper, 3, 2e-3, 1},
+                    Captures{"PaperTwelveUnderMapErrors", kPaper, 12, 2e-3, 1},
+                    Captures{"PaperTwelveUnderMapErrorsNoiseNotStated", kPaper, 12, 2e-3, {}},
+                    Captures{"PaperThree", kPaper, 3, 0, 1},
+                    Captures{"PaperThreeNoiseTooSmall", kPaper, 3, 0, 1 / 1.4},
+                    Captures{"Three", kCamera, 3, 0, 1},
+                    Captures{"ThreeNoiseTooSmall", kCamera, 3, 0, 1 / 1.4},
+                    Captures{"ThreeNoiseNotStated", kCamera, 3, 0, {}},
+                    Captures{"FourNoiseNotStated", kCamera, 4, 0, {}},
+                    Captures{"SixUnderMapErrors", kCamera, 6, 2e-3, 1},
+                    Captures{"TiedFourUnderMapErrors", kCamera, 4, 2e-3, 1, true},
+                    Captures{"TiedTwelveUnderMapErrors", kCamera, 12, 2e-3, 1, true},
+                    Captures{"TiedFourNoiseNotStated", kCamera, 4, 0, {}, true}),
+    [](const auto& captures) { return captures.param.name; });
 
 }  // namespace
 }  // namespace vlp
