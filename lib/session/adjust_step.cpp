@@ -108,7 +108,7 @@ AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& re
   return all;
 }
 
-void add_warnings(AdjustStepResult& result, const MapErrors& map_errors, bool noise_is_stated) {
+void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
   const AdjustmentResult& found = result.found;
   for (const auto& lamp : found.lamps) {
     if (!lamp.moved) continue;
@@ -136,21 +136,12 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors, bool no
                     "{} is to be expected; is it this camera's, in focus as then?",
                     found.lens_chi_squared, found.lens_freedom));
   }
-  if (noise_is_stated && found.noise_scale > 1) {
+  if (found.noise_is_contradicted) {
     result.warnings.push_back(
         fmt::format("the residuals are {:.2f} times what sigma_px lets expect, and count so",
                     found.noise_scale));
   }
   for (const std::string& note : found.notes) result.notes.push_back(note);
-}
-
-bool states_noise(const AdjustmentInput& input) {
-  for (const AdjustmentCapture& capture : input.captures) {
-    for (const Detection& detection : capture.detections) {
-      if (!detection.sigma_px) return false;
-    }
-  }
-  return true;
 }
 
 }  // namespace
@@ -187,7 +178,7 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
     blame_map(captures, alone, result);
     return result;
   }
-  add_warnings(result, map_errors, states_noise(all));
+  add_warnings(result, map_errors);
   result.metrics = {{"tilt_deg", deg_from_rad(tilt_of(found.center).angle_rad)}};
   if (const auto& arm_m = found.center.lever_arm_m) {
     result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});

@@ -44,7 +44,6 @@ struct Assembled {
   std::vector<bool> lamp_seen = {};
   int captures_left_out = 0;
   bool noise_is_stated = true;
-  bool noise_follows_residuals = false;
 };
 
 Eigen::Vector3d mean_of(const LampMap& map) {
@@ -138,7 +137,6 @@ Assembled assemble(const AdjustmentInput& input) {
     problem.lamps.push_back(
         {lamps_m.back(), input.frees_map_shape ? kInfinite : lamp.sd_m.value_or(0)});
   }
-  all.noise_follows_residuals = input.noise_follows_residuals;
   all.lamp_seen.resize(lamps_m.size());
   Eigen::Vector2d zenith(0, 0), arm_m(0, 0);
   if (center) {
@@ -461,11 +459,7 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
     if (!changed) changed = contradictions.settle(covariance);
     if (noise.freedom > 0) {
       const double scale = problem.noise_scale * noise.ratio;
-      // Stated noise is taken for too small when chance makes it so once in a thousand.
-      const double chance = all.noise_follows_residuals ? 0 : 3 * std::sqrt(0.5 / noise.freedom);
-      const bool larger = all.noise_is_stated && scale > 1 + chance;
-      const double next =
-          all.noise_is_stated ? (larger ? scale : 1) : std::max(scale, kMinNoise_px);
+      const double next = std::max(scale, all.noise_is_stated ? 1 : kMinNoise_px);
       constexpr double same = 0.01;
       if (std::abs(next / problem.noise_scale - 1) > same) {
         problem.noise_scale = next;
@@ -563,7 +557,8 @@ double mean_height_m(const AdjustmentProblem& problem) {
 }
 
 /// Counts captures and detections, and states their residuals.
-void report_detections(const AdjustmentProblem& problem, double freedom, AdjustmentResult& result) {
+void report_detections(const AdjustmentProblem& problem, bool noise_is_stated, double freedom,
+                       AdjustmentResult& result) {
   double squares_px = 0;
   std::vector<bool> capture_used(problem.captures.size());
   const std::vector<double> lengths = lengths_of(problem);
@@ -579,6 +574,8 @@ void report_detections(const AdjustmentProblem& problem, double freedom, Adjustm
   result.captures_left_out += static_cast<int>(capture_used.size()) - result.captures;
   result.residual_px = std::sqrt(squares_px / std::max(freedom, 1.0));
   result.noise_scale = problem.noise_scale;
+  const double chance = 3 * std::sqrt(0.5 / std::max(freedom, 1.0));
+  result.noise_is_contradicted = noise_is_stated && problem.noise_scale > 1 + chance;
 }
 
 /// States lens, zenith and lever arm with their covariances.
@@ -749,7 +746,7 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     return result;
   }
   const Eigen::MatrixXd& covariance = adjusted->covariance;
-  report_detections(problem, adjusted->freedom, result);
+  report_detections(problem, all.noise_is_stated, adjusted->freedom, result);
   bool has_lever_arm = false;
   result.undetermined =
       undetermined_by(problem, covariance, mean_height_m(problem), limits, has_lever_arm);

@@ -64,9 +64,6 @@ struct AdjustmentInput {
   /// Captures were checked one by one and have no gross outliers. Skips the robust start, which
   /// rejects all detections of a lamp whose exact place in the map is wrong.
   bool captures_are_checked = false;
-  /// Takes stated noise for too small wherever the residuals are larger, and not only beyond
-  /// chance.
-  bool noise_follows_residuals = false;
   /// Weighs detections without sigma_px alike in the undistorted image, as positioning does, so
   /// that errors of map and lens move zenith and fixes alike. Covariances are for equal noise in
   /// the image, without the loss of efficiency by these weights.
@@ -127,6 +124,8 @@ struct AdjustmentResult {
   /// By how much the stated sigma_px were taken larger, because the residuals are; 1 where they are
   /// not. Where none is stated, sigma_px is this many pixels.
   double noise_scale = 1;
+  /// Whether residuals larger than the stated noise are beyond chance, at one in a thousand.
+  bool noise_is_contradicted = false;
   /// What the captures leave to the survey alone, for people: the datum, lamps that nothing sees.
   std::vector<std::string> notes;
 

@@ -226,7 +226,6 @@ Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, cons
   input.calibration.camera = camera;
   input.frees_map_shape = options.refine_map;
   input.captures_are_checked = true;
-  input.noise_follows_residuals = true;
   input.weighs_in_undistorted_image = true;
   const AdjustmentResult found = adjust_in_rounds(captures, input, result);
   result.captures = found.captures;
