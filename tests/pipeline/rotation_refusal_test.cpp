@@ -53,7 +53,8 @@ TEST_F(RotationRefusal, RefusesWhatDoesNotDetermineIt) {
 /// Captures that differ by their noise alone, at two yaws of the turn or at three.
 TEST_F(RotationRefusal, RefusesCirclesAtTwoOppositeYaws) {
   const auto turn = read_detections(kExample + "turning.csv");
-  const std::size_t half = turn.size() / 2, quarter = turn.size() / 4;
+  // The turn is at two heights, one after the other.
+  const std::size_t half = turn.size() / 4, quarter = turn.size() / 8;
   const auto repeated = [&](const std::vector<std::size_t>& captures) {
     Random random(5);
     std::vector<Frame> frames;
