@@ -145,26 +145,8 @@ void run(Options options) {
   require(found);
 }
 
-void add_options(CLI::App& app, Options& options) {
-  add_capture_options(
-      app, options.images,
-      {"detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
-       "Calibration of the camera", "Where to write fixes.csv"});
-  app.add_option("--correction", options.correction,
-                 "Parts of the calibration to apply (default: all that it has)")
-      ->check(CLI::IsMember({"none", "rotation", "dispersion", "all"}))
-      ->option_text("none|rotation|dispersion|all");
-  app.add_option(
-         "--sigma-px", options.sigma_px,
-         "Standard deviation of the lamps' pixels, raised if the residuals are larger; taken from "
-         "the residuals if neither it nor a column states it")
-      ->check(CLI::Range(kMinSigma_px, kMaxSigma_px));
-  app.add_option(
-      "--captures", options.captures,
-      "captures.csv: image, time_s, roll_rad, pitch_rad (inclination of the robot, or of "
-      "the camera when there is no --camera-on-robot), vx_m_per_s, vy_m_per_s, "
-      "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry, along the axes of the same), "
-      "z_m, yaw_rad; default: captures.csv in the folder");
+/// Adds the options of motion, lean and mount, and of figures that captures.csv states.
+void add_sensor_options(CLI::App& app, Options& options) {
   app.add_option(
          "--inclination-sigma-deg", options.inclination_sigma_deg,
          "Standard deviation of the inclination sensor's angles: roll and pitch are then estimated "
@@ -205,6 +187,29 @@ void add_options(CLI::App& app, Options& options) {
          "Captures to fix together, with one velocity, where captures.csv has time_s within "
          "0.2 s (default: 1)")
       ->check(CLI::Range(1, 2));
+}
+
+void add_options(CLI::App& app, Options& options) {
+  add_capture_options(
+      app, options.images,
+      {"detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
+       "Calibration of the camera", "Where to write fixes.csv"});
+  app.add_option("--correction", options.correction,
+                 "Parts of the calibration to apply (default: all that it has)")
+      ->check(CLI::IsMember({"none", "rotation", "dispersion", "all"}))
+      ->option_text("none|rotation|dispersion|all");
+  app.add_option(
+         "--sigma-px", options.sigma_px,
+         "Standard deviation of the lamps' pixels, raised if the residuals are larger; taken from "
+         "the residuals if neither it nor a column states it")
+      ->check(CLI::Range(kMinSigma_px, kMaxSigma_px));
+  app.add_option(
+      "--captures", options.captures,
+      "captures.csv: image, time_s, roll_rad, pitch_rad (inclination of the robot, or of "
+      "the camera when there is no --camera-on-robot), vx_m_per_s, vy_m_per_s, "
+      "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry, along the axes of the same), "
+      "z_m, yaw_rad; default: captures.csv in the folder");
+  add_sensor_options(app, options);
 }
 
 }  // namespace

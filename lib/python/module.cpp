@@ -283,6 +283,19 @@ py::dict locate_frames(const Positioner& positioner, const py::object& frame_of_
   return fixes;
 }
 
+py::object body_covariance(const Fix& fix) {
+  if (!fix.body) return py::none();
+  Doubles rows = doubles({kBodyStates, kBodyStates});
+  Eigen::Map<BodyCovariance>(rows.mutable_data()) = fix.body->covariance;  // symmetric
+  return rows;
+}
+
+std::vector<int> rejected_ids(const Fix& fix) {
+  const auto count =
+      std::min(static_cast<std::size_t>(fix.rejected_lamps), fix.rejected_ids.size());
+  return {fix.rejected_ids.begin(), fix.rejected_ids.begin() + static_cast<std::ptrdiff_t>(count)};
+}
+
 std::string shown(const Fix& fix) {
   if (!fix.ok()) return "<vlp.Fix: " + std::string(name_of(fix.status)) + ">";
   const Pose& pose = fix.estimate.pose;
@@ -524,24 +537,12 @@ void define_fix(py::module_& m) {
                              [](const Fix& fix) { return fix.ok() ? fix.residual_px : kNone; })
       .def_readonly("lamps", &Fix::lamps, "That the fix rests on.")
       .def_property_readonly(
-          "body_covariance",
-          [](const Fix& fix) -> py::object {
-            if (!fix.body) return py::none();
-            Doubles rows = doubles({kBodyStates, kBodyStates});
-            Eigen::Map<BodyCovariance>(rows.mutable_data()) = fix.body->covariance;  // symmetric
-            return rows;
-          },
+          "body_covariance", &body_covariance,
           "Covariance of (x, y, z, yaw, vx, vy, yaw rate, roll, pitch), where motion or lean was "
           "estimated.")
       .def_readonly("rejected_lamps", &Fix::rejected_lamps)
       .def_property_readonly(
-          "rejected_ids",
-          [](const Fix& fix) {
-            const auto count =
-                std::min(static_cast<std::size_t>(fix.rejected_lamps), fix.rejected_ids.size());
-            return std::vector<int>(fix.rejected_ids.begin(),
-                                    fix.rejected_ids.begin() + static_cast<std::ptrdiff_t>(count));
-          },
+          "rejected_ids", &rejected_ids,
           "Lamps that were left out because the others contradict them, the first 32.")
       .def_readonly("unknown_lamps", &Fix::unknown_lamps)
       .def_readonly("time_s", &Fix::time_s)

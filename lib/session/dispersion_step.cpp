@@ -151,6 +151,17 @@ void add_lever_arm(Dispersion& dispersion, const LampCaptures& input, double hei
   *dispersion.covariance += 0.5 * (added + added.transpose());
 }
 
+void warn_of_few_captures(DispersionResult& result, DispersionMethod method) {
+  constexpr int min_captures = 4;  // three leave two degrees of freedom
+  if (method != DispersionMethod::camera || result.fit.noise_is_stated ||
+      result.fit.dispersion.captures >= min_captures) {
+    return;
+  }
+  result.warnings.emplace_back(
+      "three captures hardly show their noise, and the standard deviation of the offset may be "
+      "wrong several times over: add captures, or state sigma_px");
+}
+
 }  // namespace
 
 DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,
@@ -183,28 +194,19 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   if (fit.status == DispersionStatus::no_fix) {
     why += fmt::format("; the first: {}", explanation_of(fit.no_fix_status));
   }
-  if (fit.status == DispersionStatus::station_far) {
-    result.fail(StepFailure::wrong_place, std::move(why));
-    return result;
-  }
   if (fit.status != DispersionStatus::ok) {
-    result.fail(StepFailure::undetermined, std::move(why));
+    const bool is_far = fit.status == DispersionStatus::station_far;
+    result.fail(is_far ? StepFailure::wrong_place : StepFailure::undetermined, std::move(why));
     const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
                                 fit.status == DispersionStatus::one_yaw ||
                                 fit.status == DispersionStatus::many_yaws;
-    if (!is_of_captures) blame_map(input, levelled, result);
+    if (!is_far && !is_of_captures) blame_map(input, levelled, result);
     return result;
   }
   if (!input.calibration.rotation_center) {
     result.warnings.emplace_back("the calibration has no rotation_center: run vlp-rotation first");
   }
-  constexpr int min_captures_for_noise = 4;  // three leave two degrees of freedom
-  if (method == DispersionMethod::camera && !fit.noise_is_stated &&
-      fit.dispersion.captures < min_captures_for_noise) {
-    result.warnings.emplace_back(
-        "three captures hardly show their noise, and the standard deviation of the offset may be "
-        "wrong several times over: add captures, or state sigma_px");
-  }
+  warn_of_few_captures(result, method);
   if (!of_axis) warn_of_lever_arm(result, places, input.lamps, levelled);
   constexpr double millimetres = 1e3;
   result.metrics = {{"dispersion_mm", millimetres * fit.dispersion.radius_m},
