@@ -113,8 +113,8 @@ void add_warnings(RotationResult& result) {
   }
   if (!result.fit.center.covariance) {
     result.warnings.emplace_back(
-        "the captures leave no residuals, and the centre has no standard deviation: add captures, "
-        "four or more at each height");
+        "three captures of a height leave no residuals, and the "
+        "centre has no standard deviation: add captures, four or more at each height");
   }
   constexpr double too_noisy = 3;
   const auto& stated_px = result.spot.stated_px;
@@ -129,8 +129,10 @@ void add_warnings(RotationResult& result) {
 void add_metrics(RotationResult& result) {
   const RotationCenter& center = result.fit.center;
   result.metrics = {{"rotation_px", result.fit.residual_px},
-                    {"rotation_spread_px", result.circles.spread_px},
                     {"tilt_deg", deg_from_rad(tilt_of(center).angle_rad)}};
+  if (!result.circles.circles.empty()) {
+    result.metrics.push_back({"rotation_spread_px", result.circles.spread_px});
+  }
   if (const auto& covariance = center.covariance) {
     result.metrics.push_back({"rotation_sd_px", std::sqrt(covariance->trace())});
   }
@@ -216,9 +218,11 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
   result.fit = fit_of(result.spot, camera, method);
   if (method == RotationMethod::circle && !result.fit.converged &&
       result.circles.undetermined > 0) {
-    result.fail(StepFailure::undetermined,
-                "within their noise the captures are at two yaws, which determine no circle: add "
-                "captures at a third yaw, twelve over a full turn are good");
+    result.fail(
+        StepFailure::undetermined,
+        "the noise of the captures determines most circles, as captures at two yaws do: add "
+        "captures at other yaws, twelve over a full turn are good, or take --method joint");
+    blame_map(input, camera_alone(input.calibration), result);
     return result;
   }
   if (!result.fit.converged) {

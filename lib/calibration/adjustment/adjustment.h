@@ -124,7 +124,7 @@ struct AdjustmentResult {
   /// By how much the stated sigma_px were taken larger, because the residuals are; 1 where they are
   /// not. Where none is stated, sigma_px is this many pixels.
   double noise_scale = 1;
-  /// Whether residuals larger than the stated noise are beyond chance, at one in a thousand.
+  /// True if residuals are larger than the stated noise by more than chance, at one in a thousand.
   bool noise_is_contradicted = false;
   /// What the captures leave to the survey alone, for people: the datum, lamps that nothing sees.
   std::vector<std::string> notes;

@@ -64,8 +64,12 @@ void fit_camera(DispersionFit& fit, const StationFixes& station, DispersionCircl
     fit.status = DispersionStatus::one_yaw;
     return;
   }
+  if (separation->freedom <= 0) {
+    fit.status = DispersionStatus::too_few_captures;
+    return;
+  }
   const double factor =
-      variance_factor(separation->excess, separation->freedom, fit.noise_is_stated);
+      compute_variance_factor(separation->excess, separation->freedom, fit.noise_is_stated);
   fit.dispersion.offset_px = separation->offset_px;
   Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>() +
                        separation->offset_covariance_from_map;

@@ -49,19 +49,19 @@ enum class DispersionStatus {
 /// What it means and what to add, for people.
 std::string_view explanation_of(DispersionStatus status);
 
-/// What a camera's fixes at a known station show, and how well. What follows `noise_is_stated`
-/// holds only when the status is `ok`.
+/// Result of fit_dispersion(). Members after `noise_is_stated` are valid only if the status is
+/// `ok`.
 struct DispersionFit {
   DispersionStatus status = DispersionStatus::no_fix;
   /// Captures without a fix, and why the first has none.
   int captures_without_fix = 0;
   FixStatus no_fix_status = FixStatus::ok;
-  /// Whether all detections state their sigma_px.
+  /// True if all detections state their sigma_px.
   bool noise_is_stated = false;
 
-  /// Its circle is that of `before`. The covariance is from the scatter of the fixes, together
-  /// with the noise if all detections state it (variance_factor()), and from the map's sd_m;
-  /// std::nullopt for the enclosing circle.
+  /// Its circle is that of `before`. The covariance is from the scatter of the fixes and their
+  /// noise (compute_variance_factor()), and from the map's sd_m. std::nullopt for the enclosing
+  /// circle.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0, {}};
   /// Fixed in the world, an error of the station or of the lamp map: mean fix minus station that
   /// stays, and its covariance. Method `paper` takes it for zero.

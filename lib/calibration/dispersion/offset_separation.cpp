@@ -133,7 +133,7 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
 
 /// Propagates errors of the map: the solution moves by -(J'WJ)^-1 J'W d, d being the fixes' moves.
 Eigen::Matrix2d propagate_map(const StationFixes& fixes, const OffsetSeparation& at) {
-  const Eigen::MatrixXd moves_m = fixes.moves_by_map(at.offset_px);
+  const Eigen::MatrixXd moves_m = fixes.compute_map_displacements_m(at.offset_px);
   if (moves_m.cols() == 0) return Eigen::Matrix2d::Zero();
   Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, moves_m.cols());
   for (const Equation& equation : linearize(fixes, at)) {

@@ -67,7 +67,7 @@ Eigen::Matrix2d noise_of_fixes(const OptionalFixes& fixes, const std::vector<boo
 ///
 /// Few errors do not determine a covariance: two give one of rank 1. The sample covariance counts
 /// with n - 1, its isotropic mean with isotropic_weight. In coordinates in which the noise is the
-/// unit matrix, variance_factor() makes the variance along each axis of it.
+/// unit matrix, compute_variance_factor() makes the variance along each axis of it.
 Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
                                    const Eigen::Matrix2d& noise) {
   constexpr double isotropic_weight = 2;  // as three errors
@@ -81,17 +81,20 @@ Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
       (squares + isotropic_weight * isotropic * Eigen::Matrix2d::Identity()) /
       (n - 1 + isotropic_weight);
   const Eigen::LLT<Eigen::Matrix2d> root(noise);
-  if (root.info() != Eigen::Success) return variance_factor(1, freedom, false) * scatter / n;
+  if (root.info() != Eigen::Success)
+    return compute_variance_factor(1, freedom, false) * scatter / n;
   const Eigen::Matrix2d l = root.matrixL(), l_inverse = l.inverse();
   auto [values, axes] =
       symmetric_eigen(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
-  for (double& value : values) value = variance_factor(value, freedom, true);
+  const double ratio = (l_inverse * squares * l_inverse.transpose()).trace() / freedom;
+  for (double& value : values) value = compute_variance_factor(value, freedom, true, ratio);
   return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
 }
 
 /// Returns the covariance of the mean fix from errors of the map, which all captures have in
 /// common.
-Eigen::Matrix2d covariance_from_map(const Eigen::MatrixXd& moves_m, const std::vector<bool>& used) {
+Eigen::Matrix2d compute_covariance_from_map(const Eigen::MatrixXd& moves_m,
+                                            const std::vector<bool>& used) {
   Eigen::MatrixXd mean_m = Eigen::MatrixXd::Zero(2, moves_m.cols());
   double count = 0;
   for (std::size_t i = 0; i < used.size(); ++i) {
@@ -143,7 +146,7 @@ PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d
       const Eigen::Matrix2d noise_m2 = noise_of_fixes(station.at(offset_px), used, noise_is_stated);
       const Eigen::Matrix2d mean_covariance_m2 =
           covariance_of_mean(errors_m, noise_m2) +
-          covariance_from_map(station.moves_by_map(offset_px), used);
+          compute_covariance_from_map(station.compute_map_displacements_m(offset_px), used);
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);
       found.covariance = covariance;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/dispersion/station_fixes.h"
 
+#include <algorithm>
 #include <set>
 
 #include "positioning/positioner.h"
@@ -67,7 +68,7 @@ std::vector<std::optional<StationFixes::At>> StationFixes::at(const Eigen::Vecto
   return fixes;
 }
 
-Eigen::MatrixXd StationFixes::moves_by_map(const Eigen::Vector2d& offset_px) const {
+Eigen::MatrixXd StationFixes::compute_map_displacements_m(const Eigen::Vector2d& offset_px) const {
   std::set<int> detected;
   for (const StationCapture& capture : captures_) {
     for (const Detection& detection : capture.detections) detected.insert(detection.lamp);
@@ -85,13 +86,16 @@ Eigen::MatrixXd StationFixes::moves_by_map(const Eigen::Vector2d& offset_px) con
   for (Eigen::Index column = 0; column < moves_m.cols(); ++column) {
     const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
     double& coordinate_m = moved.lamps[lamp].position_m[column % 3];
-    coordinate_m += *map_.lamps[lamp].sd_m;
+    // A small step, so that no lamp is rejected for it.
+    constexpr double max_step_m = 1e-4;
+    const double sd_m = *map_.lamps[lamp].sd_m, step_m = std::min(sd_m, max_step_m);
+    coordinate_m += step_m;
     const auto there = at(offset_px, moved);
     coordinate_m = map_.lamps[lamp].position_m[column % 3];
     for (std::size_t i = 0; i < here.size(); ++i) {
       if (!here[i] || !there[i]) continue;
       moves_m.block<2, 1>(2 * static_cast<Eigen::Index>(i), column) =
-          there[i]->error_m - here[i]->error_m;
+          (there[i]->error_m - here[i]->error_m) * (sd_m / step_m);
     }
   }
   return moves_m;

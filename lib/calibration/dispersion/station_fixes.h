@@ -37,7 +37,7 @@ class StationFixes {
   ///
   /// @return  two rows for each capture, zero without a fix; a column for each coordinate of each
   ///          lamp that is detected and is not exact
-  Eigen::MatrixXd moves_by_map(const Eigen::Vector2d& offset_px) const;
+  Eigen::MatrixXd compute_map_displacements_m(const Eigen::Vector2d& offset_px) const;
   /// Of captures without one.
   FixStatus first_refusal() const { return first_refusal_; }
 

@@ -3,6 +3,7 @@
 #include "calibration/dispersion/station_statistics.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "calibration/dispersion/offset_separation.h"
@@ -15,8 +16,8 @@ namespace {
 
 constexpr double kFar = 0.2;  // of the lamps' height
 
-/// Computes q of variance_factor().
-double student_factor(double degrees_of_freedom) {
+/// Computes q of compute_variance_factor().
+double compute_student_factor(double degrees_of_freedom) {
   constexpr double sigmas_of_95_percent = 1.96;
   return student_bound(sigmas_of_95_percent, degrees_of_freedom) /
          (sigmas_of_95_percent * sigmas_of_95_percent);
@@ -24,7 +25,7 @@ double student_factor(double degrees_of_freedom) {
 
 /// Computes the ratio that chi-squared over its degrees of freedom exceeds in 10 % of all cases
 /// (Wilson and Hilferty).
-double unlikely_ratio(double degrees_of_freedom) {
+double compute_unlikely_ratio(double degrees_of_freedom) {
   constexpr double quantile = 1.2816;
   const double part = 2 / (9 * degrees_of_freedom);
   return std::pow(1 - part + quantile * std::sqrt(part), 3);
@@ -70,13 +71,18 @@ bool far_from_all(const OptionalFixes& fixes) {
   });
 }
 
-double variance_factor(double ratio, double nu, bool noise_is_stated) {
-  const double from_residuals = ratio * student_factor(nu);
+double compute_variance_factor(double ratio, double degrees_of_freedom, bool noise_is_stated,
+                               std::optional<double> pooled_ratio) {
+  assert(degrees_of_freedom > 0);
+  const double from_residuals = ratio * compute_student_factor(degrees_of_freedom);
   if (!noise_is_stated) return from_residuals;
-  const double all = kStatedFreedom + nu;
-  const double combined = (kStatedFreedom + nu * ratio) / all * student_factor(all);
+  const double total_freedom = kStatedFreedom + degrees_of_freedom;
+  const double combined = (kStatedFreedom + degrees_of_freedom * ratio) / total_freedom *
+                          compute_student_factor(total_freedom);
   const double factor = std::max(1.0, combined);
-  return ratio > unlikely_ratio(nu) ? std::max(factor, from_residuals) : factor;
+  const bool is_contradicted =
+      pooled_ratio.value_or(ratio) > compute_unlikely_ratio(degrees_of_freedom);
+  return is_contradicted ? std::max(factor, from_residuals) : factor;
 }
 
 std::vector<bool> near_median(const OptionalFixes& fixes) {

@@ -34,18 +34,23 @@ bool at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used);
 /// Whether every fix is farther from the station than a camera that leans by 11 degrees would be.
 bool far_from_all(const OptionalFixes& fixes);
 
-/// Computes the factor of a variance, so that 1.96 standard deviations cover 95 % of the errors.
-///
-/// The residuals have the variance s^2 = `ratio` times the nominal one, with nu degrees of freedom;
-/// q(m) = (t_m / 1.96)^2 with the quantile t_m of Student's at 97.5 %. If the noise is not stated
-/// the factor is ratio q(nu). Stated noise counts as an estimate with n = kStatedFreedom:
-///   max(1, (n + nu ratio) / (n + nu) q(n + nu)),
-/// and if the residuals contradict it (chi-squared at 10 %) the factor is at least ratio q(nu).
-double variance_factor(double ratio, double nu, bool noise_is_stated);
-
 /// Degrees of freedom with which stated noise counts: its standard deviation is right to 29 %,
 /// 1 / sqrt(12).
 inline constexpr double kStatedFreedom = 6;
+
+/// Computes the factor of a variance, so that 1.96 standard deviations cover about 95 % of the
+/// errors.
+///
+/// The residuals have the variance s^2 = `ratio` times the nominal one, with nu degrees of freedom;
+/// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 % (student_bound). If the noise is
+/// not stated the factor is ratio q(nu). Stated noise counts as an estimate with
+/// n = kStatedFreedom:
+///   max(1, (n + nu ratio) / (n + nu) q(n + nu)),
+/// and if the residuals contradict it (chi-squared at 10 %) the factor is at least ratio q(nu).
+/// @param pooled_ratio  ratio of all axes, which decides about a contradiction; `ratio` without it
+/// @pre degrees_of_freedom > 0
+double compute_variance_factor(double ratio, double degrees_of_freedom, bool noise_is_stated,
+                               std::optional<double> pooled_ratio = {});
 
 /// Those within five standard deviations of the median fix, at one yaw. Precondition: there is one.
 std::vector<bool> near_median(const OptionalFixes& fixes);

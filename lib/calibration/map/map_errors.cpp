@@ -343,6 +343,21 @@ bool is_contradicted(const std::optional<LampDisplacements>& found) {
   return !found || found->inlier_fraction < min_inlier_fraction;
 }
 
+/// Returns true if a map explains the captures: most detections agree, and the lamps are displaced
+/// by less than a tenth of their distances, which survey errors stay far below.
+bool explains_captures(const OtherMap& other) {
+  if (is_contradicted(other.found)) return false;
+  constexpr double max_fraction = 0.1;
+  Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& lamp_m : other.found->map_m) mean_m += lamp_m;
+  mean_m /= static_cast<double>(other.found->map_m.size());
+  double squares_m2 = 0;
+  for (const Eigen::Vector2d& lamp_m : other.found->map_m) {
+    squares_m2 += (lamp_m - mean_m).squaredNorm();
+  }
+  return other.size_m() <= max_fraction * std::sqrt(squares_m2);
+}
+
 /// Finds two lamps that are swapped, or a mirrored map. With it the captures have to fit far better
 /// than with the map, and with two lamps swapped better than with any other two.
 std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap& map,
@@ -355,8 +370,7 @@ std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap
   others.push_back({{MapErrorKind::mirrored}, std::move(mirrored)});
   for (OtherMap& other : others) other.found = captures.displacements(other.map);
   if (is_contradicted(found)) {
-    const auto fits = std::ranges::find_if(
-        others, [](const OtherMap& other) { return !is_contradicted(other.found); });
+    const auto fits = std::ranges::find_if(others, explains_captures);
     return fits == others.end() ? std::nullopt : std::optional(fits->error);
   }
   // The mirror image of a square is one with two corners swapped.

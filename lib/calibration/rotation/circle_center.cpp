@@ -144,16 +144,17 @@ std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
   return fit;
 }
 
-/// Returns true if the points determine the centre of their circle, rather than their noise.
+/// Returns true if the centre of a circle is determined by the yaws of its points and not only by
+/// their noise.
 ///
 /// With unit vectors u from the centre, M = sum of (u - mean u)(u - mean u)' is the information on
-/// the centre for unit noise. Noise of sd s turns each u by s / R and so adds
+/// the centre for unit noise. Noise of sd s rotates each u by s / R and so adds
 /// (s / R)^2 sum of (t . w)^2 along w, where t is the tangent. Of points at two opposite yaws the
 /// smallest eigenvalue of M is noise alone.
 ///
 /// @param noise  standard deviation of a coordinate, in the unit of the points
 bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& points, double noise) {
-  // A standard deviation from M is then at most 1 / sqrt(1 - 0.25) = 1.15 times too small.
+  // A standard deviation from M is then about 1 / sqrt(1 - 0.25) = 1.15 times too small.
   constexpr double max_noise_fraction = 0.25;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const auto& point : points) mean += (point - circle.center).normalized();
@@ -174,39 +175,55 @@ bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& poi
   return true;
 }
 
-/// Estimates the noise of a coordinate in units of the focal length. The joint fit has degrees of
-/// freedom left where three captures leave a circle none.
-double estimate_noise(const SpotCaptures& spot, const Camera& camera) {
-  const RotationFit joint = fit_joint_center(spot, camera);
-  const double noise_px = joint.converged ? joint.residual_px : spot.stated_px.value_or(0);
-  return noise_px / camera.focal_px().x();
-}
-
 /// Circles of all lamps at one height.
 struct HeightCircles {
   std::vector<LampCircle> circles;
-  int undetermined = 0;
+  std::vector<std::vector<Eigen::Vector2d>> points;
+  std::vector<SpotOutlier> outliers;
+  /// Lamps with three sightings or more and no circle.
+  int without_circle = 0;
   /// Sum of the squared distances from the circles, and its degrees of freedom.
   double squares = 0, freedom = 0;
 };
 
-HeightCircles fit_circles(const SpotCaptures& spot, std::size_t height, double focal_px,
-                          double noise, std::vector<SpotOutlier>& outliers) {
+HeightCircles fit_circles(const SpotCaptures& spot, std::size_t height, double focal_px) {
   HeightCircles result;
   for (std::size_t lamp = 0; lamp < spot.lamps.size(); ++lamp) {
     Trace trace = trace_of(spot, lamp, height);
-    const auto fit = trimmed_circle(trace, focal_px, outliers);
+    const auto fit = trimmed_circle(trace, focal_px, result.outliers);
     if (trace.points.size() < 3) continue;
-    if (!fit || !fit->converged || !is_determined(fit->circle, trace.points, noise)) {
-      ++result.undetermined;
+    if (!fit || !fit->converged) {
+      ++result.without_circle;
       continue;
     }
     const double count = static_cast<double>(trace.points.size());
     result.circles.push_back({lamp, height, *fit});
+    result.points.push_back(std::move(trace.points));
     result.squares += fit->rms * fit->rms * count;
     result.freedom += count - 3;
   }
   return result;
+}
+
+/// Estimates the noise of a coordinate in units of the focal length: from the circles, or, if they
+/// have three points each, from the joint fit; at least the stated noise. std::nullopt if neither
+/// residuals nor detections show it.
+std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
+                                     const SpotCaptures& spot, const Camera& camera) {
+  const double focal_px = camera.focal_px().x();
+  double squares = 0, freedom = 0;
+  for (const HeightCircles& height : heights) {
+    squares += height.squares;
+    freedom += height.freedom;
+  }
+  std::optional<double> noise;
+  if (freedom > 0) {
+    noise = std::sqrt(squares / freedom);
+  } else if (const RotationFit joint = fit_joint_center(spot, camera); joint.converged) {
+    noise = joint.residual_px / focal_px;
+  }
+  if (spot.stated_px) noise = std::max(noise.value_or(0), *spot.stated_px / focal_px);
+  return noise;
 }
 
 }  // namespace
@@ -215,15 +232,27 @@ CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera)
   assert(spot.status == SpotStatus::ok);
   CircleCenters result;
   const double focal_px = camera.focal_px().x();
-  const double noise = estimate_noise(spot, camera);
-  double squares = 0, freedom = 0;
+  std::vector<HeightCircles> heights;
   for (std::size_t height = 0; height < spot.heights.size(); ++height) {
-    HeightCircles at = fit_circles(spot, height, focal_px, noise, result.mean.outliers);
-    result.undetermined += at.undetermined;
-    if (std::ssize(at.circles) <= at.undetermined) continue;
-    result.circles.insert(result.circles.end(), at.circles.begin(), at.circles.end());
-    squares += at.squares;
-    freedom += at.freedom;
+    heights.push_back(fit_circles(spot, height, focal_px));
+  }
+  const std::optional<double> noise = estimate_noise(heights, spot, camera);
+  double squares = 0, freedom = 0;
+  for (const HeightCircles& height : heights) {
+    std::vector<LampCircle> determined;
+    for (std::size_t i = 0; i < height.circles.size() && noise; ++i) {
+      const LampCircle& circle = height.circles[i];
+      if (is_determined(circle.fit.circle, height.points[i], *noise)) determined.push_back(circle);
+    }
+    const int undetermined =
+        height.without_circle + static_cast<int>(height.circles.size() - determined.size());
+    result.undetermined += undetermined;
+    if (std::ssize(determined) <= undetermined) continue;
+    result.circles.insert(result.circles.end(), determined.begin(), determined.end());
+    result.mean.outliers.insert(result.mean.outliers.end(), height.outliers.begin(),
+                                height.outliers.end());
+    squares += height.squares;
+    freedom += height.freedom;
   }
   if (result.circles.empty()) return result;
   const double count = static_cast<double>(result.circles.size());

@@ -40,8 +40,8 @@ struct CircleCenters {
 /// circle, those beyond 4.5 standard deviations are rejected: against the median of the distances,
 /// then each against the circle through the others, with Student's t (robust_scatter.h). Needs
 /// three sightings of a lamp at a height that determine the centre rather than their noise: those
-/// at two opposite yaws do not. All lamps of a height share its yaws: it counts only if most of
-/// their circles are determined. Not converged when no height counts. The model is
+/// at two opposite yaws do not. A height counts only if most of its circles are determined. Not
+/// converged when no height counts. The model is
 /// RotationModel::shift.
 CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera);
 

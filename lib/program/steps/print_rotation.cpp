@@ -70,8 +70,12 @@ void print_summary(const RotationFit& fit, const SpotCaptures& spot, const Circl
   fmt::print("lamps       {}\n", spot.lamps.size());
   print_center(fit.center, camera);
   print_lever_arm(fit.center);
-  fmt::print("circles     {}, their centres spread by {:.3f} px\n", circles.circles.size(),
-             circles.spread_px);
+  if (circles.circles.empty()) {
+    fmt::print("circles     none determined\n");
+  } else {
+    fmt::print("circles     {}, their centres spread by {:.3f} px\n", circles.circles.size(),
+               circles.spread_px);
+  }
   print_residuals(fit, spot);
   fmt::print("\n{:>10} {:>10}  image\n", "z (m)", "yaw (deg)");
   for (std::size_t i = 0; i < spot.captures.size(); ++i) {
