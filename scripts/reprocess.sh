@@ -38,7 +38,7 @@
 # --readout        along which the shutter reads (default: found)
 # --shard-size N   sessions in a job at most (default 50)
 # --keep N         results that a session had before, of which so many stay in
-#                  former/ (default 0)
+#                  former/ (default 1)
 # --look           at what, to see that a session changed: at its files, or at
 #                  its folders, tables and YAML files, to which an image that
 #                  is written over in place looks the same. Default: files; in
@@ -49,8 +49,11 @@
 #                  one, by its key's first letters (default: the last one), or
 #                  that of other results
 #
-# Exit code: 0 done; 1 done, and a gate is not met, of the archive or, where it
-# has no gate_share, of a session; 2 bad input; 3 not all could be done.
+# Exit code: 0 done; 1 done, but a gate of the archive is not met, or a gate of
+# a session if the archive has no gate_share. By default the archive has one
+# gate, vanished: 0: each session of RESULTS and of --previous is still there.
+# 2 bad input; 3 incomplete: the run could not finish, no session has a result,
+# or more than no_result or no_result_share of --gates allow have none.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
 bin=${VLP_PROGRAMS_DIR:-}
@@ -119,10 +122,12 @@ mkdir -p "$results/.state" 2>/dev/null && : 2>/dev/null >>"$results/.state/lock"
   refuse "$results: cannot be written to"
 exec 9>>"$results/.state/lock"
 flock --nonblock 9 || refuse "$results: another run is at work there"
-if ! "$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}"; then
+code=0
+"$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}" || code=$?
+if [ "$code" != 0 ]; then
   if [ ! -e "$results/.state/run.json" ]; then rm -r "$results/.state"; fi
   rmdir "$results" 2>/dev/null || true
-  exit 2
+  exit "$code"
 fi
 log=$results/.state/reprocess.log
 mapfile -t again <"$results/.state/again.txt"

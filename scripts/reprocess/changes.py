@@ -7,10 +7,16 @@ inputs; figures are compared where the inputs are the same. Sessions of a camera
 lens, so cameras are what the interval counts: the mean over cameras of the change of mean_mm, with its
 95 % interval by Student's distribution, of 20 cameras or more. A session whose figure changes by no more
 than a micrometre is the same.
+
+The gates of counts limit how many items a list may have: vanished sessions, lost results, changed cameras, moved lamps.
+A vanished session has a folder in RESULTS or a row in the earlier results, and no folder in the archive. A lost result
+belongs to a session that has none now and had one in the earlier results or in former/.
 """
 import json
 import math
+import re
 import statistics
+from collections import Counter
 
 import yaml
 
@@ -111,24 +117,80 @@ def worse_share(changes):
     return changes["worse"] / changes["pairs"] if changes and changes["pairs"] else None
 
 
-# What a gate holds at most: the least and the largest limit that can be meant, and its value, or None where there
-# is none.
+def listed_in(name):
+    return lambda counts, changes, items: len(items[name]) if items.get(name) is not None else None
+
+
+# Gates, all upper limits: smallest and largest valid limit, and the function that returns the value (None: unknown).
 GATES = {
-    "no_result": (0, math.inf, lambda counts, changes: counts["no_result"] + counts["crashed"]),
-    "no_result_share": (0, 1, lambda counts, changes: (counts["no_result"] + counts["crashed"]) / counts["sessions"]),
-    "look_share": (0, 1, lambda counts, changes: counts["look"] / counts["sessions"]),
-    "gate_share": (0, 1, lambda counts, changes: counts["gate"] / counts["sessions"]),
-    "mean_mm": (0, math.inf, lambda counts, changes: counts.get("mean_mm")),
-    "median_mm": (0, math.inf, lambda counts, changes: counts.get("median_mm")),
-    "p90_mm": (0, math.inf, lambda counts, changes: counts.get("p90_mm")),
-    "newly_failed": (0, math.inf, lambda counts, changes: newly_failed(changes)),
-    "worse_share": (0, 1, lambda counts, changes: worse_share(changes)),
+    "no_result": (0, math.inf, lambda counts, changes, items: counts["no_result"] + counts["crashed"]),
+    "no_result_share": (0, 1, lambda counts, changes, items: fraction(counts, "no_result", "crashed")),
+    "look_share": (0, 1, lambda counts, changes, items: fraction(counts, "look")),
+    "gate_share": (0, 1, lambda counts, changes, items: fraction(counts, "gate")),
+    "mean_mm": (0, math.inf, lambda counts, changes, items: counts.get("mean_mm")),
+    "median_mm": (0, math.inf, lambda counts, changes, items: counts.get("median_mm")),
+    "p90_mm": (0, math.inf, lambda counts, changes, items: counts.get("p90_mm")),
+    "vanished": (0, math.inf, listed_in("vanished")),
+    "lost_results": (0, math.inf, listed_in("lost_results")),
+    "cameras_changed": (0, math.inf, listed_in("cameras_changed")),
+    "lamps_moved": (0, math.inf, listed_in("lamps_moved")),
+    "newly_failed": (0, math.inf, lambda counts, changes, items: newly_failed(changes)),
+    "worse_share": (0, 1, lambda counts, changes, items: worse_share(changes)),
     "mean_difference_mm": (
         -math.inf,
         math.inf,
-        lambda counts, changes: changes and changes.get("interval_95_mm", [None, None])[1],
+        lambda counts, changes, items: changes and changes.get("interval_95_mm", [None, None])[1],
     ),
 }
+DEFAULT_GATES = {"vanished": 0}
+COMPLETENESS_GATES = ("no_result", "no_result_share")  # exit code 3 if one is not met
+
+
+def fraction(counts, *verdicts):
+    return sum(counts[verdict] for verdict in verdicts) / counts["sessions"]
+
+
+def vanished_sessions(rows, known, before_rows):
+    """Returns the sessions that the archive no longer has. known: sessions with a folder in RESULTS."""
+    return sorted(({name_of(row) for row in before_rows} | set(known)) - {name_of(row) for row in rows})
+
+
+def lost_results(rows, before_rows, had_result):
+    """Returns the sessions that lost their result. had_result: tells if a session has a former result in RESULTS."""
+    before = {name_of(row) for row in before_rows if row["verdict"] in HAVE_RESULT}
+    names = [name_of(row) for row in rows if row["verdict"] not in HAVE_RESULT]
+    return [name for name in names if name in before or had_result(name)]
+
+
+def describe_date(change):
+    """Returns the kind of a change and when it happened, in words."""
+    before, since = (end["date"] or end["session"] for end in (change["before"], change["since"]))
+    if change["kind"] == "undecided":
+        return f"undecided: step at {since} or drift"
+    return f"drift from {before} to {since}" if change["kind"] == "drift" else f"step between {before} and {since}"
+
+
+def describe_camera(alarm):
+    change = alarm["changes"][0]
+    return f"{alarm['camera']}: {change['figure']} {change['change']:+.4g}, {describe_date(change)}"
+
+
+def describe_lamp(lamp):
+    date = describe_date(lamp | {"kind": "step"})
+    place = f"{lamp['room']} " if lamp["room"] else ""
+    return f"{place}lamp {lamp['lamp']} (map {lamp['map']}): {abs(complex(*lamp['moved_mm'])):.2f} mm, {date}"
+
+
+def listed_items(vanished, lost, fleet):
+    """Returns the items that the gates of counts count, in words; None where nothing could be tested."""
+    tested = fleet["between_sessions"]
+    cameras_tested = any(tau is not None for name, tau in tested.items() if name != "lamps")
+    return {
+        "vanished": vanished,
+        "lost_results": lost,
+        "cameras_changed": [describe_camera(alarm) for alarm in fleet["cameras"]] if cameras_tested else None,
+        "lamps_moved": [describe_lamp(lamp) for lamp in fleet["lamps"]] if tested.get("lamps") is not None else None,
+    }
 
 
 def read_gates(file):
@@ -154,19 +216,32 @@ def read_gates(file):
     return gates
 
 
-def check_gates(gates, counts, changes):
-    """A figure that there is not, of too few cameras or without earlier results, does not pass."""
+def check_gates(gates, counts, changes, items):
+    """Compares each value with its limit. An unknown value does not pass, for example without earlier results."""
     results = []
     for name, limit in gates.items():
-        value = GATES[name][2](counts, changes)
+        value = GATES[name][2](counts, changes, items)
         passed = value is not None and value <= limit
         results.append({"name": name, "value": value, "limit": limit, "passed": passed})
     return results
 
 
 def sessions_beyond_gates(counts, gates):
-    """How many sessions miss a gate of theirs, where no gate of the archive says how many may."""
+    """Returns how many sessions miss a gate of their own; 0 if `gates` has a limit for their fraction."""
     return 0 if any(gate["name"] == "gate_share" for gate in gates) else counts["gate"]
+
+
+def is_incomplete(counts, gates):
+    """Returns true if no session has a result, or if more than the gates allow have none."""
+    missed = any(gate["name"] in COMPLETENESS_GATES and not gate["passed"] for gate in gates)
+    return missed or not any(counts[verdict] for verdict in HAVE_RESULT)
+
+
+def count_reasons(rows):
+    """Returns (reason, sessions) of the sessions without a result, most frequent first. Session names are removed."""
+    failed = [row for row in rows if row["verdict"] not in HAVE_RESULT]
+    reasons = Counter(re.sub(re.escape(name_of(row)) + "/?", "", row["reason"]) for row in failed)
+    return sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
 
 
 def load(file):

@@ -9,9 +9,12 @@ from files import read_table
 from toolbox import PROGRAMS
 
 
-def fail(message):
+BAD_INPUT, INCOMPLETE = 2, 3  # exit codes of reprocess.sh
+
+
+def fail(message, code=BAD_INPUT):
     print(f"reprocess.sh: error: {message}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(code)
 
 
 def check_programs(folder):

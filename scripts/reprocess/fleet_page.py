@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The overview's part about cameras and lamps over time."""
 import pictures
+from changes import describe_date
 from fleet import camera_series, kind_of, rooms_of, times_of, widened
 from html_parts import picture, table
 from outcome import TWO
@@ -19,10 +20,6 @@ def when(end):
     return f"{end['camera']}/{end['session']}" + (f" of {end['date']}" if end["date"] else "")
 
 
-def session_of(end):
-    return end["date"] or end["session"]
-
-
 def room_of(lamp):
     return f"{lamp['room']} (map {lamp['map']})" if lamp["room"] else f"map {lamp['map']}"
 
@@ -32,14 +29,12 @@ def chance(p):
 
 
 def cameras(fleet, fleet_rows):
-    html, rows = "<h2>Cameras that changed</h2>\n", []
+    html, rows = '<h2 id="cameras">Cameras that changed</h2>\n', []
     for alarm in fleet["cameras"]:
         for change in alarm["changes"]:
-            ends = session_of(change["before"]), session_of(change["since"])
-            how = ("steadily, from {} to {}" if change["kind"] == "drift" else "at once, between {} and {}").format(*ends)
             by = f"{change['change']:+.4g} ± {change['sd']:.2g}"
-            rows.append((alarm["camera"], words_of(change["figure"]), by, how, chance(change["p"])))
-    html += table(["camera", "figure", "change", "how and when", "chance in this fleet"], rows, "changes.json")
+            rows.append((alarm["camera"], words_of(change["figure"]), by, describe_date(change), chance(change["p"])))
+    html += table(["camera", "figure", "change", "step or drift", "chance in this fleet"], rows, "changes.json")
     pictured = {alarm["camera"] for alarm in fleet["cameras"][:MOST_PICTURES]}
     series = camera_series([row for row in fleet_rows if row["camera"] in pictured])
     for alarm in fleet["cameras"][:MOST_PICTURES]:
@@ -51,7 +46,7 @@ def cameras(fleet, fleet_rows):
             rows_of_it, one = figures.get(f"{name}_{axis}_{TWO[name]}", ([], []))
             wide = widened(one, tau)
             points[axis] = [(t, value - one[0][0], sd) for t, (value, sd) in zip(times_of(rows_of_it), wide)]
-        since = first["since"]["session"] if first["kind"] == "step" else None
+        since = first["since"]["session"] if first["kind"] != "drift" else None
         at = next((time for time, row in zip(times, of_it) if row["session"] == since), None)
         dated = all(row["date"] for row in of_it)
         what = f"{name.replace('_', ' ')} from the first session ({TWO[name]})"
@@ -60,7 +55,7 @@ def cameras(fleet, fleet_rows):
 
 
 def lamps(fleet, lamp_rows):
-    html, rows = "<h2>Lamps that were moved</h2>\n", []
+    html, rows = '<h2 id="lamps">Lamps that were moved</h2>\n', []
     for lamp in fleet["lamps"]:
         by = f"{abs(complex(*lamp['moved_mm'])):.2f} mm: x {lamp['moved_mm'][0]:+.2f}, y {lamp['moved_mm'][1]:+.2f}"
         sure = "other cameras saw it before than after: it may be they" if lamp["other_cameras"] else ""
@@ -91,7 +86,7 @@ def least_found(fleet):
     for name, sizes in fleet["least_found"].items():
         words = f"{name.replace('_', ' ')} ({TWO.get(name, 'mm')})"
         rows.append((words, *(f"{sizes[kind]:.2g}" if kind in sizes else "" for kind in ("drift", "step"))))
-    return html + table(["", "steadily, from the first session to the last", "at once, in the middle"], rows)
+    return html + table(["", "drift, from the first session to the last", "step, in the middle"], rows)
 
 
 def page(fleet, fleet_rows, lamp_rows):

@@ -3,20 +3,35 @@
 """Writes changes.json and overview.html from summary.csv, in RESULTS. Nothing in the page comes from
 elsewhere, and it has no script."""
 import gc
-import re
 import subprocess
 import tempfile
-from collections import Counter
 from html import escape
 from pathlib import Path
 
 import fleet_page
 import pictures
-from changes import changes_of, check_gates, counts_of, load, name_of, read_gates, sessions_beyond_gates, with_figures
+from changes import (
+    DEFAULT_GATES,
+    HAVE_RESULT,
+    changes_of,
+    check_gates,
+    count_reasons,
+    counts_of,
+    is_incomplete,
+    listed_items,
+    load,
+    lost_results,
+    name_of,
+    read_gates,
+    sessions_beyond_gates,
+    vanished_sessions,
+    with_figures,
+)
 from files import json_text, read_table, write_whole
 from fleet import fleet_of
 from html_parts import number, picture, table
 
+MAX_NAMES = 5  # in a line of the list of actions
 MOST_PICTURES = 6
 MOST_LOOKED_INTO = 200  # sessions of other inputs, which files of them
 
@@ -33,12 +48,6 @@ def compared(run, truth, now, before):
         if subprocess.run(command, capture_output=True, check=False).returncode != 0:
             return "cannot be compared"
         return load(Path(folder) / "evaluation.json")["comparison"]["verdict"]
-
-
-def reasons(rows):
-    """How often sessions have no result for the same reason, their names left out."""
-    said = Counter(re.sub(re.escape(name_of(row)) + "/?", "", row["reason"]) for row in rows)
-    return sorted(said.items(), key=lambda item: (-item[1], item[0]))
 
 
 def differing(run, previous, pairs):
@@ -70,16 +79,19 @@ def parts_of(results, name):
     return {}
 
 
-def changed_inputs(previous, rows, changes):
+def changed_inputs(previous, rows, before, changes):
     html = "<h2>Of other inputs than before</h2>\n"
     by_name, listed = {name_of(row): row for row in rows}, []
+    rows_before = {name_of(row): row for row in before}
     lost = changes["lost_with_other_inputs"]
     for name in [*lost, *(name for name in changes["with_other_inputs"] if name not in set(lost))][:MOST_LOOKED_INTO]:
-        now, before = parts_of(Path("."), name), parts_of(previous, name)
-        files = sorted(part for part in {*now, *before} if now.get(part) != before.get(part))
+        parts_now, parts_before = parts_of(Path("."), name), parts_of(previous, name)
+        files = sorted(part for part in {*parts_now, *parts_before} if parts_now.get(part) != parts_before.get(part))
         what = "lost its result" if name in lost else by_name[name]["verdict"]
-        listed.append((name, ", ".join(files) if before else "not known", what))
-    html += table(["session", "what of it is another", "now"], listed)
+        figures = [one.get(key, "") for key in COMPARED for one in (rows_before[name], by_name[name])]
+        listed.append((name, ", ".join(files) if parts_before else "not known", what, *figures))
+    columns = [f"{key.replace('_', ' ')} {when}" for key in COMPARED for when in ("before", "now")]
+    html += table(["session", "what of it is another", "now", *columns], listed)
     more = changes["other_inputs"] - len(listed)
     return html + (f"<p>and {more} more, in changes.json</p>\n" if more else "")
 
@@ -100,13 +112,15 @@ def comparison(run, previous, rows, before, changes, pairs):
         html += picture(pictures.scatter(sorted(figures)), "Mean error of each session, before and now")
         html += differing(run, previous, pairs)
     if changes["other_inputs"]:
-        html += changed_inputs(previous, rows, changes)
+        html += changed_inputs(previous, rows, before, changes)
     if changes["newly_failed"]:
         html += "<h2>Had a result before, and have none now</h2>\n"
         by_name = {name_of(row): row["reason"] for row in rows}
         html += table(["session", "reason"], [(name, by_name[name]) for name in changes["newly_failed"]])
     return html
 
+
+COMPARED = ("verdict", "mean_mm", "rms_px")  # before and now, where inputs changed
 
 COUNTED = [
     ("better", "better"),
@@ -125,38 +139,90 @@ def look_here(rows):
     look = [row for row in rows if row["verdict"] == "look"]
     if not look:
         return ""
-    words = "<h2>Passed, but look here</h2>\n"
+    words = '<h2 id="look">Passed, but look here</h2>\n'
     columns = ["session", "mean (mm)", "images skipped", "lamps left out (captures)", "what to look at"]
     keys = ("mean_mm", "images_skipped", "lamps_left_out", "look")
     return words + table(columns, [(name_of(row), *(row[key] for key in keys)) for row in look])
 
 
-def page(run, rows, counts, gates, fleet, parts):
-    missed = [gate for gate in gates if not gate["passed"]]
-    beyond = sessions_beyond_gates(counts, gates)
+def shorten(items):
+    more = f" and {len(items) - MAX_NAMES} more" if len(items) > MAX_NAMES else ""
+    return "; ".join(items[:MAX_NAMES]) + more
+
+
+def list_actions(document, items, rows):
+    """Returns what to do, the most urgent first: (words, id of the section with the details)."""
+    counts, actions = document["counts"], []
+    if is_incomplete(counts, document["gates"]):
+        reason, count = count_reasons(rows)[0]
+        actions.append((f"Mend the archive: {count} of {counts['sessions']} sessions have no result, for: {reason}", "failed"))
+    if items["vanished"]:
+        words = "Restore these sessions, or delete their results if they are meant to be gone"
+        actions.append((f"{words}: {shorten(items['vanished'])}", "vanished"))
+    if items["lost_results"]:
+        actions.append((f"Look why these sessions lost their result: {shorten(items['lost_results'])}", "failed"))
+    if items["cameras_changed"]:
+        actions.append((f"Examine these cameras: {shorten(items['cameras_changed'])}", "cameras"))
+    if items["lamps_moved"]:
+        actions.append((f"Survey these lamps: {shorten(items['lamps_moved'])}", "lamps"))
+    missed = [gate["name"] for gate in document["gates"] if not gate["passed"] and not items.get(gate["name"])]
+    if missed:
+        actions.append((f"Look at the gates that are not met: {', '.join(missed)}", "gates"))
+    without_result = counts["no_result"] + counts["crashed"]
+    for number, words, section in (
+        (without_result, "have no result", "failed"),
+        (counts["gate"], "miss a gate of their own", "session-gates"),
+        (counts["look"], "passed with something to look at", "look"),
+    ):
+        if number and section not in [known for _, known in actions]:
+            actions.append((f"{number} of {counts['sessions']} sessions {words}", section))
+    return actions
+
+
+def verdict_part(document, items, rows):
+    """The verdict and what to do, at the top of the page."""
+    counts = document["counts"]
+    verdict = "INCOMPLETE" if is_incomplete(counts, document["gates"]) else "PASS" if document["passed"] else "FAIL"
+    html = f'<p class="verdict">{verdict}</p>\n'
+    actions = list_actions(document, items, rows)
+    if not actions:
+        return html + "<p>Nothing to do.</p>\n"
+    lines = "".join(f'<li><a href="#{section}">{escape(words)}</a></li>' for words, section in actions)
+    return html + f"<h2>What to do, the most urgent first</h2><ol>{lines}</ol>\n"
+
+
+def page(run, rows, document, items, fleet, parts):
     html = '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
     html += '<meta name="viewport" content="width=device-width, initial-scale=1">'
     html += f"<title>Reprocessed archive</title><style>{STYLE}</style></head><body><main>\n<h1>Reprocessed archive</h1>\n"
-    if gates or beyond:
-        html += f'<p class="verdict">{"FAIL" if missed or beyond else "PASS"}</p>\n'
-    if beyond:
-        html += f"<p>{beyond} of {counts['sessions']} sessions miss a gate of theirs.</p>\n"
-    html += look_here(rows) + fleet
-    if gates:
-        html += "<h2>Gates</h2>\n"
-        words = [(g["name"], number(g["value"]), g["limit"], "met" if g["passed"] else "not met") for g in gates]
-        html += table(["gate", "value", "at most", ""], words)
+    html += verdict_part(document, items, rows)
+    html += look_here(rows)
+    if items["vanished"]:
+        html += '<h2 id="vanished">No longer in the archive</h2>\n'
+        html += table(["session"], [(name,) for name in items["vanished"]], "changes.json")
+    html += fleet
+    html += '<h2 id="gates">Gates</h2>\n'
+    words = [(g["name"], number(g["value"]), g["limit"], "met" if g["passed"] else "not met") for g in document["gates"]]
+    html += table(["gate", "value", "at most", ""], words)
     html += f"<p>Version {escape(run['version'])}, toolbox {run['toolbox'][:12]}.</p>\n<h2>Sessions</h2>\n"
-    html += table(["figure", "value"], [(name.replace("_", " "), number(value)) for name, value in counts.items()])
-    failed = [row for row in rows if row["verdict"] in ("no result", "crashed")]
+    figures = [(name.replace("_", " "), number(value)) for name, value in document["counts"].items()]
+    html += table(["figure", "value"], figures)
+    failed = [row for row in rows if row["verdict"] not in HAVE_RESULT]
     if failed:
-        html += "<h2>Without a result</h2>\n" + table(["reason", "sessions"], reasons(failed))
-        html += table(["session", "reason"], [(name_of(row), row["reason"]) for row in failed])
+        lost = set(items["lost_results"])
+        html += '<h2 id="failed">Without a result</h2>\n' + table(["reason", "sessions"], count_reasons(failed))
+        columns = [(name_of(row), "had one before" if name_of(row) in lost else "", row["reason"]) for row in failed]
+        html += table(["session", "", "reason"], sorted(columns, key=lambda one: not one[1]))
     missing = [row for row in rows if row["verdict"] == "gate"]
     if missing:
-        html += "<h2>A gate is not met</h2>\n"
+        html += '<h2 id="session-gates">A gate is not met</h2>\n'
         html += table(["session", "mean (mm)", "reason"], [(name_of(r), r["mean_mm"], r["reason"]) for r in missing])
     return html + parts + "</main></body></html>\n"
+
+
+def had_result(name):
+    """Returns true if RESULTS has a former result of a session that has none now."""
+    return any(load(file)["verdict"] in HAVE_RESULT for file in (Path("former") / name).glob("*/row.json"))
 
 
 def main():
@@ -165,20 +231,25 @@ def main():
     before = read_table(Path(compare["previous"]) / "summary.csv") if compare["previous"] else []
     counts = counts_of(rows)
     changes, pairs = changes_of(rows, before) if compare["previous"] else (None, [])
-    gates = read_gates(Path(compare["gates"])) if compare["gates"] else {}
-    results = check_gates(gates, counts, changes)
+    vanished = vanished_sessions(rows, compare["vanished"], before)
+    lost = lost_results(rows, before, had_result)
+    fleet_rows, lamp_rows = read_table("fleet.csv"), read_table("lamps.csv")
+    fleet = fleet_of(fleet_rows, lamp_rows)
+    items = listed_items(vanished, lost, fleet)
+    gates = DEFAULT_GATES | (read_gates(Path(compare["gates"])) if compare["gates"] else {})
+    results = check_gates(gates, counts, changes, items)
+    incomplete = is_incomplete(counts, results)
+    passed = not incomplete and all(gate["passed"] for gate in results) and not sessions_beyond_gates(counts, results)
     parts = ""
     figures = [[float(row["mean_mm"]) for row in with_figures(some)] for some in (rows, before)]
     if figures[0]:
         parts += "<h2>Errors</h2>\n" + picture(pictures.distribution(*figures), "Mean errors of the sessions")
     if changes:
         parts += comparison(run, Path(compare["previous"]), rows, before, changes, pairs)
-    passed = all(gate["passed"] for gate in results) and not sessions_beyond_gates(counts, results)
-    fleet_rows, lamp_rows = read_table("fleet.csv"), read_table("lamps.csv")
-    fleet = fleet_of(fleet_rows, lamp_rows)
     document = {"counts": counts, "changes": changes, "gates": results, "passed": passed, "fleet": fleet}
+    document |= {"vanished": vanished, "lost_results": lost}
     write_whole("changes.json", json_text({"format": "vlp-archive-changes/1", **document}))
-    write_whole("overview.html", page(run, rows, counts, results, fleet_page.page(fleet, fleet_rows, lamp_rows), parts))
+    write_whole("overview.html", page(run, rows, document, items, fleet_page.page(fleet, fleet_rows, lamp_rows), parts))
 
 
 if __name__ == "__main__":

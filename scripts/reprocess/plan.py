@@ -5,12 +5,11 @@
 Writes into RESULTS/.state: run.json (toolbox and options), catalogue.sqlite (catalogue.py), shards/N.list (a
 session a line, with the glance at its files), shards.txt (how many), to_do.txt (the shards that Snakemake has to know
 of), again.txt (rows to make again), keep.txt (how many former results stay; no reason to run a shard again),
-dates.csv (dates and rooms of sessions) and compare.json. What has not changed is not touched, so that Snakemake
+dates.csv (dates and rooms of sessions) and compare.json (earlier results, gates, sessions that vanished). What has not changed is not touched, so that Snakemake
 runs the rest.
 """
 import argparse
 import gc
-import os
 import re
 import shutil
 import sqlite3
@@ -18,19 +17,16 @@ import time
 from pathlib import Path
 
 from catalogue import LOOKS, Catalogue
-from checks import check, fail
+from checks import INCOMPLETE, check, fail
 from dates import dates_of
 from files import digest, json_text, table, write_if_other, write_whole
+from layout import LAYOUT, check_layout, describe_wrong_level, sessions_in
 from toolbox import toolbox
 
 
-def folders_in(folder):
-    with os.scandir(folder) as entries:
-        return sorted(entry.name for entry in entries if not entry.name.startswith(".") and entry.is_dir())
-
-
-def sessions_in(archive):
-    return [f"{camera}/{session}" for camera in folders_in(archive) for session in folders_in(archive / camera)]
+def results_in(results):
+    """Returns the sessions that have a folder in RESULTS."""
+    return {name for place in ("sessions", "failed") if (results / place).is_dir() for name in sessions_in(results / place)}
 
 
 def shard_ends(sessions, size, at_a_time):
@@ -64,14 +60,21 @@ def shards_of(sessions, catalogue, size, at_a_time):
     return {number: sorted(names) for number, names in sorted(shards.items())}
 
 
-def write_shards(archive, state, options):
+def list_sessions(archive):
+    """Exits if there are none or if none has inputs, so that earlier results are kept."""
     sessions = sessions_in(archive)
     if not sessions:
-        fail(f"{archive}: no sessions in it; ARCHIVE/CAMERA/SESSION/ is where captures are looked for")
+        fail(f"{archive}: no sessions in it; " + (describe_wrong_level(archive) or LAYOUT))
     well_named = re.compile(r"\w[\w .-]*/\w[\w .-]*", re.ASCII)
     for name in sessions:
         if not well_named.fullmatch(name):
             fail(f"{archive / name}: names of cameras and sessions are of letters, digits, '.', '_', '-' and blanks")
+    if problem := check_layout(archive, sessions):
+        fail(problem, INCOMPLETE)
+    return sessions
+
+
+def write_shards(archive, sessions, state, options):
     dates = dates_of(archive, sessions)
     write_if_other(state / "dates.csv", table(["camera", "session", "date", "room"], dates))
     catalogue = Catalogue(state / "catalogue.sqlite", archive, options.rebuild_catalogue)
@@ -88,7 +91,7 @@ def write_shards(archive, state, options):
             file.unlink()
     write_if_other(state / "shards.txt", f"{len(wanted)}\n")
     catalogue.save(shards, options.shard_size)
-    return len(sessions), looked_at(catalogue, look)
+    return looked_at(catalogue, look)
 
 
 def looked_at(catalogue, look):
@@ -133,7 +136,7 @@ def main():
     parser.add_argument("--gates", type=Path)
     parser.add_argument("--session-gates", type=Path)
     parser.add_argument("--previous", type=Path)
-    parser.add_argument("--keep", type=int, default=0)
+    parser.add_argument("--keep", type=int, default=1)
     parser.add_argument("--shard-size", type=int, default=50)
     parser.add_argument("--at-a-time", type=int, default=1)
     parser.add_argument("--look", choices=LOOKS)
@@ -142,6 +145,7 @@ def main():
     options = parser.parse_args()
     archive, results = options.archive.resolve(), options.results.resolve()
     check(options)
+    sessions = list_sessions(archive)
     state = results / ".state"
     (state / "logs").mkdir(parents=True, exist_ok=True)  # a cluster's jobs find it
     shutil.rmtree(state / "ran", ignore_errors=True)
@@ -154,7 +158,7 @@ def main():
         "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
         **toolbox(options.bin),
     }
-    count, looked = write_shards(archive, state, options)
+    looked = write_shards(archive, sessions, state, options)
     write_if_other(state / "keep.txt", f"{options.keep}\n")
     write_if_other(state / "run.json", json_text(run))
     known, again = to_do(state, results / "summary.csv")
@@ -166,9 +170,10 @@ def main():
         "previous_digest": digest((previous / "summary.csv").read_text()) if previous else "",
         "gates": str(options.gates.resolve()) if options.gates else "",
         "gates_digest": digest(options.gates.read_text()) if options.gates else "",
+        "vanished": sorted(results_in(results) - set(sessions)),
     }
     write_if_other(state / "compare.json", json_text(compare))
-    print(f"{count} sessions in {archive}; {looked}")
+    print(f"{len(sessions)} sessions in {archive}; {looked}")
 
 
 if __name__ == "__main__":

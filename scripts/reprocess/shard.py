@@ -26,8 +26,11 @@ LONGEST_S = 3600
 ENVIRONMENT = {"MALLOC_TRIM_THRESHOLD_": str(256 << 20), "MALLOC_MMAP_THRESHOLD_": str(32 << 20), **os.environ}
 
 
+WITHOUT_RESULT = ("no result", "crashed")
+
+
 def place_of(name, verdict):
-    return Path("failed" if verdict in ("no result", "crashed") else "sessions") / name
+    return Path("failed" if verdict in WITHOUT_RESULT else "sessions") / name
 
 
 def key_of(inputs, run):
@@ -134,15 +137,21 @@ def put_aside(place, name, keep):
 
 
 def keep_the_last(name, keep):
-    """Of the former results."""
-    rows = sorted((Path("former") / name).glob("*/row.json"), key=lambda row: row.stat().st_mtime_ns)
-    for row in rows[: max(0, len(rows) - keep)]:
-        discard(row.parent, name)
+    """Deletes all former results but the last `keep`. If these have the verdict "no result", the last other one stays in
+    place of the oldest of them, so that a lost result can still be seen."""
+    formers = sorted((Path("former") / name).glob("*/row.json"), key=lambda row: row.stat().st_mtime_ns)
+    usable = [file for file in formers if (row_in(file.parent) or {"verdict": "crashed"})["verdict"] not in WITHOUT_RESULT]
+    kept = formers[max(0, len(formers) - keep) :]
+    if kept and usable and usable[-1] not in kept:
+        kept[0] = usable[-1]
+    for file in formers:
+        if file not in kept:
+            discard(file.parent, name)
 
 
 def publish(row, work, keep=0):
-    """Takes what a session gave to its place; of what it gave before, so many results remain. The work is left
-    as it is, so that this can be done again."""
+    """Moves the results of a session to their place and keeps `keep` former ones. The work is left unchanged, so that
+    this can be repeated."""
     name = f"{row['camera']}/{row['session']}"
     ready = STATE / "ready" / name
     shutil.rmtree(ready, ignore_errors=True)

@@ -1,13 +1,18 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Says in a few lines what a run over an archive did and how it ended; exit code 1 when a gate is not met, of the
-archive or of a session."""
+"""Prints a summary of a run over an archive. Exit code 3: no session has a result, or more than a gate allows have
+none; 1: another gate of the archive or of a session is not met."""
 import sys
 import time
 from pathlib import Path
 
-from changes import load, sessions_beyond_gates
+from changes import HAVE_RESULT, count_reasons, is_incomplete, listed_items, load, name_of, sessions_beyond_gates
+from checks import INCOMPLETE
 from files import read_table
+from layout import describe_missing_inputs
+
+MAX_NAMES = 20  # in a line on stdout; changes.json has all
+MAX_REASONS = 3
 
 
 def this_run(state, sessions):
@@ -24,16 +29,43 @@ def this_run(state, sessions):
     return text + f"{seconds:.1f} s, {cpu_s:.1f} s of processor time in the programs, {size / 1e6:.2f} MB written"
 
 
+def join_items(items, separator=", "):
+    more = f"{separator}and {len(items) - MAX_NAMES} more in changes.json" if len(items) > MAX_NAMES else ""
+    return separator.join(items[:MAX_NAMES]) + more
+
+
+def describe_incomplete(archive, rows):
+    """Returns a line: how many sessions have no result, and the most frequent reason."""
+    failed = [name_of(row) for row in rows if row["verdict"] not in HAVE_RESULT]
+    reason, count = count_reasons(rows)[0]
+    words = f"{len(failed)} of {len(rows)} sessions have no result; {count} of them: {reason}"
+    missing = describe_missing_inputs(archive, failed)
+    return words + (f"; {missing}" if missing else "")
+
+
+def describe_missed_gate(gate, items):
+    value = "has no value" if gate["value"] is None else f"is {gate['value']:.4g}"
+    words = f"reprocess.sh: gate {gate['name']}: {value}, at most {gate['limit']} is allowed"
+    return words + (f": {join_items(items[gate['name']], '; ')}" if items.get(gate["name"]) else "")
+
+
 def main():
     results = Path(sys.argv[1])
-    said = load(results / "changes.json")
-    counts, changes, fleet = said["counts"], said["changes"], said["fleet"]
-    cost_s = sum(float(row["cpu_s"] or 0) for row in read_table(results / "summary.csv"))
+    document, rows = load(results / "changes.json"), read_table(results / "summary.csv")
+    counts, changes, fleet = document["counts"], document["changes"], document["fleet"]
+    items = listed_items(document["vanished"], document["lost_results"], fleet)
+    cost_s = sum(float(row["cpu_s"] or 0) for row in rows)
     print(f"this run    {this_run(results / '.state', counts['sessions'])}")
     print(f"passed      {counts['pass']}")
-    print(f"look        {counts['look']} that passed with something to look at; the overview begins with them")
+    print(f"look        {counts['look']} that passed with something to look at; the overview lists them")
     print(f"gates       {counts['gate']} with a result that misses a gate")
     print(f"no result   {counts['no_result']}, and {counts['crashed']} that crashed; see failed/")
+    for reason, count in count_reasons(rows)[:MAX_REASONS]:
+        print(f"            {count} of them: {reason}")
+    if items["lost_results"]:
+        print(f"lost        {len(items['lost_results'])} had a result before: {join_items(items['lost_results'])}")
+    if items["vanished"]:
+        print(f"vanished    {len(items['vanished'])} no longer in the archive: {join_items(items['vanished'])}")
     if "median_mm" in counts:
         print(f"error       {counts['median_mm']:.3f} mm in the median session, 90 % below {counts['p90_mm']:.3f} mm")
     print(f"cost        {cost_s:.1f} s of processor time for all results, {cost_s / counts['sessions']:.2f} s a session")
@@ -45,14 +77,17 @@ def main():
             lost = len(changes["lost_with_other_inputs"])
             print(f"inputs      {changes['other_inputs']} of other inputs than before, {lost} lost their result with them")
     print(f"overview    {results / 'overview.html'}")
-    for gate in said["gates"]:
+    for gate in document["gates"]:
         if not gate["passed"]:
-            value = "there is no such figure" if gate["value"] is None else f"is {gate['value']:.4g}"
-            print(f"reprocess.sh: gate {gate['name']}: {value}, at most {gate['limit']} is asked for", file=sys.stderr)
-    if beyond := sessions_beyond_gates(counts, said["gates"]):
+            print(describe_missed_gate(gate, items), file=sys.stderr)
+    if beyond := sessions_beyond_gates(counts, document["gates"]):
         many = f"{beyond} of {counts['sessions']} sessions"
-        print(f"reprocess.sh: {many} miss a gate of theirs; how many may, gate_share of --gates says", file=sys.stderr)
-    return 0 if said["passed"] else 1
+        print(f"reprocess.sh: {many} miss a gate of their own; gate_share of --gates allows more", file=sys.stderr)
+    if is_incomplete(counts, document["gates"]):
+        archive = Path(load(results / ".state/run.json")["archive"])
+        print(f"reprocess.sh: error: {describe_incomplete(archive, rows)}", file=sys.stderr)
+        return INCOMPLETE
+    return 0 if document["passed"] else 1
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ code=0
 reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
 [ "$code" = 1 ] || fail "exit code $code"
 grep -q '^changed     0 better, 1 worse, 6 the same, 0 newly without' "$said" || fail "$(cat "$said")"
-grep -q 'gate worse_share: is 0.1429, at most 0.1 is asked for' "$scratch/errors" || fail "$(cat "$scratch/errors")"
+grep -q 'gate worse_share: is 0.1429, at most 0.1 is allowed' "$scratch/errors" || fail "$(cat "$scratch/errors")"
 [ "$(wc -l <"$scratch/errors")" = 1 ] || fail "the other gates are met"
 grep -q '>FAIL<' "$results/overview.html" || fail "the overview says nothing"
 as_its_schema_says changes "$results/changes.json"
@@ -37,7 +37,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   code=0
   reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
   [ "$code" = 1 ] || fail "exit code $code, and two sessions miss their gates"
-  grep -q '2 of 2 sessions miss a gate of theirs' "$scratch/errors" || fail "$(cat "$scratch/errors")"
+  grep -q '2 of 2 sessions miss a gate of their own' "$scratch/errors" || fail "$(cat "$scratch/errors")"
   printf 'format: vlp-archive-gates/1\ngates: {gate_share: 1}\n' >"$scratch/gates.yaml"
   reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" --gates "$scratch/gates.yaml" >"$said"
   grep -q '^this run    ran 0, of them 0 without a result; reused 2; ' "$said" || fail "$(cat "$said")"
@@ -68,7 +68,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   as_its_schema_says row "$looked"/*/*/*/row.json
   as_its_schema_says changes "$looked/changes.json"
   page=$looked/overview.html
-  head -n 20 "$page" | grep -q '<h2>Passed, but look here</h2>' || fail "the overview does not begin with it"
+  head -n 20 "$page" | grep -q '<h2 id="look">Passed, but look here</h2>' || fail "the overview does not begin with it"
   grep -q 'taken as zero' "$page" || fail "the warning is not in the overview"
   grep -q '6 images skipped; the first, 0006.png: cannot be read as an image: it is cut short' "$page" || fail "no skipped images"
   grep -q "$lost</td><td>lamps.yaml</td><td>lost its result" "$page" || fail "no inputs that changed"

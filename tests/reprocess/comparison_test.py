@@ -60,15 +60,49 @@ class Changes(unittest.TestCase):
     def test_gates_hold_what_they_say(self):
         counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 3), row(2, "no result", None), row(3, "crashed", None)])
         gates = {"no_result": 2, "no_result_share": 0.4, "gate_share": 0.25, "mean_mm": 2, "p90_mm": 2, "newly_failed": 0}
-        passed = [gate["passed"] for gate in changes.check_gates(gates, counts, None)]
+        passed = [gate["passed"] for gate in changes.check_gates(gates, counts, None, {})]
         self.assertEqual(passed, [True, False, True, True, False, False])
+
+    def test_gates_of_counts_limit_the_items_of_their_lists(self):
+        end = {"camera": "c", "session": "s", "date": "2026-03-14"}
+        change = {"figure": "focal_x_px", "kind": "step", "change": 1.7, "sd": 0.1, "before": end, "since": end | {"date": "2026-04-01"}}
+        lamp = {"room": "hall", "map": "0123", "lamp": 2, "moved_mm": [3, -4], "before": end, "since": end}
+        found = {"between_sessions": {"focal": 0.1, "lamps": 0.1}, "cameras": [{"camera": "c", "changes": [change]}], "lamps": [lamp]}
+        items = changes.listed_items(["c/1", "c/2"], ["d/1"], found)
+        self.assertEqual(items["cameras_changed"], ["c: focal_x_px +1.7, step between 2026-03-14 and 2026-04-01"])
+        self.assertEqual(items["lamps_moved"], ["hall lamp 2 (map 0123): 5.00 mm, step between 2026-03-14 and 2026-03-14"])
+        counts = changes.counts_of([row(0, "pass", 1)])
+        limits = {"vanished": 1, "lost_results": 1, "cameras_changed": 0, "lamps_moved": 1}
+        checked = changes.check_gates(limits, counts, None, items)
+        self.assertEqual([(gate["value"], gate["passed"]) for gate in checked], [(2, False), (1, True), (1, False), (1, True)])
+        untested = changes.listed_items([], [], {"between_sessions": {"focal": None, "lamps": None}, "cameras": [], "lamps": []})
+        checked = changes.check_gates(limits, counts, None, untested)
+        self.assertEqual([gate["passed"] for gate in checked], [True, True, False, False])
+        self.assertEqual(changes.DEFAULT_GATES, {"vanished": 0})
+
+    def test_vanished_sessions_and_lost_results_are_those_of_either_results(self):
+        rows = [row(0, "pass", 1), row(1, "no result", None), row(2, "crashed", None), row(3, "no result", None)]
+        before = [row(1, "pass", 1), row(3, "no result", None), row(4, "pass", 1)]
+        self.assertEqual(changes.vanished_sessions(rows, ["c0000/s0", "x/y"], before), ["c0002/s0", "x/y"])
+        self.assertEqual(changes.lost_results(rows, before, lambda name: name == "c0001/s0"), ["c0000/s1", "c0001/s0"])
+
+    def test_is_incomplete_where_no_session_has_a_result_or_a_gate_on_them_is_missed(self):
+        for verdicts, limits, expected in (
+            (["no result", "crashed"], {}, True),
+            (["no result", "pass"], {}, False),
+            (["no result", "gate"], {"no_result_share": 0.4}, True),
+            (["no result", "look"], {"no_result": 1, "mean_mm": 0}, False),
+        ):
+            counts = changes.counts_of([row(i, verdict, None) for i, verdict in enumerate(verdicts)])
+            checked = changes.check_gates(limits, counts, None, {})
+            self.assertEqual(changes.is_incomplete(counts, checked), expected, (verdicts, limits))
 
     def test_gates_without_a_pair_are_not_met(self):
         gates = {"newly_failed": 0, "worse_share": 1, "mean_difference_mm": 1}
 
         def passed(now, before):
             found, _ = changes.changes_of(now, before)
-            return [gate["passed"] for gate in changes.check_gates(gates, changes.counts_of(now), found)]
+            return [gate["passed"] for gate in changes.check_gates(gates, changes.counts_of(now), found, {})]
 
         self.assertEqual(passed([row(0, "pass", 1, "new")], [row(0, "pass", 1, "old")]), [True, False, False])
         self.assertEqual(passed([row(0, "pass", 1)], [row(1, "pass", 1)]), [False, False, False])
@@ -81,14 +115,14 @@ class Changes(unittest.TestCase):
         self.assertEqual(found["newly_failed"], ["c0000/s0", "c0001/s0"])
         self.assertEqual(found["lost_with_other_inputs"], ["c0000/s0"])
         self.assertEqual(pairs, [])
-        gates = changes.check_gates({"newly_failed": 1}, changes.counts_of(now), found)
+        gates = changes.check_gates({"newly_failed": 1}, changes.counts_of(now), found, {})
         self.assertEqual([(gate["value"], gate["passed"]) for gate in gates], [(2, False)])
 
     def test_sessions_that_miss_their_gates_count_where_no_gate_says_how_many_may(self):
         counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 1), row(2, "look", 1)])
         self.assertEqual((counts["pass"], counts["look"], counts["gate"]), (1, 1, 1))
         self.assertEqual(changes.sessions_beyond_gates(counts, []), 1)
-        gates = changes.check_gates({"gate_share": 0.5}, counts, None)
+        gates = changes.check_gates({"gate_share": 0.5}, counts, None, {})
         self.assertEqual(changes.sessions_beyond_gates(counts, gates), 0)
 
     def test_less_than_a_micrometre_is_the_same(self):
@@ -107,7 +141,7 @@ class Changes(unittest.TestCase):
                 ("gates: {no_result: 0}", "should begin with format"),
                 ("format: vlp-archive-gates/1\n", "should hold"),
                 ("format: vlp-archive-gates/1\ngates: {}\n", "should hold"),
-                ("format: vlp-archive-gates/1\ngates: {odd: 1}\n", "gate 'odd' is unknown"),
+                ("format: vlp-archive-gates/1\ngates: {odd: 1}\n", "gate 'odd' is unknown; there are: no_result, .*cameras_changed, "),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: .inf}\n", "should be a number"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: true}\n", "should be a number"),
                 ("format: vlp-archive-gates/1\ngates: {worse_share: 7}\n", "a share from 0 to 1, not 7"),

@@ -81,6 +81,7 @@ class OverTime(unittest.TestCase):
     def test_is_as_the_schema_says(self):
         made_up = Fleet(0, drifts=self.DRIFTS, moved=self.MOVED, broken={7: (6, {"center": (0.4, -0.3)})})
         document = {"format": "vlp-archive-changes/1", "changes": None, "gates": [], "passed": True}
+        document |= {"vanished": [], "lost_results": []}
         document |= {"counts": changes.counts_of([]), "fleet": fleet.fleet_of(*fleet_rows(made_up))}
         alarms = [one["kind"] for alarm in document["fleet"]["cameras"] for one in alarm["changes"]]
         self.assertEqual((set(alarms), len(document["fleet"]["lamps"])), ({"step", "drift"}, 2))

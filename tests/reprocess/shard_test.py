@@ -198,6 +198,18 @@ exec sleep 60
             self.assertEqual(publish("8key", 1), ["7key7key7key"])
             self.assertEqual(publish("8key", 1), ["8key8key8key"])  # the same again
 
+    def test_a_former_result_is_kept_when_a_session_fails_twice(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            work = Path("work")
+            (work / "c/s").mkdir(parents=True)
+            for key, verdict in (("good", "pass"), ("bad1", "no result"), ("bad2", "no result")):
+                (work / "c/s/session.json").unlink(missing_ok=True)
+                (work / "c/s/session.json").write_text(key)
+                shard.publish({"camera": "c", "session": "s", "verdict": verdict, "key": key}, work, 1)
+            self.assertEqual([file.read_text() for file in Path("former").rglob("session.json")], ["good"])
+
     def test_a_former_result_outlasts_a_kill_at_any_moment(self):
         with tempfile.TemporaryDirectory() as folder:
             self.addCleanup(os.chdir, os.getcwd())
