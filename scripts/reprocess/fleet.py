@@ -8,6 +8,13 @@ chance of any false alarm in the whole fleet is FALSE_ALARM_RATE at most: half o
 steps, of which there are more, and a p counts as many times as there are tests of its kind (Bonferroni), which
 holds however figures go together. Axes of a camera's figures are tested apart, as they do.
 
+A change that is called is a step, a drift or undecided, by the marginal likelihoods of the two models. Both have a mean
+and a change with the same wide prior; a step also has a date, with equal prior probability for each of its K sessions:
+  step:   mean over k of exp(z_k^2 / 2) sd_k        drift:   exp(z^2 / 2) sd
+z and sd are those of the change at session k and of the slope over all sessions. The mean over k is the penalty for the
+date. The kind is decided if one likelihood is MIN_ODDS times the other, which is a posterior probability of 95 % if steps
+and drifts are equally frequent. Otherwise it is "undecided", and the change and its date are those of the step.
+
 Stated standard deviations leave out what differs between sessions and not within one (the lens, the map). What
 neighbouring sessions of the whole fleet differ by more than is stated has a standard deviation between sessions of
 its own, tau, for each figure: the variance of a session is sd^2 + tau^2. A factor on the stated ones would take
@@ -37,6 +44,7 @@ from outcome import TWO
 FALSE_ALARM_RATE = 0.05
 FOUND_SHARE = 0.95
 NORMAL = statistics.NormalDist()
+MIN_ODDS = 19  # of a step to a drift or of a drift to a step, to decide which it is
 FEWEST_DIFFERENCES = 20
 MOST_DIFFERENCES = 4000  # they determine tau to 1 %
 TOLERANCE = 0.01  # of tau^2
@@ -151,16 +159,40 @@ def kind_of(figure):
     return figure.rsplit("_", 2)[0]
 
 
+def log_sum_exp(values):
+    largest = max(values)
+    return largest + math.log(sum(math.exp(value - largest) for value in values))
+
+
+def decide_kind(step_changes, drift_change):
+    """Returns "step", "drift" or "undecided" by the marginal likelihoods in the module docstring. Each change is
+    (change, sd); drift_change may be None."""
+    if drift_change is None:
+        return "step"
+
+    def log_likelihood(change, sd):
+        return (change / sd) ** 2 / 2 + math.log(sd)
+
+    log_step = log_sum_exp([log_likelihood(*one) for one in step_changes]) - math.log(len(step_changes))
+    log_odds = log_step - log_likelihood(*drift_change)
+    if abs(log_odds) < math.log(MIN_ODDS):
+        return "undecided"
+    return "step" if log_odds > 0 else "drift"
+
+
 def change_of(rows, series, tests):
-    """A step or a drift, whichever chance gives less often; `p`: one of its kind so large anywhere in the fleet, twice
-    for the two kinds."""
-    found = [("step", k, change, sd) for k, (change, sd) in enumerate(steps(series), 1)]
-    if line := drift(times_of(rows), series):
-        found.append(("drift", len(rows) - 1, *line))
-    chances = [(2 * tests[kind] * p_of(change / sd), -abs(change / sd)) for kind, _, change, sd in found]
-    (p, _), (kind, k, change, sd) = min(zip(chances, found))
-    ends = {"before": named(rows[k - 1 if kind == "step" else 0]), "since": named(rows[k])}
-    return {"kind": kind, "change": change, "sd": sd, "p": min(1.0, p), **ends}
+    """Returns the change of a figure. p: chance of a false alarm as significant as the more significant of the largest step
+    and the drift, anywhere in the fleet. The kind is decided apart from that, by likelihood."""
+    step_changes, drift_change = list(steps(series)), drift(times_of(rows), series)
+    k, (change, sd) = max(enumerate(step_changes, 1), key=lambda one: abs(one[1][0] / one[1][1]))
+    p = 2 * tests["step"] * p_of(change / sd)
+    if drift_change:
+        p = min(p, 2 * tests["drift"] * p_of(drift_change[0] / drift_change[1]))
+    kind = decide_kind(step_changes, drift_change)
+    before, since = rows[k - 1], rows[k]
+    if kind == "drift":
+        (change, sd), before, since = drift_change, rows[0], rows[-1]
+    return {"kind": kind, "change": change, "sd": sd, "p": min(1.0, p), "before": named(before), "since": named(since)}
 
 
 def usual(sds):

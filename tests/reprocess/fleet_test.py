@@ -1,7 +1,10 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras and lamps over time, by made-up fleets of known truth."""
+"""Cameras and lamps over time, by made-up fleets of known truth. The environment variable VLP_FLEETS sets the number of
+fleets of the tests that count steps, drifts and false alarms."""
+import os
+import random
 import unittest
 import unittest.mock
 
@@ -23,6 +26,29 @@ def fleet_rows(made_up):
         rows.append(dict.fromkeys(outcome.ALL, "") | named | outcome.calibration_of(result))
         lamps += summary.lamps_of(rows[-1])
     return rows, lamps
+
+
+FLEETS = int(os.environ.get("VLP_FLEETS", 20))
+SIZES = {"focal": 0.26, "zenith": 0.02, "center": 0.3, "rotation_center": 0.3}  # 0.1 %, degrees, px
+
+
+def steps_and_drifts(seed):
+    """Returns a fleet in which three cameras have a step and three a drift, and the truth by camera:
+    (kind, figure, first session after the step)."""
+    chance, drifts, broken, truth = random.Random(seed), {}, {}, {}
+    for number, camera in enumerate(chance.sample(range(20), 6)):
+        name, axis = list(SIZES)[(number + seed) % len(SIZES)], chance.randrange(2)
+        change = [0, 0]
+        change[axis] = chance.choice((-1, 1)) * SIZES[name]
+        figure = f"{name}_{'xy'[axis]}_{outcome.TWO[name]}"
+        if number % 2:
+            drifts[camera] = {name: change}
+            truth[f"camera-{camera:02d}"] = ("drift", figure, None)
+        else:
+            since = chance.randint(2, 8)
+            broken[camera] = (since, {name: change})
+            truth[f"camera-{camera:02d}"] = ("step", figure, since)
+    return Fleet(seed, drifts=drifts, broken=broken), truth
 
 
 class OverTime(unittest.TestCase):
@@ -84,7 +110,7 @@ class OverTime(unittest.TestCase):
         document |= {"vanished": [], "lost_results": []}
         document |= {"counts": changes.counts_of([]), "fleet": fleet.fleet_of(*fleet_rows(made_up))}
         alarms = [one["kind"] for alarm in document["fleet"]["cameras"] for one in alarm["changes"]]
-        self.assertEqual((set(alarms), len(document["fleet"]["lamps"])), ({"step", "drift"}, 2))
+        self.assertEqual((set(alarms), len(document["fleet"]["lamps"])), ({"step", "drift", "undecided"}, 2))
         self.assertEqual(schema_check.problems_of(schema_check.validator_of("changes"), document), [])
 
     def test_tells_a_drift_from_a_step(self):
@@ -149,13 +175,49 @@ class OverTime(unittest.TestCase):
         self.assertEqual([row["session"] for row in fleet.in_order(rows)], ["s0", "s1", "s2"])
         self.assertEqual(fleet.times_of(fleet.in_order(rows)), [0, 1, 2])
 
-    def test_a_change_is_of_the_kind_that_its_p_is_of(self):
-        series = [(value, 1.0) for value in (0, 0, 0, 6, 6, 6)]
-        rows = [{"camera": "c", "session": f"s{i}", "date": ""} for i in range(6)]
-        for tests, kind in (({"step": 5, "drift": 1}, "step"), ({"step": 50000, "drift": 1}, "drift")):
-            found = fleet.change_of(rows, series, tests)
-            self.assertEqual(found["kind"], kind)
-            self.assertAlmostEqual(found["p"], 2 * tests[kind] * fleet.p_of(found["change"] / found["sd"]))
+    def test_kind_and_date_of_a_change_are_right_in_95_percent(self):
+        found = right_kind = undecided = dated = right_date = false = 0
+        for seed in range(5000, 5000 + FLEETS):
+            made_up, truth = steps_and_drifts(seed)
+            result = fleet.fleet_of(*fleet_rows(made_up))
+            false += bool(result["lamps"] or {alarm["camera"] for alarm in result["cameras"]} - set(truth))
+            for alarm in result["cameras"]:
+                kind, figure, since = truth.get(alarm["camera"], (None, None, None))
+                for change in (change for change in alarm["changes"] if change["figure"] == figure):
+                    found += 1
+                    undecided += change["kind"] == "undecided"
+                    right_kind += change["kind"] in (kind, "undecided")
+                    if kind == "step" and change["kind"] != "drift":
+                        dated += 1
+                        right_date += abs(int(change["since"]["session"][-2:]) - since) <= 1
+        words = f"{found} of {6 * FLEETS} found, {right_kind} right or undecided, {undecided} undecided, "
+        words += f"{right_date} of {dated} dates right, {false} fleets with a false alarm"
+        if "VLP_FLEETS" in os.environ:
+            print(words)
+        self.assertGreater(found, 3 * FLEETS, words)
+        self.assertGreaterEqual(right_kind, 0.95 * found, words)
+        self.assertLessEqual(undecided, 0.25 * found, words)  # 16 % of 300 fleets
+        self.assertGreaterEqual(right_date, 0.95 * dated, words)
+        self.assertLessEqual(false, 0.05 * FLEETS + 3 * (0.05 * FLEETS) ** 0.5, words)
+
+    def test_kind_of_a_change_is_that_of_the_larger_likelihood(self):
+        # A focal length that jumps between March and April, in an archive with many lamps: many steps are tried.
+        rows = [{"camera": "c", "session": f"s{i}", "date": f"2026-0{i + 1}-15"} for i in range(6)]
+        for values, kind in (
+            ([0, 0, 0, 6, 6, 6], "step"),
+            ([0, 1.2, 2.4, 3.6, 4.8, 6], "drift"),
+            ([0, 0, 1, 4, 5, 5], "undecided"),
+        ):
+            series = [(value, 1.0) for value in values]
+            for tests in ({"step": 50000, "drift": 1}, {"step": 5, "drift": 1000}):
+                found = fleet.change_of(rows, series, tests)
+                self.assertEqual(found["kind"], kind, values)
+                largest = {"step": max(abs(change / sd) for change, sd in fleet.steps(series))}
+                change, sd = fleet.drift(fleet.times_of(rows), series)
+                largest["drift"] = change / sd
+                self.assertAlmostEqual(found["p"], min(1, *(2 * tests[one] * fleet.p_of(largest[one]) for one in largest)))
+        self.assertEqual(changes.describe_date(found), "undecided: step at 2026-04-15 or drift")
+        self.assertEqual(fleet.decide_kind([(6, 1)], None), "step")  # all sessions at the same time
 
     def test_steps_and_drifts_are_those_of_least_squares(self):
         series = [(1.0, 0.5), (2.0, 1.0), (4.0, 0.25)]
