@@ -33,7 +33,7 @@
 # --gates          what the archive as a whole has to keep to,
 #                  vlp-archive-gates/1
 # --session-gates  gates (vlp-gates/1) for sessions that have no gates.yaml of
-#                  their own
+#                  their own; other ones need no other calibration
 # --row-time-s     from one row of the read-out to the next (default: found)
 # --readout        along which the shutter reads (default: found)
 # --shard-size N   sessions in a job at most (default 50)

@@ -20,7 +20,7 @@ FLEET = ["camera", "session", "date", "room", "map", "tilt_deg"]
 FLEET += [column for name in TRACKED for column in (name, f"sd_{name}")] + [*RESIDUALS, "mean_mm"]
 LAMPS = ["room", "map", "lamp", "camera", "session", "date", "captures", "map_x_m", "map_y_m"]
 LAMPS += ["offset_x_mm", "offset_y_mm", "sd_offset_x_mm", "sd_offset_y_mm"]
-ALL = list(dict.fromkeys([*COLUMNS, *FLEET, "lamps", "glance"]))  # of a shard's rows
+ALL = list(dict.fromkeys([*COLUMNS, *FLEET, "lamps", "gate_metrics", "glance"]))  # of a shard's rows
 TOOK_TOO_LONG = -signal.SIGALRM
 # Files of vlp-calibrate that are kept, and their names there.
 KEPT = {
@@ -84,6 +84,13 @@ def calibration_of(session):
     return figures
 
 
+def gate_metrics(session):
+    """Returns the metrics and gates of session.json, for --session-gates: {name: value} and {name: limit}, as JSON."""
+    metrics = {metric["name"]: metric["value"] for metric in session["metrics"]}
+    gates = {gate["name"]: gate["limit"] for gate in session.get("gates", [])}
+    return json.dumps({"metrics": metrics, "gates": gates}, separators=(",", ":"))
+
+
 def outcome_of(folder, name, ended, said):
     """The verdict: "pass", "look", "gate" or "no result", as session.json says; "crashed", when vlp-calibrate
     ended without one. ended: its exit code, of a signal the negative number; said: what it said at the end."""
@@ -102,4 +109,5 @@ def outcome_of(folder, name, ended, said):
     outcome |= {"verdict": verdict, "reason": session["reason"], **told, "look": "; ".join(told["look"])}
     if verdict == "no result":
         return outcome
+    outcome["gate_metrics"] = gate_metrics(session)
     return outcome | figures_of(folder, session) | calibration_of(session)

@@ -4,9 +4,9 @@
 
 Writes into RESULTS/.state: run.json (toolbox and options), catalogue.sqlite (catalogue.py), shards/N.list (a
 session a line, with the glance at its files), shards.txt (how many), to_do.txt (the shards that Snakemake has to know
-of), again.txt (rows to make again), keep.txt (how many former results stay; no reason to run a shard again),
-dates.csv (dates and rooms of sessions) and compare.json (earlier results, gates, sessions that vanished). What has not changed is not touched, so that Snakemake
-runs the rest.
+of), again.txt (rows to make again), dates.csv (dates and rooms of sessions), compare.json (earlier results, gates,
+sessions that vanished), keep.txt (how many former results stay) and session_gates.json (limits of --session-gates). The
+last two are no reason to run a shard again. What has not changed is not touched, so that Snakemake runs the rest.
 """
 import argparse
 import gc
@@ -21,6 +21,7 @@ from checks import INCOMPLETE, check, fail
 from dates import dates_of
 from files import digest, json_text, table, write_if_other, write_whole
 from layout import LAYOUT, check_layout, describe_wrong_level, sessions_in
+from session_gates import read_limits
 from toolbox import toolbox
 
 
@@ -154,11 +155,11 @@ def main():
         "archive": str(archive),
         "bin": str(options.bin.resolve()),
         "camera": " ".join(options.camera_option),
-        "session_gates": str(options.session_gates.resolve()) if options.session_gates else "",
-        "session_gates_digest": digest(options.session_gates.read_text()) if options.session_gates else "",
         **toolbox(options.bin),
     }
     looked = write_shards(archive, sessions, state, options)
+    limits = read_limits(options.session_gates) if options.session_gates else {}
+    write_if_other(state / "session_gates.json", json_text(limits))
     write_if_other(state / "keep.txt", f"{options.keep}\n")
     write_if_other(state / "run.json", json_text(run))
     known, again = to_do(state, results / "summary.csv")

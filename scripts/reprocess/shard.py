@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reprocesses the sessions of a shard that are not current, in RESULTS, and writes the shard's rows.
 
-A session's key is a digest of its inputs, the toolbox and the options. What a session gives stands in
+A session's key is a digest of its inputs, the toolbox and the options, without --session-gates: these are applied to
+the rows (summary.py). What a session gives stands in
 sessions/CAMERA/SESSION, or, when it has no result, in failed/CAMERA/SESSION, with row.json, which has the
 key and the session's row. A folder appears whole: it is made in .state/work and moved.
 """
@@ -34,7 +35,7 @@ def place_of(name, verdict):
 
 
 def key_of(inputs, run):
-    return digest(json_text([inputs, run["toolbox"], run["camera"], run["session_gates_digest"]]))
+    return digest(json_text([inputs, run["toolbox"], run["camera"]]))
 
 
 def row_in(place):
@@ -102,8 +103,6 @@ def begin(run, each, name, work):
     (folder / "session.json").unlink(missing_ok=True)  # of a run that was interrupted
     arguments = [Path(run["archive"]) / name, "-o", folder, "--quiet", "--no-report", "--threads", "1"]
     arguments += [f"--camera-id={name.split('/')[0]}", *shlex.split(run["camera"])]
-    if run["session_gates"]:
-        arguments += ["--gates", run["session_gates"]]
     each.ask(arguments)
 
 
@@ -200,6 +199,8 @@ def reprocess(run, shard, glances, lock, keep):
     def finish(name, known, answer):
         ended, seconds, said = answer
         row = outcome_of(work / name, name, ended, said.replace(run["archive"] + "/", "")) | known
+        if "gates.yaml" in known["parts"] and "gate_metrics" in row:
+            row["gate_metrics"] = ""
         cost = f"{seconds:.3f}"
         tell("costs", shard, name, cost, f"{time.time():.3f}")  # a session may come to another shard
         tell_run(shard, row, cost, publish(row, work, keep))

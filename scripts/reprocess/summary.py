@@ -1,7 +1,8 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Joins the rows of the shards, in RESULTS, to summary.csv (a row per session), fleet.csv (a row per session with
-a calibration: its figures over time) and lamps.csv (a row per session and lamp: where the others see it)."""
+"""Joins the rows of the shards, in RESULTS, applies --session-gates, and writes summary.csv (a row per session),
+fleet.csv (a row per session with a calibration: its metrics over time) and lamps.csv (a row per session and lamp: its
+position according to the other lamps)."""
 import gc
 import json
 import re
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from files import read_table, table, write_whole
 from outcome import COLUMNS, FLEET, LAMPS
+from session_gates import apply_session_gates
 
 
 def lamps_of(row):
@@ -37,8 +39,10 @@ def main():
     stated = {(row["camera"], row["session"]): row for row in read_table(".state/dates.csv")}
     rows = [row for shard in shards for row in read_table(f".state/rows/{shard}.csv")]
     costs = costs_in(Path(".state/costs"))
+    limits = json.loads(Path(".state/session_gates.json").read_text())
     rows.sort(key=lambda row: (row["camera"], row["session"]))
     for row in rows:
+        apply_session_gates(row, limits)
         known = stated.get((row["camera"], row["session"]), {"date": "", "room": ""})
         row |= {"date": known["date"], "room": known["room"]}
         row["cpu_s"] = costs.get(f"{row['camera']}/{row['session']}", "")

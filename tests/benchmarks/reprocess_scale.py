@@ -45,7 +45,7 @@ FOLDERS = ["boards", "rotation", "dispersion", "check"]
 IN_A_FLEET = 200
 # What is asked for of 100,000 sessions: seconds of processor time, and MB.
 SETTLED_S = 2.5  # what changed within two seconds of a look is looked at again by the next one
-LIMITS = {"plan, unchanged": (5, 500), "plan, changed": (6, 500), "summary and overview": (20, None)}
+LIMITS = {"plan, unchanged": (5, 500), "plan, changed": (6, 500), "summary and overview": (20, None), "other session gates": (60, None)}
 
 
 def make_archive(archive, names):
@@ -58,6 +58,16 @@ def make_archive(archive, names):
         os.close(inside)
 
 
+def made_up_metrics(chance, mean_mm):
+    """As many metrics and gates as those of a session of datasets/archive."""
+    names = ["rms_px", "uncertainty_px", "coverage", "views", "board_tilt_deg", "halves_px"]
+    gates = dict(zip(names, (1.0, 2.0, 0.4, 6.0, 20.0, 1.0)))
+    names += [f"metric_{number:02d}_mm" for number in range(20)]
+    metrics = {name: chance.random() for name in names} | {"coverage": 1.0, "views": 20.0, "board_tilt_deg": 90.0}
+    document = {"metrics": [{"name": name, "value": value} for name, value in (metrics | {"mean_mm": mean_mm}).items()]}
+    return outcome.gate_metrics(document | {"gates": [{"name": name, "limit": gates[name]} for name in gates]})
+
+
 def made_up(sessions):
     """CAMERA/SESSION and its row."""
     for number in range(-(-sessions // IN_A_FLEET)):
@@ -67,6 +77,7 @@ def made_up(sessions):
             row = outcome.calibration_of(result) | {"camera": f"{number:04d}-{camera}", "session": session}
             row |= {"verdict": "pass", "captures": 12, "fixes": 12, "missing_share": 0, "warnings": 0, "images_skipped": 0}
             row |= {name: f"{chance.lognormvariate(-1.4, 0.5):.6g}" for name in ("mean_mm", "median_mm", "p90_mm", "max_mm")}
+            row["gate_metrics"] = made_up_metrics(chance, float(row["mean_mm"]))
             row |= {"rms_px": "0.02", "version": "1", "inputs": f"{chance.getrandbits(256):064x}", "cpu_s": "0.600"}
             row |= {"key": f"{chance.getrandbits(256):064x}", "map": f"{number:04d}" + row["map"][:8]}
             yield f"{row['camera']}/{session}", row
@@ -160,6 +171,15 @@ def run(options, folder):
     measured("reprocess.sh, unchanged", *whole)
     if left := Path(".state/to_do.txt").read_text().split():
         sys.exit(f"reprocess_scale.py: {len(left)} shards are to do, and nothing has changed")
+    session_gates = folder / "session_gates.yaml"
+    files.write_whole(session_gates, "format: vlp-gates/1\ngates: {mean_mm: 0.25}\n")
+    files.write_whole(folder / "gates.yaml", "format: vlp-archive-gates/1\ngates: {gate_share: 1}\n")
+    took["other session gates"] = measured("reprocess.sh, other session gates", *whole, "--session-gates", session_gates,
+                                           "--gates", folder / "gates.yaml")
+    counts = json.loads(Path("changes.json").read_text())["counts"]
+    print(f"{counts['gate']} of {counts['sessions']} sessions miss a gate")
+    if not 0 < counts["gate"] < counts["sessions"] or Path(".state/ran").exists():
+        sys.exit("reprocess_scale.py: the session gates were not applied, or sessions were calibrated again")
     found = json.loads(Path("changes.json").read_text())["fleet"]
     print(f"{len(found['cameras'])} cameras changed, {len(found['lamps'])} lamps were moved")
     missed = 0

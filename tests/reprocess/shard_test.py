@@ -26,11 +26,11 @@ def there_soon(file):
 
 class Shard(unittest.TestCase):
     def test_key_is_of_inputs_programs_and_options(self):
-        run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "bin": "/bin"}
+        run = {"toolbox": "t", "camera": "", "bin": "/bin"}
         keys = [shard.key_of("i", run), shard.key_of("j", run), shard.key_of("i", run | {"bin": "/other"})]
-        keys += [shard.key_of("i", run | {name: "x"}) for name in ("toolbox", "camera", "session_gates_digest")]
+        keys += [shard.key_of("i", run | {name: "x"}) for name in ("toolbox", "camera")]
         self.assertEqual(keys[0], keys[2])
-        self.assertEqual(len(set(keys)), 5)
+        self.assertEqual(len(set(keys)), 4)
 
     def test_a_session_whose_publishing_was_interrupted_is_whole_the_next_time(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -54,7 +54,7 @@ class Shard(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             self.addCleanup(os.chdir, os.getcwd())
             os.chdir(folder)
-            run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "archive": folder, "version": "1"}
+            run = {"toolbox": "t", "camera": "", "archive": folder, "version": "1"}
             run["bin"] = folder
             for name, text in (("c/1", "one"), ("c/2", "two")):
                 (Path(name) / "boards").mkdir(parents=True)
@@ -126,7 +126,7 @@ exit 5
         Path("vlp-calibrate").write_text(program)
         Path("vlp-calibrate").chmod(0o755)
         lock = self.enterContext(open("lock", "w"))
-        run = {"toolbox": "t", "camera": "", "session_gates_digest": "", "session_gates": "", "version": "1"}
+        run = {"toolbox": "t", "camera": "", "version": "1"}
         run |= {"archive": str(Path("archive").absolute()), "bin": folder.name}
         return run, "7", {"c/1": "a", "c/2": "b"}, lock, 0
 

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Applies --session-gates (vlp-gates/1) to the rows of sessions that have no gates.yaml of their own.
+
+vlp-calibrate runs without these gates, so that other gates need no other calibration: a row has the metrics and the
+gates of session.json (`gate_metrics`), and the verdict follows from them as in lib/session/session.cpp. A gate of the
+file replaces the gate of the lens with the same name.
+"""
+import json
+
+import yaml
+
+AT_LEAST = ("coverage", "views", "board_tilt_deg")  # metrics with a lower limit; all others have an upper limit
+UNITS = ("px", "mm", "deg")  # suffixes of the metrics' names
+
+
+def read_limits(file):
+    """Returns {metric: limit}. vlp-calibrate has checked the file (checks.py)."""
+    return {name: float(limit) for name, limit in yaml.safe_load(file.read_text())["gates"].items()}
+
+
+def is_met(name, value, limit):
+    if value is None:
+        return False
+    return value >= limit if name in AT_LEAST else value <= limit
+
+
+def describe_missed(name, value, limit):
+    """Returns the words of vlp-calibrate, for example "mean_mm is 1.25 mm, at most 1 mm is asked for"."""
+    unit = next((f" {unit}" for unit in UNITS if name.endswith(f"_{unit}")), "")
+    measured = "not known" if value is None else f"{value:.4g}{unit}"
+    return f"{name} is {measured}, {'at least' if name in AT_LEAST else 'at most'} {limit:.4g}{unit} is asked for"
+
+
+def apply_session_gates(row, limits):
+    """Sets verdict and reason of a row that has a result and no gates of its own."""
+    if not limits or not row["gate_metrics"]:
+        return
+    known = json.loads(row["gate_metrics"])
+    gates = known["gates"] | limits
+    values = {name: known["metrics"].get(name) for name in gates}
+    missed = [describe_missed(name, values[name], gates[name]) for name in gates if not is_met(name, values[name], gates[name])]
+    passed = "look" if row["look"] or row["lamps_left_out"] else "pass"
+    row["verdict"], row["reason"] = ("gate", "; ".join(missed)) if missed else (passed, "")
