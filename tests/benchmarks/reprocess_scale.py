@@ -45,7 +45,7 @@ FOLDERS = ["boards", "rotation", "dispersion", "check"]
 IN_A_FLEET = 200
 # What is asked for of 100,000 sessions: seconds of processor time, and MB.
 SETTLED_S = 2.5  # what changed within two seconds of a look is looked at again by the next one
-LIMITS = {"plan, unchanged": (5, 500), "plan, changed": (6, 500), "summary and overview": (20, None), "other session gates": (60, None)}
+LIMITS = {"plan, unchanged": (5, 500), "plan, changed": (6, 500), "summary and overview": (20, None), "other session gates": (30, None)}
 
 
 def make_archive(archive, names):
