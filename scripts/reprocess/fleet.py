@@ -23,7 +23,13 @@ lamps that changed do not hide themselves, and makes deviates smaller by 20 / n 
 deviates z that are divided by a factor with a relative variance v, exp(z^4 v / 2) times as many are beyond z as of
 the true one, which z^2 v / 2 of it makes good, with z = 4.5. v = 2 / n is not derived but chosen on the safe side,
 since a few are left out and neighbours go together: of all of n independent ones it would be 1 / (2 n). Of too few
-differences nothing is tested. One tau is of all cameras: one that scatters more than the others is called.
+differences nothing is tested.
+
+A camera whose sessions scatter more than those of the fleet has a tau of its own (own_between_sessions()). The test
+compares the squares of the differences between neighbouring sessions, over all its figures, with those that the tau
+of the fleet explains; the largest OWN_REJECTED of a series are left out, so that a change is not taken for scatter. The
+own tau has the same safety factor for few differences. Cameras of fewer than MIN_OWN_SESSIONS sessions have the tau of
+the fleet, and one that scatters more is called.
 
 `least_found` says what the archive can show: the change of a figure that is called in FOUND_SHARE of cases, as of the
 sessions of the median series, a drift or a step in its middle.
@@ -50,30 +56,80 @@ MOST_DIFFERENCES = 4000  # they determine tau to 1 %
 TOLERANCE = 0.01  # of tau^2
 KEPT_SHARE = 0.95
 VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1.96) / 0.95
+OWN_P = 0.01  # chance that a camera is given a tau of its own without need, which costs sensitivity only
+MIN_OWN_SESSIONS = 8
+OWN_REJECTED = 2  # largest differences of a series: a step has one, a session with an error two
+OWN_VARIANCE_FACTOR = 1.6  # of the sum of squares; neighbouring differences share a session (simulated, 8 to 50 sessions)
 LEAST_SD_MM = 1e-3
 WITH_LEVER_ARM = ("zenith", "rotation_center", "dispersion_offset")
 FEWEST_LAMPS = 4  # of three a lamp that moved cannot be told
 
 
+def truncated_variance(fraction):
+    """Returns the variance of the standard normal deviates that remain if the central `fraction` is kept."""
+    limit = NORMAL.inv_cdf((1 + fraction) / 2)
+    return 1 - 2 * limit * NORMAL.pdf(limit) / fraction
+
+
+def sum_of_smallest(differences, kept, tau2):
+    return sum(sorted(square / (variance + 2 * tau2) for square, variance in differences)[:kept])
+
+
+def solve_tau(groups, expected):
+    """Returns the tau for which the normalized squares of the smallest differences sum up to `expected`; 0 if they do not
+    exceed it. groups: (differences, number of the smallest to keep)."""
+
+    def excess(tau2):
+        return sum(sum_of_smallest(differences, kept, tau2) for differences, kept in groups) - expected
+
+    low, high = 0.0, max(square for differences, _ in groups for square, _ in differences) / VARIANCE_OF_KEPT
+    if excess(low) <= 0:
+        return 0.0
+    while excess(high) > 0:
+        high *= 2
+    while high - low > TOLERANCE * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
+    return math.sqrt(high)
+
+
 def between_sessions(differences):
-    """The standard deviation between sessions, tau; None of too few. differences: (square, stated variance)."""
+    """Returns the standard deviation between sessions, tau; None of too few. differences: (square, stated variance)."""
     differences = [one for one in differences if one[0]]
     if len(differences) < FEWEST_DIFFERENCES:
         return None
     some = differences[:: 1 + len(differences) // MOST_DIFFERENCES]
     kept = math.ceil(KEPT_SHARE * len(some))
-    expected = kept * VARIANCE_OF_KEPT / (1 + 20 / len(some)) ** 2
+    return solve_tau([(some, kept)], kept * VARIANCE_OF_KEPT / (1 + 20 / len(some)) ** 2)
 
-    def excess(tau2):
-        return sum(sorted(square / (variance + 2 * tau2) for square, variance in some)[:kept]) - expected
 
-    low, high = 0.0, max(square for square, _ in some) / VARIANCE_OF_KEPT
-    if excess(low) <= 0:
-        return 0.0
-    while high - low > TOLERANCE * high:
-        middle = (low + high) / 2
-        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
-    return math.sqrt(high)
+def chi2_quantile(p, freedoms):
+    """Returns the quantile by the approximation of Wilson and Hilferty."""
+    variance = 2 / (9 * freedoms)
+    return freedoms * (1 - variance + NORMAL.inv_cdf(p) * math.sqrt(variance)) ** 3
+
+
+def own_between_sessions(figures, between):
+    """Returns {kind of figure: tau} of a camera whose sessions scatter significantly more than those of the fleet, for the
+    kinds with a larger tau than the fleet's; {} for other cameras. figures: those of camera_series()."""
+    groups, total, expected, count = defaultdict(list), 0.0, defaultdict(float), 0
+    for figure, (_, series) in figures.items():
+        tau, differences = between.get(kind_of(figure)), neighbours(series)
+        if tau is None or len(series) < MIN_OWN_SESSIONS:
+            continue
+        kept = len(differences) - OWN_REJECTED
+        groups[kind_of(figure)].append((differences, kept))
+        expected[kind_of(figure)] += kept * truncated_variance((kept + 0.5) / len(differences))  # the cut is between two
+        total += sum_of_smallest(differences, kept, tau**2)
+        count += kept
+    freedoms = count / OWN_VARIANCE_FACTOR
+    if not count or total / sum(expected.values()) < chi2_quantile(1 - OWN_P, freedoms) / freedoms:
+        return {}
+    own = {}
+    for kind, of_kind in groups.items():
+        known = sum(kept for _, kept in of_kind)
+        own[kind] = solve_tau(of_kind, expected[kind] / (1 + 20 / known) ** 2)
+    return {kind: tau for kind, tau in own.items() if tau > between[kind]}
 
 
 def widened(series, tau):
@@ -230,12 +286,13 @@ def smallness(change):
     return -abs(change["change"] / change["sd"])
 
 
-def changed_cameras(cameras, between, tests):
+def changed_cameras(cameras, between, own, tests):
     alarms = []
     for camera, figures in cameras.items():
         changes = []
+        taus = between | own.get(camera, {})
         for figure, (rows, series) in figures.items():
-            tau = between.get(kind_of(figure))
+            tau = taus.get(kind_of(figure))
             if tau is not None:
                 changes.append({"figure": figure, **change_of(rows, widened(series, tau), tests)})
         changes = sorted((one for one in changes if one["p"] < FALSE_ALARM_RATE), key=smallness)
@@ -357,6 +414,8 @@ def fleet_of(rows, lamp_rows):
     if tau_mm is not None:
         least_found["lamps"] = least_found_of_lamps(rooms, tau_mm, tests)
         moved = [lamp for room in rooms for lamp in room.moved(tau_mm, tests)]
-    alarms = changed_cameras(cameras, between, tests)
-    found = {"between_sessions": between, "least_found": least_found, "cameras": alarms, "lamps": moved}
+    own = {camera: own_between_sessions(figures, between) for camera, figures in cameras.items()}
+    own = {camera: taus for camera, taus in own.items() if taus}
+    alarms = changed_cameras(cameras, between, own, tests)
+    found = {"between_sessions": between, "own_between_sessions": own, "least_found": least_found, "cameras": alarms, "lamps": moved}
     return {"false_alarm_rate": FALSE_ALARM_RATE, "tests": tests, **found}

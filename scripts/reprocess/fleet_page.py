@@ -41,7 +41,8 @@ def cameras(fleet, fleet_rows):
         figures, first = series[alarm["camera"]], alarm["changes"][0]
         name, points = kind_of(first["figure"]), {}
         of_it = figures[first["figure"]][0]
-        times, tau = times_of(of_it), fleet["between_sessions"][name]
+        times = times_of(of_it)
+        tau = fleet["own_between_sessions"].get(alarm["camera"], {}).get(name, fleet["between_sessions"][name])
         for axis in "xy":  # from the first session, so that both are seen
             rows_of_it, one = figures.get(f"{name}_{axis}_{TWO[name]}", ([], []))
             wide = widened(one, tau)
@@ -80,6 +81,20 @@ def lamps(fleet, lamp_rows):
     return html
 
 
+def own_scatter(fleet):
+    """The cameras whose sessions scatter more than those of the fleet."""
+    if not fleet["own_between_sessions"]:
+        return ""
+    rows = []
+    for camera, taus in sorted(fleet["own_between_sessions"].items()):
+        for name, tau in taus.items():
+            words = f"{name.replace('_', ' ')} ({TWO[name]})"
+            rows.append((camera, words, f"{tau:.2g}", f"{fleet['between_sessions'][name]:.2g}"))
+    html = "<h2>Cameras whose sessions scatter more than those of the fleet</h2>\n"
+    columns = ["camera", "figure", "standard deviation between sessions", "that of the fleet"]
+    return html + table(columns, rows, "changes.json")
+
+
 def least_found(fleet):
     html = "<p>What sessions like these show: a change of so much is called in 95 of 100 cases.</p>\n"
     rows = []
@@ -105,4 +120,4 @@ def page(fleet, fleet_rows, lamp_rows):
     html += f"false alarm in all of it is {rate} at most."
     if wide:
         html += f" Sessions differ by more than they state; this standard deviation between sessions counts, too: {wide}."
-    return html + " All figures: fleet.csv, lamps.csv.</p>\n" + least_found(fleet)
+    return html + " All figures: fleet.csv, lamps.csv.</p>\n" + own_scatter(fleet) + least_found(fleet)

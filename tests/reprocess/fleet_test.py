@@ -105,12 +105,13 @@ class OverTime(unittest.TestCase):
             self.assertEqual([first["before"]["date"], first["since"]["date"]], dates_of_both)
 
     def test_is_as_the_schema_says(self):
-        made_up = Fleet(0, drifts=self.DRIFTS, moved=self.MOVED, broken={7: (6, {"center": (0.4, -0.3)})})
+        made_up = Fleet(0, drifts=self.DRIFTS, moved=self.MOVED, broken={7: (6, {"center": (0.4, -0.3)})}, noisy=(11,))
         document = {"format": "vlp-archive-changes/1", "changes": None, "gates": [], "passed": True}
         document |= {"vanished": [], "lost_results": []}
         document |= {"counts": changes.counts_of([]), "fleet": fleet.fleet_of(*fleet_rows(made_up))}
         alarms = [one["kind"] for alarm in document["fleet"]["cameras"] for one in alarm["changes"]]
         self.assertEqual((set(alarms), len(document["fleet"]["lamps"])), ({"step", "drift", "undecided"}, 2))
+        self.assertIn("camera-11", document["fleet"]["own_between_sessions"])
         self.assertEqual(schema_check.problems_of(schema_check.validator_of("changes"), document), [])
 
     def test_tells_a_drift_from_a_step(self):
@@ -136,6 +137,32 @@ class OverTime(unittest.TestCase):
                 found = fleet.fleet_of(*fleet_rows(Fleet(seed, cameras=40, sessions=6, unequal=unequal)))
                 alarms += bool(found["cameras"] or found["lamps"])
             self.assertLessEqual(alarms, 6, unequal)  # as above
+
+    def test_gives_no_more_false_alarms_where_some_cameras_scatter_three_times_as_much(self):
+        for cameras, sessions, noisy in ((20, 10, (4, 11)), (40, 8, (1, 9, 22, 33))):
+            alarms = needless = 0
+            for seed in range(6000, 6000 + FLEETS):
+                found = fleet.fleet_of(*fleet_rows(Fleet(seed, cameras=cameras, sessions=sessions, noisy=noisy)))
+                alarms += bool(found["cameras"] or found["lamps"])
+                own = set(found["own_between_sessions"])
+                self.assertLessEqual({f"camera-{camera:02d}" for camera in noisy}, own, seed)
+                needless += len(own) - len(noisy)
+            self.assertLessEqual(alarms, 0.05 * FLEETS + 3 * (0.05 * FLEETS) ** 0.5)
+            self.assertLessEqual(needless, 0.02 * FLEETS * cameras)
+
+    def test_calls_a_change_of_a_camera_that_scatters_more(self):
+        for seed in range(5):
+            made_up = Fleet(seed, noisy=(4, 11), broken={4: (5, {"center": (4, 0)})})
+            found = fleet.fleet_of(*fleet_rows(made_up))
+            self.assertEqual([alarm["camera"] for alarm in found["cameras"]], ["camera-04"])
+            change = found["cameras"][0]["changes"][0]
+            self.assertEqual((change["figure"], change["kind"]), ("center_x_px", "step"))
+
+    def test_own_tau_is_that_of_cameras_with_enough_sessions(self):
+        rows, lamps = fleet_rows(Fleet(1, sessions=7, noisy=(4,)))
+        self.assertEqual(fleet.fleet_of(rows, lamps)["own_between_sessions"], {})
+        self.assertAlmostEqual(fleet.truncated_variance(0.95), fleet.VARIANCE_OF_KEPT, places=4)
+        self.assertAlmostEqual(fleet.chi2_quantile(0.99, 10), 23.21, delta=0.05)
 
     def test_states_the_standard_deviation_between_sessions(self):
         for unequal in (1, 3):

@@ -8,6 +8,7 @@ import random
 # What sessions of datasets/archive state, and how many times as much they scatter.
 SDS = {"focal": ("px", 0.025, 1.7), "center": ("px", 0.029, 1.7), "zenith": ("deg", 0.006, 1.5)}
 SDS |= {"rotation_center": ("px", 0.013, 1.2), "lever_arm": ("mm", 0.075, 1.1), "dispersion_offset": ("px", 0.003, 5)}
+NOISY = 3
 LAMP_SD_MM, LAMP_SCATTER = 0.06, 1.5
 PLACES = {i + 1: complex(-0.6 + 0.6 * (i % 3), -0.3 + 0.6 * (i // 3)) for i in range(6)}
 
@@ -15,12 +16,13 @@ PLACES = {i + 1: complex(-0.6 + 0.6 * (i % 3), -0.3 + 0.6 * (i // 3)) for i in r
 class Fleet:
     """cameras x sessions a camera, evenly over a year, in two rooms by turns. drifts: {camera: {figure: whole change
     of x and y}}; broken: {camera: (session, {figure: (x, y)})} at once; moved: [(room, lamp, day, mm as complex)].
-    honest: sessions scatter by what they state. unequal: sessions state sds of 1 / unequal to unequal times SDS, and
+    honest: sessions scatter by what they state. noisy: cameras whose sessions scatter three times as much. unequal: sessions state sds of 1 / unequal to unequal times SDS, and
     scatter by these and by what differs between all sessions alike."""
 
-    def __init__(self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False, unequal=1):
+    def __init__(self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False, unequal=1, noisy=()):
         self.chance = random.Random(seed)
         self.cameras, self.sessions, self.honest, self.unequal = cameras, sessions, honest, unequal
+        self.noisy = frozenset(noisy)
         self.drifts, self.broken, self.moved = dict(drifts), dict(broken), list(moved)
         self.rooms = [self.errors_of_a_map() for _ in range(2)]
 
@@ -51,7 +53,7 @@ class Fleet:
             between = 0 if self.honest else sd * math.sqrt(factor**2 - 1)
             if self.unequal > 1:
                 sd *= self.unequal ** self.chance.uniform(-1, 1)
-            scatter = math.hypot(sd, between)
+            scatter = math.hypot(sd, between) * (NOISY if camera in self.noisy else 1)
             drift = self.drifts.get(camera, {}).get(name, (0, 0))
             since, jump = self.broken.get(camera, (0, {}))
             jump = jump.get(name, (0, 0)) if session >= since else (0, 0)
