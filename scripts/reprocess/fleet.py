@@ -12,8 +12,8 @@ A change that is called is a step, a drift or undecided, by the marginal likelih
 and a change with the same wide prior; a step also has a date, with equal prior probability for each of its K sessions:
   step:   mean over k of exp(z_k^2 / 2) sd_k        drift:   exp(z^2 / 2) sd
 z and sd are those of the change at session k and of the slope over all sessions. The mean over k is the penalty for the
-date. The kind is decided if one likelihood is MIN_ODDS times the other, which is a posterior probability of 95 % if steps
-and drifts are equally frequent. Otherwise it is "undecided", and the change and its date are those of the step.
+date. The kind is decided if one likelihood is MIN_ODDS times the other, a posterior probability of 95 % if steps and
+drifts are equally frequent. Otherwise it is "undecided", and the change and its date are those of the step.
 
 Stated standard deviations leave out what differs between sessions and not within one (the lens, the map). What
 neighbouring sessions of the whole fleet differ by more than is stated has a standard deviation between sessions of
@@ -59,7 +59,7 @@ VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1
 OWN_P = 0.01  # chance that a camera is given a tau of its own without need, which costs sensitivity only
 MIN_OWN_SESSIONS = 8
 OWN_REJECTED = 2  # largest differences of a series: a step has one, a session with an error two
-OWN_VARIANCE_FACTOR = 1.6  # of the sum of squares; neighbouring differences share a session (simulated, 8 to 50 sessions)
+OWN_VARIANCE_FACTOR = 1.6  # of the sum of squares: neighbouring differences share a session (simulated, 8 to 50)
 LEAST_SD_MM = 1e-3
 WITH_LEVER_ARM = ("zenith", "rotation_center", "dispersion_offset")
 FEWEST_LAMPS = 4  # of three a lamp that moved cannot be told
@@ -76,8 +76,8 @@ def sum_of_smallest(differences, kept, tau2):
 
 
 def solve_tau(groups, expected):
-    """Returns the tau for which the normalized squares of the smallest differences sum up to `expected`; 0 if they do not
-    exceed it. groups: (differences, number of the smallest to keep)."""
+    """Returns the tau for which the normalized squares of the smallest differences sum up to `expected`; 0 if they do
+    not exceed it. groups: (differences, number of the smallest to keep)."""
 
     def excess(tau2):
         return sum(sum_of_smallest(differences, kept, tau2) for differences, kept in groups) - expected
@@ -110,8 +110,8 @@ def chi2_quantile(p, freedoms):
 
 
 def own_between_sessions(figures, between):
-    """Returns {kind of figure: tau} of a camera whose sessions scatter significantly more than those of the fleet, for the
-    kinds with a larger tau than the fleet's; {} for other cameras. figures: those of camera_series()."""
+    """Returns {kind of figure: tau} of a camera whose sessions scatter significantly more than those of the fleet, for
+    the kinds with a larger tau than the fleet's; {} for other cameras. figures: those of camera_series()."""
     groups, total, expected, count = defaultdict(list), 0.0, defaultdict(float), 0
     for figure, (_, series) in figures.items():
         tau, differences = between.get(kind_of(figure)), neighbours(series)
@@ -119,7 +119,8 @@ def own_between_sessions(figures, between):
             continue
         kept = len(differences) - OWN_REJECTED
         groups[kind_of(figure)].append((differences, kept))
-        expected[kind_of(figure)] += kept * truncated_variance((kept + 0.5) / len(differences))  # the cut is between two
+        fraction = (kept + 0.5) / len(differences)  # the cut is between two of them
+        expected[kind_of(figure)] += kept * truncated_variance(fraction)
         total += sum_of_smallest(differences, kept, tau**2)
         count += kept
     freedoms = count / OWN_VARIANCE_FACTOR
@@ -237,8 +238,8 @@ def decide_kind(step_changes, drift_change):
 
 
 def change_of(rows, series, tests):
-    """Returns the change of a figure. p: chance of a false alarm as significant as the more significant of the largest step
-    and the drift, anywhere in the fleet. The kind is decided apart from that, by likelihood."""
+    """Returns the change of a figure. p: chance of a false alarm as significant as the more significant of the largest
+    step and the drift, anywhere in the fleet. The kind is decided apart from that, by likelihood."""
     step_changes, drift_change = list(steps(series)), drift(times_of(rows), series)
     k, (change, sd) = max(enumerate(step_changes, 1), key=lambda one: abs(one[1][0] / one[1][1]))
     p = 2 * tests["step"] * p_of(change / sd)
@@ -417,5 +418,6 @@ def fleet_of(rows, lamp_rows):
     own = {camera: own_between_sessions(figures, between) for camera, figures in cameras.items()}
     own = {camera: taus for camera, taus in own.items() if taus}
     alarms = changed_cameras(cameras, between, own, tests)
-    found = {"between_sessions": between, "own_between_sessions": own, "least_found": least_found, "cameras": alarms, "lamps": moved}
+    found = {"between_sessions": between, "own_between_sessions": own, "least_found": least_found}
+    found |= {"cameras": alarms, "lamps": moved}
     return {"false_alarm_rate": FALSE_ALARM_RATE, "tests": tests, **found}

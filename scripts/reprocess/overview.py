@@ -155,7 +155,8 @@ def list_actions(document, items, rows):
     counts, actions = document["counts"], []
     if is_incomplete(counts, document["gates"]):
         reason, count = count_reasons(rows)[0]
-        actions.append((f"Mend the archive: {count} of {counts['sessions']} sessions have no result, for: {reason}", "failed"))
+        words = f"{count} of {counts['sessions']} sessions have no result, for: {reason}"
+        actions.append((f"Mend the archive: {words}", "failed"))
     if items["vanished"]:
         words = "Restore these sessions, or delete their results if they are meant to be gone"
         actions.append((f"{words}: {shorten(items['vanished'])}", "vanished"))
@@ -202,7 +203,8 @@ def page(run, rows, document, items, fleet, parts):
         html += table(["session"], [(name,) for name in items["vanished"]], "changes.json")
     html += fleet
     html += '<h2 id="gates">Gates</h2>\n'
-    words = [(g["name"], number(g["value"]), g["limit"], "met" if g["passed"] else "not met") for g in document["gates"]]
+    gates = document["gates"]
+    words = [(g["name"], number(g["value"]), g["limit"], "met" if g["passed"] else "not met") for g in gates]
     html += table(["gate", "value", "at most", ""], words)
     html += f"<p>Version {escape(run['version'])}, toolbox {run['toolbox'][:12]}.</p>\n<h2>Sessions</h2>\n"
     figures = [(name.replace("_", " "), number(value)) for name, value in document["counts"].items()]

@@ -27,7 +27,8 @@ from toolbox import toolbox
 
 def results_in(results):
     """Returns the sessions that have a folder in RESULTS."""
-    return {name for place in ("sessions", "failed") if (results / place).is_dir() for name in sessions_in(results / place)}
+    places = [results / place for place in ("sessions", "failed")]
+    return {name for place in places if place.is_dir() for name in sessions_in(place)}
 
 
 def shard_ends(sessions, size, at_a_time):

@@ -38,7 +38,7 @@ def apply_session_gates(row, limits):
         return
     known = json.loads(row["gate_metrics"])
     gates = known["gates"] | limits
-    values = {name: known["metrics"].get(name) for name in gates}
-    missed = [describe_missed(name, values[name], gates[name]) for name in gates if not is_met(name, values[name], gates[name])]
+    checked = [(name, known["metrics"].get(name), limit) for name, limit in gates.items()]
+    missed = [describe_missed(*gate) for gate in checked if not is_met(*gate)]
     passed = "look" if row["look"] or row["lamps_left_out"] else "pass"
     row["verdict"], row["reason"] = ("gate", "; ".join(missed)) if missed else (passed, "")

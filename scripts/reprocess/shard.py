@@ -136,10 +136,11 @@ def put_aside(place, name, keep):
 
 
 def keep_the_last(name, keep):
-    """Deletes all former results but the last `keep`. If these have the verdict "no result", the last other one stays in
-    place of the oldest of them, so that a lost result can still be seen."""
+    """Deletes all former results but the last `keep`. If these have the verdict "no result", the last other one stays
+    in place of the oldest of them, so that a lost result can still be seen."""
     formers = sorted((Path("former") / name).glob("*/row.json"), key=lambda row: row.stat().st_mtime_ns)
-    usable = [file for file in formers if (row_in(file.parent) or {"verdict": "crashed"})["verdict"] not in WITHOUT_RESULT]
+    verdicts = {file: (row_in(file.parent) or {"verdict": "crashed"})["verdict"] for file in formers}
+    usable = [file for file in formers if verdicts[file] not in WITHOUT_RESULT]
     kept = formers[max(0, len(formers) - keep) :]
     if kept and usable and usable[-1] not in kept:
         kept[0] = usable[-1]
