@@ -138,7 +138,7 @@ TEST_F(RealLog, IsFartherFromThePathWithTheLeanOfEachImage) {
   };
   const std::string free = " --lean-sd-deg 90 --sigma-px 0.3";
   EXPECT_NEAR(figures(in_log("lamps.yaml"), calibration, free).mean_distance_m, 0.03639, 1e-4);
-  EXPECT_THAT(evaluate(), testing::HasSubstr("p90            67.3"));
+  EXPECT_THAT(evaluate(), testing::HasSubstr("p90            67.28"));
   ASSERT_EQ(level().exit_code, 0);
   EXPECT_NEAR(figures(in_log("lamps.yaml"), path("levelled.yaml"), free).mean_distance_m, 0.03639,
               1e-4);
