@@ -79,8 +79,10 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
                       StationRecordsOptions& options) {
   CLI::App* command = add_where(app, name, what, options);
   command->add_option("--camera-id", options.filter.camera, "Only of this camera");
-  command->add_option("--of-station", options.filter.station,
-                      "Only of the station of this name, or any");
+  command->add_option(
+      "--of-station", options.filter.station,
+      "Only of the station of this name, or any (default: that of --station; of a study "
+      "any)");
   command->add_option("--verdict", options.filter.verdict, "Only with this verdict")
       ->check(CLI::IsMember({"PASS", "FAIL", "INVALID", "any"}));
   command->add_option("--kind", options.filter.kind, "Only units, or only golden units")

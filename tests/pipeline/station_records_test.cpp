@@ -51,6 +51,25 @@ TEST_F(StationRecords, DeletesWhatIsKeptNoLonger) {
   EXPECT_THAT(records("list").output, HasSubstr("1 runs"));
 }
 
+/// Stations that share their records.
+TEST_F(StationRecords, ListsTheRunsOfItsStationOnly) {
+  ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
+  change("station.yaml", "station: station-1", "station: station-2");
+  ASSERT_EQ(run_program(run("0002", "--idle-s 0.1")).exit_code, 3);
+  const auto own = records("list");
+  EXPECT_EQ(own.exit_code, 0) << own.errors;
+  EXPECT_THAT(own.output, AllOf(HasSubstr("station-2"), Not(HasSubstr("station-1")),
+                                HasSubstr("1 runs, 0 passed, 0 failed, 1 invalid\n")));
+  EXPECT_THAT(records("list --of-station station-1").output,
+              AllOf(HasSubstr("station-1"), Not(HasSubstr("station-2"))));
+  EXPECT_THAT(records("list --of-station any").output, HasSubstr("2 runs"));
+  EXPECT_EQ(records("export -o " + (folder / "runs.csv").string()).output, "1 runs\n");
+  EXPECT_THAT(records("show --camera-id 0001").errors, HasSubstr("there is no such run"));
+  // Records alone are of no station.
+  const std::string database = (folder / "station/records.db").string();
+  EXPECT_THAT(run_program("vlp-station list --records " + database).output, HasSubstr("2 runs"));
+}
+
 /// What somebody changes in the database is found.
 TEST_F(StationRecords, FindsWhatWasChangedInItsRecords) {
   prepare("0001");
@@ -202,7 +221,8 @@ TEST_F(StationRecords, WatchesATrend) {
   EXPECT_THAT(records("trend rms_px --rules none").errors, HasSubstr("there is no rule none"));
   EXPECT_THAT(records("trend rms_px --until 2200-01-01").output,
               HasSubstr("10 runs, 2100-01-01T00:00:00Z to 2109-01-01T00:00:00Z"));
-  EXPECT_THAT(records("list --since 2400-01-01 --until 2460-01-01").output, HasSubstr("2 runs"));
+  EXPECT_THAT(records("list --of-station any --since 2400-01-01 --until 2460-01-01").output,
+              HasSubstr("2 runs"));
   for (const char* no_time : {"21.11.2026", "2026-02-30", "2026-11-21T24:00", "2026-11-21T10:60",
                               "2026-11-21T10:59:60", "2026-11-21T10:99:00Z"}) {
     EXPECT_EQ(records(std::string("list --since ") + no_time).exit_code, 2) << no_time;

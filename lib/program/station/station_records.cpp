@@ -48,25 +48,31 @@ std::unique_ptr<KnownRuns> known_runs(const StationRecordsOptions& options) {
   return known;
 }
 
-/// A filter in which "any" is not asked for.
-RunFilter asked(RunFilter filter) {
+/// Returns the filter with "any" replaced by no condition.
+RunFilter replace_any(RunFilter filter) {
   for (std::string* text : {&filter.station, &filter.verdict, &filter.kind}) {
     if (*text == kAny) text->clear();
   }
   return filter;
 }
 
-/// The run that is named, or the last that the filter lets through.
-RunRecord run_of(KnownRuns& known, const StationRecordsOptions& options) {
-  return options.run.empty() ? known.last(asked(options.filter)) : known.find(options.run);
+/// Returns the runs that the options ask for: those of --station, unless --of-station is given.
+RunFilter requested_runs(const StationRecordsOptions& options, const KnownRuns& known) {
+  RunFilter filter = options.filter;
+  if (filter.station.empty() && known.station()) filter.station = known.station()->station;
+  return replace_any(std::move(filter));
 }
 
-/// What is compared unless it is asked for otherwise: units of the station.
+/// The run that is named, or the last that the filter lets through.
+RunRecord run_of(KnownRuns& known, const StationRecordsOptions& options) {
+  return options.run.empty() ? known.last(requested_runs(options, known)) : known.find(options.run);
+}
+
+/// Returns requested_runs(), of units unless --kind is given.
 RunFilter comparable(const StationRecordsOptions& options, const KnownRuns& known) {
-  RunFilter filter = options.filter;
-  if (filter.kind.empty()) filter.kind = "unit";
-  if (filter.station.empty() && known.station()) filter.station = known.station()->station;
-  return asked(filter);
+  RunFilter filter = requested_runs(options, known);
+  if (options.filter.kind.empty()) filter.kind = "unit";
+  return filter;
 }
 
 const StationConfig* station_of(const KnownRuns& known) {
@@ -158,7 +164,7 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
 
 void list_runs(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
-  const auto runs = known->list(asked(options.filter));
+  const auto runs = known->list(requested_runs(options, *known));
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}\n";
   say(fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
   for (const RunSummary& run : runs) {
@@ -284,7 +290,7 @@ void verify_records(const StationRecordsOptions& options) {
 
 void export_runs(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
-  const auto runs = known->whole(asked(options.filter));
+  const auto runs = known->whole(requested_runs(options, *known));
   write_runs(options.output, runs);
   fmt::print("{} runs\n", runs.size());
 }
@@ -392,7 +398,7 @@ void show_study(const StationRecordsOptions& options) {
   Records& records = known->records();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
-  const auto points = judged_values(records, options.figure, asked(filter));
+  const auto points = judged_values(records, options.figure, replace_any(filter));
   const auto values = study_values(points, options.units);
   const MeasurementStudy study = determined([&] { return measurement_study(values); });
   const auto gate = gate_of(options.figure, station_of(*known), records, points);
