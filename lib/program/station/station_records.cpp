@@ -269,9 +269,10 @@ void clean_up(const StationRecordsOptions& options) {
 
 void void_run(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
-  const auto [record, problem] =
+  const auto [record, problem, files_problem] =
       void_run(*known, options.run, options.operator_name, options.reason);
   if (!problem.empty()) spdlog::error("{}", printable(problem));
+  if (!files_problem.empty()) spdlog::warn("{}", printable(files_problem));
   say(fmt::format("{} {} {}: voided\n", record.run, record.camera, record.verdict));
   for (const ScreenLine& line : hook_lines(record)) say(fmt::format("{}\n", line.text));
 }

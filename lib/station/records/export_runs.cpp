@@ -106,7 +106,12 @@ std::string text_of(const nlohmann::ordered_json& json) {
 
 }  // namespace
 
-std::string run_json(const RunRecord& run) { return text_of(json_of(run)); }
+std::string hook_json(const RunRecord& run) {
+  nlohmann::ordered_json json;
+  json["event"] = voided(run) != nullptr ? "voided" : "verdict";
+  json.update(json_of(run));
+  return text_of(json);
+}
 
 void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
   if (file.extension() == ".csv") return write_csv(file, runs);

@@ -240,7 +240,7 @@ RunEvent hook_wanted(const Hook& hook, const std::string& operator_name) {
 
 RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
   std::array<int, 2> pipe{};
-  const Descriptor input(file_with(run_json(record)));
+  const Descriptor input(file_with(hook_json(record)));
   if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
     return failed("cannot be started: " + std::generic_category().message(errno));
   }

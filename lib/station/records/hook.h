@@ -40,7 +40,7 @@ class HookLock {
   bool held_ = true;
 };
 
-/// Runs the hook with run_json() of the run on its stdin. Whatever becomes of it is what the event
+/// Runs the hook with hook_json() of the run on its stdin. Whatever becomes of it is what the event
 /// tells: kHookDone with the last line that it wrote, kHookFailed with exit code, signal or time
 /// limit before that line, or why it could not be started. Takes no longer than the time limit, at
 /// which it is killed with all that it has started, those that left its group too, unless they run

@@ -15,6 +15,7 @@
 #include "station/database_name.h"
 #include "station/records/golden_due.h"
 #include "station/records/hook.h"
+#include "station/records/publish_run.h"
 #include "station/records/run_hooks.h"
 
 namespace vlp {
@@ -136,6 +137,26 @@ RunCounts count_runs(std::span<const RunSummary> runs) {
   return counts;
 }
 
+namespace {
+
+/// Renames the files of a voided run. Returns why they keep their names; empty if they do not.
+std::string rename_files(const StationConfig* own_station, const RunRecord& record) {
+  if (own_station == nullptr) {
+    return fmt::format(
+        "the files of run {} keep their names: the same command with --station of {}"
+        " renames them",
+        record.run, record.station);
+  }
+  try {
+    mark_files_voided(record, own_station->results);
+    return "";
+  } catch (const InputError& error) {
+    return fmt::format("the run is voided, but its files keep their names: {}", error.what());
+  }
+}
+
+}  // namespace
+
 Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
                 const std::string& reason) {
   Voided result{known.find(run)};
@@ -151,7 +172,9 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
     }
     record = known.find(run);  // another may have voided it before the lock was had
   }
+  const StationConfig* own_station = own ? &*station : nullptr;
   if (const RunEvent* event = voided(record)) {
+    if (own) mark_files_voided(record, station->results);
     throw std::invalid_argument(
         fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text));
   }
@@ -159,12 +182,14 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
   record.events.push_back(new_event(kVoided, printable(reason), who));
   if (!station) {
     known.records().keep(record);
+    result.files_problem = rename_files(own_station, record);
     return result;
   }
   Spool& spool = *known.spool();
   if (lock) record.events.push_back(hook_wanted(*station->hook, who));
   spool.keep(record);
   if (own && record.kind == "golden") forget_golden(*station, record.run);
+  result.files_problem = rename_files(own_station, record);
   spool.deliver();
   if (lock) result.problem = call_hook(*station->hook, record, *lock, spool);
   return result;

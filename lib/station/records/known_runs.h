@@ -71,11 +71,14 @@ struct Voided {
   RunRecord run;
   /// Why it is not recorded what became of the hook; empty when it is.
   std::string problem = {};
+  /// Why the files of the run keep their names; empty if they do not.
+  std::string files_problem = {};
 };
 /// Voids a run: it counts no more, in no yield, trend or study, which its events tell, with who and
-/// why, and a golden run makes the golden unit due. At the station whose run it is, its hook is
-/// told (call_hook()). Throws std::invalid_argument for a run that was voided before, InputError
-/// when it cannot be kept or its hook is being run.
+/// why, and a golden run makes the golden unit due. At the station whose run it is, its files are
+/// renamed (mark_files_voided()), and its hook is told (call_hook()). Throws std::invalid_argument
+/// for a run that was voided before, whose files are renamed all the same, InputError when it
+/// cannot be kept or its hook is being run.
 Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
                 const std::string& reason);
 

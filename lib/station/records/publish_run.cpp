@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/records/publish_run.h"
 
+#include <array>
 #include <cstdint>
+#include <system_error>
+#include <utility>
 
 #include "rig/file.h"
 #include "rig/input_error.h"
@@ -19,8 +22,26 @@ void check_results(const fs::path& results, const std::string& camera) {
 }
 
 const char* calibration_name(const RunRecord& record) {
+  if (voided(record) != nullptr) return "voided-calibration.yaml";
   if (record.passed()) return "calibration.yaml";
   return record.invalid() ? "invalid-calibration.yaml" : "failed-calibration.yaml";
+}
+
+void mark_files_voided(const RunRecord& record, const fs::path& results) {
+  constexpr std::array names{std::pair("calibration.yaml", "voided-calibration.yaml"),
+                             std::pair("failed-calibration.yaml", "voided-calibration.yaml"),
+                             std::pair("invalid-calibration.yaml", "voided-calibration.yaml"),
+                             std::pair("certificate.html", "voided-certificate.html"),
+                             std::pair("report.html", "voided-report.html")};
+  const fs::path folder = results / record.camera / record.run;
+  for (const auto& [name, voided_name] : names) {
+    std::error_code error;
+    fs::rename(folder / name, folder / voided_name, error);
+    const bool is_missing =
+        error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
+    if (!error || is_missing) continue;
+    throw InputError(folder / name, "cannot be renamed: " + error.message());
+  }
 }
 
 fs::path publish_run(const RunRecord& record, const std::vector<ReportPicture>& pictures,
@@ -36,7 +57,7 @@ fs::path publish_run(const RunRecord& record, const std::vector<ReportPicture>& 
       throw InputError(calibration, "is not what the record has: move it away");
     }
   }
-  const fs::path report = folder / "report.html";
+  const fs::path report = folder / (voided(record) ? "voided-report.html" : "report.html");
   if (!fs::exists(report)) write_file(report, unit_report(record, calibration, pictures));
   return folder;
 }

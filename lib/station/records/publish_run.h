@@ -15,13 +15,19 @@ namespace vlp {
 /// takes a file, and has room. Throws InputError.
 void check_results(const std::filesystem::path& results, const std::string& camera);
 
-/// The name of a run's calibration among its files, by its verdict.
+/// Returns the name of a run's calibration among its files, by its verdict: calibration.yaml,
+/// failed-calibration.yaml, invalid-calibration.yaml, or voided-calibration.yaml.
 const char* calibration_name(const RunRecord& record);
 
-/// Writes of RESULTS/CAMERA/RUN/ what is not there: calibration.yaml when the unit passed,
-/// failed-calibration.yaml or invalid-calibration.yaml when it did not and came so far;
-/// report.html, last, which without `pictures` has none. The folder. It can be done at any time,
-/// and again. Throws InputError, for a calibration that is there and is another, too.
+/// Renames calibration, report and certificate in RESULTS/CAMERA/RUN/ to voided-calibration.yaml,
+/// voided-report.html and voided-certificate.html, so that nobody takes them for valid. Skips files
+/// that do not exist. Throws InputError.
+void mark_files_voided(const RunRecord& record, const std::filesystem::path& results);
+
+/// Writes the files of RESULTS/CAMERA/RUN/ that are missing, and returns the folder: the
+/// calibration, if there is one, as calibration_name(); then report.html, which without `pictures`
+/// has none. Can be repeated at any time. Throws InputError, also if the calibration exists and
+/// differs from the record's.
 std::filesystem::path publish_run(const RunRecord& record,
                                   const std::vector<ReportPicture>& pictures,
                                   const std::filesystem::path& results);

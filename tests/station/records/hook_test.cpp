@@ -53,7 +53,7 @@ TEST_F(HookTest, GetsTheRunInItsFolder) {
   EXPECT_EQ(event.what, kHookDone);
   EXPECT_EQ(event.text, "label 7");
   const std::string seen = TemporaryFolder::content_of(folder / "seen.json");
-  EXPECT_EQ(seen, run_json(judged_run()));
+  EXPECT_EQ(seen, hook_json(judged_run()));
   const auto json = nlohmann::json::parse(seen);
   EXPECT_EQ(json["verdict"], "PASS");
   EXPECT_EQ(json["figures"]["rms_px"]["met"], true);

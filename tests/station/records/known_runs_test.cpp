@@ -28,6 +28,7 @@ class KnownRunsTest : public testing::Test {
     config.station = "station-1";
     config.records = (folder / "records.db").string();
     config.spool = folder / "spool";
+    config.results = folder / "results";
   }
   std::string keep(int number, double rms_px = 0.1) const {
     const RunRecord run = sample(run_of(number), "a", rms_px);
@@ -118,14 +119,36 @@ TEST_F(KnownRunsTest, AreVoidedOnceWithWhoAndWhy) {
   EXPECT_THAT(record->events[0].who, testing::StartsWith("Ann ("));
 }
 
+TEST_F(KnownRunsTest, LeaveNoValidCalibrationOfAVoidedPass) {
+  const RunRecord run = sample(run_of(1), "a", 0.1);
+  ASSERT_TRUE(run.passed());
+  Records(config.records).keep(run);
+  const auto results = config.results / "a" / run.run;
+  std::filesystem::create_directories(results);
+  folder.file((results / "calibration.yaml").string(), run.calibration);
+  config.hook = Hook{{"sh", "-c", "cat >told.json"}, folder / ".", 20};
+  KnownRuns known(config);
+  EXPECT_EQ(void_run(known, run.run, "Ann", "wrong serial").files_problem, "");
+  EXPECT_FALSE(std::filesystem::exists(results / "calibration.yaml"));
+  EXPECT_EQ(TemporaryFolder::content_of(results / "voided-calibration.yaml"), run.calibration);
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "told.json"),
+              testing::StartsWith("{\n \"event\": \"voided\",\n"));
+  // Where the files are is known to its station only.
+  const std::string second = keep(2);
+  KnownRuns records(config.records);
+  EXPECT_THAT(void_run(records, second, "Ann", "wrong serial").files_problem,
+              HasSubstr("keep their names: the same command with --station of station-1"));
+}
+
 /// Labels and the factory's system have to hear of it.
 TEST_F(KnownRunsTest, TellTheHookWhatWasVoided) {
   config.hook = Hook{{"sh", "-c", "cat >told.json; echo taken back"}, folder / ".", 20};
   const std::string run = keep(1);
   {
     KnownRuns known(config);
-    const auto [record, problem] = void_run(known, run, "Ann", "wrong serial");
+    const auto [record, problem, files_problem] = void_run(known, run, "Ann", "wrong serial");
     EXPECT_EQ(problem, "");
+    EXPECT_EQ(files_problem, "");
     EXPECT_EQ(record.events.back().what, kHookDone);
     EXPECT_THAT(known.with_open_hook(), IsEmpty());
   }

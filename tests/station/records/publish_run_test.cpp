@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 
+#include <string>
+#include <vector>
+
 #include "support/refused.h"
 #include "support/temporary_folder.h"
 
@@ -57,6 +60,28 @@ TEST(PublishRun, NamesACalibrationByItsVerdict) {
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "failed-calibration.yaml"));
   record.judge({{"lamp 5 is loose", false}});
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "b") / "invalid-calibration.yaml"));
+}
+
+TEST(MarkFilesVoided, LeavesNoFileThatSeemsValid) {
+  const TemporaryFolder folder;
+  RunRecord record = passed();
+  const fs::path results = publish_run(record, {}, folder / "results");
+  folder.file((results / "certificate.html").string(), "certificate");
+  mark_files_voided(record, folder / "results");
+  std::vector<std::string> names;
+  for (const auto& file : fs::directory_iterator(results)) {
+    names.push_back(file.path().filename().string());
+  }
+  EXPECT_THAT(names,
+              testing::UnorderedElementsAre("voided-calibration.yaml", "voided-certificate.html",
+                                            "voided-report.html"));
+  // As after a kill, and before the files are written.
+  mark_files_voided(record, folder / "results");
+  mark_files_voided(record, folder / "none");
+  // A run that is published when it is voided already.
+  record.events.push_back(new_event(kVoided, "wrong serial", "Ann"));
+  EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "voided-calibration.yaml"));
+  EXPECT_FALSE(fs::exists(folder / "a" / record.camera / record.run / "report.html"));
 }
 
 TEST(CheckResults, RefusesAFolderThatCannotBeOne) {
