@@ -73,6 +73,20 @@ std::string unknown_options(const CLI::App& app) {
   return names;
 }
 
+/// Returns an unknown command with those that exist, or asks for one; empty if a command was given.
+std::string command_problem(const CLI::App& app) {
+  const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+  if (commands.empty() || !app.get_subcommands().empty()) return "";
+  std::string names;
+  for (const CLI::App* command : commands) {
+    names.append(names.empty() ? "" : ", ").append(command->get_name());
+  }
+  const std::vector<std::string> words = app.remaining();
+  if (words.empty()) return "a command is missing; the commands are: " + names;
+  if (words.front().starts_with('-')) return "";
+  return "there is no command '" + words.front() + "'; the commands are: " + names;
+}
+
 /// Whether two outputs, which need not exist, are one file; an empty name is none.
 bool same_file(const std::string& one, const std::string& other) {
   const auto of = [](const std::string& file) {
@@ -167,7 +181,9 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
     const auto unknown = unknown_options(app);  // a misspelt option says more than what it lacks
-    if (!unknown.empty()) {
+    if (const auto problem = command_problem(app); !problem.empty()) {
+      spdlog::error("{}; see {} --help", problem, app.get_name());
+    } else if (!unknown.empty()) {
       spdlog::error("unknown: {}; see {} --help", unknown, app.get_name());
     } else {
       spdlog::error("{}; see {} --help", error.what(), app.get_name());

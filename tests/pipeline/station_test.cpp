@@ -397,6 +397,21 @@ INSTANTIATE_TEST_SUITE_P(
                               "boards (0/12): 12 of 12 images refused: 12 too dark"}),
     [](const auto& instance) { return instance.param.name; });
 
+TEST_F(Station, NamesAnUnknownCommand) {
+  for (const char* words : {"diff", "diff --operator Ann", "diff run-1 run-2"}) {
+    const auto refused = run_program(std::string("vlp-station ") + words);
+    EXPECT_EQ(refused.exit_code, 2) << words;
+    EXPECT_THAT(refused.errors,
+                testing::MatchesRegex("vlp-station: error: there is no command 'diff'; the "
+                                      "commands are: run, verify, .*list, show, .*study; see "
+                                      "vlp-station --help\n"))
+        << words;
+  }
+  EXPECT_THAT(run_program("vlp-station").errors,
+              HasSubstr("a command is missing; the commands are: run, verify,"));
+  EXPECT_THAT(run_program("vlp-station --oprator Ann").errors, HasSubstr("unknown: --oprator"));
+}
+
 TEST_F(Station, RefusesWhatItCannotUse) {
   EXPECT_EQ(run_program(batch()).exit_code, 2);  // no folders
   EXPECT_EQ(run_program(run("../up", "--batch " + folder.file("a", "").string())).exit_code, 2);
