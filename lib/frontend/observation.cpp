@@ -103,20 +103,23 @@ std::vector<Frame> kept_frames(std::span<const Observation> images) {
 
 std::string summarize_rejections(std::span<const Observation> images) {
   std::map<std::pair<RejectionReason, std::string>, int> counts;
+  std::map<std::pair<RejectionReason, std::string>, std::string> remedies;
   int rejected = 0;
   for (const Observation& image : images) {
     if (image.is_kept()) continue;
     const auto& [reason, message] = *image.rejection;
-    // Names the camera that an image belongs to.
+    // Names the run that an image belongs to; after the colon stands how it gets free.
     const bool has_owner = reason == RejectionReason::used_elsewhere;
-    ++counts[{reason, has_owner ? message.substr(0, message.find(':')) : name_of(reason).data()}];
+    const auto colon = std::min(message.find(':'), message.size());
+    const std::pair key(reason, has_owner ? message.substr(0, colon) : name_of(reason).data());
+    remedies[key] = has_owner ? message.substr(colon) : remedy_for(reason);
+    ++counts[key];
     ++rejected;
   }
-  std::string text;
-  std::string_view remedy;
+  std::string text, remedy;
   for (const auto& [key, count] : counts) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, key.second);
-    if (2 * count > rejected) remedy = remedy_for(key.first);
+    if (2 * count > rejected) remedy = remedies[key];
   }
   return text.append(remedy);
 }

@@ -243,9 +243,22 @@ TEST_F(Station, TakesNoImagesOfAnotherUnit) {
   EXPECT_EQ(run_program(batch("0001")).exit_code, 3);  // its own, again
   const auto result = run_program(batch("0002"));
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.errors, HasSubstr("4 of 4 images refused: 4 already of camera 0001"));
+  EXPECT_THAT(result.errors,
+              ContainsRegex("4 of 4 images refused: 4 already of camera 0001, run (20[0-9TZ]+-"
+                            "[0-9a-f]{16}): if its serial was wrong, 'vlp-station void 20"));
   EXPECT_THAT(records("show --camera-id 0001").output, HasSubstr("4, 4 used"));
   EXPECT_THAT(records("show --camera-id 0002").output, HasSubstr("4, 0 used"));
+}
+
+/// The way out that is named after images went under a wrong serial.
+TEST_F(Station, FreesTheImagesOfAVoidedRun) {
+  render_four_boards();
+  EXPECT_EQ(run_program(batch("MIX")).exit_code, 3);
+  const std::string errors = run_program(batch("0002")).errors;
+  std::smatch way_out;
+  ASSERT_TRUE(std::regex_search(errors, way_out, std::regex("'vlp-station (void 20[^']+)'")));
+  ASSERT_EQ(records(way_out.str(1) + " --operator Ann --reason 'wrong serial'").exit_code, 0);
+  EXPECT_THAT(run_program(batch("0002")).errors, Not(HasSubstr("already of")));
 }
 
 /// Before the first image is looked at.

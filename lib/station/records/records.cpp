@@ -410,7 +410,7 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
                       ":camera AND " +
                           kNotVoided + " ORDER BY runs.run LIMIT 1",
         soci::into(camera), soci::into(run), soci::use(sha256), soci::use(other_than_camera);
-    return run.empty() ? std::string() : "camera " + camera + ": run " + run;
+    return run.empty() ? std::string() : describe_owner(camera, run);
   });
 }
 

@@ -83,8 +83,8 @@ class Records {
   std::optional<RunRecord> find(const std::string& run);
   /// Throws InputError when no run could be kept now.
   void check_writable();
-  /// "camera 0001: run RUN" of the first run of another camera, not voided, that uses an image of
-  /// this digest; empty when there is none.
+  /// Returns describe_owner() of the first run of another camera, not voided, that uses an image of
+  /// this digest; an empty string if there is none.
   std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
   /// The first judged run of a golden unit that uses an image of this digest; empty when there is
   /// none.

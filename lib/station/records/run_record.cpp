@@ -15,6 +15,7 @@
 #include <limits>
 #include <opencv2/core/utility.hpp>
 #include <random>
+#include <set>
 
 #include "calibration/intrinsics/mrcal_files.h"
 #include "station/database_name.h"
@@ -55,6 +56,26 @@ const RunEvent* voided(const RunRecord& record) {
   const auto event = std::find_if(record.events.begin(), record.events.end(),
                                   [](const RunEvent& each) { return each.what == kVoided; });
   return event == record.events.end() ? nullptr : &*event;
+}
+
+std::string describe_owner(const std::string& camera, const std::string& run) {
+  return fmt::format(
+      "camera {}, run {}: if its serial was wrong, 'vlp-station void {}' frees its images", camera,
+      run, run);
+}
+
+bool repeats_images(const RunRecord& run, const RunRecord& earlier) {
+  if (run.camera != earlier.camera || run.run == earlier.run) return false;
+  std::set<std::string> earlier_digests;
+  for (const RunRecord::Image& image : earlier.images) {
+    if (image.refused.empty()) earlier_digests.insert(image.sha256);
+  }
+  const auto is_new = [&](const RunRecord::Image& image) {
+    return image.refused.empty() && !earlier_digests.contains(image.sha256);
+  };
+  const auto is_used = [](const RunRecord::Image& image) { return image.refused.empty(); };
+  return std::any_of(run.images.begin(), run.images.end(), is_used) &&
+         std::none_of(run.images.begin(), run.images.end(), is_new);
 }
 
 std::string why_no_verdict(const RunRecord& record) {

@@ -71,6 +71,12 @@ struct RunRecord {
   void judge(const std::vector<Cause>& why);
 };
 
+/// Returns whose an image is that a run uses, and how it gets free: "camera 0001, run RUN: ...".
+std::string describe_owner(const std::string& camera, const std::string& run);
+
+/// Returns true if `run` uses images, and `earlier` used all of them; both of one camera.
+bool repeats_images(const RunRecord& run, const RunRecord& earlier);
+
 /// The event that voided a run; null when it was not.
 const RunEvent* voided(const RunRecord& record);
 

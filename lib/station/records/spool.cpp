@@ -371,7 +371,7 @@ std::string Spool::owner_of(const std::string& sha256, const std::string& other_
   for (const auto& [file, spooled] : known_) {
     const RunRecord& run = spooled.run;
     if (run.camera != other_than_camera && uses(run, sha256) && voided(run) == nullptr) {
-      return "camera " + run.camera + ": run " + run.run;
+      return describe_owner(run.camera, run.run);
     }
   }
   std::string owner;

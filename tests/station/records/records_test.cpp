@@ -93,7 +93,7 @@ void check_voided(Records& records) {
   EXPECT_EQ(records.list({})[0].run, run.run);
   EXPECT_EQ(records.list({})[0].voided, "wrong serial");
   EXPECT_EQ(records.list({})[1].voided, "");
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), "camera a: run " + run_of(1));
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), describe_owner("a", run_of(1)));
 }
 
 /// What holds in every database.
@@ -113,8 +113,8 @@ void check_records(const std::string& where) {
   EXPECT_EQ(all[3].station, "station-1");
   EXPECT_THAT(all[3].causes, StartsWith("it's \"blurred\""));
   // Whose an image is: of the first run that uses it, and of no run of the camera itself.
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), "camera a: run " + run_of(0));
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "a"), "camera b: run " + run_of(2));
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), describe_owner("a", run_of(0)));
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "a"), describe_owner("b", run_of(2)));
   EXPECT_EQ(records.owner_of(std::string(64, 'c'), "b"), "") << "it was refused there";
   EXPECT_EQ(refusal_of([&] { records.check_writable(); }), "");
   RunFilter filter;

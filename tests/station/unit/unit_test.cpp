@@ -104,14 +104,18 @@ TEST_F(UnitTest, IsNotJudgedWhenItEndsEarly) {
 }
 
 TEST_F(UnitTest, TakesNoImageOfAnother) {
-  unit.refuse_images_of_others([](const std::string&) { return "camera 0001: run R"; });
+  unit.refuse_images_of_others([](const std::string&) { return describe_owner("0001", "R"); });
   fs::copy_file(kView, folder / "0.png");
   unit.add(StationStep::boards, {folder / "0.png"});
-  EXPECT_EQ(unit.step(StationStep::boards).images.at("0.png").refusal(),
-            "already of camera 0001: run R");
+  EXPECT_EQ(
+      unit.step(StationStep::boards).images.at("0.png").refusal(),
+      "already of camera 0001, run R: if its serial was wrong, 'vlp-station void R' frees its "
+      "images");
   unit.advance(true);
   EXPECT_THAT(find_causes(unit),
-              ElementsAre(Field(&Cause::text, HasSubstr("1 already of camera 0001"))));
+              ElementsAre(Field(&Cause::text,
+                                HasSubstr("1 already of camera 0001, run R: if its serial was "
+                                          "wrong, 'vlp-station void R' frees its images"))));
   EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
 }
 
