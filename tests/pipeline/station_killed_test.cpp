@@ -25,9 +25,13 @@ int number_of(const char* variable, int otherwise) {
 
 class StationKilled : public SmallStation {
  protected:
-  /// Puts so many more images of the unit where they arrive, in the order of the steps.
+  /// Puts `count` more images of the unit where they arrive, in the order of the steps; other images
+  /// once a run has ended.
   void arrive(std::size_t count) const {
-    if (!fs::exists(captures("b"))) prepare("b");
+    if (!fs::exists(captures("b"))) {
+      take_again();
+      prepare("b");
+    }
     for (const char* step : {"boards", "rotation", "dispersion", "check"}) {
       for (const auto& image : images(step)) {
         const auto there = captures("b") / step / image.filename();

@@ -108,6 +108,24 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   EXPECT_THAT(records("verify").errors, HasSubstr("check"));
 }
 
+/// What is measured from the same images counts once, whatever the verdict was.
+TEST_F(Station, CountsTheSameImagesOnce) {
+  render();
+  ASSERT_EQ(run_program(batch()).exit_code, 0);
+  const std::string first = only_results("0001").filename().string();
+  const auto again = run_program(batch());
+  EXPECT_EQ(again.exit_code, 3);
+  EXPECT_THAT(again.errors,
+              HasSubstr("camera 0001 is not judged: all images are those of run " + first +
+                        ", which is no repetition: take new ones, or 'vlp-station void " + first));
+  EXPECT_THAT(records("list").output,
+              HasSubstr("2 runs, 1 passed, 0 failed, 1 invalid: yield 100.0 % of 1"));
+  ASSERT_EQ(records("void " + first + " --operator Ann --reason 'wrong lamps'").exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder / "station/results/0001" / first / "calibration.yaml"));
+  EXPECT_TRUE(fs::exists(folder / "station/results/0001" / first / "voided-calibration.yaml"));
+  EXPECT_EQ(run_program(batch()).exit_code, 0) << "it is the only one that counts";
+}
+
 /// The station feeds images one by one to the steps that vlp-calibrate takes a folder through.
 TEST_F(Station, GivesWhatVlpCalibrateGives) {
   render();

@@ -131,7 +131,12 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   const auto points = judged_values(known->records(), options.figure, comparable(options, *known));
   check_one_station(points, options);
   const auto values = reference_values(points, references);
-  const BiasStudy study = determined([&] { return bias_study(values); });
+  std::vector<std::string> units;
+  for (const auto& [unit, reference] : references) units.push_back(unit);
+  const BiasStudy study = determined([&] {
+    check_repetitions(known->records(), points, study_values(points, units));
+    return bias_study(values);
+  });
   constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}\n";
   say(fmt::format("{}: bias against {} reference units, {}\n\n", options.figure, study.units.size(),
                   std::string_view(kind.unit).empty() ? "a share" : kind.unit));
@@ -401,7 +406,10 @@ void show_study(const StationRecordsOptions& options) {
   if (filter.kind.empty()) filter.kind = "unit";
   const auto points = judged_values(records, options.figure, replace_any(filter));
   const auto values = study_values(points, options.units);
-  const MeasurementStudy study = determined([&] { return measurement_study(values); });
+  const MeasurementStudy study = determined([&] {
+    check_repetitions(records, points, values);
+    return measurement_study(values);
+  });
   const auto gate = gate_of(options.figure, station_of(*known), records, points);
   say(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}\n\n", options.figure,
                   study.units, study.stations, study.repeats, study.mean, kind.unit));

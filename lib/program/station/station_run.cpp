@@ -123,7 +123,8 @@ void add_folders(Unit& unit, const fs::path& folder) {
 
 /// The record of a unit that ends now. A golden unit that failed meanwhile spoils it; one that only
 /// became due does not.
-RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions& options) {
+RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions& options,
+                     Spool& spool) {
   if (unit.distrusted().empty()) {
     unit.distrust(golden_problem(unit.config(), GoldenAt::verdict));
     const std::string due = golden_problem(unit.config());
@@ -134,6 +135,11 @@ RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions
   RunRecord record = make_unit_record(unit, run, kProgram);
   record.operator_name = options.operator_name;
   record.shift = options.shift;
+  if (record.invalid())
+    return record;  // the images of a unit that was not judged may be used again
+  if (const std::string earlier = spool.repeated_run_of(record); !earlier.empty()) {
+    reject_repetition(record, earlier);
+  }
   return record;
 }
 
@@ -144,7 +150,7 @@ RunRecord run_batch(const StationRunOptions& options, const StationConfig& confi
   if (!unit.distrusted().empty()) spdlog::warn("{}; no unit passes", unit.distrusted());
   add_folders(unit, options.batch);
   unit.advance(true);
-  RunRecord record = record_now(unit, run, options);
+  RunRecord record = record_now(unit, run, options, spool);
   Terminal terminal;
   conclude(
       record, unit.pictures(), spool, config, terminal, [] {}, [] {});
@@ -170,7 +176,7 @@ RunRecord run_watched(const StationRunOptions& options, const StationConfig& con
   }
   guide_unit(options, unit, watched, sources, spool, terminal);
   unit.advance(true);
-  RunRecord record = record_now(unit, watched.run(), options);
+  RunRecord record = record_now(unit, watched.run(), options, spool);
   conclude(
       record, unit.pictures(), spool, config, terminal, [&] { watched.mark_kept(); },
       [&] { watched.put_away(); });

@@ -414,6 +414,26 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
   });
 }
 
+std::vector<std::string> Records::judged_runs_with(const std::string& sha256,
+                                                   const std::string& camera) {
+  return database_->run(
+      [&](Watch&) {
+        std::string run;
+        std::vector<std::string> runs;
+        const std::string invalid = name_of(Verdict::invalid);
+        soci::statement judged =
+            (database_->sql.prepare
+                 << "SELECT DISTINCT runs.run FROM images JOIN runs ON runs.run = images.run WHERE "
+                    "images.sha256 = :sha256 AND images.refused = '' AND runs.kind = 'unit' AND "
+                    "runs.camera = :camera AND runs.verdict <> :invalid AND " +
+                        kNotVoided + " ORDER BY runs.run",
+             soci::into(run), soci::use(sha256), soci::use(camera), soci::use(invalid));
+        judged.execute();
+        while (judged.fetch()) runs.push_back(run);
+        return runs;
+      });
+}
+
 std::string Records::golden_run_of(const std::string& sha256) {
   return database_->run([&](Watch&) {
     std::string run;

@@ -86,6 +86,9 @@ class Records {
   /// Returns describe_owner() of the first run of another camera, not voided, that uses an image of
   /// this digest; an empty string if there is none.
   std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
+  /// Returns the judged runs of a unit, not voided, that use an image of this digest, the earliest
+  /// first.
+  std::vector<std::string> judged_runs_with(const std::string& sha256, const std::string& camera);
   /// The first judged run of a golden unit that uses an image of this digest; empty when there is
   /// none.
   std::string golden_run_of(const std::string& sha256);

@@ -380,6 +380,31 @@ std::string Spool::owner_of(const std::string& sha256, const std::string& other_
   return owner;
 }
 
+std::string Spool::repeated_run_of(const RunRecord& run) {
+  const auto first = std::find_if(run.images.begin(), run.images.end(),
+                                  [](const auto& image) { return image.refused.empty(); });
+  if (first == run.images.end()) return "";
+  std::set<std::string> voided_runs;  // which the records may not know yet
+  for (const RunRecord& earlier : waiting()) {
+    if (voided(earlier) != nullptr) {
+      voided_runs.insert(earlier.run);
+    } else if (earlier.kind == "unit" && !earlier.invalid() && repeats_images(run, earlier)) {
+      return earlier.run;
+    }
+  }
+  std::string repeated;
+  if (!may_ask()) return repeated;  // state() has the images that were not looked up
+  ask([&](Records& records) {
+    for (const std::string& name : records.judged_runs_with(first->sha256, run.camera)) {
+      const auto earlier = records.find(name);
+      if (!earlier || voided_runs.contains(name) || !repeats_images(run, *earlier)) continue;
+      repeated = name;
+      return;
+    }
+  });
+  return repeated;
+}
+
 std::string Spool::golden_run_of(const std::string& sha256) {
   read();
   for (const auto& [file, spooled] : known_) {

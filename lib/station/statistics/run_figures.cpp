@@ -89,6 +89,26 @@ std::vector<StudyValue> study_values(const std::vector<TrendPoint>& points,
   return values;
 }
 
+void check_repetitions(Records& records, const std::vector<TrendPoint>& points,
+                       const std::vector<StudyValue>& values) {
+  std::map<std::string, std::vector<RunRecord>> runs_of_unit;
+  for (const StudyValue& value : values) runs_of_unit[value.unit];
+  for (const TrendPoint& point : points) {
+    const auto runs = runs_of_unit.find(point.camera);
+    if (runs == runs_of_unit.end()) continue;
+    auto run = records.find(point.run);
+    if (!run) continue;
+    for (const RunRecord& earlier : runs->second) {
+      if (!repeats_images(*run, earlier) && !repeats_images(earlier, *run)) continue;
+      throw std::invalid_argument(
+          fmt::format("runs {} and {} of camera {} have the same images, which is no repetition: "
+                      "take new images, or void one of the two",
+                      earlier.run, run->run, point.camera));
+    }
+    runs->second.push_back(std::move(*run));
+  }
+}
+
 std::vector<ReferenceValue> reference_values(const std::vector<TrendPoint>& points,
                                              const std::map<std::string, double>& references) {
   std::vector<std::string> units;

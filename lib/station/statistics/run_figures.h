@@ -40,6 +40,10 @@ ToleranceLimits limits_of(const MetricKind& kind, std::optional<double> gate);
 /// Throws std::invalid_argument for units of which there is none.
 std::vector<StudyValue> study_values(const std::vector<TrendPoint>& points,
                                      const std::vector<std::string>& units);
+/// Throws std::invalid_argument, which names them, if two runs of one of the units use the same
+/// images: they show no repeatability. Runs without images are not compared.
+void check_repetitions(Records& records, const std::vector<TrendPoint>& points,
+                       const std::vector<StudyValue>& values);
 /// Those of reference units, with what their figure is known to be. Throws as study_values().
 std::vector<ReferenceValue> reference_values(const std::vector<TrendPoint>& points,
                                              const std::map<std::string, double>& references);

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/unit/unit_record.h"
 
+#include <fmt/core.h>
+
 #include <utility>
 
 #include "captures/digest.h"
@@ -35,6 +37,14 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
     }
   }
   return record;
+}
+
+void reject_repetition(RunRecord& record, const std::string& earlier) {
+  record.verdict = name_of(Verdict::invalid);
+  record.causes = fmt::format(
+      "all images are those of run {}, which is no repetition: take new ones, or 'vlp-station void "
+      "{}' if that run should not count\n{}",
+      earlier, earlier, record.causes);
 }
 
 }  // namespace vlp

@@ -127,6 +127,48 @@ TEST(Spool, KnowsWhichGoldenRunUsedAnImage) {
   EXPECT_TRUE(fs::is_empty(folder / "spool"));
 }
 
+/// What is measured from the same images is no second measurement.
+TEST(Spool, KnowsWhichRunUsedAllImages) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string();
+  Spool spool(folder / "spool", where);
+  spool.prepare();
+  const RunRecord earlier = numbered_run(1);
+  ASSERT_FALSE(earlier.invalid());
+  RunRecord again = earlier;
+  again.run = numbered_run(2).run;
+  for (const std::string state : {"here", "in the records"}) {
+    spool.keep(earlier);
+    if (state != "here") spool.deliver();
+    EXPECT_EQ(spool.repeated_run_of(again), earlier.run) << state;
+    EXPECT_EQ(spool.repeated_run_of(earlier), "") << "itself, " << state;
+    RunRecord fewer = again, other = again, camera = again, none = again;
+    fewer.images.resize(kImagesOfARun / 2);
+    EXPECT_EQ(spool.repeated_run_of(fewer), earlier.run) << state;
+    other.images.back().sha256 = "another";
+    EXPECT_EQ(spool.repeated_run_of(other), "") << "one is new, " << state;
+    other.images.back().refused = "blurred";
+    EXPECT_EQ(spool.repeated_run_of(other), earlier.run) << "and not used, " << state;
+    camera.camera = "another";
+    EXPECT_EQ(spool.repeated_run_of(camera), "") << state;
+    none.images.clear();
+    EXPECT_EQ(spool.repeated_run_of(none), "") << state;
+  }
+  // What did not count may be done again.
+  RunRecord voided_run = earlier;
+  voided_run.events = {new_event(kVoided, "wrong lamps", "Ann")};
+  spool.keep(voided_run);
+  EXPECT_EQ(spool.repeated_run_of(again), "");
+  RunRecord invalid = numbered_run(3), invalid_again = numbered_run(3);
+  invalid.judge({{"no captures.csv"}});
+  invalid_again.run = numbered_run(4).run;
+  spool.keep(invalid);
+  EXPECT_EQ(spool.repeated_run_of(invalid_again), "");
+  spool.deliver();
+  EXPECT_EQ(spool.repeated_run_of(again), "");
+  EXPECT_EQ(spool.repeated_run_of(invalid_again), "");
+}
+
 /// A run that waits, whatever happened to it since, is one run.
 TEST(Spool, KeepsWhatBecameOfARun) {
   const TemporaryFolder folder;

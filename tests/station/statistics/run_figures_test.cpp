@@ -92,5 +92,19 @@ TEST(RunFigure, IsNamedAmongThoseThereAre) {
                   AllOf(HasSubstr("there is no figure rms_um"), HasSubstr("rms_px"))));
 }
 
+/// sample() has the same images in each run.
+TEST_F(RunFigures, OfTheSameImagesAreNoRepetition) {
+  const auto points = judged();
+  const auto values = study_values(points, {});
+  ASSERT_THAT(values, SizeIs(2));
+  EXPECT_THAT(
+      refusal_of<std::invalid_argument>([&] { check_repetitions(records, points, values); }),
+      HasSubstr("runs " + run_of(1) + " and " + run_of(3) +
+                " of camera a have the same images, which is no repetition"));
+  EXPECT_EQ(refusal_of<std::invalid_argument>(
+                [&] { check_repetitions(records, points, study_values(points, {"b"})); }),
+            "");
+}
+
 }  // namespace
 }  // namespace vlp

@@ -119,6 +119,17 @@ TEST_F(UnitTest, TakesNoImageOfAnother) {
   EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
 }
 
+TEST(RejectRepetition, NamesTheEarlierRun) {
+  RunRecord record;
+  record.judge({});
+  ASSERT_TRUE(record.passed());
+  reject_repetition(record, "R1");
+  EXPECT_TRUE(record.invalid());
+  EXPECT_EQ(record.first_cause(),
+            "all images are those of run R1, which is no repetition: take new ones, or "
+            "'vlp-station void R1' if that run should not count");
+}
+
 TEST(VerdictOf, IsDecidedByTheFirstCause) {
   EXPECT_EQ(verdict_of({}), Verdict::pass);
   EXPECT_EQ(verdict_of({{"decentred", true}, {"the operator left"}}), Verdict::fail);
