@@ -2,11 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/unit/station_screen.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <optional>
 #include <span>
 #include <sstream>
+#include <vector>
 
 #include "captures/printable.h"
 #include "station/records/hook.h"
@@ -35,6 +38,42 @@ void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const
 
 std::string outcome_of(const UnitImage& image) {
   return image.is_used() ? "taken" : "refused: " + image.refusal();
+}
+
+/// Returns the step that measures a figure of a unit.
+StationStep measuring_step(const std::string& figure) {
+  const auto kind = metric_kind(figure);
+  if (kind && kind->source == MetricSource::rotation) return StationStep::rotation;
+  if (kind && kind->source == MetricSource::dispersion) return StationStep::dispersion;
+  return figure.starts_with("check_") ? StationStep::check : StationStep::boards;
+}
+
+/// Returns the first step of a unit's run that has no figure; std::nullopt if all have, and for
+/// golden units, whose steps are optional. The blur is known before the boards are solved.
+std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
+  if (record.kind != "unit") return std::nullopt;
+  for (const StationStep step : kStationSteps) {
+    const bool is_measured =
+        std::any_of(record.figures.begin(), record.figures.end(), [&](const CheckedMetric& figure) {
+          return figure.value && figure.name != "blur_px" && measuring_step(figure.name) == step;
+        });
+    if (!is_measured) return step;
+  }
+  return std::nullopt;
+}
+
+/// Returns how many gates have no figure, and why: "20 gates, because boards did not finish"; their
+/// names if all steps finished. Empty if all gates have a figure.
+std::string describe_unmeasured_gates(const RunRecord& record) {
+  std::vector<std::string> names;
+  for (const CheckedMetric& figure : record.figures) {
+    if (figure.limit && !figure.value) names.push_back(figure.name);
+  }
+  if (names.empty()) return "";
+  const auto step = find_unfinished_step(record);
+  if (!step) return fmt::format("{}", fmt::join(names, ", "));
+  return fmt::format("{} {}, because {} did not finish", names.size(),
+                     names.size() == 1 ? "gate" : "gates", name_of(*step));
 }
 
 ScreenLine gate_line(const CheckedMetric& figure) {
@@ -134,16 +173,12 @@ std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
   const Tone tone = passed ? Tone::good : Tone::bad;
   std::vector<ScreenLine> lines{
       {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
-  std::string not_reached;
   for (const CheckedMetric& figure : record.figures) {
-    if (!figure.limit) continue;
-    if (figure.value) {
-      lines.push_back(gate_line(figure));
-    } else {
-      not_reached.append(not_reached.empty() ? "" : ", ").append(figure.name);
-    }
+    if (figure.limit && figure.value) lines.push_back(gate_line(figure));
   }
-  if (!not_reached.empty()) add_wrapped(lines, "Gates", "not reached: " + not_reached, Tone::plain);
+  if (const std::string gates = describe_unmeasured_gates(record); !gates.empty()) {
+    add_wrapped(lines, "Gates", "not measured: " + gates, Tone::plain);
+  }
   std::istringstream causes(record.causes);
   if (!record.causes.empty()) lines.push_back({""});
   for (std::string cause; std::getline(causes, cause);) {

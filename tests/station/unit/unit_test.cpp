@@ -99,8 +99,49 @@ TEST_F(UnitTest, IsNotJudgedWhenItEndsEarly) {
   std::string screen;
   for (const ScreenLine& line : verdict_screen(record)) screen += line.text + "\n";
   EXPECT_THAT(screen,
-              AllOf(HasSubstr("INVALID   camera"), HasSubstr("Gates    not reached: blur_px"),
+              AllOf(HasSubstr("INVALID   camera"),
+                    HasSubstr("Gates    not measured: 21 gates, because boards did not finish\n"),
                     HasSubstr("Cause    boards: the operator ended"), Not(HasSubstr("NOT MET"))));
+}
+
+/// What is missing is named by the step that did not finish, or by its name.
+TEST(VerdictScreen, SaysWhyGatesAreNotMeasured) {
+  const auto gates_line = [](const RunRecord& record) {
+    for (const ScreenLine& line : verdict_screen(record)) {
+      if (line.text.starts_with("Gates")) return line.text;
+    }
+    return std::string();
+  };
+  RunRecord record;
+  record.kind = "unit";
+  record.judge({{"rotation: no image can be used"}});
+  const std::vector<Gate> gates{{"blur_px", 1},
+                                {"rms_px", 1},
+                                {"rotation_px", 1},
+                                {"dispersion_mm", 1},
+                                {"check_mean_mm", 1}};
+  const auto measure = [&](const std::vector<Metric>& metrics) {
+    record.figures = check_gates(gates, metrics);
+  };
+  measure({{"blur_px", 0.5}});
+  EXPECT_EQ(gates_line(record), "Gates    not measured: 4 gates, because boards did not finish");
+  measure({{"blur_px", 0.5}, {"rms_px", 0.1}});
+  EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because rotation did not finish");
+  measure({{"blur_px", 0.5}, {"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}});
+  EXPECT_EQ(gates_line(record), "Gates    not measured: 1 gate, because check did not finish");
+  measure({{"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}, {"check_mean_mm", 1}});
+  EXPECT_EQ(gates_line(record), "Gates    not measured: blur_px");
+  measure({{"blur_px", 0.5},
+           {"rms_px", 0.1},
+           {"rotation_px", 0.1},
+           {"dispersion_mm", 0.1},
+           {"check_mean_mm", 1}});
+  EXPECT_EQ(gates_line(record), "");
+  // The steps of a golden unit are optional.
+  record.kind = "golden";
+  measure({{"check_mean_mm", 1}});
+  EXPECT_EQ(gates_line(record),
+            "Gates    not measured: blur_px, rms_px, rotation_px, dispersion_mm");
 }
 
 TEST_F(UnitTest, TakesNoImageOfAnother) {
