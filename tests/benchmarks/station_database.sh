@@ -47,7 +47,7 @@ seconds=$(awk -v a="$begun" -v b="$EPOCHREALTIME" 'BEGIN { printf "%.1f", b - a 
 
 here=$(vlp-station list --records "$records" | grep -c '^20')
 units=$(vlp-station list --records "$records" | awk '/^20/ { print $6 }' | sort -u | wc -l)
-waited=$(grep -l 'kept here' "$work"/said-* | wc -l || true)
+waited=$(grep -l 'delivered automatically' "$work"/said-* | wc -l || true)
 deadlocks=$(grep -c deadlock "$work/server/log" || true)
 trail=$(vlp-station verify-records --records "$records" 2>&1) || echo "the trail" >>"$work/wrong"
 echo "$stations stations, $runs runs in $seconds s: $here kept, of $units units;" \

@@ -12,6 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
+using testing::AnyOf;
 using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
@@ -321,23 +322,32 @@ TEST_F(Station, KeepsRunsHereWhileTheRecordsAreAway) {
   render_four_boards();
   const auto first = run_program(batch("0001"));
   EXPECT_EQ(first.exit_code, 3);
-  EXPECT_THAT(first.errors, HasSubstr("runs are kept here: "));
+  const auto is_short = Not(AnyOf(HasSubstr("share/records.db"), HasSubstr("kept here")));
+  EXPECT_THAT(
+      first.errors,
+      AllOf(HasSubstr("warning: records are offline; runs are kept, delivered automatically"),
+            is_short));
   EXPECT_THAT(first.output,
-              AllOf(HasSubstr("INVALID   camera 0001"), HasSubstr("Records  kept here, 1 waiting:"),
-                    HasSubstr("share/records.db")));
+              AllOf(HasSubstr("INVALID   camera 0001"),
+                    HasSubstr("Records  records are offline; 1 run kept, delivered automatically"),
+                    is_short));
   // Guards go on with what is kept here.
   const auto second = run_program(batch("0002"));
   EXPECT_THAT(second.errors, HasSubstr("4 of 4 images refused: 4 already of camera 0001"));
-  EXPECT_THAT(second.output, HasSubstr("kept here, 2 waiting"));
+  EXPECT_THAT(second.output, HasSubstr("2 runs kept, delivered automatically"));
   const auto listed = records("list");
   EXPECT_EQ(listed.exit_code, 2) << "these may not be all";
   EXPECT_THAT(listed.output,
               AllOf(HasSubstr("(waits here) boards"), HasSubstr("2 runs, 0 passed")));
-  EXPECT_THAT(listed.errors, HasSubstr("kept here, 2 waiting"));
+  const std::string offline = "records are offline; 2 runs kept, delivered automatically\n";
+  EXPECT_EQ(listed.errors, "vlp-station: error: " + offline);
+  EXPECT_THAT(records("list --verbose").errors,
+              AllOf(HasSubstr("share/records.db"), HasSubstr("kept here, 2 waiting")));
   EXPECT_EQ(records("export -o " + (folder / "runs.csv").string()).exit_code, 2);
   const auto shown = records("show --camera-id 0002");
   EXPECT_EQ(shown.exit_code, 0);
   EXPECT_THAT(shown.output, HasSubstr("INVALID   camera 0002"));
+  EXPECT_EQ(shown.errors, "vlp-station: warning: " + offline);
 
   fs::create_directory(folder / "station/share");
   EXPECT_EQ(records("list").exit_code, 2);

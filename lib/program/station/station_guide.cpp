@@ -73,7 +73,7 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
     changed = changed || !arrivals.empty();
     if (changed && terminal.interactive()) {
       auto lines = station_screen(unit);
-      for (ScreenLine& line : spool_lines(spool.state())) lines.push_back(std::move(line));
+      for (ScreenLine& line : spool_lines(spool.notice())) lines.push_back(std::move(line));
       lines.push_back({"q: verdict now   Ctrl-C: leave, to go on later"});
       terminal.draw(lines);
     }

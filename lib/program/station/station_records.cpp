@@ -36,16 +36,34 @@ constexpr const char* kAny = "any";
 /// To stdout; what records hold of names is not for the terminal to obey.
 void say(const std::string& text) { fmt::print("{}", printable(text)); }
 
-/// Of a station, or of records alone; what the spool has to tell is told.
+/// Opens the runs of a station, or of records alone. Reports the state of the spool, unless the
+/// records are away: then it is for commands that go on without them (warn_if_away()).
 std::unique_ptr<KnownRuns> known_runs(const StationRecordsOptions& options) {
   if (options.station.empty() == options.records.empty()) {
     throw std::invalid_argument("which records? Give --station or --records");
   }
-  if (options.station.empty()) return std::make_unique<KnownRuns>(options.records);
-  auto known = std::make_unique<KnownRuns>(read_station(options.station));
-  const std::string state = known->spool()->state();
-  if (!state.empty()) spdlog::warn("{}", printable(state));
-  return known;
+  try {
+    if (options.station.empty()) return std::make_unique<KnownRuns>(options.records);
+    auto known = std::make_unique<KnownRuns>(read_station(options.station));
+    const std::string state = known->spool()->state();
+    if (state.empty()) return known;
+    if (known->are_away()) {
+      spdlog::debug("{}", printable(state));
+    } else {
+      spdlog::warn("{}", printable(state));
+    }
+    return known;
+  } catch (const RecordsUnavailable& error) {
+    if (error.details != error.what()) spdlog::debug("{}", printable(error.details));
+    throw;
+  }
+}
+
+/// Reports that a command used the runs that wait, because the records are away.
+void warn_if_away(KnownRuns& known) {
+  if (known.spool() != nullptr && known.are_away()) {
+    spdlog::warn("{}", printable(known.spool()->notice()));
+  }
 }
 
 /// Returns the filter with "any" replaced by no condition.
@@ -63,9 +81,12 @@ RunFilter requested_runs(const StationRecordsOptions& options, const KnownRuns& 
   return replace_any(std::move(filter));
 }
 
-/// The run that is named, or the last that the filter lets through.
+/// Returns the run that is named, or the last that the filter lets through.
 RunRecord run_of(KnownRuns& known, const StationRecordsOptions& options) {
-  return options.run.empty() ? known.last(requested_runs(options, known)) : known.find(options.run);
+  RunRecord run =
+      options.run.empty() ? known.last(requested_runs(options, known)) : known.find(options.run);
+  warn_if_away(known);
+  return run;
 }
 
 /// Returns requested_runs(), of units unless --kind is given.
@@ -278,6 +299,7 @@ void void_run(const StationRecordsOptions& options) {
       void_run(*known, options.run, options.operator_name, options.reason);
   if (!problem.empty()) spdlog::error("{}", printable(problem));
   if (!files_problem.empty()) spdlog::warn("{}", printable(files_problem));
+  warn_if_away(*known);
   say(fmt::format("{} {} {}: voided\n", record.run, record.camera, record.verdict));
   for (const ScreenLine& line : hook_lines(record)) say(fmt::format("{}\n", line.text));
 }

@@ -39,6 +39,15 @@ void note(const StationConfig& config, const RunRecord& record) {
   }
 }
 
+/// Returns Spool::notice(); its details go to the log.
+std::string spool_notice(Spool& spool) {
+  std::string notice = spool.notice();
+  if (const std::string state = spool.state(); state != notice) {
+    spdlog::debug("{}", printable(state));
+  }
+  return notice;
+}
+
 /// Keeps the run, says the verdict, writes its files; then the records, which may be away, and the
 /// hook.
 void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spool& spool,
@@ -79,7 +88,7 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
     if (!problem.empty()) spdlog::error("{}", problem);
     terminal.print(hook_lines(record));
   }
-  terminal.print(spool_lines(spool.state()));
+  terminal.print(spool_lines(spool_notice(spool)));
   if (undone.empty()) return;
   throw std::runtime_error(
       fmt::format("{}; the verdict {} is recorded: {}", undone, record.verdict, mend));
@@ -89,7 +98,9 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
 void prepare(Spool& spool, const StationConfig& config, const std::string& camera) {
   check_results(config.results, camera);
   spool.prepare();
-  if (const std::string state = spool.state(); !state.empty()) spdlog::warn("{}", printable(state));
+  if (const auto notice = spool_notice(spool); !notice.empty()) {
+    spdlog::warn("{}", printable(notice));
+  }
 }
 
 void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
@@ -229,7 +240,9 @@ void run_hooks(const StationRunOptions& options) {
         fmt::print("{}\n", printable(fmt::format("{} {} {}: {}", run.run, run.camera, run.verdict,
                                                  outcome)));
       });
-  if (const std::string state = spool.state(); !state.empty()) spdlog::warn("{}", printable(state));
+  if (const auto notice = spool_notice(spool); !notice.empty()) {
+    spdlog::warn("{}", printable(notice));
+  }
   if (hooks.failed > 0) {
     throw std::runtime_error(
         fmt::format("the hook failed for {} of {} runs", hooks.failed, hooks.runs));

@@ -37,12 +37,12 @@ KnownRuns::KnownRuns(StationConfig station) : station_(std::move(station)) {
   spool_->deliver();
   away_ = spool_->away();  // not waited for twice
   if (away_.empty()) open(station_->records);
-  if (!away_.empty() && waiting().empty()) throw std::runtime_error(away_);
+  if (!away_.empty() && waiting().empty()) throw_unavailable();
 }
 
 KnownRuns::KnownRuns(const std::string& records) {
   open(records);
-  if (!away_.empty()) throw std::runtime_error(away_);
+  if (!away_.empty()) throw_unavailable();
 }
 
 void KnownRuns::open(const std::string& where) {
@@ -51,9 +51,17 @@ void KnownRuns::open(const std::string& where) {
       throw InputError(name_of_database(where), "there are no records");
     }
     records_.emplace(where);
+  } catch (const RecordsAway& error) {
+    away_ = error.what();
+    if (spool_) spool_->put_off(error);
   } catch (const InputError& error) {
     away_ = error.what();
   }
+}
+
+void KnownRuns::throw_unavailable() {
+  const bool has_notice = spool_ && !spool_->away().empty();
+  throw RecordsUnavailable(has_notice ? spool_->notice() : away_, away_);
 }
 
 std::vector<RunRecord> KnownRuns::waiting() {
@@ -61,7 +69,7 @@ std::vector<RunRecord> KnownRuns::waiting() {
 }
 
 Records& KnownRuns::records() {
-  if (!records_) throw std::runtime_error(away_);
+  if (!records_) throw_unavailable();
   return *records_;
 }
 

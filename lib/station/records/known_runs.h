@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "station/records/records.h"
@@ -14,21 +16,31 @@
 
 namespace vlp {
 
+/// Records that a command needs are away. what() is for the operator; `details` has the reason.
+class RecordsUnavailable : public std::runtime_error {
+ public:
+  RecordsUnavailable(const std::string& notice, std::string why)
+      : std::runtime_error(notice), details(std::move(why)) {}
+  std::string details;
+};
+
 /// What is known of runs: records, and of a station also what waits for them in its spool, which is
 /// brought there first.
 class KnownRuns {
  public:
-  /// Of a station. Throws std::runtime_error when its records are away and nothing waits.
+  /// Of a station. Throws RecordsUnavailable when its records are away and nothing waits.
   explicit KnownRuns(StationConfig station);
-  /// Of records alone (Records). Throws std::runtime_error when they are away, and for a file that
+  /// Of records alone (Records). Throws RecordsUnavailable when they are away, and for a file that
   /// is not there: no records are made.
   explicit KnownRuns(const std::string& records);
 
   const std::optional<StationConfig>& station() const { return station_; }
   /// Null without a station.
   Spool* spool() { return spool_ ? &*spool_ : nullptr; }
-  /// For what cannot do without them: throws std::runtime_error when they are away.
+  /// For what cannot do without them: throws RecordsUnavailable when they are away.
   Records& records();
+  /// Returns true if the records cannot be asked: what is known are the runs that wait.
+  bool are_away() const { return !records_; }
 
   /// Of the records, if they answer, and of those that wait, whose causes say so; from the first to
   /// the last.
@@ -46,6 +58,7 @@ class KnownRuns {
 
  private:
   void open(const std::string& where);
+  [[noreturn]] void throw_unavailable();
   std::vector<RunRecord> waiting();
 
   std::optional<StationConfig> station_ = {};

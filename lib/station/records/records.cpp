@@ -72,6 +72,13 @@ bool may_pass(const soci::soci_error& error) {
          (server->sqlstate() == lock_not_available || server->sqlstate() == deadlock_detected);
 }
 
+/// Returns true if the server's user may not do what was asked for.
+bool lacks_rights(const soci::soci_error& error) {
+  const auto* server = dynamic_cast<const soci::postgresql_soci_error*>(&error);
+  constexpr const char* insufficient_privilege = "42501";
+  return server != nullptr && server->sqlstate() == insufficient_privilege;
+}
+
 /// Ends a connection on which nothing was heard for so long: libpq waits for the answer of a server
 /// that is frozen for ever, and what limits the server sets itself are frozen with it.
 class Watch {
@@ -143,15 +150,16 @@ struct Records::Database {
   /// Tables are there; from then on a connection that was lost is made again.
   bool ready = false;
 
-  /// Why there is no connection. A server that took its time is not asked whether it is there.
-  RecordsAway not_connected(std::string what, std::chrono::steady_clock::time_point begun) const {
+  /// Throws why there is no connection. A server that took its time is not asked whether it exists.
+  [[noreturn]] void throw_not_connected(std::string what,
+                                        std::chrono::steady_clock::time_point begun) const {
     const std::string soci = "Cannot establish connection to the database. ";
     if (what.starts_with(soci)) what.erase(0, soci.size());
     constexpr std::chrono::seconds soon(2);
     const bool refused = std::chrono::steady_clock::now() - begun < soon && answers(where);
-    return {name, (refused ? "the server of the records answers, but refuses 'records' as it is: "
-                           : "the server of the records cannot be reached: ") +
-                      what};
+    if (!refused) throw RecordsAway(name, "the server of the records cannot be reached: " + what);
+    throw RecordsRefused(
+        name, "the server of the records answers, but refuses 'records' as it is: " + what);
   }
 
   /// Errors name the database.
@@ -163,11 +171,14 @@ struct Records::Database {
     } catch (const InputError&) {
       throw;
     } catch (const soci::soci_error& error) {
-      std::string what = error.what();
+      std::string what = error.get_error_message();  // without the SQL
       std::replace_if(
           what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
       if (name.starts_with("postgresql://") && !sql.is_connected())
-        throw not_connected(what, begun);
+        throw_not_connected(what, begun);
+      if (lacks_rights(error)) {
+        throw RecordsRefused(name, "the user of the records lacks a right: " + what);
+      }
       if (may_pass(error)) throw RecordsAway(name, "the records: " + what);
       throw InputError(name, "the records: " + what);
     } catch (const std::exception& error) {

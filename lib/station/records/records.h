@@ -53,10 +53,16 @@ std::vector<Row> last_of(std::vector<Row> rows, int last) {
   return rows;
 }
 
-/// Records that give no answer, refuse the connection, or are locked: a later try may do.
+/// Records that give no answer, refuse the connection or their user, or are locked: a later try may
+/// do.
 class RecordsAway : public InputError {
  public:
   using InputError::InputError;
+};
+/// Records that answer but refuse access: somebody has to mend `records` or the server.
+class RecordsRefused : public RecordsAway {
+ public:
+  using RecordsAway::RecordsAway;
 };
 
 /// The records of one or more stations in a database: a file of SQLite, or PostgreSQL by a

@@ -119,6 +119,15 @@ bool uses(const RunRecord& run, const std::string& sha256) {
   });
 }
 
+/// Returns what the operator has to know of records that are away; an empty string if only the
+/// error says what to do.
+std::string notice_of(const InputError& error) {
+  if (dynamic_cast<const RecordsRefused*>(&error) != nullptr) {
+    return "records are offline (access refused)";
+  }
+  return dynamic_cast<const RecordsAway*>(&error) != nullptr ? "records are offline" : "";
+}
+
 }  // namespace
 
 std::string text_of_run(const SpooledRun& spooled) {
@@ -190,11 +199,11 @@ std::string Spool::ask(const Action& action) {
     away_.clear();
     return "";
   } catch (const RecordsAway& error) {
-    put_off(error.what());
+    put_off(error);
     return error.what();
   } catch (const InputError& error) {
     if (!records_) {
-      put_off(error.what());
+      put_off(error);
     } else {
       away_.clear();
     }
@@ -204,10 +213,11 @@ std::string Spool::ask(const Action& action) {
 
 bool Spool::may_ask() const { return Clock::now() >= ask_again_; }
 
-void Spool::put_off(const std::string& why) {
+void Spool::put_off(const InputError& error) {
   constexpr std::chrono::minutes a_while(1);
   ask_again_ = Clock::now() + a_while;
-  away_ = why;
+  away_ = error.what();
+  away_notice_ = notice_of(error);
 }
 
 void Spool::prepare() {
@@ -216,7 +226,7 @@ void Spool::prepare() {
   try {
     if (!records_) records_ = std::make_unique<Records>(where_);
   } catch (const RecordsAway& error) {
-    return put_off(error.what());
+    return put_off(error);
   }
   problem_ = ask([](Records& records) { records.check_writable(); });
   if (problem_.empty()) deliver();
@@ -266,26 +276,24 @@ void Spool::deliver() {
   }
 }
 
-std::string Spool::state() {
-  read();
-  const std::string& why = away_.empty() ? problem_ : away_;
-  std::set<std::string> waiting, others;
+std::size_t Spool::count_waiting() const {
+  std::set<std::string> runs;
+  for (const auto& [file, spooled] : known_) {
+    if (spooled.records == name_) runs.insert(spooled.run.run);
+  }
+  return runs.size();
+}
+
+std::string Spool::with_remarks(const std::string& first) const {
+  std::set<std::string> others;
   std::string other_records;
   for (const auto& [file, spooled] : known_) {
-    if (spooled.records == name_) {
-      waiting.insert(spooled.run.run);
-    } else {
-      others.insert(spooled.run.run);
-      other_records = spooled.records;
-    }
+    if (spooled.records == name_) continue;
+    others.insert(spooled.run.run);
+    other_records = spooled.records;
   }
   std::vector<std::string> said;
-  if (!waiting.empty()) {
-    said.push_back(
-        fmt::format("kept here, {} waiting{}{}", waiting.size(), why.empty() ? "" : ": ", why));
-  } else if (!why.empty()) {
-    said.push_back("runs are kept here: " + why);
-  }
+  if (!first.empty()) said.push_back(first);
   if (!others.empty()) {
     said.push_back(
         fmt::format("{} here for other records, such as {}", others.size(), other_records));
@@ -295,6 +303,27 @@ std::string Spool::state() {
     said.push_back(fmt::format("{} images were not looked up in the records", not_asked_));
   }
   return fmt::format("{}", fmt::join(said, "; "));
+}
+
+std::string Spool::state() {
+  read();
+  const std::string& why = away_.empty() ? problem_ : away_;
+  const std::size_t waiting = count_waiting();
+  if (waiting > 0) {
+    return with_remarks(
+        fmt::format("kept here, {} waiting{}{}", waiting, why.empty() ? "" : ": ", why));
+  }
+  return with_remarks(why.empty() ? "" : "runs are kept here: " + why);
+}
+
+std::string Spool::notice() {
+  if (away_.empty() || away_notice_.empty()) return state();
+  read();
+  const std::size_t waiting = count_waiting();
+  const std::string runs = waiting == 0   ? "runs are"
+                           : waiting == 1 ? "1 run"
+                                          : fmt::format("{} runs", waiting);
+  return with_remarks(fmt::format("{}; {} kept, delivered automatically", away_notice_, runs));
 }
 
 std::vector<fs::path> Spool::files() {

@@ -53,6 +53,11 @@ class Spool {
   /// a file that cannot be read; how many digests were looked for here only. Empty when
   /// there is nothing to tell.
   std::string state();
+  /// Returns state() for the operator, in one line: "records are offline; 1 run kept, delivered
+  /// automatically" in place of why they are away.
+  std::string notice();
+  /// Leaves the records alone for a minute, because of `error`.
+  void put_off(const InputError& error);
   const std::filesystem::path& folder() const { return folder_; }
   /// Why the records are away, since they were asked last; empty when they are not.
   const std::string& away() const { return away_; }
@@ -80,7 +85,11 @@ class Spool {
   template <typename Action>
   std::string ask(const Action& action);
   bool may_ask() const;
-  void put_off(const std::string& why);
+  /// Counts the runs that wait for these records.
+  std::size_t count_waiting() const;
+  /// Returns `first`, unless it is empty, and what else there is to say: runs for other records,
+  /// files that cannot be read, images that were not looked up.
+  std::string with_remarks(const std::string& first) const;
 
   std::filesystem::path folder_;
   /// `name_` is what files of runs for these records say.
@@ -89,6 +98,8 @@ class Spool {
   /// Why the records are away; why they did not take a run; a file that read() could not read, or
   /// that is no run.
   std::string away_, problem_, unread_;
+  /// `away_` for the operator; empty if only `away_` says what to do.
+  std::string away_notice_;
   std::chrono::steady_clock::time_point ask_again_;
   /// What read() has found, for these records and for others.
   std::map<std::filesystem::path, SpooledRun> known_;

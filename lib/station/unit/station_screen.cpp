@@ -153,9 +153,9 @@ std::string last_image_line(const Unit& unit, StationStep step, const std::strin
   return fmt::format("{} {}: {} ({})", name_of(step), image, outcome, count_of(unit, step));
 }
 
-std::vector<ScreenLine> spool_lines(const std::string& state) {
+std::vector<ScreenLine> spool_lines(const std::string& notice) {
   std::vector<ScreenLine> lines;
-  if (!state.empty()) add_wrapped(lines, "Records", printable(state), Tone::bad);
+  if (!notice.empty()) add_wrapped(lines, "Records", printable(notice), Tone::bad);
   return lines;
 }
 

@@ -29,8 +29,8 @@ std::string last_image_line(const Unit& unit, StationStep step, const std::strin
 /// hook_problem() with what to do; nothing when that is nothing.
 std::vector<ScreenLine> hook_lines(const RunRecord& record);
 
-/// What Spool::state() says of the records; nothing when that is nothing.
-std::vector<ScreenLine> spool_lines(const std::string& state);
+/// Returns Spool::notice() as lines; no line if it is empty.
+std::vector<ScreenLine> spool_lines(const std::string& notice);
 
 /// The gates with figure and limit, the causes, the root first, and PASS, FAIL or INVALID, large.
 std::vector<ScreenLine> verdict_screen(const RunRecord& record);

@@ -166,6 +166,39 @@ TEST(Spool, TellsARefusalFromAServerThatIsAway) {
               AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("cannot be reached")));
 }
 
+/// Whoever reads the screen of a station need not know SQL.
+TEST(Spool, NamesNoSqlToTheOperator) {
+  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
+  const TemporaryFolder folder;
+  const PostgresServer server("right");
+  ASSERT_NE(server.uri(), "");
+  { const Records made(server.uri()); }
+  const std::string set_up =
+      "psql -X -q '" + server.uri() + "' -c \"CREATE ROLE guest LOGIN PASSWORD 'guest'\"";
+  ASSERT_EQ(std::system(set_up.c_str()), 0);
+  const auto spool_of = [&](const std::string& user, const std::string& name) {
+    return Spool(folder / name,
+                 "postgresql://" + user + "@" + server.address() + "/postgres?connect_timeout=2");
+  };
+  // Its user has no right to the tables.
+  Spool guest = spool_of("guest:guest", "guest");
+  guest.prepare();
+  EXPECT_EQ(guest.notice(),
+            "records are offline (access refused); runs are kept, delivered automatically");
+  guest.keep(numbered_run(1));
+  guest.deliver();
+  EXPECT_EQ(guest.notice(),
+            "records are offline (access refused); 1 run kept, delivered automatically");
+  EXPECT_THAT(guest.state(), AllOf(HasSubstr("permission denied"), Not(HasSubstr("SELECT")),
+                                   Not(HasSubstr("UPDATE")), Not(HasSubstr("while"))));
+  server.stop();
+  Spool offline = spool_of("vlp:right", "offline");
+  offline.prepare();
+  for (int run = 1; run <= 2; ++run) offline.keep(numbered_run(run));
+  EXPECT_EQ(offline.notice(), "records are offline; 2 runs kept, delivered automatically");
+  EXPECT_THAT(offline.state(), HasSubstr("cannot be reached"));
+}
+
 /// A server that takes nothing but TLS, with a certificate of its own.
 TEST(Spool, GoesToAServerThroughTls) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
