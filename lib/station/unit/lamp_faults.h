@@ -23,10 +23,19 @@ std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMa
 /// Describes the lamps of the map that no capture contains, one line each. Requires three captures.
 std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampMap& map);
 
-/// Captures that were taken elsewhere than their table says: fixes of three lamps or more that are
-/// off by more than 5 mm and 8 times what the others are off by. One line for people each; nothing
-/// for more than one that is more than a tenth of them, for then it is not the places.
+/// Describes captures that were taken elsewhere than their table says, or by another camera, in one
+/// line: fixes of three lamps or more whose horizontal errors are gross outliers of the others,
+/// more than 5 mm and 8 times the median. Returns no line if there are none, and for fewer than
+/// five fixes. Outliers are fewer than half, because the median is typical of the others.
 std::vector<std::string> place_faults(std::span<const Frame> frames, const LampMap& map,
                                       const Calibration& calibration, const CapturesTable& places);
+
+/// Describes captures at known points that another camera took, or the same one moved on its mount:
+/// their errors share an offset that rotates with the camera, of more than 5 mm, without which they
+/// are a third or less. Such an offset is part of the calibration. Returns an empty string if there
+/// is none, for fewer than five fixes, and if the camera did not rotate between the captures: then
+/// the points may be off as well.
+std::string camera_fault(std::span<const Frame> frames, const LampMap& map,
+                         const Calibration& calibration, const CapturesTable& places);
 
 }  // namespace vlp

@@ -181,7 +181,7 @@ std::vector<Cause> find_missing_figures(const Unit& unit,
 }
 
 /// Returns faults of the lamps and of the lens that saw them, by the captures of all steps; without
-/// these, faults of the known points, by the captures of the check.
+/// these, faults of the known points or of the camera there, by the captures of the check.
 std::vector<std::string> find_station_faults(const Unit& unit) {
   const auto known = unit.calibration();
   if (!known) return {};
@@ -198,7 +198,13 @@ std::vector<std::string> find_station_faults(const Unit& unit) {
   }
   const UnitStep& check = unit.step(StationStep::check);
   if (!is_solved(check)) return {};
-  return place_faults(frames_of(check), unit.config().lamps, *known, captures_in(check.folder));
+  const auto check_frames = frames_of(check);
+  const auto places = captures_in(check.folder);
+  faults = place_faults(check_frames, unit.config().lamps, *known, places);
+  if (!faults.empty()) return faults;
+  std::string fault = camera_fault(check_frames, unit.config().lamps, *known, places);
+  if (!fault.empty()) faults.push_back(std::move(fault));
+  return faults;
 }
 
 }  // namespace

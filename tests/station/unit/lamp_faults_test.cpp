@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <span>
 
 #include "positioning/positioner.h"
@@ -122,10 +123,46 @@ TEST_F(PlaceFaults, NameTheOnePointThatIsElsewhere) {
   }
 }
 
-/// Then it is not the points.
-TEST_F(PlaceFaults, NameNoneWhereManyAreElsewhere) {
-  for (std::size_t i = 0; i < frames.size(); i += 4) places[frames[i].image].y_m = 0.5;
-  EXPECT_THAT(place_faults(frames, map, calibration, places), IsEmpty());
+TEST_F(PlaceFaults, NameSeveralThatAreElsewhere) {
+  ASSERT_GT(frames.size(), 12U);
+  CapturesTable wrong = places;
+  for (std::size_t i = 0; i < 5; ++i) wrong.at(frames[i].image).y_m.value() += 0.052;
+  wrong.at(frames[9].image).x_m.value() += 0.03;
+  EXPECT_THAT(place_faults(frames, map, calibration, wrong),
+              ElementsAre("captures " + frames[0].image + " to " + frames[4].image + ", " +
+                          frames[9].image +
+                          " are off by up to 52.0 mm, the others by 0.3 mm: taken elsewhere than "
+                          "their table says, or by another camera"));
+}
+
+/// Half of them say nothing of the others.
+TEST_F(PlaceFaults, NameNoneWhereMostAreElsewhere) {
+  CapturesTable wrong = places;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (i % 4 != 0) wrong.at(frames[i].image).y_m.value() += 0.02;
+  }
+  EXPECT_THAT(place_faults(frames, map, calibration, wrong), IsEmpty());
+}
+
+/// A zenith of another camera moves all fixes by one offset in the frame of the camera.
+TEST_F(PlaceFaults, NameAnotherCameraThatTookAll) {
+  EXPECT_EQ(camera_fault(frames, map, calibration, places), "");
+  const Positioner positioner(map, calibration);
+  CapturesTable rotating = places, constant = places, scattered = places;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Fix fix = positioner.locate(frames[i].detections);
+    if (!fix.ok()) continue;
+    const double yaw_rad = fix.estimate.pose.yaw_rad;
+    rotating.at(frames[i].image).x_m.value() += 0.03 * std::cos(yaw_rad);
+    rotating.at(frames[i].image).y_m.value() += 0.03 * std::sin(yaw_rad);
+    constant.at(frames[i].image).x_m.value() += 0.03;
+    scattered.at(frames[i].image).x_m.value() += i % 2 == 0 ? 0.03 : -0.03;
+  }
+  EXPECT_THAT(camera_fault(frames, map, calibration, rotating),
+              testing::AllOf(HasSubstr("are off by 30.0 mm in one direction of the camera"),
+                             HasSubstr(frames.front().image + " to ")));
+  EXPECT_EQ(camera_fault(frames, map, calibration, constant), "") << "the points are off";
+  EXPECT_EQ(camera_fault(frames, map, calibration, scattered), "");
 }
 
 }  // namespace
