@@ -397,6 +397,59 @@ TEST_F(Station, NamesLampsThatAnotherCameraTook) {
                     "boards: they show a focal length of 508[.].* px and the centre [(]407"));
 }
 
+/// Images of another unit among those of the boards.
+TEST_F(Station, NamesBoardImagesOfAnotherUnit) {
+  render("boards");
+  fs::rename(folder / "unit", folder / "first");
+  change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
+  change("scene.yaml", "seed: 1", "seed: 2");
+  render("boards");
+  for (const char* image : {"0003.png", "0008.png"}) {
+    fs::copy_file(folder / "unit/boards" / image, folder / "first/boards" / image,
+                  fs::copy_options::overwrite_existing);
+  }
+  fs::remove_all(folder / "unit");
+  fs::rename(folder / "first", folder / "unit");
+  const auto result = run_program(batch());
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.errors, HasSubstr("camera 0001 is not judged: boards: 2 board images do not "
+                                       "fit the other 14: 0003.png, 0008.png"));
+  // The shared step warns.
+  fs::copy_file(folder / "station/board.yaml", folder / "unit/board.yaml",
+                fs::copy_options::overwrite_existing);
+  EXPECT_THAT(
+      run_program("vlp-intrinsics " + (folder / "unit/boards").string() + " --board " +
+                  (folder / "station/board.yaml").string() + " -o " + (folder / "c.yaml").string())
+          .errors,
+      HasSubstr("warning: 2 board images do not fit the other 14: 0003.png, 0008.png"));
+}
+
+/// Images of another unit among those of the check, or all of them.
+TEST_F(Station, NamesCheckImagesOfAnotherUnit) {
+  render();
+  fs::rename(folder / "unit", folder / "first");
+  change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[516, 516.5, 399.1, 301.0");
+  render("check");
+  for (const char* image : {"0000.png", "0001.png", "0002.png"}) {
+    fs::copy_file(folder / "unit/check" / image, folder / "first/check" / image,
+                  fs::copy_options::overwrite_existing);
+  }
+  fs::rename(folder / "unit/check", folder / "check");
+  fs::remove_all(folder / "unit");
+  fs::rename(folder / "first", folder / "unit");
+  const auto some = run_program(batch());
+  EXPECT_EQ(some.exit_code, 3);
+  EXPECT_THAT(some.errors,
+              ContainsRegex("camera 0001 is not judged: captures 0000.png to 0002.png are off by "
+                            "up to [0-9.]+ mm, the others by 0[.]0[0-9]+ mm"));
+  fs::remove_all(folder / "unit/check");
+  fs::rename(folder / "check", folder / "unit/check");
+  const auto all = run_program(batch());
+  EXPECT_EQ(all.exit_code, 3);
+  EXPECT_THAT(all.errors, ContainsRegex("is not judged: the 8 captures 0000.png to 0007.png are "
+                                        "off by [0-9.]+ mm in one direction of the camera"));
+}
+
 struct LensFault {
   const char* name;
   std::string from, to, cause;

@@ -12,6 +12,7 @@
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/common_curve.h"
+#include "calibration/intrinsics/inconsistent_views.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/spline_fit.h"
@@ -219,6 +220,13 @@ void warn_of_dropped_views(LensEstimate& result) {
   }
 }
 
+void warn_of_inconsistent_views(LensEstimate& result) {
+  const InconsistentViews found = find_inconsistent_views(result.solution);
+  if (found.views.empty()) return;
+  result.inconsistent_views = describe(found, result.images);
+  result.warnings.push_back(result.inconsistent_views);
+}
+
 /// Selects the lens model of the views. Returns false if there are too few.
 bool choose_model(SplitViews& views, LensEstimate& result) {
   result.choice = choose_lens(views.solved);
@@ -324,6 +332,7 @@ LensEstimate estimate_lens(LensViews input) {
     fail(result, LensStatus::wrong_board, exact.problem);
     return result;
   }
+  warn_of_inconsistent_views(result);
   warn_of_edge_shift(result.solution, result);
   add_uncertainty(views, fisheye, input.choose_lens_model, result);
   return result;

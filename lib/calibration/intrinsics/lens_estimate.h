@@ -59,6 +59,9 @@ struct LensEstimate {
   std::vector<BoardView> views = {};
   /// Images of the views in the solve, in the order of IntrinsicsSolution.
   std::vector<std::string> images = {};
+  /// Describes views that do not fit the lens of the others (find_inconsistent_views()); empty if
+  /// all fit. Also one of the warnings.
+  std::string inconsistent_views = {};
   std::vector<std::string> warnings = {}, details = {};
 
   bool ok() const { return status == LensStatus::ok; }

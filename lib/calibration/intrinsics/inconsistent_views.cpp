@@ -1,0 +1,92 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/inconsistent_views.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "geometry/median.h"
+
+namespace vlp {
+namespace {
+
+/// Of the typical view's median residual.
+constexpr double kMinResidualRatio = 3;
+constexpr double kMinOutlierFraction = 0.1;
+/// Names of images in a message.
+constexpr std::size_t kMaxNames = 12;
+
+/// Fit of the corners of a view.
+struct ViewFit {
+  double median_px;
+  double outlier_fraction;
+};
+
+ViewFit measure_fit(const BoardProblem& problem, const std::vector<Eigen::Vector2d>& residuals,
+                    std::size_t begin, std::size_t end) {
+  std::vector<double> sizes_px;
+  std::size_t outliers = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    const double weight = problem.points[i].z();
+    if (weight == BoardProblem::kUnseen || !residuals[i].allFinite()) continue;
+    sizes_px.push_back(residuals[i].norm());
+    if (weight < 0) ++outliers;
+  }
+  if (sizes_px.empty()) return {0, 0};
+  return {upper_median(sizes_px),
+          static_cast<double>(outliers) / static_cast<double>(sizes_px.size())};
+}
+
+}  // namespace
+
+InconsistentViews find_inconsistent_views(const IntrinsicsSolution& solution) {
+  const BoardProblem& problem = solution.problem;
+  const auto residuals = residuals_of(problem);
+  const std::size_t points_of_view = problem.points.size() / solution.views.size();
+  std::vector<ViewFit> fits;
+  std::vector<double> medians_px;
+  for (std::size_t i = 0; i < solution.views.size(); ++i) {
+    fits.push_back(measure_fit(problem, residuals, i * points_of_view, (i + 1) * points_of_view));
+    medians_px.push_back(fits.back().median_px);
+  }
+  InconsistentViews found;
+  found.typical_px = upper_median(medians_px);
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    if (fits[i].median_px < kMinResidualRatio * found.typical_px) continue;
+    if (fits[i].outlier_fraction < kMinOutlierFraction) continue;
+    found.views.push_back(solution.views[i]);
+    found.worst_px = std::max(found.worst_px, fits[i].median_px);
+  }
+  for (const auto& dropped : solution.dropped) {
+    found.views.push_back(dropped.view);
+    found.worst_px = std::numeric_limits<double>::infinity();
+  }
+  std::sort(found.views.begin(), found.views.end());
+  const std::size_t all = solution.views.size() + solution.dropped.size();
+  found.others = all - found.views.size();
+  if (found.views.size() >= found.others) return {};
+  return found;
+}
+
+std::string describe(const InconsistentViews& found, const std::vector<std::string>& images) {
+  std::string names;
+  for (std::size_t i = 0; i < std::min(found.views.size(), kMaxNames); ++i) {
+    names.append(names.empty() ? "" : ", ").append(images[found.views[i]]);
+  }
+  if (found.views.size() > kMaxNames) {
+    names += fmt::format(" and {} more", found.views.size() - kMaxNames);
+  }
+  const std::string residuals = std::isfinite(found.worst_px)
+                                    ? fmt::format(" (residuals up to {:.2f} px, the others {:.2f})",
+                                                  found.worst_px, found.typical_px)
+                                    : "";
+  const bool is_one = found.views.size() == 1;
+  return fmt::format("{} board image{} not fit the other {}: {}{}; {} taken by another camera?",
+                     found.views.size(), is_one ? " does" : "s do", found.others, names, residuals,
+                     is_one ? "was it" : "were they");
+}
+
+}  // namespace vlp
