@@ -136,7 +136,7 @@ void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
   CLI::App* voided = add_where(
       app, "void",
       "A run counts no more: in no yield, trend or study; it stays in the records, with who voided "
-      "it and why, and is done again",
+      "it and why, its files are renamed, and it is done again",
       options);
   voided->add_option("run", options.run, "Name of the run")->required();
   voided->add_option("--operator", options.operator_name, "Who")->required();

@@ -18,6 +18,7 @@
 #include "frontend/lamp_intake.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
+#include "session/check_outliers.h"
 #include "session/dispersion_step.h"
 #include "session/evaluate_step.h"
 #include "session/lens_step.h"
@@ -543,6 +544,13 @@ class SessionRun {
       throw InputError(fixes, "no line can be fitted to its fixes: they have no direction");
     }
     if (!found.ok()) return {found};
+    std::vector<CheckError> errors;
+    for (const FixError& error : errors_of(*input, input->fixes).errors) {
+      errors.push_back({input->fixes.rows[error.fix].image, error.horizontal_m.norm()});
+    }
+    if (std::string outliers = describe_check_outliers(errors); !outliers.empty()) {
+      found.warnings.push_back(std::move(outliers));
+    }
     std::vector<CheckedMetric> all = result_.gates;
     all.insert(all.end(), found.gates.begin(), found.gates.end());
     return {found, [=, this] {

@@ -442,6 +442,12 @@ TEST_F(Station, NamesCheckImagesOfAnotherUnit) {
   EXPECT_THAT(some.errors,
               ContainsRegex("camera 0001 is not judged: captures 0000.png to 0002.png are off by "
                             "up to [0-9.]+ mm, the others by 0[.]0[0-9]+ mm"));
+  // The shared step warns.
+  EXPECT_THAT(
+      run_program("vlp-calibrate " + (folder / "unit").string() + " -o " +
+                  (folder / "results").string() + " --no-report --row-time-s 3e-5 --readout rows")
+          .errors,
+      HasSubstr("captures 0000.png to 0002.png are off by up to "));
   fs::remove_all(folder / "unit/check");
   fs::rename(folder / "check", folder / "unit/check");
   const auto all = run_program(batch());

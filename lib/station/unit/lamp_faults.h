@@ -23,12 +23,11 @@ std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMa
 /// Describes the lamps of the map that no capture contains, one line each. Requires three captures.
 std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampMap& map);
 
-/// Describes captures that were taken elsewhere than their table says, or by another camera, in one
-/// line: fixes of three lamps or more whose horizontal errors are gross outliers of the others,
-/// more than 5 mm and 8 times the median. Returns no line if there are none, and for fewer than
-/// five fixes. Outliers are fewer than half, because the median is typical of the others.
-std::vector<std::string> place_faults(std::span<const Frame> frames, const LampMap& map,
-                                      const Calibration& calibration, const CapturesTable& places);
+/// Describes captures that were taken elsewhere than their table says, or by another camera
+/// (describe_check_outliers()), by fixes of three lamps or more. Returns an empty string if there
+/// are none.
+std::string place_fault(std::span<const Frame> frames, const LampMap& map,
+                        const Calibration& calibration, const CapturesTable& places);
 
 /// Describes captures at known points that another camera took, or the same one moved on its mount:
 /// their errors share an offset that rotates with the camera, of more than 5 mm, without which they

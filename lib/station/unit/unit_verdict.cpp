@@ -200,9 +200,10 @@ std::vector<std::string> find_station_faults(const Unit& unit) {
   if (!is_solved(check)) return {};
   const auto check_frames = frames_of(check);
   const auto places = captures_in(check.folder);
-  faults = place_faults(check_frames, unit.config().lamps, *known, places);
-  if (!faults.empty()) return faults;
-  std::string fault = camera_fault(check_frames, unit.config().lamps, *known, places);
+  std::string fault = place_fault(check_frames, unit.config().lamps, *known, places);
+  if (fault.empty()) {
+    fault = camera_fault(check_frames, unit.config().lamps, *known, places);
+  }
   if (!fault.empty()) faults.push_back(std::move(fault));
   return faults;
 }

@@ -72,7 +72,7 @@ class Verification {
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = captures_in(step.folder);
     if (each == StationStep::check) {
-      places_ = place_faults(frames, config_.lamps, golden_.calibration, places);
+      place_fault_ = place_fault(frames, config_.lamps, golden_.calibration, places);
     }
     add(name_of(each), each == StationStep::check
                            ? check_fixes(config_, golden_.calibration, frames, places)
@@ -95,11 +95,9 @@ class Verification {
       std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
     }
     std::vector<Cause> first;
-    first.reserve(faults.size() + places_.size());
+    first.reserve(faults.size() + 1);
     for (const std::string& fault : faults) first.push_back({fault, true});
-    if (first.empty()) {
-      for (const std::string& fault : places_) first.push_back({fault, false});
-    }
+    if (first.empty() && !place_fault_.empty()) first.push_back({place_fault_, false});
     causes_.insert(causes_.begin(), first.begin(), first.end());
     RunRecord record = new_record("golden", config_, golden_.camera_id, run, program);
     record.figures = figures;
@@ -143,8 +141,8 @@ class Verification {
   std::vector<Metric> values_ = {};
   std::vector<StepPicture> drawn_ = {};
   std::vector<Cause> causes_ = {};
-  /// Captures of the check that were taken elsewhere.
-  std::vector<std::string> places_ = {};
+  /// Describes captures of the check that were taken elsewhere.
+  std::string place_fault_ = {};
   std::vector<RunRecord::Image> images_ = {};
 };
 

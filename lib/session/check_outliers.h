@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace vlp {
+
+/// Smaller horizontal errors at known points are no fault of the captures: a camera may have them.
+inline constexpr double kMinOutlierError_m = 0.005;
+
+/// Horizontal error of a fix at a known point.
+struct CheckError {
+  std::string image;
+  double horizontal_m;
+};
+
+/// Describes captures that were taken elsewhere than their table says, or by another camera, in one
+/// line: their errors are gross outliers of the others, more than 5 mm and 8 times the median.
+/// Returns an empty string if there are none, and for fewer than five errors. Outliers are fewer
+/// than half, because the median is typical of the others.
+std::string describe_check_outliers(const std::vector<CheckError>& errors);
+
+}  // namespace vlp

@@ -1,0 +1,43 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/check_outliers.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace vlp {
+namespace {
+
+/// 36 captures with errors of 0.05 mm, those of `indices` with 52 mm.
+std::vector<CheckError> errors_with(const std::vector<std::size_t>& indices) {
+  std::vector<CheckError> errors;
+  for (int i = 0; i < 36; ++i) errors.push_back({std::to_string(100 + i), 5e-5});
+  for (const std::size_t index : indices) errors[index].horizontal_m = 0.052;
+  return errors;
+}
+
+TEST(DescribeCheckOutliers, NamesRunsOfCaptures) {
+  EXPECT_EQ(describe_check_outliers(errors_with({0, 1, 2, 3, 4})),
+            "captures 100 to 104 are off by up to 52.0 mm, the others by 0.05 mm: taken elsewhere "
+            "than their table says, or by another camera");
+  EXPECT_EQ(describe_check_outliers(errors_with({7})),
+            "107 was not taken where its table says: it is 52.0 mm off, others 0.05 mm");
+  const std::string many = describe_check_outliers(errors_with({0, 2, 3, 5, 7, 9, 11, 12, 13}));
+  EXPECT_EQ(many.substr(0, many.find(" are")),
+            "captures 100, 102, 103, 105, 107, 109 and 1 more groups");
+}
+
+TEST(DescribeCheckOutliers, IsEmptyWithoutGrossOutliers) {
+  EXPECT_EQ(describe_check_outliers(errors_with({})), "");
+  auto errors = errors_with({});
+  errors[3].horizontal_m = 0.004;
+  EXPECT_EQ(describe_check_outliers(errors), "") << "a camera may have it";
+  for (CheckError& error : errors) error.horizontal_m = 0.05;
+  EXPECT_EQ(describe_check_outliers(errors), "") << "all of them";
+  EXPECT_EQ(describe_check_outliers({{"a", 1e-5}, {"b", 1}, {"c", 1e-5}}), "") << "too few";
+}
+
+}  // namespace
+}  // namespace vlp
