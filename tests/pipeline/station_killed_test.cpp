@@ -25,8 +25,8 @@ int number_of(const char* variable, int otherwise) {
 
 class StationKilled : public SmallStation {
  protected:
-  /// Puts `count` more images of the unit where they arrive, in the order of the steps; other images
-  /// once a run has ended.
+  /// Puts `count` more images of the unit where they arrive, in the order of the steps; other
+  /// images once a run has ended.
   void arrive(std::size_t count) const {
     if (!fs::exists(captures("b"))) {
       take_again();
