@@ -240,13 +240,15 @@ TEST(PositionerLocate, RefusesOneMovingLampWithoutRowTime) {
 
 TEST(FixOneLamp, IsExactForRotatingRobot) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.15, -0.1, 0.1}, 0.9}, {}}, {}};
-  rig.map.lamps.resize(1);
   rig.mount = CameraMount{{0.3, -0.2, 0.5}, 0.7};
   rig.body.motion = {{0.5, 0.2}, 1.5, {0, 0}};
   Sensors sensors;
   sensors.height_and_yaw = HeightAndYaw{0.6, 0.9 + 0.7};
   sensors.motion = KnownMotion{{0.5, 0.2}, 1.5, 0, 0};
-  const Fix fix = rig.positioner().locate(seen_from(rig, 0.1), sensors);
+  std::vector<Detection> seen = seen_from(rig, 0.1);
+  ASSERT_FALSE(seen.empty());
+  seen.resize(1);
+  const Fix fix = rig.positioner().locate(seen, sensors);
   ASSERT_TRUE(fix.ok());
   EXPECT_LT((fix.estimate.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
 }

@@ -182,12 +182,8 @@ TEST_F(CInterface, LocatesTogetherWithEarlierFrames) {
   for (const Detection& one : before) {
     given_before.push_back({one.lamp, one.pixel.x(), one.pixel.y(), *one.sigma_px});
   }
-  rig.body.motion = {};
-  seen = seen_from(rig, 0.1);
+  seen = before;
   given = given_before;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    given[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(), 0.1};
-  }
   sensors.inclination_sigma_rad = same.inclination_sigma_rad = 0.2;
   const EarlierFrame frame{before, 0.05};
   const vlp_earlier_frame given_frame{given_before.data(), given_before.size(), 0.05};
