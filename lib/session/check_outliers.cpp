@@ -45,25 +45,30 @@ std::string describe_check_outliers(const std::vector<CheckError>& errors) {
   std::vector<double> sizes_m;
   sizes_m.reserve(errors.size());
   for (const CheckError& error : errors) sizes_m.push_back(error.horizontal_m);
-  const double typical_m = upper_median(sizes_m);
-  const double limit_m = std::max(kMinOutlierError_m, kMinRatio * typical_m);
+  const double limit_m = std::max(kMinOutlierError_m, kMinRatio * upper_median(sizes_m));
   std::vector<std::size_t> outliers;
+  std::vector<double> others_m;
   double max_m = 0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (sizes_m[i] < limit_m) continue;
+    const double size_m = errors[i].horizontal_m;
+    if (size_m < limit_m) {
+      others_m.push_back(size_m);
+      continue;
+    }
     outliers.push_back(i);
-    max_m = std::max(max_m, sizes_m[i]);
+    max_m = std::max(max_m, size_m);
   }
   if (outliers.empty()) return "";
+  const double others_median_m = upper_median(others_m);
   if (outliers.size() == 1) {
     return fmt::format(
         "{} was not taken where its table says: it is {:.1f} mm off, others {:.2g} mm",
-        errors[outliers.front()].image, kMillimetres * max_m, kMillimetres * typical_m);
+        errors[outliers.front()].image, kMillimetres * max_m, kMillimetres * others_median_m);
   }
   return fmt::format(
       "captures {} are off by up to {:.1f} mm, the others by {:.2g} mm: taken "
       "elsewhere than their table says, or by another camera",
-      join_images(errors, outliers), kMillimetres * max_m, kMillimetres * typical_m);
+      join_images(errors, outliers), kMillimetres * max_m, kMillimetres * others_median_m);
 }
 
 }  // namespace vlp

@@ -546,7 +546,10 @@ class SessionRun {
     if (!found.ok()) return {found};
     std::vector<CheckError> errors;
     for (const FixError& error : errors_of(*input, input->fixes).errors) {
-      errors.push_back({input->fixes.rows[error.fix].image, error.horizontal_m.norm()});
+      const FixRow& row = input->fixes.rows[error.fix];
+      constexpr int min_lamps = 3;  // fixes of two lamps may be far off at the edge of a room
+      if (row.lamps < min_lamps) continue;
+      errors.push_back({row.image, error.horizontal_m.norm()});
     }
     if (std::string outliers = describe_check_outliers(errors); !outliers.empty()) {
       found.warnings.push_back(std::move(outliers));

@@ -60,9 +60,12 @@ InconsistentViews find_inconsistent_views(const IntrinsicsSolution& solution) {
     found.views.push_back(solution.views[i]);
     found.worst_px = std::max(found.worst_px, fits[i].median_px);
   }
-  for (const auto& dropped : solution.dropped) {
-    found.views.push_back(dropped.view);
-    found.worst_px = std::numeric_limits<double>::infinity();
+  // A single view without a pose may be shaken or misdetected, and is not in the lens.
+  if (solution.dropped.size() + found.views.size() > 1) {
+    for (const auto& dropped : solution.dropped) {
+      found.views.push_back(dropped.view);
+      found.worst_px = std::numeric_limits<double>::infinity();
+    }
   }
   std::sort(found.views.begin(), found.views.end());
   const std::size_t all = solution.views.size() + solution.dropped.size();

@@ -22,9 +22,10 @@ struct InconsistentViews {
 };
 
 /// Finds views that do not fit the lens of the other views: those that fit no pose
-/// (IntrinsicsSolution::dropped), and those with a median residual of three times the typical
-/// view's or more, of which at least 10 % of the corners are outliers of the solve. Returns no view
-/// if they are half of all or more: then it is unknown which views are of one camera.
+/// (IntrinsicsSolution::dropped), unless it is a single one, and those with a median residual of
+/// three times the typical view's or more, of which at least 10 % of the corners are outliers of
+/// the solve. Returns no view if they are half of all or more: then it is unknown which views are
+/// of one camera.
 ///
 /// Reason for both conditions: a view of a bent board or of a shaken camera has large residuals
 /// without outliers of the solve, and single tags that are misdetected are outliers of a view whose
