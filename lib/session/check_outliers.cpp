@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kMinErrors = 5;
 /// Of the median error.
 constexpr double kMinRatio = 8;
-constexpr double kMillimetres = 1e3;
+constexpr double kMmPerM = 1e3;
 
 /// Returns names of images with runs of neighbours joined: "0000.png to 0004.png, 0010.png".
 std::string join_images(const std::vector<CheckError>& errors,
@@ -63,12 +63,12 @@ std::string describe_check_outliers(const std::vector<CheckError>& errors) {
   if (outliers.size() == 1) {
     return fmt::format(
         "{} was not taken where its table says: it is {:.1f} mm off, others {:.2g} mm",
-        errors[outliers.front()].image, kMillimetres * max_m, kMillimetres * others_median_m);
+        errors[outliers.front()].image, kMmPerM * max_m, kMmPerM * others_median_m);
   }
   return fmt::format(
       "captures {} are off by up to {:.1f} mm, the others by {:.2g} mm: taken "
       "elsewhere than their table says, or by another camera",
-      join_images(errors, outliers), kMillimetres * max_m, kMillimetres * others_median_m);
+      join_images(errors, outliers), kMmPerM * max_m, kMmPerM * others_median_m);
 }
 
 }  // namespace vlp

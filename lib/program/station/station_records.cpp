@@ -153,6 +153,7 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   check_one_station(points, options);
   const auto values = reference_values(points, references);
   std::vector<std::string> units;
+  units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   const BiasStudy study = determined([&] {
     check_repetitions(known->records(), points, study_values(points, units));
