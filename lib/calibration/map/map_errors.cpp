@@ -376,7 +376,7 @@ std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap
   // The mirror image of a square is one with two corners swapped.
   const bool is_mirrored = others.back().size_m() <= 2 * others.front().size_m();
   const std::size_t best = is_mirrored ? others.size() - 1 : 0;
-  if (!others[best].found) return std::nullopt;
+  if (!explains_captures(others[best])) return std::nullopt;
   const DisplacementTest test(*others[best].found, map);
   const double added_m2 = test.added_variance_m2({});
   const auto count = static_cast<double>(map.lamps.size());
