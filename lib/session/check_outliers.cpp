@@ -14,7 +14,7 @@ namespace {
 
 /// Fewer errors do not show what is typical of them.
 constexpr std::size_t kMinErrors = 5;
-/// Of the median error.
+/// Ratio to the median error.
 constexpr double kMinRatio = 8;
 constexpr double kMmPerM = 1e3;
 

@@ -13,10 +13,11 @@
 namespace vlp {
 namespace {
 
-/// Of the typical view's median residual.
+/// Ratio to the median residual of the typical view.
 constexpr double kMinResidualRatio = 3;
+/// Fraction of the corners of a view.
 constexpr double kMinOutlierFraction = 0.1;
-/// Names of images in a message.
+/// Number of images named in a message.
 constexpr std::size_t kMaxNames = 12;
 
 /// Fit of the corners of a view.

@@ -28,10 +28,11 @@ class RecordsUnavailable : public std::runtime_error {
 /// brought there first.
 class KnownRuns {
  public:
-  /// Of a station. Throws RecordsUnavailable when its records are away and nothing waits.
+  /// Reads the runs of a station. Throws RecordsUnavailable if its records are away and nothing
+  /// waits.
   explicit KnownRuns(StationConfig station);
-  /// Of records alone (Records). Throws RecordsUnavailable when they are away, and for a file that
-  /// is not there: no records are made.
+  /// Reads the runs of records alone (Records). Throws RecordsUnavailable if they are away, and for
+  /// a file that is not there: no records are made.
   explicit KnownRuns(const std::string& records);
 
   const std::optional<StationConfig>& station() const { return station_; }
@@ -84,7 +85,7 @@ struct Voided {
   RunRecord run;
   /// Why it is not recorded what became of the hook; empty when it is.
   std::string problem = {};
-  /// Why the files of the run keep their names; empty if they do not.
+  /// Reason for which the files of the run keep their names; empty if they do not.
   std::string files_problem = {};
 };
 /// Voids a run: it counts no more, in no yield, trend or study, which its events tell, with who and

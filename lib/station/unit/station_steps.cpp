@@ -122,7 +122,7 @@ StepResult solve_boards(const StationConfig& config, const std::string& camera_i
   result.skipped.clear();  // the station reports images itself
   if (result.failure == StepFailure::wrong_board) return named("wrong board", std::move(result));
   if (result.ok()) compare(config.type, result);
-  // Of two cameras the lens is none; the operator knows which images are wrong.
+  // A lens from images of two cameras is that of neither; the operator removes the wrong images.
   if (result.ok() && !result.lens.inconsistent_views.empty()) {
     result.fail(StepFailure::undetermined, result.lens.inconsistent_views);
   }
