@@ -94,7 +94,7 @@ void run(const CLI::App& app, Options options) {
   require(found);
   if (!options.plot.empty()) draw(options.plot, found.drawing());
   write_calibration(options.images.output, found.calibration);
-  print_dispersion(found.fit, places.captures.size());
+  print_dispersion(found.fit, input.calibration.camera.focal_px(), places.captures.size());
 }
 
 }  // namespace

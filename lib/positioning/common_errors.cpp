@@ -12,6 +12,7 @@
 #include "geometry/plane.h"
 #include "geometry/symmetric.h"
 #include "rig/calibration_error.h"
+#include "rig/find_lamp.h"
 
 namespace vlp {
 namespace {
@@ -70,6 +71,12 @@ double unlikely_chi_squared(double freedom) {
   return freedom * root * root * root;
 }
 
+/// Returns true if the lamp of a map has this place, to 1 um.
+bool is_at(const Lamp& lamp, const Eigen::Vector3d& position_m) {
+  constexpr double tolerance_m = 1e-6;
+  return (position_m - lamp.position_m).norm() < tolerance_m;
+}
+
 }  // namespace
 
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
@@ -83,39 +90,53 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
                        (correction == Correction::dispersion || correction == Correction::all);
   if (turned) add_turns(turns_, calibration, correction, with_zenith_error);
   if (shifted) add_turns(turns_, calibration, correction, with_offset_error);
-  const Eigen::Index first_lamp = shared(), zenith = intrinsics_;
   offset_ = intrinsics_ + (turned ? 2 : 0);
-  covariance_ =
-      Eigen::MatrixXd::Zero(first_lamp + 3 * std::ssize(lamps), first_lamp + 3 * std::ssize(lamps));
+  const Eigen::Index size = shared() + 3 * std::ssize(lamps);
+  covariance_ = Eigen::MatrixXd::Zero(size, size);
+  state_lens_and_zenith(calibration);
+  state_lamps(lamps, calibration.adjustment);
+  if (turned || shifted) propagate_to_zenith_and_offset(lamps, calibration);
+  stated_ = calibration.adjustment || covariance_.diagonal().maxCoeff() > 0;
+}
+
+void CommonErrors::state_lens_and_zenith(const Calibration& calibration) {
+  const auto& center = calibration.rotation_center;
+  const auto& dispersion = calibration.dispersion;
   const auto& adjustment = calibration.adjustment;
   const auto& report = calibration.intrinsics_report;
-  // What was calibrated with a lens leans against it: without how it does, the lens' errors would
-  // count twice.
-  const bool lens_counts_once = turned    ? calibration.rotation_center->by_intrinsics.has_value()
-                                : shifted ? calibration.dispersion->by_intrinsics.has_value()
-                                          : true;
+  // A part that was calibrated with the lens compensates its errors in part: without by_intrinsics
+  // these would count twice.
+  const bool lens_counts_once = has_zenith()   ? center->by_intrinsics.has_value()
+                                : has_offset() ? dispersion->by_intrinsics.has_value()
+                                               : true;
   const bool lens = report && report->covariance && lens_counts_once;
-  const bool zenith_stated =
-      adjustment || (turned && calibration.rotation_center->covariance.has_value());
+  const bool zenith_stated = adjustment || (has_zenith() && center->covariance);
   complete_ = adjustment || (lens && zenith_stated);
   part_stated_ = {adjustment || lens, zenith_stated,
-                  !shifted || calibration.dispersion->covariance.has_value(), true};
-  // Of each row, where it stands in the adjustment's covariance.
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> adjusted;
-  if (adjustment) {
-    for (Eigen::Index i = 0; i < intrinsics_; ++i) adjusted.emplace_back(i, i);
-    for (Eigen::Index i = 0; turned && i < 2; ++i) adjusted.emplace_back(zenith + i, zenith + i);
-  } else if (lens) {
+                  !has_offset() || dispersion->covariance.has_value(), true};
+  if (lens && !adjustment) {
     covariance_.topLeftCorner(intrinsics_, intrinsics_) = *report->covariance;
   }
+  if (has_zenith() && !adjustment) {
+    covariance_.block<2, 2>(intrinsics_, intrinsics_) =
+        normalized(center->covariance, calibration.camera.focal_px());
+  }
+}
+
+void CommonErrors::state_lamps(std::span<const Lamp> lamps,
+                               const std::optional<Adjustment>& adjustment) {
+  // Pairs of a row here and the same row of the adjustment's covariance.
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> adjusted;
+  if (adjustment) {
+    for (Eigen::Index i = 0; i < offset_; ++i) adjusted.emplace_back(i, i);
+  }
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    const Eigen::Index row = first_lamp + 3 * static_cast<Eigen::Index>(i);
+    const Eigen::Index row = row_of_lamp(i);
     if (adjustment) {
       const auto& places = adjustment->lamps;
       const auto place = std::find_if(places.begin(), places.end(),
                                       [&](const auto& one) { return one.id == lamps[i].id; });
-      constexpr double same_m = 1e-6;
-      if (place != places.end() && (place->position_m - lamps[i].position_m).norm() < same_m) {
+      if (place != places.end() && is_at(lamps[i], place->position_m)) {
         const Eigen::Index from = intrinsics_ + 4 + 3 * (place - places.begin());
         for (Eigen::Index k = 0; k < 3; ++k) adjusted.emplace_back(row + k, from + k);
         continue;
@@ -134,38 +155,51 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
       covariance_(row, col) = adjustment->covariance(from_row, from_col);
     }
   }
-  // From errors that are independent (lens, own of the zenith, own of the offset) to those there
-  // are.
-  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
-  Eigen::MatrixXd passed_on = Eigen::MatrixXd::Identity(first_lamp, first_lamp);
-  if (turned && !adjustment) {
-    const RotationCenter& center = *calibration.rotation_center;
-    covariance_.block<2, 2>(zenith, zenith) = normalized(center.covariance, focal_px);
-    if (center.by_intrinsics) {
-      passed_on.block(zenith, 0, 2, intrinsics_) = *center.by_intrinsics;
-    }
+}
+
+void CommonErrors::propagate_to_zenith_and_offset(std::span<const Lamp> lamps,
+                                                  const Calibration& calibration) {
+  const Eigen::Index rows = shared() - intrinsics_;
+  // Derivatives of zenith and offset by independent errors: lens, own of the zenith, own of the
+  // offset, lamps.
+  Eigen::MatrixXd derivatives = Eigen::MatrixXd::Zero(rows, covariance_.cols());
+  derivatives.middleCols(intrinsics_, rows).setIdentity();
+  if (has_zenith() && !calibration.adjustment && calibration.rotation_center->by_intrinsics) {
+    derivatives.topLeftCorner(2, intrinsics_) = *calibration.rotation_center->by_intrinsics;
   }
-  if (shifted) {
+  if (has_offset()) {
     const Dispersion& dispersion = *calibration.dispersion;
-    covariance_.block<2, 2>(offset_, offset_) = normalized(dispersion.covariance, focal_px);
-    if (dispersion.by_intrinsics) {
-      passed_on.block(offset_, 0, 2, intrinsics_) = *dispersion.by_intrinsics;
+    covariance_.block<2, 2>(offset_, offset_) =
+        normalized(dispersion.covariance, calibration.camera.focal_px());
+    auto of_offset = derivatives.bottomRows<2>();
+    if (dispersion.by_intrinsics) of_offset.leftCols(intrinsics_) = *dispersion.by_intrinsics;
+    for (const Dispersion::UncertainLamp& uncertain : dispersion.by_lamps) {
+      if (const auto row = find_stated_row(lamps, uncertain)) {
+        of_offset.middleCols<3>(*row) = uncertain.by_position;
+      } else {
+        const Eigen::Matrix<double, 2, 3> move = uncertain.sd_m * uncertain.by_position;
+        covariance_.block<2, 2>(offset_, offset_) += move * move.transpose();
+      }
     }
-    if (turned) {
-      // The offset takes up what the zenith lacks.
+    if (has_zenith()) {
+      // The offset compensates the error of the zenith.
       const Eigen::Matrix2d by_zenith = dispersion.by_zenith
                                             ? Eigen::Matrix2d(*dispersion.by_zenith)
                                             : Eigen::Matrix2d(-Eigen::Matrix2d::Identity());
-      passed_on.middleRows<2>(offset_) +=
-          by_zenith * Eigen::MatrixXd(passed_on.middleRows<2>(zenith));
+      of_offset += by_zenith * Eigen::MatrixXd(derivatives.topRows<2>());
     }
   }
-  if (turned || shifted) {
-    covariance_.topRows(first_lamp) = passed_on * covariance_.topRows(first_lamp).eval();
-    covariance_.leftCols(first_lamp) =
-        covariance_.leftCols(first_lamp).eval() * passed_on.transpose();
-  }
-  stated_ = adjustment.has_value() || covariance_.diagonal().maxCoeff() > 0;
+  covariance_.middleRows(intrinsics_, rows) = derivatives * covariance_;
+  covariance_.middleCols(intrinsics_, rows) = covariance_ * derivatives.transpose();
+}
+
+std::optional<Eigen::Index> CommonErrors::find_stated_row(
+    std::span<const Lamp> lamps, const Dispersion::UncertainLamp& uncertain) const {
+  const Lamp* lamp = find_lamp(lamps, uncertain.id);
+  if (lamp == nullptr || !is_at(*lamp, uncertain.position_m)) return std::nullopt;
+  const Eigen::Index row = row_of_lamp(static_cast<std::size_t>(lamp - lamps.data()));
+  const bool is_stated = lamp->sd_m || covariance_.block<3, 3>(row, row).trace() > 0;
+  return is_stated ? std::optional(row) : std::nullopt;
 }
 
 CommonErrors CommonErrors::only(CommonPart part) const {

@@ -36,11 +36,13 @@ inline constexpr std::array kCommonParts{CommonPart::lens, CommonPart::zenith, C
 class CommonErrors {
  public:
   /// C from the adjustment; without one from the steps in a row: with e_lens from the boards
-  ///   e_zenith = own + by_intrinsics e_lens,   e_offset = own + by_intrinsics e_lens + by_zenith
-  ///   e_zenith (by_zenith is -1 where it is not stated; the lens counts where the first of these
-  /// that is applied states by_intrinsics, and where none is applied),
+  ///   e_zenith = own + by_intrinsics e_lens,
+  ///   e_offset = own + by_intrinsics e_lens + by_zenith e_zenith + by_lamps e_lamps
+  /// (by_zenith is -1 where it is not stated; the lens counts where the first of these that is
+  /// applied states by_intrinsics, and where none is applied),
   /// and of the lamps the survey's sd_m. `lamps` are the map's, in the order in which indices name
-  /// them. The lamps of an adjustment are those of the map where they have the same place, to 1 um.
+  /// them. Lamps of an adjustment or a dispersion are those of the map if they have the same id and
+  /// place, to 1 um. The errors of other lamps of a dispersion are independent of the map.
   CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
 
   /// Whether anything at all is known of them.
@@ -53,7 +55,8 @@ class CommonErrors {
   /// One part of C, with the others taken as exact. The parts add up to C, and none makes a
   /// variance negative: each is what would go away were it known exactly, when those before it, in
   /// the order of kCommonParts, already are (block Cholesky). For steps in a row that is what each
-  /// has of its own, and the lens' part is with all that the steps after it make of its errors.
+  /// has of its own, and the lens' part is with all that the steps after it make of its errors. The
+  /// lamps' part is without what an offset that was found with the same map compensates.
   CommonErrors only(CommonPart part) const;
   /// Lamps of the adjustment that the map has elsewhere: what they have in common with the
   /// calibration is lost.
@@ -130,6 +133,22 @@ class CommonErrors {
   Eigen::Index shared() const { return intrinsics_ + std::ssize(turns_); }
 
  private:
+  bool has_zenith() const { return offset_ > intrinsics_; }
+  bool has_offset() const { return shared() > offset_; }
+  Eigen::Index row_of_lamp(std::size_t lamp) const {
+    return shared() + 3 * static_cast<Eigen::Index>(lamp);
+  }
+  /// Sets which parts are stated, and the covariances of lens and zenith without an adjustment.
+  void state_lens_and_zenith(const Calibration& calibration);
+  /// Sets the covariances of the lamps, and all that an adjustment states.
+  void state_lamps(std::span<const Lamp> lamps, const std::optional<Adjustment>& adjustment);
+  /// Adds the effects of earlier steps to zenith and offset. @pre one of them is applied
+  void propagate_to_zenith_and_offset(std::span<const Lamp> lamps, const Calibration& calibration);
+  /// Returns the first row of a lamp of the dispersion if the map has it at the same place and
+  /// states its error.
+  std::optional<Eigen::Index> find_stated_row(std::span<const Lamp> lamps,
+                                              const Dispersion::UncertainLamp& uncertain) const;
+
   /// How many intrinsics, and where the offset stands.
   Eigen::Index intrinsics_, offset_ = 0;
   Eigen::Matrix3d base_from_camera_, camera_from_base_;

@@ -7,6 +7,7 @@
 #include "captures/number_text.h"
 #include "geometry/angles.h"
 #include "report/html.h"
+#include "rig/calibration_error.h"
 
 namespace vlp {
 namespace {
@@ -93,7 +94,7 @@ std::string rotation_table(const RotationCenter& center) {
   return html_table(table);
 }
 
-std::string dispersion_table(const Dispersion& dispersion) {
+std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d& focal_px) {
   const auto mm = [](double value_m) { return significant(1e3 * value_m, 3); };
   return html_table(
       {"",
@@ -103,7 +104,8 @@ std::string dispersion_table(const Dispersion& dispersion) {
         {"its centre from the station",
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset taken off the image",
-         pair(dispersion.offset_px, "px") + deviations(dispersion.covariance, 1, "px")}}});
+         pair(dispersion.offset_px, "px") +
+             deviations(offset_covariance_with_map(dispersion, focal_px), 1, "px")}}});
 }
 
 std::string history_list(const std::vector<HistoryEntry>& entries) {

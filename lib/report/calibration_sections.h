@@ -13,7 +13,7 @@ namespace vlp {
 std::string camera_table(const Camera& camera);
 std::string intrinsics_table(const IntrinsicsReport& report);
 std::string rotation_table(const RotationCenter& center);
-std::string dispersion_table(const Dispersion& dispersion);
+std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d& focal_px);
 
 /// Program, version and options of each part, and the digests of its inputs, to be folded away.
 std::string history_list(const std::vector<HistoryEntry>& entries);

@@ -125,7 +125,8 @@ std::string report_html(const Report& report) {
     camera = camera_table(calibration->camera);
     if (calibration->intrinsics_report) camera += intrinsics_table(*calibration->intrinsics_report);
     if (calibration->rotation_center) rotation = rotation_table(*calibration->rotation_center);
-    if (calibration->dispersion) dispersion = dispersion_table(*calibration->dispersion);
+    if (calibration->dispersion)
+      dispersion = dispersion_table(*calibration->dispersion, calibration->camera.focal_px());
   }
   const auto pictures = [&](ReportPart part) { return pictures_of(report, part); };
   return html_page(

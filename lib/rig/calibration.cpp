@@ -140,6 +140,16 @@ RotationCenter read_rotation_center(YamlMap map, std::size_t intrinsics) {
   return center;
 }
 
+Dispersion::UncertainLamp read_uncertain_lamp(YamlMap map) {
+  Dispersion::UncertainLamp lamp;
+  lamp.id = map.required("id").integer_within(0, kLarge);
+  lamp.position_m = Eigen::Vector3d(map.required("position_m").numbers(3).data());
+  lamp.sd_m = map.required("sd_m").number_within(0, kInfinity, "m");
+  lamp.by_position = read_matrix(map.required("by_position"), 2, 3);
+  map.finish();
+  return lamp;
+}
+
 Dispersion read_dispersion(YamlMap map, std::size_t intrinsics) {
   Dispersion dispersion;
   dispersion.offset_px = Eigen::Vector2d(map.required("offset_px").numbers(2).data());
@@ -154,6 +164,13 @@ Dispersion read_dispersion(YamlMap map, std::size_t intrinsics) {
   }
   if (const auto value = map.optional("by_zenith")) {
     dispersion.by_zenith = read_matrix(*value, 2, 2);
+  }
+  if (const auto value = map.optional("by_lamps")) {
+    const auto items = value->list();
+    dispersion.by_lamps.reserve(items.size());
+    for (const YamlValue& item : items) {
+      dispersion.by_lamps.push_back(read_uncertain_lamp(item.map()));
+    }
   }
   map.finish();
   return dispersion;

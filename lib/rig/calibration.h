@@ -94,12 +94,23 @@ struct Dispersion {
   double radius_m;
   Eigen::Vector2d center_m;
   int captures;
-  /// Of offset_px, in px^2.
+  /// Covariance of offset_px from the captures alone, in px^2, with lens, zenith and lamp map taken
+  /// as exact.
   std::optional<Matrix2> covariance = {};
-  /// What an error of the intrinsics, and one of the zenith's normalized point, does to
-  /// offset_px / f, a column each: `covariance` takes both as exact.
+  /// Derivatives of offset_px / f by the intrinsics and by the zenith's normalized point.
   std::optional<MatrixX> by_intrinsics = {};
   std::optional<Matrix2> by_zenith = {};
+  /// A lamp whose surveyed place the offset depends on.
+  struct UncertainLamp {
+    int id;
+    /// Place and standard deviation per axis in the map of the calibration.
+    Eigen::Vector3d position_m;
+    double sd_m;
+    /// Derivative of offset_px / f by the place, per metre.
+    Eigen::Matrix<double, 2, 3, Eigen::DontAlign> by_position;
+  };
+  /// Lamps of the map with an sd_m above zero that the captures show.
+  std::vector<UncertainLamp> by_lamps = {};
 };
 
 /// What one adjustment of many captures (vlp-adjust) says of all that it estimated together.

@@ -55,4 +55,16 @@ Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& er
   return calibration;
 }
 
+std::optional<Matrix2> offset_covariance_with_map(const Dispersion& dispersion,
+                                                  const Eigen::Vector2d& focal_px) {
+  if (!dispersion.covariance) return std::nullopt;
+  Eigen::Matrix2d covariance = *dispersion.covariance;
+  for (const Dispersion::UncertainLamp& lamp : dispersion.by_lamps) {
+    const Eigen::Matrix<double, 2, 3> move_px =
+        lamp.sd_m * (focal_px.asDiagonal() * lamp.by_position);
+    covariance += move_px * move_px.transpose();
+  }
+  return Matrix2(covariance);
+}
+
 }  // namespace vlp

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "calibration.h"
 
@@ -28,5 +29,10 @@ Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& er
 
 /// With an error added to offset_px / f. Precondition: there is a dispersion.
 Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& error);
+
+/// Computes the covariance of offset_px from captures and lamp map, in px^2, with lens and zenith
+/// taken as exact. Returns std::nullopt without Dispersion::covariance.
+std::optional<Matrix2> offset_covariance_with_map(const Dispersion& dispersion,
+                                                  const Eigen::Vector2d& focal_px);
 
 }  // namespace vlp

@@ -97,6 +97,19 @@ void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
   out << YAML::EndMap;
 }
 
+void emit_uncertain_lamps(YAML::Emitter& out, const std::vector<Dispersion::UncertainLamp>& lamps) {
+  out << YAML::Key << "by_lamps" << YAML::Value << YAML::BeginSeq;
+  for (const auto& [id, position_m, sd_m, by_position] : lamps) {
+    out << YAML::Flow << YAML::BeginMap;
+    emit_integer(out, "id", id);
+    emit_numbers(out, "position_m", position_m);
+    emit_number(out, "sd_m", sd_m);
+    emit_matrix(out, "by_position", by_position);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
+}
+
 void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
   begin_part(out, "dispersion");
   emit_numbers(out, "offset_px", dispersion.offset_px);
@@ -106,6 +119,7 @@ void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
   if (dispersion.covariance) emit_covariance(out, "covariance", *dispersion.covariance);
   if (dispersion.by_intrinsics) emit_matrix(out, "by_intrinsics", *dispersion.by_intrinsics);
   if (dispersion.by_zenith) emit_covariance(out, "by_zenith", *dispersion.by_zenith);
+  if (!dispersion.by_lamps.empty()) emit_uncertain_lamps(out, dispersion.by_lamps);
   out << YAML::EndMap;
 }
 

@@ -30,6 +30,7 @@
 #include "calibration/levelling/drive.h"
 #include "geometry/angles.h"
 #include "geometry/frames.h"
+#include "rig/calibration_error.h"
 #include "session/adjust_step.h"
 #include "session/dispersion_step.h"
 #include "session/locate_step.h"
@@ -312,9 +313,9 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
   const DispersionFit truth = fit_dispersion(exact, room.true_map(), believed, method);
   if (!trial.has_result || truth.status != DispersionStatus::ok) return trial;
   const Dispersion& found = result.fit.dispersion;
-  if (!found.covariance) return trial;
-  trial.errors.push_back(
-      normalize(found.offset_px - truth.dispersion.offset_px, *found.covariance));
+  const auto covariance_px2 = offset_covariance_with_map(found, believed.camera.focal_px());
+  if (!covariance_px2) return trial;
+  trial.errors.push_back(normalize(found.offset_px - truth.dispersion.offset_px, *covariance_px2));
   return trial;
 }
 

@@ -56,6 +56,8 @@ TEST(Calibration, KeepsCovariancesAndAnAdjustment) {
   calibration.intrinsics_report->covariance = covariance.topLeftCorner(8, 8);
   calibration.rotation_center->by_intrinsics = root.topLeftCorner(2, 8);
   calibration.dispersion->by_zenith = Matrix2{{-1, 0.1}, {0, -1}};
+  calibration.dispersion->by_lamps = {{3, {1, 2, 3}, 0.002, root.topLeftCorner(2, 3)},
+                                      {7, {-1, 0, 3}, 0.001, root.topRightCorner(2, 3)}};
   calibration.adjustment = Adjustment{
       {{3, {1, 2, 3}}, {7, {-1, 0, 3}}}, covariance, {"rotation", "survey"}, 12, 70, 0.05};
   expect_kept(calibration);

@@ -79,6 +79,13 @@ void expect_same(const Dispersion& found, const Dispersion& expected) {
   EXPECT_EQ(found.covariance, expected.covariance);
   EXPECT_EQ(found.by_intrinsics, expected.by_intrinsics);
   EXPECT_EQ(found.by_zenith, expected.by_zenith);
+  ASSERT_EQ(found.by_lamps.size(), expected.by_lamps.size());
+  for (std::size_t i = 0; i < found.by_lamps.size(); ++i) {
+    EXPECT_EQ(found.by_lamps[i].id, expected.by_lamps[i].id);
+    EXPECT_EQ(found.by_lamps[i].position_m, expected.by_lamps[i].position_m);
+    EXPECT_EQ(found.by_lamps[i].sd_m, expected.by_lamps[i].sd_m);
+    EXPECT_EQ(found.by_lamps[i].by_position, expected.by_lamps[i].by_position);
+  }
 }
 
 void expect_same(const Adjustment& found, const Adjustment& expected) {

@@ -39,6 +39,21 @@ bool all_stated(std::span<const StationCapture> captures) {
   });
 }
 
+/// Converts derivatives of offset_px, the first two rows, to those of offset_px / f.
+std::vector<Dispersion::UncertainLamp> make_uncertain_lamps(const LampDerivatives& derivatives,
+                                                            const Eigen::Vector2d& focal_px) {
+  std::vector<Dispersion::UncertainLamp> lamps;
+  lamps.reserve(derivatives.lamps.size());
+  for (std::size_t i = 0; i < derivatives.lamps.size(); ++i) {
+    const Lamp& lamp = derivatives.lamps[i];
+    const auto by_position_px =
+        derivatives.by_positions.block<2, 3>(0, 3 * static_cast<Eigen::Index>(i));
+    lamps.push_back({lamp.id, lamp.position_m, *lamp.sd_m,
+                     focal_px.cwiseInverse().asDiagonal() * by_position_px});
+  }
+  return lamps;
+}
+
 void fit_paper(DispersionFit& fit, const StationFixes& station, const Eigen::Vector2d& focal_px,
                DispersionCircle kind) {
   const PaperOffset found = find_paper_offset(station, focal_px, kind, fit.noise_is_stated);
@@ -46,10 +61,12 @@ void fit_paper(DispersionFit& fit, const StationFixes& station, const Eigen::Vec
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
   fit.dispersion.covariance = found.covariance;
+  fit.dispersion.by_lamps = make_uncertain_lamps(found.by_lamps, focal_px);
   apply(fit, station, found.used, kind);
 }
 
-void fit_camera(DispersionFit& fit, const StationFixes& station, DispersionCircle kind) {
+void fit_camera(DispersionFit& fit, const StationFixes& station, const Eigen::Vector2d& focal_px,
+                DispersionCircle kind) {
   const auto separation = separate_offsets(station);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
@@ -71,12 +88,14 @@ void fit_camera(DispersionFit& fit, const StationFixes& station, DispersionCircl
   const double factor =
       compute_variance_factor(separation->excess, separation->freedom, fit.noise_is_stated);
   fit.dispersion.offset_px = separation->offset_px;
-  Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>() +
-                       separation->offset_covariance_from_map;
+  Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>();
   covariance(1, 0) = covariance(0, 1);
   fit.dispersion.covariance = covariance;
+  fit.dispersion.by_lamps = make_uncertain_lamps(separation->by_lamps, focal_px);
+  const Eigen::MatrixXd world_moves_m = separation->by_lamps.compute_moves().bottomRows<2>();
   fit.world_offset_m = separation->world_m;
-  fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>();
+  fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>() +
+                         world_moves_m * world_moves_m.transpose();
   apply(fit, station, separation->used, kind);
 }
 
@@ -108,7 +127,7 @@ DispersionFit fit_dispersion(std::span<const StationCapture> captures, const Lam
     if (paper) {
       fit_paper(fit, station, focal_px, circle);
     } else {
-      fit_camera(fit, station, circle);
+      fit_camera(fit, station, focal_px, circle);
     }
   }
   return fit;

@@ -60,11 +60,11 @@ struct DispersionFit {
   bool noise_is_stated = false;
 
   /// Its circle is that of `before`. The covariance is from the scatter of the fixes and their
-  /// noise (compute_variance_factor()), and from the map's sd_m. std::nullopt for the enclosing
-  /// circle.
+  /// noise (compute_variance_factor()), `by_lamps` from the map's sd_m. There is neither for the
+  /// enclosing circle.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0, {}};
   /// Fixed in the world, an error of the station or of the lamp map: mean fix minus station that
-  /// stays, and its covariance. Method `paper` takes it for zero.
+  /// stays, and its covariance from noise and map. Method `paper` takes it for zero.
   std::optional<Eigen::Vector2d> world_offset_m = {};
   Matrix2 world_covariance = Matrix2::Zero();
 

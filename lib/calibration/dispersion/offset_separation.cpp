@@ -132,17 +132,18 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
 }
 
 /// Propagates errors of the map: the solution moves by -(J'WJ)^-1 J'W d, d being the fixes' moves.
-Eigen::Matrix2d propagate_map(const StationFixes& fixes, const OffsetSeparation& at) {
-  const Eigen::MatrixXd moves_m = fixes.compute_map_displacements_m(at.offset_px);
-  if (moves_m.cols() == 0) return Eigen::Matrix2d::Zero();
-  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, moves_m.cols());
+LampDerivatives propagate_map(const StationFixes& fixes, const OffsetSeparation& at) {
+  LampDerivatives derivatives = fixes.compute_lamp_derivatives(at.offset_px);
+  if (derivatives.lamps.empty()) return derivatives;
+  const Eigen::MatrixXd& d_fixes = derivatives.by_positions;
+  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, d_fixes.cols());
   for (const Equation& equation : linearize(fixes, at)) {
     if (!at.used[equation.capture]) continue;
     const auto row = 2 * static_cast<Eigen::Index>(equation.capture);
-    gradient += equation.jacobian.transpose() * equation.whitening * moves_m.middleRows<2>(row);
+    gradient += equation.jacobian.transpose() * equation.whitening * d_fixes.middleRows<2>(row);
   }
-  const Eigen::MatrixXd offset_px = at.covariance.topRows<2>() * gradient;
-  return offset_px * offset_px.transpose();
+  derivatives.by_positions = -at.covariance * gradient;
+  return derivatives;
 }
 
 }  // namespace
@@ -157,7 +158,7 @@ std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes) {
     if (!changed) return std::nullopt;
     if (!*changed) break;
   }
-  result.offset_covariance_from_map = propagate_map(fixes, result);
+  result.by_lamps = propagate_map(fixes, result);
   return result;
 }
 

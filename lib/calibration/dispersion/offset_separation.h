@@ -14,10 +14,11 @@ namespace vlp {
 struct OffsetSeparation {
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
   Eigen::Vector2d world_m = Eigen::Vector2d::Zero();
-  /// Of both when the fixes scatter as their covariances say.
+  /// Covariance of both, offset_px first, if the fixes scatter as their covariances state and the
+  /// map is exact.
   Eigen::Matrix4d covariance;
-  /// Covariance of offset_px from the map's sd_m.
-  Eigen::Matrix2d offset_covariance_from_map = Eigen::Matrix2d::Zero();
+  /// Derivatives of both by the places of the lamps, rows in the order of `covariance`.
+  LampDerivatives by_lamps = {};
   /// Squared residuals over what those let expect; zero when as many fixes as unknowns are used.
   double excess;
   /// Number of rows of the fixes that are used, minus the unknowns.

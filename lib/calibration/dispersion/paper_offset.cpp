@@ -91,19 +91,20 @@ Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
   return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
 }
 
-/// Returns the covariance of the mean fix from errors of the map, which all captures have in
-/// common.
-Eigen::Matrix2d compute_covariance_from_map(const Eigen::MatrixXd& moves_m,
-                                            const std::vector<bool>& used) {
-  Eigen::MatrixXd mean_m = Eigen::MatrixXd::Zero(2, moves_m.cols());
+/// Computes the derivatives of the offset by the places of the lamps. The offset takes back the
+/// mean of the moves of the fixes.
+LampDerivatives compute_offset_derivatives(const StationFixes& station, const PaperOffset& found,
+                                           const Eigen::Matrix2d& image_from_floor) {
+  LampDerivatives derivatives = station.compute_lamp_derivatives(found.offset_px);
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.by_positions.cols());
   double count = 0;
-  for (std::size_t i = 0; i < used.size(); ++i) {
-    if (!used[i]) continue;
-    mean_m += moves_m.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+  for (std::size_t i = 0; i < found.used.size(); ++i) {
+    if (!found.used[i]) continue;
+    mean += derivatives.by_positions.middleRows<2>(2 * static_cast<Eigen::Index>(i));
     ++count;
   }
-  mean_m /= count;
-  return mean_m * mean_m.transpose();
+  derivatives.by_positions = -image_from_floor * mean / count;
+  return derivatives;
 }
 
 }  // namespace
@@ -122,7 +123,7 @@ PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d
   const OptionalFixes fixes = station.at({0, 0});
   const std::vector<bool> used = near_median(fixes);
   const TypicalFix typical = typical_of(fixes, used);
-  if (!typical.at_one_yaw()) return {DispersionStatus::many_yaws};
+  if (!typical.at_one_yaw()) return {.status = DispersionStatus::many_yaws};
   Eigen::Matrix2d image_from_floor =
       focal_px.asDiagonal() *
       Eigen::Matrix2d(product_matrix(typical.heading.normalized()).transpose() / typical.height_m);
@@ -141,19 +142,18 @@ PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d
       offset_px -= image_from_floor * center_m;
       continue;
     }
-    PaperOffset found{DispersionStatus::ok, offset_px, {}, used};
+    PaperOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
     if (kind == DispersionCircle::mean) {
       const Eigen::Matrix2d noise_m2 = noise_of_fixes(station.at(offset_px), used, noise_is_stated);
-      const Eigen::Matrix2d mean_covariance_m2 =
-          covariance_of_mean(errors_m, noise_m2) +
-          compute_covariance_from_map(station.compute_map_displacements_m(offset_px), used);
+      const Eigen::Matrix2d mean_covariance_m2 = covariance_of_mean(errors_m, noise_m2);
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);
       found.covariance = covariance;
+      found.by_lamps = compute_offset_derivatives(station, found, image_from_floor);
     }
     return found;
   }
-  return {DispersionStatus::diverged};
+  return {.status = DispersionStatus::diverged};
 }
 
 }  // namespace vlp

@@ -18,9 +18,11 @@ struct PaperOffset {
   /// `ok`, many_yaws or diverged; otherwise there is nothing below.
   DispersionStatus status;
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
-  /// Covariance from the scatter of the fixes, at least that of their noise, and from the map's
-  /// sd_m. std::nullopt for the enclosing circle.
+  /// Covariance from the scatter of the fixes, at least that of their noise. std::nullopt for the
+  /// enclosing circle.
   std::optional<Matrix2> covariance = {};
+  /// Derivatives of offset_px by the places of the lamps; empty without a covariance.
+  LampDerivatives by_lamps = {};
   /// Of each capture.
   std::vector<bool> used = {};
 };

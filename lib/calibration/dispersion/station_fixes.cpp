@@ -32,6 +32,14 @@ Fix fix_of(const Positioner& positioner, const StationCapture& capture) {
 
 }  // namespace
 
+Eigen::MatrixXd LampDerivatives::compute_moves() const {
+  Eigen::MatrixXd moves = by_positions;
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    moves.middleCols<3>(3 * static_cast<Eigen::Index>(i)) *= *lamps[i].sd_m;
+  }
+  return moves;
+}
+
 StationFixes::StationFixes(std::span<const StationCapture> captures, const LampMap& map,
                            const Calibration& calibration)
     : captures_(captures), map_(map), calibration_(calibration) {
@@ -68,37 +76,40 @@ std::vector<std::optional<StationFixes::At>> StationFixes::at(const Eigen::Vecto
   return fixes;
 }
 
-Eigen::MatrixXd StationFixes::compute_map_displacements_m(const Eigen::Vector2d& offset_px) const {
+LampDerivatives StationFixes::compute_lamp_derivatives(const Eigen::Vector2d& offset_px) const {
   std::set<int> detected;
   for (const StationCapture& capture : captures_) {
     for (const Detection& detection : capture.detections) detected.insert(detection.lamp);
   }
+  LampDerivatives derivatives;
   std::vector<std::size_t> uncertain;
   for (std::size_t i = 0; i < map_.lamps.size(); ++i) {
     const Lamp& lamp = map_.lamps[i];
     if (lamp.sd_m.value_or(0) > 0 && detected.contains(lamp.id)) uncertain.push_back(i);
   }
-  Eigen::MatrixXd moves_m =
-      Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
-  if (uncertain.empty()) return moves_m;
+  derivatives.lamps.reserve(uncertain.size());
+  for (const std::size_t lamp : uncertain) derivatives.lamps.push_back(map_.lamps[lamp]);
+  Eigen::MatrixXd& by_positions = derivatives.by_positions;
+  by_positions = Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
+  if (uncertain.empty()) return derivatives;
   const auto here = at(offset_px);
   LampMap moved = map_;
-  for (Eigen::Index column = 0; column < moves_m.cols(); ++column) {
+  for (Eigen::Index column = 0; column < by_positions.cols(); ++column) {
     const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
     double& coordinate_m = moved.lamps[lamp].position_m[column % 3];
     // A small step, so that no lamp is rejected for it.
     constexpr double max_step_m = 1e-4;
-    const double sd_m = *map_.lamps[lamp].sd_m, step_m = std::min(sd_m, max_step_m);
+    const double step_m = std::min(*map_.lamps[lamp].sd_m, max_step_m);
     coordinate_m += step_m;
     const auto there = at(offset_px, moved);
     coordinate_m = map_.lamps[lamp].position_m[column % 3];
     for (std::size_t i = 0; i < here.size(); ++i) {
       if (!here[i] || !there[i]) continue;
-      moves_m.block<2, 1>(2 * static_cast<Eigen::Index>(i), column) =
-          (there[i]->error_m - here[i]->error_m) * (sd_m / step_m);
+      by_positions.block<2, 1>(2 * static_cast<Eigen::Index>(i), column) =
+          (there[i]->error_m - here[i]->error_m) / step_m;
     }
   }
-  return moves_m;
+  return derivatives;
 }
 
 }  // namespace vlp

@@ -11,6 +11,16 @@
 
 namespace vlp {
 
+/// Derivatives of some quantities by the places of lamps that the map states an sd_m of.
+struct LampDerivatives {
+  std::vector<Lamp> lamps;
+  /// A row for each quantity, three columns for each lamp.
+  Eigen::MatrixXd by_positions;
+
+  /// Returns the moves of the quantities by errors of one standard deviation, a column each.
+  Eigen::MatrixXd compute_moves() const;
+};
+
 /// The fixes of captures at a station, as functions of the dispersion's offset.
 class StationFixes {
  public:
@@ -32,12 +42,9 @@ class StationFixes {
 
   /// Of each capture; nothing where there is no fix.
   std::vector<std::optional<At>> at(const Eigen::Vector2d& offset_px) const;
-  /// Computes the moves of the fixes by errors of the map of one standard deviation (Lamp::sd_m),
-  /// in m, by a difference each.
-  ///
-  /// @return  two rows for each capture, zero without a fix; a column for each coordinate of each
-  ///          lamp that is detected and is not exact
-  Eigen::MatrixXd compute_map_displacements_m(const Eigen::Vector2d& offset_px) const;
+  /// Computes the derivatives of the fixes, in m, by the places of the lamps that are detected and
+  /// have an sd_m above zero, by a difference each. Two rows for each capture, zero without a fix.
+  LampDerivatives compute_lamp_derivatives(const Eigen::Vector2d& offset_px) const;
   /// Of captures without one.
   FixStatus first_refusal() const { return first_refusal_; }
 

@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "rig/calibration_error.h"
+
 namespace vlp {
 namespace {
 
@@ -16,7 +18,8 @@ void print_circle(const char* name, const Circle& circle) {
 
 }  // namespace
 
-void print_dispersion(const DispersionFit& fit, std::size_t captures) {
+void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
+                      std::size_t captures) {
   const Dispersion& found = fit.dispersion;
   fmt::print("captures    {}, {} used, {} left out as outliers, {} without a fix\n", captures,
              found.captures, static_cast<int>(fit.fixes.size()) - found.captures,
@@ -24,9 +27,9 @@ void print_dispersion(const DispersionFit& fit, std::size_t captures) {
   print_circle("before", fit.before);
   print_circle("after", fit.after);
   fmt::print("offset      {:.4f} {:.4f} px", found.offset_px.x(), found.offset_px.y());
-  if (found.covariance) {
-    fmt::print(", sd {:.4f} {:.4f} px", std::sqrt((*found.covariance)(0, 0)),
-               std::sqrt((*found.covariance)(1, 1)));
+  if (const auto covariance_px2 = offset_covariance_with_map(found, focal_px)) {
+    fmt::print(", sd {:.4f} {:.4f} px", std::sqrt((*covariance_px2)(0, 0)),
+               std::sqrt((*covariance_px2)(1, 1)));
   }
   fmt::print(", fixed in the camera\n");
   if (const auto& world_m = fit.world_offset_m) {

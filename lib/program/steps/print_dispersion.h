@@ -2,14 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 
 #include "calibration/dispersion/dispersion.h"
 
 namespace vlp {
 
-/// The circles of the fixes before and after, and what was told apart, on stdout. `captures` are
-/// those at known places.
-void print_dispersion(const DispersionFit& fit, std::size_t captures);
+/// Prints the circles of the fixes before and after, and the errors of camera and world, on stdout.
+///
+/// @param focal_px  of the camera
+/// @param captures  number of captures at known places
+void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
+                      std::size_t captures);
 
 }  // namespace vlp
