@@ -24,6 +24,7 @@ struct Types {
   IntrinsicsReport report;
   RotationCenter rotation_center;
   Dispersion dispersion;
+  Dispersion::UncertainLamp uncertain_lamp;
   Adjustment adjustment;
   Adjustment::Place place;
   HistoryEntry entry;
