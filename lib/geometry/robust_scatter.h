@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "geometry/median.h"
+#include "geometry/statistical_bounds.h"
 
 /// Scatter of residuals of which some are outliers, from their median, and the bound beyond which a
 /// residual is an outlier, for samples of any size. "Linear" residuals have one coordinate,
@@ -45,16 +46,6 @@ inline double robust_planar_variance(std::vector<double> squares, double degrees
   const double rows = 2 * static_cast<double>(squares.size());
   return upper_median(std::move(squares)) / median_of_unit_variance * rows /
          std::max(degrees_of_freedom, 1.0);
-}
-
-/// Computes the bound of t^2, Student's with m degrees of freedom, that is exceeded as rarely as
-/// sigmas^2 by the square of a normal variable of unit variance.
-///
-/// m (exp((sigmas (8 m + 3) / (8 m + 1))^2 / m) - 1). Source: Wallace, Bounds on normal
-/// approximations to Student's and the chi-square distributions (1959).
-inline double student_bound(double sigmas, double m) {
-  const double z = sigmas * (8 * m + 3) / (8 * m + 1);
-  return m * std::expm1(z * z / m);
 }
 
 /// Computes the bound of the squared residuals in units of robust_linear_variance() that normal

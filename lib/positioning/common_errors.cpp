@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "geometry/plane.h"
+#include "geometry/statistical_bounds.h"
 #include "geometry/symmetric.h"
 #include "rig/calibration_error.h"
 #include "rig/find_lamp.h"
@@ -61,14 +62,6 @@ Eigen::Matrix2d normalized(const std::optional<Matrix2>& covariance_px,
   if (!covariance_px) return Eigen::Matrix2d::Zero();
   const Eigen::Vector2d inverse = focal_px.cwiseInverse();
   return inverse.asDiagonal() * *covariance_px * inverse.asDiagonal();
-}
-
-/// Chi-squared that one in ten thousand exceeds (Wilson and Hilferty).
-double unlikely_chi_squared(double freedom) {
-  constexpr double quantile = 3.719;
-  const double part = 2 / (9 * freedom);
-  const double root = 1 - part + quantile * std::sqrt(part);
-  return freedom * root * root * root;
 }
 
 /// Returns true if the lamp of a map has this place, to 1 um.
@@ -441,7 +434,8 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
       worst = drop;
       worst_lamp = i;
     });
-    if (chi_squared <= unlikely_chi_squared(2 * static_cast<double>(left) - 4)) return found;
+    const double freedom = 2 * static_cast<double>(left) - 4;
+    if (chi_squared <= chi_squared_bound(kSigmasOfOneInTenThousand, freedom)) return found;
     // Of three that contradict each other nobody knows which is wrong; nor when most are.
     if (!(worst > 0) || left == 3 || 2 * (left - 1) <= sightings.size()) return {};
     left_out.set(worst_lamp);

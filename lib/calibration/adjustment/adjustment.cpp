@@ -17,6 +17,7 @@
 
 #include "calibration/adjustment/adjustment_problem.h"
 #include "geometry/robust_scatter.h"
+#include "geometry/statistical_bounds.h"
 #include "geometry/symmetric.h"
 #include "positioning/inclination_rotation.h"
 #include "positioning/robust_fix.h"
@@ -695,9 +696,9 @@ void report_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covari
       result.lens_chi_squared += along * along / told.values[i];
       ++result.lens_freedom;
     }
-    const double n = result.lens_freedom, t = 3.719;  // one in ten thousand
     result.lens_contradicted =
-        result.lens_chi_squared > n + t * std::sqrt(2 * n) + 2.0 / 3.0 * (t * t - 1);
+        result.lens_freedom > 0 &&
+        result.lens_chi_squared > chi_squared_bound(kSigmasOfOneInTenThousand, result.lens_freedom);
   }
 }
 

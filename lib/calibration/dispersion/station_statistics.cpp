@@ -10,6 +10,7 @@
 #include "geometry/angles.h"
 #include "geometry/median.h"
 #include "geometry/robust_scatter.h"
+#include "geometry/statistical_bounds.h"
 
 namespace vlp {
 namespace {
@@ -23,12 +24,15 @@ double compute_student_factor(double degrees_of_freedom) {
          (sigmas_of_95_percent * sigmas_of_95_percent);
 }
 
-/// Computes the ratio that chi-squared over its degrees of freedom exceeds in 10 % of all cases
-/// (Wilson and Hilferty).
-double compute_unlikely_ratio(double degrees_of_freedom) {
-  constexpr double quantile = 1.2816;
-  const double part = 2 / (9 * degrees_of_freedom);
-  return std::pow(1 - part + quantile * std::sqrt(part), 3);
+/// Computes the weight of residuals that contradict stated noise: 0 up to the ratio that 20 % of
+/// all residuals exceed, 1 from that of 5 %, linear in between.
+double compute_contradiction(double ratio, double degrees_of_freedom) {
+  constexpr double sigmas_of_20_percent = 0.8416, sigmas_of_5_percent = 1.6449;
+  const double first =
+      chi_squared_bound(sigmas_of_20_percent, degrees_of_freedom) / degrees_of_freedom;
+  const double last =
+      chi_squared_bound(sigmas_of_5_percent, degrees_of_freedom) / degrees_of_freedom;
+  return std::clamp((ratio - first) / (last - first), 0.0, 1.0);
 }
 
 }  // namespace
@@ -80,9 +84,8 @@ double compute_variance_factor(double ratio, double degrees_of_freedom, bool noi
   const double combined = (kStatedFreedom + degrees_of_freedom * ratio) / total_freedom *
                           compute_student_factor(total_freedom);
   const double factor = std::max(1.0, combined);
-  const bool is_contradicted =
-      pooled_ratio.value_or(ratio) > compute_unlikely_ratio(degrees_of_freedom);
-  return is_contradicted ? std::max(factor, from_residuals) : factor;
+  const double weight = compute_contradiction(pooled_ratio.value_or(ratio), degrees_of_freedom);
+  return factor * std::pow(std::max(1.0, from_residuals / factor), weight);
 }
 
 std::vector<bool> near_median(const OptionalFixes& fixes) {

@@ -45,9 +45,10 @@ inline constexpr double kStatedFreedom = 6;
 /// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 % (student_bound). If the noise is
 /// not stated the factor is ratio q(nu). Stated noise counts as an estimate with
 /// n = kStatedFreedom:
-///   max(1, (n + nu ratio) / (n + nu) q(n + nu)),
-/// and if the residuals contradict it (chi-squared at 10 %) the factor is at least ratio q(nu).
-/// @param pooled_ratio  ratio of all axes, which decides about a contradiction; `ratio` without it
+///   f = max(1, (n + nu ratio) / (n + nu) q(n + nu)),
+/// and if the residuals contradict it, f (ratio q(nu) / f)^w where that is larger: w rises from 0
+/// to 1 with chi-squared between its bounds of 20 % and 5 %, so that the factor is continuous.
+/// @param pooled_ratio  ratio of all axes, which determines w; `ratio` without it
 /// @pre degrees_of_freedom > 0
 double compute_variance_factor(double ratio, double degrees_of_freedom, bool noise_is_stated,
                                std::optional<double> pooled_ratio = {});

@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+
+/// Bounds of chi-squared and Student's t in closed form, for libraries that do without Boost. They
+/// are stated by `sigmas`: a normal variable of unit variance exceeds the same probability there.
+namespace vlp {
+
+/// Number of standard deviations that a normal variable exceeds in one of ten thousand cases.
+inline constexpr double kSigmasOfOneInTenThousand = 3.719;
+
+/// Computes the bound of t^2, Student's with m degrees of freedom, that is exceeded as rarely as
+/// sigmas^2 by the square of a normal variable of unit variance.
+///
+/// m (exp((sigmas (8 m + 3) / (8 m + 1))^2 / m) - 1). Source: Wallace, Bounds on normal
+/// approximations to Student's and the chi-square distributions (1959).
+inline double student_bound(double sigmas, double m) {
+  const double z = sigmas * (8 * m + 3) / (8 * m + 1);
+  return m * std::expm1(z * z / m);
+}
+
+/// Computes the bound of chi-squared with m degrees of freedom that is exceeded as rarely as
+/// `sigmas` by a normal variable of unit variance.
+///
+/// m (1 - 2 / (9 m) + sigmas sqrt(2 / (9 m)))^3. Source: Wilson and Hilferty, The distribution of
+/// chi-square (1931).
+inline double chi_squared_bound(double sigmas, double m) {
+  const double part = 2 / (9 * m);
+  const double root = 1 - part + sigmas * std::sqrt(part);
+  return m * root * root * root;
+}
+
+}  // namespace vlp
