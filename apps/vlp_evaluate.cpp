@@ -1,13 +1,16 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// vlp-evaluate: what fixes are worth, against a truth, a path or a commanded line.
+#include <fmt/core.h>
 #include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
 #include <future>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -18,6 +21,8 @@
 #include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
 #include "evaluation/gate.h"
+#include "evaluation/junit.h"
+#include "evaluation/proposed_gates.h"
 #include "program/app.h"
 #include "program/steps/history.h"
 #include "program/steps/print_evaluation.h"
@@ -28,6 +33,8 @@
 namespace vlp {
 namespace {
 
+constexpr const char* kName = "vlp-evaluate";
+
 /// The report that vlp-evaluate writes; none without a file.
 struct ReportOption {
   std::string file;
@@ -37,7 +44,8 @@ struct ReportOption {
 };
 
 struct Options {
-  std::string fixes, truth, path, compare, lamps, calibration, gates_file, json, junit;
+  std::string fixes, truth, path, compare, lamps, calibration, gates_file, json, junit,
+      proposed_gates;
   std::vector<double> line_m;  // X0 Y0 X1 Y1
   std::vector<std::string> gates;
   double noise_px = 0;
@@ -103,7 +111,10 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
     inputs.push_back(fixes);
     check_line("--track " + fixes, {x0_m, y0_m, x1_m, y1_m});
   }
-  check_outputs({{"--json", options.json}, {"--junit", options.junit}, {"--report", report.file}},
+  check_outputs({{"--json", options.json},
+                 {"--junit", options.junit},
+                 {"--propose-gates", options.proposed_gates},
+                 {"--report", report.file}},
                 inputs);
 }
 
@@ -155,9 +166,19 @@ std::string report_of(const CLI::App& app, const Options& options, const Evaluat
   return report_page(std::move(report));
 }
 
-void run(const CLI::App& app, const Options& options) {
-  const std::vector<Gate> gates = gates_of(options);
-  check_options(options, gates);
+void write_proposed_gates(const std::string& file, const EvaluationInput& input,
+                          const Evaluation& evaluation) {
+  const std::vector<Gate> gates = propose_gates(input, evaluation);
+  if (gates.empty()) {
+    throw Undetermined(
+        fmt::format("--propose-gates: too few stations or captures to propose gates from: at least "
+                    "{} are needed",
+                    kFewestUnits));
+  }
+  write_file(file, format_gates(gates, evaluation));
+}
+
+void run_evaluation(const CLI::App& app, const Options& options, const std::vector<Gate>& gates) {
   const EvaluationInput input = input_of(options);
   const EvaluateResult found = evaluate_fixes(input, gates);
   require(found);
@@ -169,12 +190,40 @@ void run(const CLI::App& app, const Options& options) {
   std::string report;
   if (!options.report.file.empty()) report = report_of(app, options, input, found);
   if (!options.json.empty()) write_file(options.json, json_of(found.evaluation, found.gates));
-  if (!options.junit.empty()) write_file(options.junit, junit_of(found.gates));
+  if (!options.junit.empty())
+    write_file(options.junit, format_junit(kName, make_junit_tests(found.gates)));
   if (!report.empty()) write_file(options.report.file, report);
+  if (!options.proposed_gates.empty()) {
+    write_proposed_gates(options.proposed_gates, input, found.evaluation);
+  }
   tell(found);
   print_evaluation(found.evaluation, found.gates);
   const std::string failed = words_of_missed(found.gates);
   if (!failed.empty()) throw GateNotMet(failed);
+}
+
+/// Writes an error that leaves no gate checked to the JUnit file, which CI reads in place of
+/// stderr.
+void write_junit_error(const std::string& file, const char* type, const char* message) {
+  if (file.empty()) return;
+  const JUnitTest test{"evaluation", JUnitTest::Result::error, message, type};
+  write_file(file, format_junit(kName, std::span(&test, 1)));
+}
+
+void run(const CLI::App& app, const Options& options) {
+  const std::vector<Gate> gates = gates_of(options);
+  check_options(options, gates);
+  try {
+    run_evaluation(app, options, gates);
+  } catch (const GateNotMet&) {
+    throw;
+  } catch (const Undetermined& error) {
+    write_junit_error(options.junit, "undetermined", error.what());
+    throw;
+  } catch (const std::exception& error) {
+    write_junit_error(options.junit, "bad_input", error.what());
+    throw;
+  }
 }
 
 void add_report_options(CLI::App& app, ReportOption& option) {
@@ -222,7 +271,10 @@ void add_options(CLI::App& app, Options& options) {
       ->option_text("NAME=VALUE");
   app.add_option("--gates", options.gates_file, "Gates from a file, vlp-gates/1");
   app.add_option("--json", options.json, "Write the figures for programs, evaluation.json");
-  app.add_option("--junit", options.junit, "Write the gates for a CI system, JUnit XML");
+  app.add_option("--junit", options.junit,
+                 "Write the gates for a CI system, JUnit XML; an error if they cannot be checked");
+  app.add_option("--propose-gates", options.proposed_gates,
+                 "Write gates that a run as good as this one meets, gates.yaml");
   auto* lamps = app.add_option(
       "--lamps", options.lamps,
       "Lamp map, lamps.yaml, for the theoretical limit at the true places, and the report");
@@ -252,7 +304,7 @@ int main(int argc, char** argv) {
       "    --gate mean_mm=0.2,p90_mm=0.4 --gate missing=0 --json evaluation.json \\\n"
       "    --calibration datasets/example/calibration.yaml \\\n"
       "    --lamps datasets/example/lamps.yaml --report report.html\n",
-      "vlp-evaluate");
+      vlp::kName);
   vlp::Options options;
   vlp::add_options(app, options);
   app.footer("Gates:\n" + vlp::gate_descriptions(vlp::known_metrics()));

@@ -32,6 +32,7 @@ tests=(
   groff zsh  # manual pages and completions are checked by them
   abigail-tools  # the library's ABI is
   python3-jsonschema  # documents of JSON are held against datasets/schemas
+  python3-yaml  # tests/ci/run_action.py
 )
 root=(debootstrap)
 # Snakemake, and a Slurm on one machine for the tests of its profile.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <pugixml.hpp>
 #include <sstream>
 
 #include "evaluation/gate.h"
@@ -156,25 +155,6 @@ std::string json_of(const Evaluation& evaluation, const std::vector<CheckedMetri
   json["gates"] = json_of(gates);
   json["passed"] = std::none_of(gates.begin(), gates.end(), failed);
   return json.dump(2) + "\n";
-}
-
-std::string junit_of(const std::vector<CheckedMetric>& gates) {
-  const auto failures = std::count_if(gates.begin(), gates.end(), failed);
-  pugi::xml_document document;
-  pugi::xml_node suite = document.append_child("testsuites").append_child("testsuite");
-  suite.append_attribute("name") = "vlp-evaluate";
-  suite.append_attribute("tests") = static_cast<unsigned long>(gates.size());
-  suite.append_attribute("failures") = static_cast<long>(failures);
-  for (const CheckedMetric& gate : gates) {
-    pugi::xml_node test = suite.append_child("testcase");
-    test.append_attribute("classname") = "vlp-evaluate";
-    test.append_attribute("name") = gate.name.c_str();
-    if (gate.met()) continue;
-    test.append_child("failure").append_attribute("message") = words_of(gate).c_str();
-  }
-  std::ostringstream text;
-  document.save(text, "  ");
-  return text.str();
 }
 
 }  // namespace vlp

@@ -22,7 +22,4 @@ namespace vlp {
 /// "at least", passed), passed.
 std::string json_of(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
-/// JUnit XML, for CI systems: a test case for each gate, failed with words_of() it.
-std::string junit_of(const std::vector<CheckedMetric>& gates);
-
 }  // namespace vlp

@@ -103,9 +103,10 @@ constexpr std::array kMetricKinds{
     MetricKind{"scatter_mm", "mm", MetricSource::evaluation,
                "of fixes within stations; needs a truth and stations with two fixes or more",
                kOfFixes},
-    MetricKind{"height_rms_mm", "mm", MetricSource::evaluation,
-               "root mean square of the height errors; needs z_m in the truth or the path",
-               "the heights are worse than was asked for"},
+    MetricKind{
+        "height_rms_mm", "mm", MetricSource::evaluation,
+        "root mean square of the height errors; needs z_m in the truth or the path",
+        "the heights are worse than was asked for, as with a wrong focal length or lamp heights"},
     MetricKind{"yaw_rms_deg", "deg", MetricSource::evaluation,
                "root mean square of the yaw errors; needs yaw_rad in the truth",
                "the yaws are worse than was asked for", Direction::at_most, 180},

@@ -90,6 +90,13 @@ struct Work {
   std::function<void()> write = [] {};
 };
 
+/// session.json last: without it the results are of a run that was killed.
+void write_summaries(const SessionResults& results, const SessionResult& result,
+                     const SessionOptions& options) {
+  write_file(results.file("junit.xml"), session_junit(result));
+  write_file(results.file("session.json"), session_json(result, options));
+}
+
 class SessionRun {
  public:
   SessionRun(const SessionFolder& session, std::vector<Gate> gates, SessionResults& results,
@@ -162,7 +169,7 @@ class SessionRun {
       const std::string name = line.filename().string();
       steps.push_back({name, std::vector<std::string>{name + "-fixes.csv"}});
     }
-    std::vector<std::string> evaluation{"evaluation.json", "gates.xml"};
+    std::vector<std::string> evaluation{"evaluation.json"};
     if (options_.report) evaluation.emplace_back("report.html");
     steps.push_back({"evaluate", evaluation});
     return steps;
@@ -554,14 +561,12 @@ class SessionRun {
     if (std::string outliers = describe_check_outliers(errors); !outliers.empty()) {
       found.warnings.push_back(std::move(outliers));
     }
-    std::vector<CheckedMetric> all = result_.gates;
-    all.insert(all.end(), found.gates.begin(), found.gates.end());
     return {found, [=, this] {
               write_file(out("evaluation.json"), json_of(found.evaluation, found.gates));
-              if (!all.empty()) write_file(out("gates.xml"), junit_of(all));
               if (!options_.report) return;
               Report page;
-              page.gates = all;
+              page.gates = result_.gates;
+              page.gates.insert(page.gates.end(), found.gates.begin(), found.gates.end());
               page.calibration = result_.calibration;
               page.pictures = pictures();
               page.evaluation = history("", inputs);
@@ -592,7 +597,7 @@ class SessionRun {
       result_.verdict = SessionVerdict::gate;
       result_.reason = missed;
     }
-    write_file(out("session.json"), session_json(result_, options_));
+    write_summaries(results_, result_, options_);
   }
 
   const SessionFolder& session_;
@@ -647,7 +652,7 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
     } else {
       taken.forget_all();
     }
-    write_file(taken.file("session.json"), session_json(result, options));
+    write_summaries(taken, result, options);
     return result;
   }
   return SessionRun(*folder, std::move(gates), taken, options, observer).run();

@@ -27,7 +27,7 @@ namespace vlp {
 ///   dispersion  dispersion -> calibration.yaml, dispersion.svg       unless there is no dispersion/
 ///   check       check -> check-fixes.csv                             unless there is no check/
 ///   line-x      line-x -> line-x-fixes.csv
-///   evaluate    -> evaluation.json (with the gates of the errors), gates.xml (with all), report.html
+///   evaluate    -> evaluation.json (with the gates of the errors), report.html
 // clang-format on
 struct SessionOptions {
   ProgramVersion program;
@@ -90,10 +90,11 @@ std::vector<MetricKind> session_metrics();
 /// report, all into `results`, which is made when it is not there. A step whose inputs, options and
 /// outputs are as when it last ended, with this program, is not run again. What this run does not
 /// make, or cannot, is removed. Every file appears whole; killed, the next run goes on.
-/// session.json says how it went (session_file.h). What is wrong with the session, a bad file or a
-/// step that fails, is in the result; thrown is what is wrong with the options
-/// (std::invalid_argument) and with `results` (InputError): a folder of captures, one that another
-/// session's results are in or another run is at work in, or that cannot be written.
+/// session.json (session_file.h) and junit.xml say how it went, whatever the verdict. What is wrong
+/// with the session, a bad file or a step that fails, is in the result; thrown is what is wrong
+/// with the options (std::invalid_argument) and with `results` (InputError): a folder of captures,
+/// one that another session's results are in or another run is at work in, or that cannot be
+/// written.
 SessionResult run_session(const std::filesystem::path& session,
                           const std::filesystem::path& results, const SessionOptions& options,
                           const SessionObserver& observer = {});

@@ -8,6 +8,7 @@
 
 #include "calibration/passed_on.h"
 #include "calibration/rotation/rotation_fit.h"
+#include "evaluation/junit.h"
 #include "geometry/angles.h"
 #include "positioning/common_errors.h"
 #include "rig/calibration_error.h"
@@ -125,6 +126,28 @@ std::string session_json(const SessionResult& result, const SessionOptions& opti
     json["history"] = history_of(*result.calibration);
   }
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string session_junit(const SessionResult& result) {
+  std::vector<JUnitTest> tests;
+  tests.reserve(result.steps.size() + result.gates.size() + 1);
+  for (const SessionStep& step : result.steps) {
+    JUnitTest test{step.name};
+    test.warnings = step.result.warnings;
+    if (!step.result.ok()) {
+      test.result = JUnitTest::Result::error;
+      test.message = step.result.why;
+      test.error_type = name_of(step.result.failure);
+    }
+    tests.push_back(std::move(test));
+  }
+  if (result.steps.empty()) {
+    tests.push_back(
+        {"session", JUnitTest::Result::error, result.reason, std::string(name_of(result.failure))});
+  }
+  const auto gates = make_junit_tests(result.gates);
+  tests.insert(tests.end(), gates.begin(), gates.end());
+  return format_junit("vlp-calibrate", tests);
 }
 
 }  // namespace vlp

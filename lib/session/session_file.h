@@ -20,4 +20,9 @@ namespace vlp {
 /// bytes.
 std::string session_json(const SessionResult& result, const SessionOptions& options);
 
+/// `junit.xml`, for CI systems: a test for each step with its warnings, then one for each gate. A
+/// step without a result is an error of the type SessionResult::failure, with its message; a
+/// session that cannot be read is an error of a test named "session".
+std::string session_junit(const SessionResult& result);
+
 }  // namespace vlp

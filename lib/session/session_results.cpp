@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 constexpr std::array kResults{
     "lens.yaml",    "lens.cameramodel", "lens.svg",       "camera.yaml",     "rotated.yaml",
     "rotation.svg", "calibration.yaml", "dispersion.svg", "check-fixes.csv", "evaluation.json",
-    "gates.xml",    "report.html",      "session.json"};
+    "junit.xml",    "report.html",      "session.json"};
 
 /// Fixes of drives, but for those that are wanted.
 void forget_drives(const fs::path& results, const std::set<std::string>& wanted) {
@@ -150,7 +150,7 @@ void SessionResults::forget_behind(const std::string& step) const {
 }
 
 void SessionResults::forget_evaluation() const {
-  for (const char* name : {"evaluation.json", "gates.xml", "report.html"}) fs::remove(file(name));
+  for (const char* name : {"evaluation.json", "report.html"}) fs::remove(file(name));
   fs::remove(record_of("evaluate"));
 }
 

@@ -99,6 +99,7 @@ TEST_F(Calibrate, NamesAMovedLampInEveryStep) {
     }
     EXPECT_GE(count, 2U) << "rotation, dispersion, and check unless dispersion fails";
     EXPECT_THAT(errors, Not(HasSubstr("no offset explains")));
+    EXPECT_THAT(result("junit.xml"), HasSubstr(line));
   };
   expect_lines("[-0.03, -0.32, 1.6]",
                "lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm)");
@@ -207,7 +208,8 @@ TEST_F(SmallSession, EndsWithTheVerdictOfTheGatesEachTime) {
     EXPECT_THAT(result.output, HasSubstr("NOT MET     tilt_deg is "));
   }
   EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
-  EXPECT_THAT(result("gates.xml"), HasSubstr("<failure message=\"tilt_deg is "));
+  EXPECT_THAT(result("junit.xml"),
+              testing::ContainsRegex("<failure message=\"[^\"]*\\(tilt_deg is "));
   expect_documents_as_their_schemas_say();
   // Another limit measures nothing again.
   folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  tilt_deg: 90\n");
@@ -554,6 +556,8 @@ TEST_F(Calibrate, SaysWhatIsMissing) {
   EXPECT_EQ(empty.exit_code, 2);
   EXPECT_THAT(empty.errors, HasSubstr("lamps.yaml: is missing"));
   EXPECT_THAT(result("session.json"), HasSubstr("\"failure\": \"bad_input\""));
+  EXPECT_THAT(result("junit.xml"),
+              HasSubstr("<error type=\"bad_input\" message=\"lamps.yaml: is "));
   EXPECT_THAT(calibrate("--nonsense").errors, HasSubstr("unknown: --nonsense"));
   EXPECT_EQ(calibrate("--row-time-s").exit_code, 2);
   folder.file("gates.yaml", "format: vlp-gates/1\ngates: {odd_mm: 1}\n");

@@ -86,6 +86,32 @@ TEST_F(Evaluate, EndsWithOneAndAllIsWrittenWhenAGateIsNotMet) {
   EXPECT_EQ(with_truth("--gate mean_mm=2.5 --gate p90_mm=4.5").exit_code, 0);
 }
 
+TEST_F(Evaluate, WritesAnErrorToJUnitWhenNoGateCanBeChecked) {
+  const auto unknown = with_truth("--gate mean_mm=1,worse_mm=1 --junit junit.xml");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(content("junit.xml"),
+              AllOf(HasSubstr("errors=\"1\""), HasSubstr("<error type=\"bad_input\" message=\"gate "
+                                                         "'worse_mm': there is no such figure")));
+  folder.file("fixes.csv", kFixes + "a.png,too_few_lamps,,,,,,,,,1,\n");
+  const auto none = with_truth("--gate mean_mm=1 --junit junit.xml");
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_THAT(content("junit.xml"), HasSubstr("<error type=\"undetermined\" message=\""));
+}
+
+TEST_F(Evaluate, ProposesGatesThatTheRunMeets) {
+  const auto few = with_truth("--propose-gates gates.yaml");
+  EXPECT_EQ(few.exit_code, 3);
+  EXPECT_THAT(few.errors, HasSubstr("--propose-gates: too few stations or captures"));
+  const auto proposed =
+      evaluate_example("--noise-px 0.05 --propose-gates '" + path("gates.yaml") + "'");
+  ASSERT_EQ(proposed.exit_code, 0) << proposed.errors;
+  EXPECT_THAT(content("gates.yaml"),
+              AllOf(HasSubstr("format: vlp-gates/1\n"), HasSubstr("  mean_mm: "),
+                    HasSubstr("  height_rms_mm: "), HasSubstr("  missing: 0 ")));
+  const auto met = evaluate_example("--noise-px 0.05 --gates '" + path("gates.yaml") + "'");
+  EXPECT_EQ(met.exit_code, 0) << met.errors;
+}
+
 TEST_F(Evaluate, SaysThatNoGateAsksForWhatIsMissing) {
   const std::string words = "1 of 6 captures has no fix, and no gate 'missing' asks";
   const auto result = with_truth("--gate mean_mm=2.5 --report r.html");

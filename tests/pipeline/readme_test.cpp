@@ -78,44 +78,6 @@ std::vector<std::string> commands_in(const fs::path& page) {
   return commands;
 }
 
-/// The lines of a page's block of code of that language which has `word`.
-std::vector<std::string> block_of(const fs::path& page, const std::string& language,
-                                  const std::string& word) {
-  std::vector<std::string> block;
-  bool inside = false, found = false;
-  for (const std::string& line : lines_in(page)) {
-    if (line.starts_with("```") && inside) {
-      if (found) return block;
-      inside = false;
-    } else if (line == "```" + language) {
-      inside = true;
-      block.clear();
-    } else if (inside) {
-      block.push_back(line);
-      found = found || line.find(word) != std::string::npos;
-    }
-  }
-  return {};
-}
-
-/// The script of each `run: |` of a workflow.
-std::vector<std::string> scripts_of(const std::vector<std::string>& workflow) {
-  constexpr const char* indent = "          ";
-  std::vector<std::string> scripts;
-  bool inside = false;
-  for (const std::string& line : workflow) {
-    if (line == "      - run: |") {
-      scripts.emplace_back();
-      inside = true;
-    } else if (inside && line.starts_with(indent)) {
-      scripts.back().append(line).append("\n");
-    } else {
-      inside = false;
-    }
-  }
-  return scripts;
-}
-
 /// The page without its blocks of code, which may hold anything.
 std::string prose_of(const fs::path& page) {
   std::string prose;
@@ -221,36 +183,6 @@ TEST(Pages, CommandsWorkAsTyped) {
   expect_formats_to_name_the_columns_of(folder / "out");
 }
 
-TEST(Pages, WorkflowGuardsAnAccuracy) {
-#ifdef __SANITIZE_ADDRESS__
-  GTEST_SKIP() << "hundreds of images; the programs' own tests run under the sanitizers";
-#endif
-  const fs::path page = kSource / "apps/README.md";
-  const TemporaryFolder folder;
-  const std::string there = "cd '" + (folder / "").string() + "' && ";
-  const auto made = run_program(there + "vlp-simulate -q '" + kSource.string() +
-                                "/datasets/archive/scene.yaml' -o session");
-  ASSERT_EQ(made.exit_code, 0) << made.errors;
-  std::string gates;
-  for (const auto& line : block_of(page, "yaml", "vlp-gates/1")) gates += line + "\n";
-  folder.file("gates.yaml", gates);
-  const auto scripts = scripts_of(block_of(page, "yaml", "jobs:"));
-  ASSERT_EQ(scripts.size(), 3U);
-  EXPECT_THAT(scripts[0], testing::HasSubstr("./packages/vlp-tools_*.deb"));  // tests/packages.sh
-  const auto calibrated = run_program(there + scripts[1]);
-  EXPECT_EQ(calibrated.exit_code, 0) << calibrated.errors;
-  fs::copy(folder / "results/check-fixes.csv", folder / "accepted-fixes.csv");
-  const auto evaluated = run_program(there + scripts[2]);
-  EXPECT_EQ(evaluated.exit_code, 0) << evaluated.errors;
-  EXPECT_EQ(problems_by_schema("evaluation", {folder / "evaluation.json"}), "");
-  EXPECT_TRUE(fs::exists(folder / "evaluation.xml"));
-  EXPECT_TRUE(fs::exists(folder / "results/report.html"));
-  // It does fail when it should.
-  folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1e-6}\n");
-  EXPECT_EQ(run_program(there + scripts[1]).exit_code, 1);
-  EXPECT_EQ(run_program(there + scripts[2]).exit_code, 1);
-}
-
 TEST(Pages, HaveASectionForEachProgram) {
   const auto headings = headings_of(kSource / "apps/README.md");
   for (const auto& program : fs::directory_iterator(VLP_PROGRAMS_DIR)) {
@@ -334,7 +266,8 @@ constexpr Question kQuestions[] = {
     {"May several threads use it?", "lib/README.md", "On a robot", "any number of threads"},
     {"How do I call it from Python?", "apps/README.md", "Python", "import vlp"},
     {"What do FAIL and INVALID mean?", "apps/README.md", "vlp-station", "INVALID (3) is"},
-    {"How do I guard an accuracy in a CI?", "apps/README.md", "In your CI", "vlp-tools_*.deb"},
+    {"How do I guard an accuracy in a CI?", "apps/README.md", "In your CI",
+     "scripts/ci/action.yml"},
     {"How do I run an archive on a cluster?", "scripts/reprocess/README.md", "How it runs",
      "sbatch"},
 };

@@ -38,9 +38,10 @@ std::string options_of(const CLI::App& app, const std::vector<std::string>& inpu
 }  // namespace
 
 std::span<const std::string_view> options_without_history() {
-  static constexpr std::array<std::string_view, 14> others = {
-      "--output", "--plot",    "--annotate", "--threads", "--quiet",  "--verbose", "--cache",
-      "--ros",    "--corners", "--kalibr",   "--opencv",  "--report", "--json",    "--junit"};
+  static constexpr std::array<std::string_view, 15> others = {
+      "--output",  "--plot",   "--annotate", "--threads", "--quiet",
+      "--verbose", "--cache",  "--ros",      "--corners", "--kalibr",
+      "--opencv",  "--report", "--json",     "--junit",   "--propose-gates"};
   return others;
 }
 

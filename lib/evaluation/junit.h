@@ -1,0 +1,39 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "evaluation/gate.h"
+
+namespace vlp {
+
+/// One test of a JUnit report.
+struct JUnitTest {
+  enum class Result {
+    passed,
+    failed,  // measured, and a gate is not met
+    error    // could not be measured
+  };
+
+  std::string name;
+  Result result = Result::passed;
+  /// Cause and remedy if the test did not pass.
+  std::string message = {};
+  /// Kind of an error, for example "wrong_map"; empty for the other results.
+  std::string error_type = {};
+  /// Printed with the test whether it passed or not.
+  std::vector<std::string> warnings = {};
+};
+
+/// Returns a test for each gate, in their order; `failed` with cause_of() the gate if it is not
+/// met. Precondition: all have a limit.
+std::vector<JUnitTest> make_junit_tests(std::span<const CheckedMetric> gates);
+
+/// Formats a report of one suite as JUnit XML, for CI systems. Errors become `error`, failures
+/// `failure`, warnings `system-err`.
+std::string format_junit(const std::string& suite, std::span<const JUnitTest> tests);
+
+}  // namespace vlp

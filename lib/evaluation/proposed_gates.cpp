@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/proposed_gates.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <optional>
+
+#include "evaluation/evaluation_metrics.h"
+#include "geometry/angles.h"
+
+namespace vlp {
+namespace {
+
+/// 99.9 % and 97.5 % quantiles of the standard normal distribution.
+constexpr double kNormalQuantile999 = 3.0902, kNormalQuantile975 = 1.96;
+/// Smallest margin, relative to the value, and in mm or degrees.
+constexpr double kMinRelativeMargin = 0.01, kMinMargin = 0.001;
+
+double round_up(double value) {
+  constexpr double last_digit = 2;  // of three
+  const double step = std::pow(10, std::floor(std::log10(value)) - last_digit);
+  return step * std::ceil(value / step - kMinRelativeMargin);
+}
+
+double compute_limit(double value, double interval_high) {
+  const double standard_error = std::max(0.0, interval_high - value) / kNormalQuantile975;
+  const double margin = std::max({kNormalQuantile999 * std::numbers::sqrt2 * standard_error,
+                                  kMinRelativeMargin * value, kMinMargin});
+  return round_up(value + margin);
+}
+
+/// Computes the intervals of the errors that `size_of` returns for each fix, std::nullopt for fixes
+/// without one.
+std::optional<ErrorIntervals> compute_intervals(
+    const std::vector<FixError>& errors,
+    const std::function<std::optional<double>(const FixError&)>& size_of, int threads) {
+  std::vector<double> sizes;
+  std::vector<std::size_t> units;
+  sizes.reserve(errors.size());
+  units.reserve(errors.size());
+  for (const FixError& error : errors) {
+    if (const auto size = size_of(error)) {
+      sizes.push_back(std::abs(*size));
+      units.push_back(error.unit);
+    }
+  }
+  if (sizes.empty()) return std::nullopt;
+  return error_intervals(sizes, units, threads);
+}
+
+}  // namespace
+
+std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& evaluation) {
+  std::vector<Gate> gates;
+  if (!evaluation.intervals_m) return gates;
+  const auto add = [&](const char* name, double value, double interval_high) {
+    gates.push_back({name, compute_limit(value, interval_high)});
+  };
+  const ErrorIntervals& horizontal_m = *evaluation.intervals_m;
+  add("mean_mm", 1e3 * evaluation.horizontal_m.mean, 1e3 * horizontal_m.mean.high);
+  if (const auto& p90_m = horizontal_m.p90) {
+    add("p90_mm", 1e3 * evaluation.horizontal_m.p90, 1e3 * p90_m->high);
+  }
+  const std::vector<FixError> errors = errors_of(input, input.fixes).errors;
+  const auto height_m = compute_intervals(
+      errors, [](const FixError& error) { return error.height_m; }, input.threads);
+  if (height_m)
+    add("height_rms_mm", 1e3 * evaluation.height_m->sizes.rms, 1e3 * height_m->rms.high);
+  const auto yaw_rad = compute_intervals(
+      errors, [](const FixError& error) { return error.yaw_rad; }, input.threads);
+  if (yaw_rad) {
+    add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->sizes.rms),
+        deg_from_rad(yaw_rad->rms.high));
+  }
+  gates.push_back({"missing", evaluation.missing_share()});
+  return gates;
+}
+
+std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evaluation) {
+  std::string text = fmt::format(
+      "# Proposed from {} fixes of {} captures; a run of the same accuracy exceeds a limit in 1 "
+      "of\n"
+      "# 1,000 cases.\nformat: vlp-gates/1\ngates:\n",
+      evaluation.fixes, evaluation.captures);
+  const std::vector<Metric> metrics = metrics_of(evaluation);
+  for (const Gate& gate : gates) {
+    text += fmt::format("  {}: {:.6g}  # {:.4g} measured\n", gate.metric, gate.limit,
+                        value_of(metrics, gate.metric).value_or(0));
+  }
+  return text;
+}
+
+}  // namespace vlp

@@ -1,0 +1,96 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluation/proposed_gates.h"
+
+#include <gmock/gmock.h>
+
+#include <random>
+
+#include "evaluation/evaluation_metrics.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+
+/// A fix at each of `count` places 1 m apart, with independent errors: 1 mm per horizontal axis,
+/// `height_scale` times 2 mm in height, 0.1 degrees in yaw.
+EvaluationInput draw_run(std::size_t count, unsigned seed, double height_scale = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  EvaluationInput input;
+  input.truth = FromFile<TruthRow>{"truth.csv", {}};
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string image = std::to_string(i);
+    const double x_m = static_cast<double>(i);
+    const double error_x_m = 1e-3 * normal(random), error_y_m = 1e-3 * normal(random);
+    const double height_m = height_scale * 2e-3 * normal(random);
+    const double yaw_rad = 1.745e-3 * normal(random);
+    input.fixes.rows.push_back(
+        {image, "ok", FixRow::Fix{{{x_m + error_x_m, error_y_m, height_m}, yaw_rad}, {}, 0}, 3});
+    input.truth->rows.push_back({image, {x_m, 0}, 0, 0});
+  }
+  return input;
+}
+
+TEST(ProposeGates, AreMetByRunsOfTheSameAccuracy) {
+  int exceeded = 0, checked = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    const EvaluationInput first = draw_run(40, 2 * seed), second = draw_run(40, 2 * seed + 1);
+    const auto gates = propose_gates(first, evaluate(first));
+    ASSERT_EQ(gates.size(), 5);
+    for (const auto& gate : check_gates(gates, metrics_of(evaluate(second)))) {
+      ++checked;
+      if (!gate.met()) ++exceeded;
+    }
+  }
+  ASSERT_EQ(checked, 1000);
+  // 0.1 % each in theory; the bootstrap intervals of 40 units are somewhat narrow.
+  EXPECT_LE(exceeded, 10);
+}
+
+TEST(ProposeGates, CatchHeightsOfADifferentScale) {
+  const EvaluationInput good = draw_run(40, 1), wrong = draw_run(40, 2, 3);
+  const auto gates = propose_gates(good, evaluate(good));
+  ASSERT_FALSE(gates.empty());
+  EXPECT_THAT(words_of_missed(check_gates(gates, metrics_of(evaluate(wrong)))),
+              HasSubstr("height_rms_mm is"));
+}
+
+TEST(ProposeGates, LeaveAMarginWithoutScatter) {
+  EvaluationInput input = draw_run(8, 1);
+  for (std::size_t i = 0; i < 8; ++i) {
+    input.fixes.rows[i].fix->pose = {{static_cast<double>(i) + 1e-3, 0, 0}, 0};
+  }
+  const auto gates = propose_gates(input, evaluate(input));
+  ASSERT_EQ(gates.size(), 4) << "p90 needs 20 units";
+  EXPECT_EQ(gates[0].metric, "mean_mm");
+  EXPECT_NEAR(gates[0].limit, 1.01, 1e-9);
+  EXPECT_EQ(gates[1].metric, "height_rms_mm");
+  EXPECT_NEAR(gates[1].limit, 0.001, 1e-9);
+  EXPECT_EQ(gates[3].metric, "missing");
+  EXPECT_EQ(gates[3].limit, 0);
+}
+
+TEST(ProposeGates, NeedFiveUnits) {
+  const EvaluationInput input = draw_run(4, 1);
+  EXPECT_TRUE(propose_gates(input, evaluate(input)).empty());
+}
+
+TEST(FormatGates, AreReadBack) {
+  const EvaluationInput input = draw_run(40, 1);
+  const Evaluation evaluation = evaluate(input);
+  const auto gates = propose_gates(input, evaluation);
+  const TemporaryFolder folder;
+  const auto read = read_gates(folder.file("gates.yaml", format_gates(gates, evaluation)),
+                               metric_kinds({MetricSource::evaluation}));
+  ASSERT_EQ(read.size(), gates.size());
+  for (std::size_t i = 0; i < gates.size(); ++i) {
+    EXPECT_EQ(read[i].metric, gates[i].metric);
+    EXPECT_NEAR(read[i].limit, gates[i].limit, 1e-5 * gates[i].limit);
+  }
+}
+
+}  // namespace
+}  // namespace vlp

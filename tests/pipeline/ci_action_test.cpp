@@ -1,0 +1,95 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// The steps of scripts/ci/action.yml, run as a CI system runs them; tests/packages.sh runs them in
+/// a bare root with the package of the programs.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+
+#include "rig/calibration.h"
+#include "support/program.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+
+class CiAction : public testing::Test {
+ protected:
+  const TemporaryFolder folder;
+
+  void SetUp() override {
+#ifdef __SANITIZE_ADDRESS__
+    GTEST_SKIP() << "renders a session; the programs' own tests run under the sanitizers";
+#endif
+    const auto rendered = run_program("vlp-simulate -q " VLP_SOURCE_DIR
+                                      "/datasets/archive/scene.yaml "
+                                      "--only boards,rotation,dispersion,check -o '" +
+                                      (folder / "session").string() + "'");
+    ASSERT_EQ(rendered.exit_code, 0) << rendered.errors;
+    folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1, missing: 0}\n");
+  }
+  ProgramResult run_action(const std::string& inputs) const {
+    return run_program("cd '" + (folder / "").string() +
+                       "' && python3 " VLP_SOURCE_DIR
+                       "/tests/ci/run_action.py session=session "
+                       "'options=--row-time-s 3e-5 --readout rows' gates=gates.yaml " +
+                       inputs);
+  }
+  std::string content(const std::string& name) const {
+    return TemporaryFolder::content_of(folder / name);
+  }
+};
+
+TEST_F(CiAction, PassesAndComparesWithAcceptedFixes) {
+  const auto first = run_action("results=accepted");
+  ASSERT_EQ(first.exit_code, 0) << first.output << first.errors;
+  EXPECT_THAT(content("accepted/junit.xml"),
+              AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"mean_mm\"")));
+  EXPECT_FALSE(fs::exists(folder / "accepted/comparison.xml"));
+  const auto again = run_action("accepted=accepted/check-fixes.csv");
+  EXPECT_EQ(again.exit_code, 0) << again.output << again.errors;
+  EXPECT_THAT(content("results/comparison.xml"),
+              AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"worse_mm\"")));
+}
+
+TEST_F(CiAction, NamesTheLampThatIsWrongInTheMap) {
+  const std::string lamps = content("session/lamps.yaml"), before = "position_m: [-0.6, -0.3,";
+  ASSERT_NE(lamps.find(before), std::string::npos);
+  folder.file("session/lamps.yaml", std::string(lamps).replace(lamps.find(before), before.size(),
+                                                               "position_m: [-0.57, -0.3,"));
+  const auto result = run_action("");
+  const std::string lamp = "lamp 1 hangs 30 mm from where the map has it (x -30 mm, y +0 mm)";
+  EXPECT_THAT(content("results/junit.xml"), HasSubstr(lamp));
+  EXPECT_THAT(result.errors, HasSubstr(lamp));
+}
+
+TEST_F(CiAction, FailsByProposedGatesForAFocalLengthThatIsOnePercentOff) {
+  const auto good = run_action("results=good");
+  ASSERT_EQ(good.exit_code, 0) << good.output << good.errors;
+  const auto proposed = run_program("cd '" + (folder / "").string() +
+                                    "' && vlp-evaluate good/check-fixes.csv --truth "
+                                    "session/check/truth.csv --propose-gates gates.yaml");
+  ASSERT_EQ(proposed.exit_code, 0) << proposed.errors;
+  Calibration camera = read_calibration(folder / "good/lens.yaml");
+  for (const std::size_t focal_length : {0U, 1U}) camera.camera.intrinsics[focal_length] *= 1.01;
+  write_calibration(folder / "session/camera.yaml", camera);
+  const auto result = run_action("");
+  EXPECT_EQ(result.exit_code, 1) << result.output << result.errors;
+  EXPECT_THAT(
+      content("results/junit.xml"),
+      testing::ContainsRegex("<failure message=\"[^\"]*focal length[^\"]*height_rms_mm is"));
+}
+
+TEST_F(CiAction, FailsWithAnErrorInTheReportForAWrongRowTime) {
+  const auto result = run_action("'options=--row-time-s 1.5e-5 --readout rows'");
+  EXPECT_NE(result.exit_code, 0) << result.output;
+  EXPECT_THAT(content("results/junit.xml"),
+              AllOf(HasSubstr("errors=\"1\""), HasSubstr("<error type=")));
+}
+
+}  // namespace
+}  // namespace vlp
