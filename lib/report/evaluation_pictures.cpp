@@ -20,14 +20,14 @@ namespace {
 
 Eigen::Vector2d place_m(const FixRow& row) { return row.fix->pose.position_m.head<2>(); }
 
-ErrorPlot floor_of(const EvaluationInput& input, const std::vector<FixError>& errors,
-                   const LampMap& lamps) {
+ErrorPlot make_floor_plan(const EvaluationInput& input, const std::vector<FixError>& errors,
+                          const LampMap& lamps) {
   ErrorPlot plot{"Fixes on the floor", {}, {}, lamps};
   std::vector<bool> found(input.truth ? input.truth->rows.size() : 0);
   plot.fixes.reserve(errors.size());
   for (const FixError& error : errors) {
     const Eigen::Vector2d fix_m = place_m(input.fixes.rows[error.fix]);
-    plot.fixes.push_back({fix_m - error.horizontal_m, fix_m});
+    plot.fixes.push_back({fix_m - error.horizontal_m, fix_m, input.fixes.rows[error.fix].image});
     if (input.truth) found[error.truth] = true;
   }
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -38,12 +38,16 @@ ErrorPlot floor_of(const EvaluationInput& input, const std::vector<FixError>& er
 
 }  // namespace
 
+Drawing draw_floor_plan(const EvaluationInput& input, const LampMap& lamps) {
+  return drawing_of(make_floor_plan(input, errors_of(input, input.fixes).errors, lamps));
+}
+
 std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
                                                const Evaluation& evaluation, const LampMap& lamps) {
   const std::vector<FixError> errors = errors_of(input, input.fixes).errors;
   std::vector<ReportPicture> pictures;
   if (!input.line_m) {
-    pictures.push_back(report_picture(drawing_of(floor_of(input, errors, lamps))));
+    pictures.push_back(report_picture(drawing_of(make_floor_plan(input, errors, lamps))));
   } else if (evaluation.fit) {
     pictures.push_back(drive_picture("Drive", input.fixes.rows, *input.line_m, *evaluation.fit));
   }

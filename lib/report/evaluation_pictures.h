@@ -7,11 +7,16 @@
 #include <vector>
 
 #include "evaluation/evaluation.h"
+#include "report/plots/gnuplot.h"
 #include "report/report_picture.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 
 namespace vlp {
+
+/// Draws the errors of the fixes on the floor plan. Throws InputError when image names do not
+/// match.
+Drawing draw_floor_plan(const EvaluationInput& input, const LampMap& lamps);
 
 /// Errors on the floor and their distribution; with a commanded line the drive along it instead of
 /// the floor. Throws InputError, see svg_of(). Precondition: there is a fix.

@@ -103,13 +103,18 @@ std::string html_table(const HtmlTable& table) {
 
 std::string html_figure(const ReportPicture& picture) {
   const bool png = picture.image.rfind("\x89PNG", 0) == 0;
+  HtmlTable table{"", {}, {}};
+  if (!picture.table.empty()) {
+    table.header = picture.table.front();
+    table.rows.assign(picture.table.begin() + 1, picture.table.end());
+  }
   const std::string large = picture.part == ReportPart::camera ? " class=\"large\"" : "";
   return "<figure" + large +
          ">\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Picture\">"
          "<img alt=\"" +
          html_text(picture.alt) + "\" src=\"data:image/" + (png ? "png" : "svg+xml") + ";base64," +
          base64(picture.image) + "\"></div>\n" + html_element("figcaption", picture.caption) +
-         "</figure>\n";
+         "</figure>\n" + (table.rows.empty() ? "" : html_table(table));
 }
 
 }  // namespace vlp

@@ -34,7 +34,7 @@ struct HtmlTable {
 };
 std::string html_table(const HtmlTable& table);
 
-/// A picture inside the page, with its caption.
+/// A picture inside the page, with its caption, and its table below.
 std::string html_figure(const ReportPicture& picture);
 
 }  // namespace vlp

@@ -35,7 +35,7 @@ std::vector<std::string> row_of(const CheckedMetric& gate, bool may_be_out_of_re
 }
 
 std::string gates_table(const Report& report) {
-  HtmlTable table{"Gates", {"gate", "figure", "limit", "result"}, {}};
+  HtmlTable table{"", {"gate", "figure", "limit", "result"}, {}};
   for (const auto& gate : report.gates) {
     const bool given = report.verdict.has_value();
     if (!gate.met() && (gate.value || !given)) table.marked.push_back(table.rows.size());
@@ -73,9 +73,13 @@ std::string verdict_of_gates(const std::vector<CheckedMetric>& gates, const std:
 }
 
 std::string verdict(const Report& report) {
-  return (report.verdict ? box_of(*report.verdict)
-                         : verdict_of_gates(report.gates, report.caution)) +
-         gates_table(report);
+  return report.verdict ? box_of(*report.verdict) : verdict_of_gates(report.gates, report.caution);
+}
+
+std::string facts_table(const Report& report) {
+  HtmlTable table{"", {}, {}};
+  for (const auto& [label, value] : report.facts) table.rows.push_back({label, value});
+  return table.rows.empty() ? "" : html_table(table);
 }
 
 std::string refused_of(const Report& report) {
@@ -131,11 +135,12 @@ std::string report_html(const Report& report) {
   const auto pictures = [&](ReportPart part) { return pictures_of(report, part); };
   return html_page(
       report.title,
-      verdict(report) + html_section("Figures", figures_of(report)) +
+      verdict(report) + facts_table(report) +
+          html_section("Fixes on the floor", pictures(ReportPart::floor)) +
+          html_section("Gates", gates_table(report)) + html_section("Figures", figures_of(report)) +
           html_section("Camera", camera + pictures(ReportPart::camera)) +
           html_section("Rotation centre", rotation + pictures(ReportPart::rotation)) +
           html_section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
-          html_section("Fixes on the floor", pictures(ReportPart::floor)) +
           html_section("Distribution of the errors", pictures(ReportPart::distribution)) +
           html_section("Moving tracks", pictures(ReportPart::tracks)) +
           html_section("More pictures", pictures(ReportPart::other)) +

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "evaluation/gate.h"
@@ -52,11 +53,14 @@ struct Report {
   /// In place of the gates' own; a gate without a figure was then not reached.
   std::optional<ReportVerdict> verdict = {};
   std::vector<ReportRefusal> refused = {};
+  /// Label and value of what identifies the measurement, shown below the verdict: who, when.
+  std::vector<std::pair<std::string, std::string>> facts = {};
 };
 
 /// One HTML page that needs nothing else: style and pictures are inside, there is no script.
-/// Verdict, figures, camera, rotation centre, dispersion, fixes, distribution, tracks, refused
-/// images, history; for a screen, a phone and A4 paper. Same report, same bytes.
+/// Verdict, facts, fixes on the floor, gates, figures, camera, rotation centre, dispersion,
+/// distribution, tracks, refused images, history; for a screen, a phone and A4 paper. Same report,
+/// same bytes.
 std::string report_html(const Report& report);
 
 }  // namespace vlp

@@ -114,7 +114,9 @@ ReportPicture read_report_picture(const std::filesystem::path& file) {
 }
 
 ReportPicture report_picture(const Drawing& drawing) {
-  return picture_of(svg_of(drawing), drawing.name);
+  ReportPicture picture = picture_of(svg_of(drawing), drawing.name);
+  picture.table = drawing.table;
+  return picture;
 }
 
 }  // namespace vlp

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "report/plots/gnuplot.h"
 
@@ -18,6 +19,8 @@ struct ReportPicture {
   std::string image;
   /// What it shows, how to read it; for those who see it and for those who do not.
   std::string caption, alt;
+  /// Drawing::table.
+  std::vector<std::vector<std::string>> table = {};
 };
 
 /// A picture that a program drew. It is recognised by its title; one that is not (a PNG has none)

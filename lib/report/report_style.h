@@ -37,7 +37,8 @@ code { font: .85rem/1.4 "DejaVu Sans Mono", ui-monospace, monospace; }
 .digests { font: .8rem/1.4 "DejaVu Sans Mono", ui-monospace, monospace; }
 .digests td { overflow-wrap: anywhere; min-width: 18rem; }
 footer { margin-top: 2rem; font-size: .85rem; color: #444; }
-@page { size: A4; margin: 14mm 15mm; }
+.signature { margin: 4rem 0 1rem; width: 20rem; max-width: 100%; border-top: 1px solid #555; font-size: .85rem; }
+@page { size: A4; margin: 14mm 15mm; @bottom-right { content: counter(page) " / " counter(pages); font-size: 8pt; } }
 @media print {
   body { max-width: none; padding: 0; font-size: 10pt; }
   h2, caption, summary { break-after: avoid; }

@@ -25,6 +25,33 @@ std::vector<double> errors_of(const ErrorPlot& plot) {
   return errors_m;
 }
 
+/// Makes the table of the fixes that are furthest off, the worst first.
+std::vector<std::vector<std::string>> make_table(const ErrorPlot& plot) {
+  constexpr std::size_t max_rows = 10;
+  constexpr int place_digits = 3, error_digits = 2;
+  constexpr double millimetres = 1e3;
+  std::vector<ErrorPlot::Fix> fixes = plot.fixes;
+  const std::size_t count = std::min(max_rows, fixes.size());
+  std::partial_sort(fixes.begin(), fixes.begin() + static_cast<std::ptrdiff_t>(count), fixes.end(),
+                    [](const auto& a, const auto& b) { return error_m(a) > error_m(b); });
+  std::vector<std::vector<std::string>> table;
+  table.reserve(count + 1);
+  if (count > 0) {
+    table.push_back(
+        {"largest errors", "x, y of the truth (m)", "error in x, y (mm)", "error (mm)"});
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const ErrorPlot::Fix& fix = fixes[i];
+    const Eigen::Vector2d error_mm = millimetres * (fix.fix_m - fix.truth_m);
+    table.push_back(
+        {fix.image,
+         fixed(fix.truth_m.x(), place_digits) + ", " + fixed(fix.truth_m.y(), place_digits),
+         fixed(error_mm.x(), error_digits) + ", " + fixed(error_mm.y(), error_digits),
+         fixed(error_mm.norm(), error_digits)});
+  }
+  return table;
+}
+
 /// Nine tenths of the errors are no larger; 0 for none.
 double p90_of(std::vector<double> errors_m) {
   if (errors_m.empty()) return 0;
@@ -157,7 +184,8 @@ Drawing drawing_of(const ErrorPlot& plot) {
               bar(scale, {scale.paper.min().x(), scale.paper.min().y() - 1.2 * margin_m}) +
               "set xlabel 'x (m)'\nset ylabel 'y (m)'\nset size ratio -1\nset xrange " +
               plot_range(least.x(), most.x()) + "\nset yrange " + plot_range(least.y(), most.y()) +
-              "\n" + layers(plot, blocks, scale)};
+              "\n" + layers(plot, blocks, scale),
+          make_table(plot)};
 }
 
 }  // namespace vlp

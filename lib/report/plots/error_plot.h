@@ -17,6 +17,8 @@ struct ErrorPlot {
   /// Of the captures with a fix, in the world.
   struct Fix {
     Eigen::Vector2d truth_m, fix_m;
+    /// Name of the capture, for the table.
+    std::string image = {};
   };
   std::vector<Fix> fixes;
   /// Where the captures without a fix were.
@@ -32,7 +34,8 @@ double error_magnification(double p90_m, double width_m);
 
 /// From each true place an arrow towards its fix. Of more than 500 fixes some are drawn, evenly
 /// in their order, and the 20 that are furthest off; arrows longer than a quarter of the floor are
-/// cut short, dashed and counted. Of more than 200 captures without a fix some are drawn.
+/// cut short, dashed and counted. Of more than 200 captures without a fix some are drawn. The table
+/// has the ten fixes that are furthest off.
 Drawing drawing_of(const ErrorPlot& plot);
 
 }  // namespace vlp

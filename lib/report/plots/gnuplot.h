@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace vlp {
 
@@ -14,6 +15,8 @@ struct Drawing {
   int width_px, height_px;
   /// In gnuplot's language, without `set terminal` and `set output`.
   std::string commands;
+  /// Table below the picture in a report, its first row the header; may be empty.
+  std::vector<std::vector<std::string>> table = {};
 };
 
 /// Draws into `picture`, .png or .svg by its ending, whole or not at all. Same commands, same

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "captures/digest.h"
 #include "captures/number_text.h"
 #include "positioning/common_errors.h"
 #include "report/calibration_sections.h"
@@ -59,6 +60,7 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
                       {"unit", "camera " + record.camera},
                       {"image", fmt::format("{} x {} px", width_px, height_px)},
                       {"measured at", record.station},
+                      {"operator", record.operator_name.empty() ? "\u00a0" : record.operator_name},
                       {"begun (UTC)", record.begun_utc},
                       {"ended (UTC)", record.ended_utc},
                       {"procedure",
@@ -76,15 +78,24 @@ std::string results_part(const Calibration& calibration) {
   }
   const std::string lens(name_of(calibration.camera.lens_model));
   return html_table(table) +
-         html_element("p", "Lens model " + lens +
-                               "; all its parameters are in the unit's calibration.yaml. The "
-                               "expanded uncertainty is the standard uncertainty times k = 2, for "
-                               "about 95 % of a normal distribution. It is that of the captures' "
-                               "scatter, for the zenith and the dispersion with the lens's part; "
-                               "the board, the lamp map and the known points are taken as exact.");
+         html_element(
+             "p", "Lens model " + lens +
+                      "; all its parameters are in the unit's calibration.yaml. The "
+                      "expanded uncertainty is the standard uncertainty times k = 2, for "
+                      "about 95 % of a normal distribution. It includes the scatter of the "
+                      "captures, the lamp map as far as lamps.yaml states its sd_m, and for the "
+                      "zenith and the dispersion the lens. The board and the known points are "
+                      "taken as exact.");
 }
 
-/// Of each gate the figure, what is asked for, and whether it conforms, by which rule.
+/// "rms_px: residuals of the board's corners, ..." for a reader who has only the certificate.
+std::string describe_requirement(const std::string& metric) {
+  const auto kind = metric_kind(metric);
+  return kind ? metric + ": " + kind->meaning : metric;
+}
+
+/// Makes the table of the gates: the figure, what is asked for, and whether it conforms, by which
+/// rule.
 std::string conformity_part(const RunRecord& record) {
   HtmlTable table{"", {"requirement", "figure", "limit", "accepted", "conforms", "rule"}, {}};
   constexpr int digits = 4, of_probability = 3;
@@ -106,7 +117,7 @@ std::string conformity_part(const RunRecord& record) {
     }
     if (!figure.met()) table.marked.push_back(table.rows.size());
     table.rows.push_back(
-        {figure.name, measured,
+        {describe_requirement(figure.name), measured,
          words_of(figure.asked) + " " + with_unit(significant(*figure.limit, digits), figure.unit),
          with_unit(significant(figure.acceptance_limit(), digits), figure.unit), outcome, rule});
   }
@@ -120,12 +131,26 @@ std::string conformity_part(const RunRecord& record) {
              "truth.");
 }
 
+/// Returns the digest of the names and digests of the images that a step used, empty without any.
+std::string digest_images(const RunRecord& record, const std::string& step) {
+  std::string text;
+  for (const RunRecord::Image& image : record.images) {
+    if (image.step == step && image.refused.empty()) text += image.name + " " + image.sha256 + "\n";
+  }
+  return text.empty() ? "" : sha256_of_text(text);
+}
+
 std::string traceability_part(const RunRecord& record, const Calibration& calibration) {
+  const std::string check = digest_images(record, "check");
   return html_element("p",
                       "Digests (SHA-256) of what the results rest on. \"station\" is the "
                       "configuration with the camera's type, the board and the lamp map, whose own "
                       "certificates belong to this one: " +
-                          record.config_sha256 + ".") +
+                          record.config_sha256 + "." +
+                          (check.empty() ? ""
+                                         : " \"check\", the list of names and digests of the "
+                                           "images at the known points: " +
+                                               check + ".")) +
          history_list(calibration.history);
 }
 
@@ -133,10 +158,10 @@ std::string traceability_part(const RunRecord& record, const Calibration& calibr
 std::string part_to_fill_in() {
   HtmlTable table{"", {}, {}};
   for (const char* line : {"laboratory, address", "customer", "temperature, humidity",
-                           "certificates of board and lamp map", "issued by, date", "signature"}) {
+                           "certificates of board and lamp map", "issued by, date"}) {
     table.rows.push_back({line, "\u00a0"});
   }
-  return html_table(table) +
+  return html_table(table) + "<div class=\"signature\">signature</div>\n" +
          html_element("p", "The results relate to this unit as it was measured, and only to it.");
 }
 

@@ -54,13 +54,15 @@ std::string unit_report(const RunRecord& record, const std::filesystem::path& ca
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
-  std::string who;
-  if (!record.operator_name.empty()) who += ", operator " + record.operator_name;
-  if (!record.shift.empty()) who += ", shift " + record.shift;
-  report.notes.push_back("Run " + record.run + ", ended " + record.ended_utc + who + "; " +
-                         record.program + "; " + record.libraries + "; station configuration " +
-                         record.config_sha256 + "; " + std::to_string(used) + " of " +
-                         std::to_string(record.images.size()) + " images used.");
+  report.facts = {
+      {"run", record.run},
+      {"begun, ended (UTC)", record.begun_utc + ", " + record.ended_utc},
+      {"operator", record.operator_name},
+      {"shift", record.shift},
+      {"images", std::to_string(record.images.size()) + ", " + std::to_string(used) + " used"}};
+  std::erase_if(report.facts, [](const auto& fact) { return fact.second.empty(); });
+  report.notes.push_back(record.program + "; " + record.libraries + "; station configuration " +
+                         record.config_sha256 + ".");
   if (!calibration.empty()) report.calibration = read_calibration(calibration);
   report.pictures = pictures;
   return report_html(report);

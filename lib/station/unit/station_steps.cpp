@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "calibration/intrinsics/projection_difference.h"
+#include "report/evaluation_pictures.h"
 #include "session/dispersion_step.h"
 #include "session/evaluate_step.h"
 #include "session/lens_step.h"
@@ -172,6 +173,7 @@ StepResult check_fixes(const StationConfig& config, const Calibration& calibrati
   input.truth = {"check", std::move(known.truth)};
   input.station_m = place_radius_m(calibration);
   const EvaluateResult errors = evaluate_fixes(input, {});
+  result.drawing = [input, lamps = config.lamps] { return draw_floor_plan(input, lamps); };
   add_errors(input, errors.evaluation, result);
   if (const auto& typical = located.summary.typical; typical && typical->median_residual_px) {
     result.metrics.push_back({"check_residual_px", *typical->median_residual_px});

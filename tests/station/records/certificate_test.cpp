@@ -108,7 +108,8 @@ TEST(Certificate, HasWhatARecordHas) {
                               "<td>guard band of 1.645 u</td>"));
   EXPECT_THAT(page, HasSubstr("<td>0.1235\u00a0px</td><td>at most 0.3\u00a0px</td>"
                               "<td>0.3\u00a0px</td><td>yes</td><td>simple</td>"));
-  EXPECT_THAT(page, HasSubstr("signature"));
+  EXPECT_THAT(page, HasSubstr("<div class=\"signature\">signature</div>"));
+  EXPECT_THAT(page, HasSubstr("counter(pages)"));
 }
 
 TEST(Certificate, SaysThatAUnitDoesNotConform) {
