@@ -130,7 +130,8 @@ typedef struct vlp_fix {
   double roll_rad, pitch_rad;
   double yaw_rad;
   /* Of (x, y, z, roll, pitch, yaw), by rows: all that is known of the fix's error. Where the lean
-   * is not estimated, roll and pitch have the sensor's own variance and no correlation stated. */
+   * is not estimated, roll and pitch have the variance of vlp_sensors.inclination_sigma_rad and no
+   * correlation stated; 0 if that is 0, which takes the camera as exactly level or exactly read. */
   double covariance[36];
   /* The part that is of this frame alone and averages out. */
   double noise_covariance[36];
