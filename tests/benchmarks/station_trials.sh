@@ -7,6 +7,7 @@
 #   tests/benchmarks/station_trials.sh good [COUNT [FIRST_SEED]]     by default 50 units, from seed 1
 #   tests/benchmarks/station_trials.sh faulty [COUNT [FIRST_SEED]]   5 of each of six kinds
 #   tests/benchmarks/station_trials.sh kinds [COUNT [FIRST_SEED]]    1 of each of 28 kinds
+#   tests/benchmarks/station_trials.sh mixed [COUNT [FIRST_SEED]]    10 units, each step with images of another
 #   tests/benchmarks/station_trials.sh timing [COUNT [FIRST_SEED]]   1 unit
 # A line for each; exit code 1 when one did not end as it should. A good unit takes 9 s of processor
 # time, six faulty ones 30 s. kinds needs /usr/bin/python3 with OpenCV (python3-opencv). timing: the
@@ -16,8 +17,8 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 PATH=$PWD/build/bin:$PATH
 what=${1:-good} count=${2:-} first=${3:-1}
-declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [timing]=1)
-[ -n "${counts[$what]:-}" ] || { sed -n '5,14s/^# \?//p' "$0"; exit 2; }
+declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [mixed]=10 [timing]=1)
+[ -n "${counts[$what]:-}" ] || { sed -n '5,15s/^# \?//p' "$0"; exit 2; }
 count=${count:-${counts[$what]}}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -295,6 +296,37 @@ kinds() {
   unit_again
   rm -f "$work"/unit/boards/00[123]?.png
   tried few-boards "$seed" 'boards: not enough images'
+}
+
+# mixed SEED: a good unit of which three of the images of one step, each step in turn, are of another camera: INVALID,
+# with the name of one of them.
+mixed() {
+  local step image said named
+  scene_of $(($1 + 1000)) 505 510 9 0.7
+  render
+  rm -rf "$work/other"
+  mv "$work/unit" "$work/other"
+  scene_of "$1" 514.8 525.2 5 0.7
+  render
+  rm -rf "$work/good"
+  mv "$work/unit" "$work/good"
+  for step in boards rotation dispersion check; do
+    unit_again
+    named=''
+    for image in $(find "$work/good/$step" -name '*.png' -printf '%f\n' | sort | awk "NR % 4 == 1 + $1 % 4" | head -3); do
+      cp "$work/other/$step/$image" "$work/unit/$step/$image"
+      echo "mixed $again" >>"$work/unit/$step/$image"
+      named+="${named:+|}${image%.png}"
+    done
+    said=$(vlp-station run --station "$work/station/station.yaml" --camera-id "mixed-$step-$1" \
+      --batch "$work/unit" 2>&1 | grep -v ': info: ' || true)
+    if grep -q INVALID <<<"$said" && grep -qE "($named)" <<<"$said"; then
+      printf 'mixed %-18s %4d   named\n' "$step" "$1"
+    else
+      wrong=$((wrong + 1))
+      printf 'mixed %-18s %4d   NOT AS IT SHOULD: %s\n' "$step" "$1" "$(grep -m 1 -E 'PASS|FAIL|INVALID' <<<"$said")"
+    fi
+  done
 }
 
 timing() {
