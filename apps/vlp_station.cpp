@@ -87,6 +87,8 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
       ->check(CLI::IsMember({"PASS", "FAIL", "INVALID", "any"}));
   command->add_option("--kind", options.filter.kind, "Only units, or only golden units")
       ->check(CLI::IsMember({"unit", "golden", "any"}));
+  command->add_option("--operator", options.filter.operator_name, "Only of this operator");
+  command->add_option("--shift", options.filter.shift, "Only of this shift");
   command
       ->add_option("--since", options.filter.since,
                    "Only those that ended at this UTC or later, 2026-11-21 or 2026-11-21T13:45")

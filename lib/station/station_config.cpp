@@ -240,6 +240,11 @@ StationConfig read_station(const fs::path& file) {
   if (const auto pattern = document.optional("serial_pattern")) {
     config.serial_pattern = read_pattern(*pattern);
   }
+  if (const auto operators = document.optional("void_operators")) {
+    const std::vector<YamlValue> names = operators->list();
+    std::ranges::transform(names, std::back_inserter(config.void_operators),
+                           [](const YamlValue& name) { return name.text(); });
+  }
   config.captures = path_of(document.required("captures"), file);
   config.results = path_of(document.required("results"), file);
   config.records = records_of(document.required("records"), file);

@@ -80,6 +80,8 @@ struct StationConfig {
   std::optional<VerifyDue> verify_due;
   /// A regular expression of ECMAScript that the ids of units match as a whole; empty: any do.
   std::string serial_pattern;
+  /// Operators who may void runs of this station; empty: all may.
+  std::vector<std::string> void_operators = {};
   /// Folders: where the images of a unit arrive, as CAPTURES/CAMERA/STEP/, and where results go.
   std::filesystem::path captures, results;
   /// A file of SQLite, or postgresql://...

@@ -53,9 +53,10 @@ TEST_F(StationYaml, ShowsWhatAShiftMayWant) {
   folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
   folder.file(
       "station.yaml",
-      std::regex_replace(TemporaryFolder::content_of(folder / "station.yaml"),
-                         std::regex("\n# (golden:|verify_due:|serial_pattern:|hook:|keep:| {9})"),
-                         "\n$1"));
+      std::regex_replace(
+          TemporaryFolder::content_of(folder / "station.yaml"),
+          std::regex("\n# (golden:|verify_due:|serial_pattern:|void_operators:|hook:|keep:| {9})"),
+          "\n$1"));
   const StationConfig config = read_station(folder / "station.yaml");
   ASSERT_TRUE(config.golden);
   EXPECT_THAT(config.golden->gates, SizeIs(7));
@@ -63,6 +64,7 @@ TEST_F(StationYaml, ShowsWhatAShiftMayWant) {
   EXPECT_EQ(config.verify_due->units, 200);
   EXPECT_EQ(serial_problem(config, "0001"), "");
   EXPECT_NE(serial_problem(config, "x1"), "");
+  EXPECT_EQ(config.void_operators, (std::vector<std::string>{"Ann", "Bea"}));
   ASSERT_TRUE(config.hook);
   EXPECT_THAT(config.hook->command, SizeIs(3));
   EXPECT_EQ(config.keep.images_days, 90);

@@ -210,6 +210,10 @@ void list_runs(const StationRecordsOptions& options) {
     fmt::print(": yield {:.1f} % of {}", percent * *yield, counts.units_judged);
   }
   fmt::print("\n");
+  if (const auto yield = counts.first_pass_yield()) {
+    fmt::print("{} cameras, {} with more than one run: first-pass yield {:.1f} %\n", counts.cameras,
+               counts.cameras_reworked, percent * *yield);
+  }
   const auto open = known->with_open_hook();
   const auto without = std::count_if(runs.begin(), runs.end(), [&](const RunSummary& run) {
     return std::binary_search(open.begin(), open.end(), run.run);

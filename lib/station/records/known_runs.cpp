@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -27,7 +28,20 @@ bool passes(const RunRecord& run, const RunFilter& filter) {
   };
   return is(run.camera, filter.camera) && is(run.station, filter.station) &&
          is(run.verdict, filter.verdict) && is(run.kind, filter.kind) &&
+         is(run.operator_name, filter.operator_name) && is(run.shift, filter.shift) &&
          run.ended_utc >= filter.since && (filter.until.empty() || run.ended_utc < filter.until);
+}
+
+void check_may_void(const StationConfig& station, const std::string& operator_name) {
+  const auto& operators = station.void_operators;
+  if (operators.empty() ||
+      std::find(operators.begin(), operators.end(), operator_name) != operators.end()) {
+    return;
+  }
+  throw std::invalid_argument(
+      fmt::format("operator {} may not void runs of station {}: void_operators in station.yaml has "
+                  "those who may",
+                  printable(operator_name), station.station));
 }
 
 }  // namespace
@@ -126,8 +140,14 @@ std::optional<double> RunCounts::yield() const {
   return static_cast<double>(units_passed) / static_cast<double>(units_judged);
 }
 
+std::optional<double> RunCounts::first_pass_yield() const {
+  if (cameras == 0) return std::nullopt;
+  return static_cast<double>(cameras_passed_first) / static_cast<double>(cameras);
+}
+
 RunCounts count_runs(std::span<const RunSummary> runs) {
   RunCounts counts;
+  std::map<std::string, int> judged;
   for (const RunSummary& run : runs) {
     if (!run.voided.empty()) {
       ++counts.voided;
@@ -140,7 +160,14 @@ RunCounts count_runs(std::span<const RunSummary> runs) {
     if (run.verdict == name_of(Verdict::invalid)) ++counts.invalid;
     if (run.kind != "unit") continue;
     if (passed) ++counts.units_passed;
-    if (passed || failed) ++counts.units_judged;
+    if (!passed && !failed) continue;
+    ++counts.units_judged;
+    if (const auto runs_of_camera = ++judged[run.camera]; runs_of_camera == 1) {
+      ++counts.cameras;
+      if (passed) ++counts.cameras_passed_first;
+    } else if (runs_of_camera == 2) {
+      ++counts.cameras_reworked;
+    }
   }
   return counts;
 }
@@ -181,6 +208,7 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
     record = known.find(run);  // another may have voided it before the lock was had
   }
   const StationConfig* own_station = own ? &*station : nullptr;
+  if (own) check_may_void(*station, operator_name);
   if (const RunEvent* event = voided(record)) {
     if (own) mark_files_voided(record, station->results);
     throw std::invalid_argument(

@@ -74,11 +74,17 @@ struct RunCounts {
   std::size_t passed = 0, failed = 0, invalid = 0, voided = 0;
   /// Of the units that were judged, those that passed.
   std::size_t units_passed = 0, units_judged = 0;
+  /// Cameras that were judged as units: all, those whose first run passed, and those with two runs
+  /// or more.
+  std::size_t cameras = 0, cameras_passed_first = 0, cameras_reworked = 0;
 
-  /// Nothing when no unit was judged.
+  /// Returns the fraction of runs of units that passed, std::nullopt if no unit was judged.
   std::optional<double> yield() const;
+  /// Returns the fraction of cameras whose first run passed, std::nullopt if no unit was judged.
+  std::optional<double> first_pass_yield() const;
 };
 
+/// Counts runs, given from the first to the last.
 RunCounts count_runs(std::span<const RunSummary> runs);
 
 struct Voided {
@@ -91,7 +97,8 @@ struct Voided {
 /// Voids a run: it counts no more, in no yield, trend or study, which its events tell, with who and
 /// why, and a golden run makes the golden unit due. At the station whose run it is, its files are
 /// renamed (mark_files_voided()), and its hook is told (call_hook()). Throws std::invalid_argument
-/// for a run that was voided before, whose files are renamed all the same, InputError when it
+/// for an operator who is not among StationConfig::void_operators of that station, and for a run
+/// that was voided before, whose files are renamed all the same, InputError when it
 /// cannot be kept or its hook is being run.
 Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
                 const std::string& reason);

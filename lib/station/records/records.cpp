@@ -291,14 +291,17 @@ std::string condition(const RunFilter& filter) {
   if (!filter.station.empty()) text += " AND runs.station = :station";
   if (!filter.verdict.empty()) text += " AND runs.verdict = :verdict";
   if (!filter.kind.empty()) text += " AND runs.kind = :kind";
+  if (!filter.operator_name.empty()) text += " AND runs.operator_name = :operator_name";
+  if (!filter.shift.empty()) text += " AND runs.shift = :shift";
   if (!filter.since.empty()) text += " AND runs.ended_utc >= :since";
   if (!filter.until.empty()) text += " AND runs.ended_utc < :until";
   return text;
 }
 
 void bind(soci::statement& statement, const RunFilter& filter) {
-  for (const std::string* value : {&filter.camera, &filter.station, &filter.verdict, &filter.kind,
-                                   &filter.since, &filter.until}) {
+  for (const std::string* value :
+       {&filter.camera, &filter.station, &filter.verdict, &filter.kind, &filter.operator_name,
+        &filter.shift, &filter.since, &filter.until}) {
     if (!value->empty()) statement.exchange(soci::use(*value));
   }
 }

@@ -10,6 +10,7 @@
 #include "station/records/golden_due.h"
 #include "station/records/hook.h"
 #include "station/sample_records.h"
+#include "support/refused.h"
 
 namespace vlp {
 namespace {
@@ -103,6 +104,51 @@ TEST(RunCounts, LeaveVoidedRunsOutOfTheYield) {
   EXPECT_EQ(counts.units_judged, 3U);
   EXPECT_DOUBLE_EQ(counts.yield().value(), 2.0 / 3);
   EXPECT_FALSE(count_runs({}).yield());
+}
+
+TEST(RunCounts, HaveAFirstPassYieldAndRework) {
+  const std::vector<RunSummary> runs{{"1", "unit", "", "a", "", "PASS", "", ""},
+                                     {"2", "unit", "", "b", "", "FAIL", "", ""},
+                                     {"3", "unit", "", "b", "", "PASS", "", ""},
+                                     {"4", "unit", "", "c", "", "INVALID", "", ""},
+                                     {"5", "unit", "", "c", "", "PASS", "", ""},
+                                     {"6", "unit", "", "d", "", "FAIL", "", "wrong serial"},
+                                     {"7", "golden", "", "g", "", "FAIL", "", ""}};
+  const RunCounts counts = count_runs(runs);
+  EXPECT_EQ(counts.cameras, 3U);
+  EXPECT_EQ(counts.cameras_reworked, 1U);
+  EXPECT_DOUBLE_EQ(counts.first_pass_yield().value(), 2.0 / 3);
+  EXPECT_FALSE(count_runs({}).first_pass_yield());
+}
+
+TEST_F(KnownRunsTest, AreFilteredByOperatorAndShift) {
+  RunRecord night = sample(run_of(1), "a", 0.1), day = sample(run_of(2), "a", 0.1);
+  night.operator_name = "Ann";
+  night.shift = "night";
+  day.operator_name = "Bea";
+  for (const RunRecord* run : {&night, &day}) Records(config.records).keep(*run);
+  const auto expect_only_the_night = [&] {
+    KnownRuns known(config);
+    const auto is_night = ElementsAre(Field(&RunSummary::run, night.run));
+    EXPECT_THAT(known.list({}), SizeIs(2));
+    EXPECT_THAT(known.list(only(&RunFilter::operator_name, "Ann")), is_night);
+    EXPECT_THAT(known.list(only(&RunFilter::shift, "night")), is_night);
+    EXPECT_THAT(known.list(only(&RunFilter::operator_name, "Cat")), IsEmpty());
+  };
+  expect_only_the_night();
+  take_records_away();
+  for (const RunRecord* run : {&night, &day}) Spool(config.spool, config.records).keep(*run);
+  expect_only_the_night();
+}
+
+TEST_F(KnownRunsTest, AreVoidedByThoseAloneWhoMay) {
+  const std::string run = keep(1);
+  config.void_operators = {"Bea"};
+  KnownRuns known(config);
+  EXPECT_THAT(refusal_of([&] { void_run(known, run, "Ann", "wrong serial"); }),
+              HasSubstr("operator Ann may not void runs of station station-1: void_operators"));
+  EXPECT_THAT(known.find(run).events, IsEmpty());
+  EXPECT_THAT(void_run(known, run, "Bea", "wrong serial").run.events, SizeIs(1));
 }
 
 TEST_F(KnownRunsTest, AreVoidedOnceWithWhoAndWhy) {
