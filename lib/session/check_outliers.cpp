@@ -18,14 +18,16 @@ constexpr std::size_t kMinErrors = 5;
 constexpr double kMinRatio = 8;
 constexpr double kMmPerM = 1e3;
 
-/// Returns names of images with runs of neighbours joined: "0000.png to 0004.png, 0010.png".
+/// Returns names of images with runs of successive captures joined: "0000.png to 0004.png,
+/// 0010.png". A capture without an error ends a run.
 std::string join_images(const std::vector<CheckError>& errors,
                         const std::vector<std::size_t>& indices) {
   constexpr std::size_t max_groups = 5;
   std::vector<std::string> groups;
   for (std::size_t begin = 0; begin < indices.size();) {
     std::size_t end = begin + 1;
-    while (end < indices.size() && indices[end] == indices[end - 1] + 1) ++end;
+    const auto capture = [&](std::size_t i) { return errors[indices[i]].capture; };
+    while (end < indices.size() && capture(end) == capture(end - 1) + 1) ++end;
     groups.push_back(errors[indices[begin]].image);
     if (end > begin + 1) {
       groups.back().append(end > begin + 2 ? " to " : ", ").append(errors[indices[end - 1]].image);

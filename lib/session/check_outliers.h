@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,8 @@ inline constexpr double kMinOutlierError_m = 0.005;
 struct CheckError {
   std::string image;
   double horizontal_m;
+  /// Index of the capture in the folder, which may have captures without an error.
+  std::size_t capture = 0;
 };
 
 /// Describes captures that were taken elsewhere than their table says, or by another camera, in one

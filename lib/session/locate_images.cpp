@@ -12,6 +12,7 @@
 
 #include "geometry/angles.h"
 #include "positioning/correction.h"
+#include "session/row_time_check.h"
 #include "session/skipped_images.h"
 
 namespace vlp {
@@ -150,6 +151,20 @@ bool has_detections(const std::vector<Frame>& frames) {
                      [](const Frame& frame) { return !frame.detections.empty(); });
 }
 
+/// Adds a contradiction of the row time to a result: as its failure if it has one, as a warning
+/// otherwise, because the fixes of a camera at rest are valid.
+void add_row_time_error(const std::vector<Observation>& images, const LocateInput& input,
+                        const std::filesystem::path& calibration_file, LocateResult& located) {
+  std::string error = describe_row_time_error(images, input.lamps, input.calibration.camera,
+                                              calibration_file.filename().string(), located.ok());
+  if (error.empty()) return;
+  if (located.ok()) {
+    located.warnings.push_back(std::move(error));
+  } else {
+    located.fail(StepFailure::bad_input, std::move(error));
+  }
+}
+
 }  // namespace
 
 LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput input,
@@ -184,6 +199,9 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
     result.located = locate_frames(input);
   }
   add_remarks(seen, result.located);
+  if (options.classifier.empty()) {
+    add_row_time_error(seen.images, input, images.calibration_file, result.located);
+  }
   return result;
 }
 

@@ -25,13 +25,14 @@ struct PeriodsOfImages {
   std::vector<LightPeriod> lights;
   std::vector<std::array<int, 2>> sizes_px;
 
-  PeriodsOfImages(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels) {
-    for (std::size_t i = 0; i < seen.folders.size(); ++i) {
-      for (LightPeriod light : measured_periods(seen.folders[i].images, labels[i])) {
+  PeriodsOfImages(const std::vector<const std::vector<Observation>*>& folders,
+                  const std::vector<std::vector<Frame>>& labels) {
+    for (std::size_t i = 0; i < folders.size(); ++i) {
+      for (LightPeriod light : measured_periods(*folders[i], labels[i])) {
         light.image += sizes_px.size();
         lights.push_back(std::move(light));
       }
-      for (const Observation& image : seen.folders[i].images) sizes_px.push_back(image.size_px);
+      for (const Observation& image : *folders[i]) sizes_px.push_back(image.size_px);
     }
   }
 
@@ -53,19 +54,6 @@ struct PeriodsOfImages {
   }
 };
 
-/// Chooses a row time by periods and duties or, where they do not decide, by the lamps' places,
-/// too.
-RowTimeResult choose_by_places(const SeenLights& seen,
-                               const std::vector<std::vector<Frame>>& labels,
-                               const LampMap& lamps) {
-  const PeriodsOfImages periods(seen, labels);
-  const RowTimeCandidates found = estimate_row_time(
-      std::vector<MeasuredPeriod>(periods.lights.begin(), periods.lights.end()), lamps);
-  if (found.candidates.size() < 2) return choose_row_time(found);
-  const auto images = periods.by_group(found.groups);
-  return choose_row_time(found, compute_position_costs(found, images, lamps, seen.camera.lens));
-}
-
 /// Collects the images of all folders, without their lights.
 std::vector<Observation> collect_images(const SeenLights& seen) {
   std::vector<Observation> images;
@@ -79,6 +67,17 @@ std::vector<Observation> collect_images(const SeenLights& seen) {
 }
 
 }  // namespace
+
+RowTimeResult choose_row_time_by_places(const std::vector<const std::vector<Observation>*>& folders,
+                                        const std::vector<std::vector<Frame>>& labels,
+                                        const LampMap& lamps, const std::optional<Lens>& lens) {
+  const PeriodsOfImages periods(folders, labels);
+  const RowTimeCandidates found = estimate_row_time(
+      std::vector<MeasuredPeriod>(periods.lights.begin(), periods.lights.end()), lamps);
+  if (found.candidates.size() < 2) return choose_row_time(found);
+  const auto images = periods.by_group(found.groups);
+  return choose_row_time(found, compute_position_costs(found, images, lamps, lens));
+}
 
 SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps,
                       const std::optional<Calibration>& calibration, bool with_row_time,
@@ -132,7 +131,11 @@ RowTimeStepResult find_row_time(const SeenLights& seen,
                                 const std::optional<Calibration>& calibration, HistoryEntry entry) {
   check_frequencies(lamps, lamps_file);
   RowTimeStepResult result;
-  const RowTimeResult estimate = choose_by_places(seen, labels, lamps);
+  std::vector<const std::vector<Observation>*> folders;
+  folders.reserve(seen.folders.size());
+  for (const Observations& folder : seen.folders) folders.push_back(&folder.images);
+  const RowTimeResult estimate =
+      choose_row_time_by_places(folders, labels, lamps, seen.camera.lens);
   if (!estimate.found) {
     result.fail(StepFailure::undetermined, estimate.problem);
     return result;

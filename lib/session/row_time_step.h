@@ -33,6 +33,14 @@ SeenLights see_lights(const std::vector<std::filesystem::path>& folders, const L
 /// Adds the remarks of all folders to the result of a step, see add_remarks().
 void add_remarks(const SeenLights& seen, StepResult& result);
 
+/// Chooses a row time by periods and duties of the lights in the images of each folder. Uses their
+/// places, too, if several row times fit (compute_position_costs()).
+///
+/// @param labels  lights of each folder that are lamps; none: all lights, whatever their lamps
+RowTimeResult choose_row_time_by_places(const std::vector<const std::vector<Observation>*>& folders,
+                                        const std::vector<std::vector<Frame>>& labels,
+                                        const LampMap& lamps, const std::optional<Lens>& lens);
+
 struct RowTimeStepResult : StepResult {
   RowTime found{};
 };

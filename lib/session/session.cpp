@@ -25,6 +25,7 @@
 #include "session/locate_images.h"
 #include "session/locate_step.h"
 #include "session/rotation_step.h"
+#include "session/row_time_check.h"
 #include "session/row_time_step.h"
 #include "session/session_file.h"
 #include "session/session_results.h"
@@ -333,20 +334,43 @@ class SessionRun {
   /// Detects the lamps in the captures of a step. Returns false, with the failure in `result`, if
   /// none can be used.
   bool observe(const fs::path& folder, ImageUse use, LampCaptures& captures,
-               const fs::path& calibration_file, StepResult& result,
+               const fs::path& calibration_file, Observations& seen, StepResult& result,
                const std::optional<CapturesTable>& table = std::nullopt) const {
     LampImages images{folder, captures.lamps, captures.lamps_file, captures.calibration,
                       calibration_file};
     images.captures = table;
-    const Observations seen = observe_lamps(images, use, lamp_options(), observer_.progress);
+    seen = observe_lamps(images, use, lamp_options(), observer_.progress);
     captures.frames = kept_frames(seen.images);
     add_remarks(seen, result);
+    const Camera& camera = captures.calibration.camera;
+    explain_by_row_time(captures, seen.images, result);
+    if (use == ImageUse::turn && camera.row_time_s) {
+      result.metrics = row_time_metrics(
+          check_row_time(seen.images, captures.lamps, {*camera.row_time_s, row_time_source()}));
+    }
     return result.ok();
   }
 
-  /// Adds the remarks on the images to the result of a step.
+  /// Makes a row time that the images contradict the failure of a step (row_time_check.h). If the
+  /// step failed, another row time replaces the reason.
+  void explain_by_row_time(const LampCaptures& captures, const std::vector<Observation>& images,
+                           StepResult& result) const {
+    if (session_.classifier()) return;  // the lamps are not identified by frequency
+    std::string error = describe_row_time_error(images, captures.lamps, captures.calibration.camera,
+                                                row_time_source(), result.ok());
+    if (!error.empty()) result.fail(StepFailure::bad_input, std::move(error));
+  }
+
+  /// Name of the file or the option that states the row time.
+  std::string row_time_source() const {
+    if (session_.camera()) return session_.camera()->filename().string();
+    return options_.frontend.row_time_s ? "--row-time-s" : "camera.yaml";
+  }
+
+  /// Adds the remarks on the images, and what they measure, to the result of a step.
   template <typename Result>
   static void add(const StepResult& remarks, Result& result) {
+    result.metrics.insert(result.metrics.end(), remarks.metrics.begin(), remarks.metrics.end());
     result.skipped = remarks.skipped;
     result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
     result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(),
@@ -365,12 +389,14 @@ class SessionRun {
       LampCaptures captures{
           {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(camera_file)};
       StepResult remarks;
+      Observations seen;
       // Inclinations are ignored: the axis is level.
-      if (!observe(session_.rotation(), ImageUse::turn, captures, camera_file, remarks,
+      if (!observe(session_.rotation(), ImageUse::turn, captures, camera_file, seen, remarks,
                    CapturesTable())) {
         return Work{remarks};
       }
       RotationResult found = solve_rotation(captures, RotationMethod::axis, history("", inputs));
+      if (!found.ok()) explain_by_row_time(captures, seen.images, found);
       add(remarks, found);
       return Work{found, [this, found] {
                     write_picture(found, "rotation.svg");
@@ -386,7 +412,9 @@ class SessionRun {
       LampCaptures captures{
           {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(rotated)};
       StepResult remarks;
-      if (!observe(folder, ImageUse::places, captures, rotated, remarks)) return Work{remarks};
+      Observations seen;
+      if (!observe(folder, ImageUse::places, captures, rotated, seen, remarks))
+        return Work{remarks};
       const KnownPlaces places = at_known_places(captures.frames, captures_in(folder));
       if (places.captures.empty()) {
         throw InputError(folder,
@@ -396,6 +424,7 @@ class SessionRun {
       DispersionResult found =
           solve_dispersion(captures, places, DispersionMethod::camera, DispersionCircle::mean,
                            history("", with_tables(inputs, folder)));
+      if (!found.ok()) explain_by_row_time(captures, seen.images, found);
       add(remarks, found);
       if (places.without > 0) {
         found.warnings.push_back(
@@ -556,7 +585,7 @@ class SessionRun {
       const FixRow& row = input->fixes.rows[error.fix];
       constexpr int min_lamps = 3;  // fixes of two lamps may be far off at the edge of a room
       if (row.lamps < min_lamps) continue;
-      errors.push_back({row.image, error.horizontal_m.norm()});
+      errors.push_back({row.image, error.horizontal_m.norm(), error.fix});
     }
     if (std::string outliers = describe_check_outliers(errors); !outliers.empty()) {
       found.warnings.push_back(std::move(outliers));

@@ -213,8 +213,11 @@ StationConfig read_station(const fs::path& file) {
   YamlMap document = read_yaml(file, "vlp-station/1");
   Files files(file);
   StationConfig config;
+  config.file = file;
   config.station = document.required("station").text();
-  config.type = read_shutter(document.required("camera_type"), files).camera;
+  const YamlValue type = document.required("camera_type");
+  config.type = read_shutter(type, files).camera;
+  config.type_file = fs::path(type.text()).filename().string();
   const YamlValue board = document.required("board");
   config.board = read_board(files(board));
   if (config.board.has_squares()) {

@@ -62,8 +62,12 @@ struct Retention {
 /// their names begin with a slash.
 struct StationConfig {
   std::string station;
+  /// File of this configuration, as it was named.
+  std::filesystem::path file;
   /// The camera's type: imager, lens model, row time, read-out, and as lens the nominal one.
   Camera type;
+  /// File name of `type`, for messages.
+  std::string type_file;
   Board board;
   LampMap lamps;
   /// Where the camera is in the step `dispersion` unless its captures.csv says it.

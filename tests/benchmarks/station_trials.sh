@@ -6,7 +6,7 @@
 # good ones pass, and faulty ones fail with the cause named first. In the project's folder, built:
 #   tests/benchmarks/station_trials.sh good [COUNT [FIRST_SEED]]     by default 50 units, from seed 1
 #   tests/benchmarks/station_trials.sh faulty [COUNT [FIRST_SEED]]   5 of each of six kinds
-#   tests/benchmarks/station_trials.sh kinds [COUNT [FIRST_SEED]]    1 of each of 28 kinds
+#   tests/benchmarks/station_trials.sh kinds [COUNT [FIRST_SEED]]    1 of each of 30 kinds
 #   tests/benchmarks/station_trials.sh mixed [COUNT [FIRST_SEED]]    10 units, each step with images of another
 #   tests/benchmarks/station_trials.sh timing [COUNT [FIRST_SEED]]   1 unit
 # A line for each; exit code 1 when one did not end as it should. A good unit takes 9 s of processor
@@ -247,7 +247,15 @@ kinds() {
   tried dark-lamps "$seed" 'too dark'
   unit_again
   station_change camera_type.yaml 's/row_time_s: 3.0e-05/row_time_s: 3.3e-05/'
-  tried row-time "$seed" "the row time of the camera's type"
+  tried row-time "$seed" 'row time is 33 us in camera_type.yaml'
+  station_again
+  unit_again
+  station_change camera_type.yaml 's/row_time_s: 3.0e-05/row_time_s: 2.85e-05/'
+  tried row-time-5-percent "$seed" 'row time is 28.5 us in camera_type.yaml'
+  station_again
+  unit_again
+  station_change camera_type.yaml 's/row_time_s: 3.0e-05/row_time_s: 3.75e-05/'
+  tried row-time-25-percent "$seed" 'row time is 37.5 us in camera_type.yaml'
   station_again
 
   # The places.

@@ -13,7 +13,9 @@ namespace {
 /// 36 captures with errors of 0.05 mm, those of `indices` with 52 mm.
 std::vector<CheckError> errors_with(const std::vector<std::size_t>& indices) {
   std::vector<CheckError> errors;
-  for (int i = 0; i < 36; ++i) errors.push_back({std::to_string(100 + i), 5e-5});
+  for (int i = 0; i < 36; ++i) {
+    errors.push_back({std::to_string(100 + i), 5e-5, static_cast<std::size_t>(i)});
+  }
   for (const std::size_t index : indices) errors[index].horizontal_m = 0.052;
   return errors;
 }
@@ -27,6 +29,13 @@ TEST(DescribeCheckOutliers, NamesRunsOfCaptures) {
   const std::string many = describe_check_outliers(errors_with({0, 2, 3, 5, 7, 9, 11, 12, 13}));
   EXPECT_EQ(many.substr(0, many.find(" are")),
             "captures 100, 102, 103, 105, 107, 109 and 1 more groups");
+}
+
+TEST(DescribeCheckOutliers, EndsARunAtACaptureWithoutError) {
+  auto errors = errors_with({0, 1, 2, 3, 4, 5});
+  errors.erase(errors.begin() + 3);
+  const std::string outliers = describe_check_outliers(errors);
+  EXPECT_EQ(outliers.substr(0, outliers.find(" are")), "captures 100 to 102, 104, 105");
 }
 
 TEST(DescribeCheckOutliers, IsEmptyWithoutGrossOutliers) {

@@ -26,6 +26,8 @@ struct PlaceError {
   std::string image;
   Eigen::Vector2d horizontal_m;
   double yaw_rad;
+  /// Index of the frame.
+  std::size_t frame;
 };
 
 /// Returns the errors of fixes of three lamps or more at known points, in the order of the frames.
@@ -33,7 +35,8 @@ std::vector<PlaceError> place_errors(std::span<const Frame> frames, const LampMa
                                      const Calibration& calibration, const CapturesTable& places) {
   const Positioner positioner(map, calibration);
   std::vector<PlaceError> errors;
-  for (const Frame& frame : frames) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Frame& frame = frames[i];
     const auto place = places.find(frame.image);
     if (place == places.end() || place->second.place == PlaceOf::axis) continue;
     const auto& [x_m, y_m] = std::tie(place->second.x_m, place->second.y_m);
@@ -41,7 +44,7 @@ std::vector<PlaceError> place_errors(std::span<const Frame> frames, const LampMa
     if (!x_m || !y_m || !fix.ok() || fix.lamps < 3) continue;
     const auto& pose = fix.estimate.pose;
     errors.push_back(
-        {frame.image, pose.position_m.head<2>() - Eigen::Vector2d(*x_m, *y_m), pose.yaw_rad});
+        {frame.image, pose.position_m.head<2>() - Eigen::Vector2d(*x_m, *y_m), pose.yaw_rad, i});
   }
   return errors;
 }
@@ -73,16 +76,17 @@ std::string place_fault(std::span<const Frame> frames, const LampMap& map,
                         const Calibration& calibration, const CapturesTable& places) {
   std::vector<CheckError> errors;
   for (const PlaceError& error : place_errors(frames, map, calibration, places)) {
-    errors.push_back({error.image, error.horizontal_m.norm()});
+    errors.push_back({error.image, error.horizontal_m.norm(), error.frame});
   }
   return describe_check_outliers(errors);
 }
 
-std::string camera_fault(std::span<const Frame> frames, const LampMap& map,
-                         const Calibration& calibration, const CapturesTable& places) {
-  constexpr double max_ratio = 1.0 / 3, millimetres = 1e3;
+std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
+                                               const Calibration& calibration,
+                                               const CapturesTable& places) {
+  constexpr double max_ratio = 1.0 / 3;
   const std::vector<PlaceError> errors = place_errors(frames, map, calibration, places);
-  if (errors.size() < kMinErrors) return "";
+  if (errors.size() < kMinErrors) return std::nullopt;
   const auto count = static_cast<double>(errors.size());
   const auto in_camera = [](const PlaceError& error) -> Eigen::Vector2d {
     return Eigen::Rotation2Dd(-error.yaw_rad) * error.horizontal_m;
@@ -98,14 +102,30 @@ std::string camera_fault(std::span<const Frame> frames, const LampMap& map,
     camera_squares += (in_camera(error) - camera_offset_m).squaredNorm();
     world_squares += (error.horizontal_m - world_offset_m).squaredNorm();
   }
-  const bool is_offset = camera_offset_m.norm() >= kMinOutlierError_m &&
-                         camera_squares <= max_ratio * max_ratio * squares;
-  if (!is_offset || camera_squares > max_ratio * max_ratio * world_squares) return "";
+  const auto explains = [&](double offset_m, double left, double other_left) {
+    constexpr double max_square_ratio = max_ratio * max_ratio;
+    return offset_m >= kMinOutlierError_m && left <= max_square_ratio * squares &&
+           left <= max_square_ratio * other_left;
+  };
+  if (explains(camera_offset_m.norm(), camera_squares, world_squares)) {
+    return CommonOffset{camera_offset_m, true, errors.size()};
+  }
+  if (explains(world_offset_m.norm(), world_squares, camera_squares)) {
+    return CommonOffset{world_offset_m, false, errors.size()};
+  }
+  return std::nullopt;
+}
+
+std::string describe(const CommonOffset& offset) {
+  constexpr double millimetres = 1e3;
+  const Eigen::Vector2d offset_mm = millimetres * offset.offset_m;
   return fmt::format(
-      "the {} captures {} to {} are off by {:.1f} mm in one direction of the camera, which turns "
-      "with it: were they taken by another camera, or was it moved on its mount?",
-      errors.size(), errors.front().image, errors.back().image,
-      millimetres * camera_offset_m.norm());
+      "all {} captures of the check are off by {:.1f} mm in one direction of the {} (x {:+.1f} mm, "
+      "y {:+.1f} mm): {}",
+      offset.captures, offset_mm.norm(), offset.in_camera ? "camera" : "room", offset_mm.x(),
+      offset_mm.y(),
+      offset.in_camera ? "it is loose in its housing or on its mount, or another one took them"
+                       : "the known points or the lamps have moved");
 }
 
 }  // namespace vlp

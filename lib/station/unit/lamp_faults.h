@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,12 +32,26 @@ std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampM
 std::string place_fault(std::span<const Frame> frames, const LampMap& map,
                         const Calibration& calibration, const CapturesTable& places);
 
-/// Describes captures at known points that another camera took, or the same one moved on its mount:
-/// their errors share an offset that rotates with the camera, of more than 5 mm, without which they
-/// are a third or less. Such an offset is part of the calibration. Returns an empty string if there
-/// is none, for fewer than five fixes, and if the camera did not rotate between the captures: then
-/// the points may be off as well.
-std::string camera_fault(std::span<const Frame> frames, const LampMap& map,
-                         const Calibration& calibration, const CapturesTable& places);
+/// Offset that the errors of all captures at known points share.
+struct CommonOffset {
+  /// Fix minus known point: in the frame of the level camera if `in_camera`, otherwise in the
+  /// world.
+  Eigen::Vector2d offset_m;
+  /// True if it rotates with the camera: the camera moved since it was calibrated. Otherwise the
+  /// known points or the lamps moved.
+  bool in_camera;
+  /// Number of captures.
+  std::size_t captures;
+};
+
+/// Finds an offset of more than 5 mm, without which the errors of captures at known points are a
+/// third or less. Returns std::nullopt if there is none, for fewer than five fixes, and if the
+/// camera did not rotate between the captures, so that the two frames cannot be separated.
+std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
+                                               const Calibration& calibration,
+                                               const CapturesTable& places);
+
+/// Describes an offset with its size and direction, and its possible reasons, in one line.
+std::string describe(const CommonOffset& offset);
 
 }  // namespace vlp

@@ -40,24 +40,17 @@ std::string outcome_of(const UnitImage& image) {
   return image.is_used() ? "taken" : "refused: " + image.refusal();
 }
 
-/// Returns the step that measures a figure of a unit.
-StationStep measuring_step(const std::string& figure) {
-  const auto kind = metric_kind(figure);
-  if (kind && kind->source == MetricSource::rotation) return StationStep::rotation;
-  if (kind && kind->source == MetricSource::dispersion) return StationStep::dispersion;
-  return figure.starts_with("check_") ? StationStep::check : StationStep::boards;
-}
-
-/// Returns the first step of a unit's run that has no figure; std::nullopt if all have, and for
-/// golden units, whose steps are optional. The blur is known before the boards are solved.
+/// Returns the step of a unit's run that did not finish, which its causes begin with
+/// (find_causes()); std::nullopt if all did, and for golden units, whose steps are optional.
+/// Figures do not show it: a step may fail after it measured some.
 std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
   if (record.kind != "unit") return std::nullopt;
-  for (const StationStep step : kStationSteps) {
-    const bool is_measured =
-        std::any_of(record.figures.begin(), record.figures.end(), [&](const CheckedMetric& figure) {
-          return figure.value && figure.name != "blur_px" && measuring_step(figure.name) == step;
-        });
-    if (!is_measured) return step;
+  std::istringstream causes(record.causes);
+  for (std::string cause; std::getline(causes, cause);) {
+    for (const StationStep step : kStationSteps) {
+      const std::string name = name_of(step);
+      if (cause.starts_with(name + ": ") || cause.starts_with(name + " (")) return step;
+    }
   }
   return std::nullopt;
 }

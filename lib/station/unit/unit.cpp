@@ -3,6 +3,7 @@
 #include "station/unit/unit.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include <fmt/core.h>
@@ -169,7 +170,8 @@ void Unit::look(StationStep step, const std::vector<fs::path>& files) {
   for (UnitImage& image : images) {
     const std::string owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : "";
     if (!owner.empty()) {
-      image.seen.reject(RejectionReason::used_elsewhere, "already of " + owner);
+      image.seen.reject(RejectionReason::used_elsewhere,
+                        "already of " + owner);
     }
     at(step).last = image.seen.name();
     take(step, std::move(image));
@@ -328,12 +330,30 @@ HistoryEntry Unit::history_of(StationStep step) const {
           {{"station", config_.sha256}, {name_of(step), sha256_of_text(digests)}}};
 }
 
+std::vector<Observation> lamp_observations(const Unit& unit) {
+  std::vector<Observation> images;
+  for (const StationStep step : kStationSteps) {
+    if (step == StationStep::boards) continue;
+    Observations seen = observations_of(unit.step(step));
+    std::move(seen.images.begin(), seen.images.end(), std::back_inserter(images));
+  }
+  return images;
+}
+
+StatedRowTime stated_row_time(const StationConfig& config) {
+  return {config.type.row_time_s.value(), config.type_file};
+}
+
 std::optional<Calibration> Unit::calibration() const {
   std::optional<Calibration> last;
   for (const UnitStep& state : steps_) {
     if (state.result && state.result->ok()) last = state.result->calibration;
   }
   return last;
+}
+
+RowTimeCheck Unit::row_time() const {
+  return check_row_time(lamp_observations(*this), config_.lamps, stated_row_time(config_));
 }
 
 std::vector<CheckedMetric> Unit::figures() const {
@@ -345,6 +365,8 @@ std::vector<CheckedMetric> Unit::figures() const {
     if (!state.result) continue;
     values.insert(values.end(), state.result->metrics.begin(), state.result->metrics.end());
   }
+  const auto row_time = row_time_metrics(this->row_time());
+  values.insert(values.end(), row_time.begin(), row_time.end());
   return check_all(config_.gates, values, unit_metrics());
 }
 

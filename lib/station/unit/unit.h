@@ -13,7 +13,9 @@
 #include "evaluation/gate.h"
 #include "frontend/board_intake.h"
 #include "frontend/lamp_intake.h"
+#include "session/row_time_check.h"
 #include "session/step_history.h"
+#include "station/records/run_record.h"
 #include "station/unit/station_step.h"
 #include "station/unit/unit_step.h"
 
@@ -62,6 +64,8 @@ class Unit {
   const std::string& distrusted() const { return distrusted_; }
 
   const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
+  /// Compares the row time of the camera's type with that of the lamps of all steps.
+  RowTimeCheck row_time() const;
   /// The first step that is not done; nothing when all are.
   std::optional<StationStep> current() const;
   /// It is of no use to go on: a step has so many refused images in a row, or enough images that
@@ -102,5 +106,11 @@ class Unit {
   BoardIntake boards_;
   std::array<UnitStep, 4> steps_;
 };
+
+/// Returns the observations of the images with lamps, rejected ones too.
+std::vector<Observation> lamp_observations(const Unit& unit);
+
+/// Returns the row time of the station's type of camera.
+StatedRowTime stated_row_time(const StationConfig& config);
 
 }  // namespace vlp

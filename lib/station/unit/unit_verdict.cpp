@@ -10,7 +10,7 @@
 
 #include <fmt/core.h>
 
-#include "calibration/map/row_time_error.h"
+#include "session/row_time_check.h"
 #include "session/session_folder.h"
 #include "station/unit/guidance.h"
 #include "station/unit/lamp_faults.h"
@@ -57,36 +57,11 @@ Refusals find_refusals(const UnitStep& state, const StationConfig& config) {
           2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame(config)};
 }
 
-/// Returns that the lights of refused images are the lamps with another row time; empty otherwise.
-std::string find_row_time_fault(const UnitStep& state, const StationConfig& config) {
-  const double row_time_s = config.type.row_time_s.value_or(0);
-  std::vector<double> frequencies_hz;
-  for (const auto& [name, image] : state.images) {
-    if (image.is_used()) continue;
-    for (const Light& light : image.seen.lights) {
-      if (light.kind != LightKind::unknown || light.reason != LightReason::unknown_period) continue;
-      frequencies_hz.push_back(1 / (light.stripes.period_lines * row_time_s));
-    }
-  }
-  constexpr std::size_t min_lights = 6;
-  if (frequencies_hz.size() < min_lights) return "";
-  const auto found_s = find_true_row_time(frequencies_hz, config.lamps, row_time_s);
-  if (!found_s) return "";
-  constexpr double microseconds = 1e6;
-  return fmt::format(
-      "the row time of the camera's type, {:.2f} us, is not this camera's: with {:.2f} us its "
-      "lights are the lamps of the map",
-      microseconds * row_time_s, microseconds * *found_s);
-}
-
 /// Returns what keeps a step from ending well.
 std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
   const UnitStep& state = unit.step(step);
   if (state.done()) return {};
   std::vector<Cause> causes;
-  if (std::string fault = find_row_time_fault(state, unit.config()); !fault.empty()) {
-    causes.push_back({std::move(fault)});
-  }
   const std::string count = count_of(unit, step);
   const Refusals refused = find_refusals(state, unit.config());
   if (!refused.text.empty()) {
@@ -182,9 +157,14 @@ std::vector<Cause> find_missing_figures(const Unit& unit,
 
 /// Returns faults of the lamps and of the lens that saw them, by the captures of all steps; without
 /// these, faults of the known points or of the camera there, by the captures of the check.
-std::vector<std::string> find_station_faults(const Unit& unit) {
+std::vector<Cause> find_station_faults(const Unit& unit) {
   const auto known = unit.calibration();
   if (!known) return {};
+  // First of all: with a wrong row time, lights are other lamps or none.
+  const Lens lens(known->camera.lens_model, known->camera.intrinsics);
+  std::string row_time = find_row_time_error(lamp_observations(unit), unit.config().lamps, lens,
+                                             stated_row_time(unit.config()));
+  if (!row_time.empty()) return {{std::move(row_time)}};
   std::vector<Frame> frames;
   for (const StationStep step : kLampSteps) {
     for (Frame& frame : frames_of(unit.step(step))) frames.push_back(std::move(frame));
@@ -192,20 +172,26 @@ std::vector<std::string> find_station_faults(const Unit& unit) {
   auto faults = lamp_faults(frames, unit.config().lamps, *known);
   auto unseen = unseen_lamps(frames, unit.config().lamps);
   std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
-  if (!faults.empty()) return faults;
+  if (!faults.empty()) {
+    std::vector<Cause> causes;
+    causes.reserve(faults.size());
+    for (std::string& fault : faults) causes.push_back({std::move(fault)});
+    return causes;
+  }
   if (std::string fault = lens_fault(frames, unit.config().lamps, *known); !fault.empty()) {
-    return {std::move(fault)};
+    return {{std::move(fault)}};
   }
   const UnitStep& check = unit.step(StationStep::check);
   if (!is_solved(check)) return {};
   const auto check_frames = frames_of(check);
   const auto places = captures_in(check.folder);
-  std::string fault = place_fault(check_frames, unit.config().lamps, *known, places);
-  if (fault.empty()) {
-    fault = camera_fault(check_frames, unit.config().lamps, *known, places);
+  // One offset of all captures is no fault of single ones; one that rotates is the camera's.
+  if (const auto offset = find_common_offset(check_frames, unit.config().lamps, *known, places)) {
+    return {{describe(*offset), offset->in_camera}};
   }
-  if (!fault.empty()) faults.push_back(std::move(fault));
-  return faults;
+  std::string fault = place_fault(check_frames, unit.config().lamps, *known, places);
+  if (fault.empty()) return {};
+  return {{std::move(fault)}};
 }
 
 }  // namespace
@@ -219,8 +205,10 @@ std::vector<Cause> find_causes(const Unit& unit) {
   std::vector<Cause> causes;
   if (!unit.distrusted().empty()) causes.push_back({unit.distrusted()});
   append(causes, of_boards);  // before faults of the lamps: the lens was measured without them
-  if (!of_boards.empty() || !of_lamps.empty()) {
-    for (std::string& fault : find_station_faults(unit)) causes.push_back({std::move(fault)});
+  if (std::string error = unit.row_time().error; !error.empty()) {
+    causes.push_back({std::move(error)});
+  } else if (!of_boards.empty() || !of_lamps.empty()) {
+    append(causes, find_station_faults(unit));
   }
   append(causes, std::move(of_lamps));
   return causes;

@@ -14,6 +14,7 @@
 #include "frontend/lamp_intake.h"
 #include "frontend/selection.h"
 #include "rig/input_error.h"
+#include "session/row_time_check.h"
 #include "session/session_folder.h"
 #include "station/unit/lamp_faults.h"
 #include "station/unit/station_step.h"
@@ -68,10 +69,13 @@ class Verification {
                             level_rotations(captures_table(folder), golden_.calibration, 0));
     UnitStep step = observe_folder(folder, threads_, ImageUse::places, config_.frontend,
                                    [&](const SourceImage& image) { return intake.observe(image); });
+    Observations seen = observations_of(step);
+    std::move(seen.images.begin(), seen.images.end(), std::back_inserter(lamp_images_));
     const auto frames = frames_of(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = captures_in(step.folder);
     if (each == StationStep::check) {
+      common_offset_ = find_common_offset(frames, config_.lamps, golden_.calibration, places);
       place_fault_ = place_fault(frames, config_.lamps, golden_.calibration, places);
     }
     add(name_of(each), each == StationStep::check
@@ -81,6 +85,10 @@ class Verification {
   }
 
   RunRecord record(const std::string& run, const ProgramVersion& program) {
+    const RowTimeCheck row_time =
+        check_row_time(lamp_images_, config_.lamps,
+                       {*config_.type.row_time_s, "the calibration of the golden unit"});
+    for (const Metric& metric : row_time_metrics(row_time)) values_.push_back(metric);
     const auto figures = check_all(golden_.gates, values_, unit_metrics());
     for (const CheckedMetric& figure : figures) {
       // It is the station that is measured, and fails by its figures.
@@ -95,9 +103,12 @@ class Verification {
       std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
     }
     std::vector<Cause> first;
-    first.reserve(faults.size() + 1);
+    first.reserve(faults.size() + 2);
     for (const std::string& fault : faults) first.push_back({fault, true});
+    const bool is_offset = common_offset_ && !causes_.empty();
+    if (first.empty() && is_offset) first.push_back({describe(*common_offset_), true});
     if (first.empty() && !place_fault_.empty()) first.push_back({place_fault_, false});
+    if (!row_time.error.empty()) first.insert(first.begin(), {row_time.error, false});
     causes_.insert(causes_.begin(), first.begin(), first.end());
     RunRecord record = new_record("golden", config_, golden_.camera_id, run, program);
     record.figures = figures;
@@ -138,9 +149,11 @@ class Verification {
   fs::path folder_;
   int threads_;
   std::vector<Frame> frames_ = {};
+  std::vector<Observation> lamp_images_ = {};
   std::vector<Metric> values_ = {};
   std::vector<StepPicture> drawn_ = {};
   std::vector<Cause> causes_ = {};
+  std::optional<CommonOffset> common_offset_ = {};
   /// Describes captures of the check that were taken elsewhere.
   std::string place_fault_ = {};
   std::vector<RunRecord::Image> images_ = {};

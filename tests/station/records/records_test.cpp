@@ -93,7 +93,7 @@ void check_voided(Records& records) {
   EXPECT_EQ(records.list({})[0].run, run.run);
   EXPECT_EQ(records.list({})[0].voided, "wrong serial");
   EXPECT_EQ(records.list({})[1].voided, "");
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), describe_owner("a", run_of(1)));
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), (ImageOwner{"a", run_of(1)}));
 }
 
 /// What holds in every database.
@@ -113,9 +113,9 @@ void check_records(const std::string& where) {
   EXPECT_EQ(all[3].station, "station-1");
   EXPECT_THAT(all[3].causes, StartsWith("it's \"blurred\""));
   // Whose an image is: of the first run that uses it, and of no run of the camera itself.
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), describe_owner("a", run_of(0)));
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "a"), describe_owner("b", run_of(2)));
-  EXPECT_EQ(records.owner_of(std::string(64, 'c'), "b"), "") << "it was refused there";
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), (ImageOwner{"a", run_of(0)}));
+  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "a"), (ImageOwner{"b", run_of(2)}));
+  EXPECT_EQ(records.owner_of(std::string(64, 'c'), "b"), ImageOwner{}) << "it was refused there";
   EXPECT_EQ(refusal_of([&] { records.check_writable(); }), "");
   RunFilter filter;
   filter.camera = "a";
@@ -463,7 +463,7 @@ TEST(ExportRuns, WritesCsv) {
       "blur_px,focal_percent,center_px,nominal_px,board_bend_mm,rms_px,uncertainty_px,halves_px,"
       "coverage,"
       "views,board_tilt_deg,rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_"
-      "mm,dispersion_mm,"
+      "mm,row_time_us,row_time_sd_us,dispersion_mm,"
       "dispersion_offset_px,world_mm,check_fixes,check_lamps,check_lamps_seen,check_mean_mm,"
       "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
   EXPECT_THAT(csv, HasSubstr("2026-11-21T13:45:01Z,2026-11-21T13:45:01Z,PASS"));

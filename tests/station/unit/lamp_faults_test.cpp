@@ -144,8 +144,8 @@ TEST_F(PlaceFaults, NameNoneWhereMostAreElsewhere) {
 }
 
 /// A zenith of another camera moves all fixes by one offset in the frame of the camera.
-TEST_F(PlaceFaults, NameAnotherCameraThatTookAll) {
-  EXPECT_EQ(camera_fault(frames, map, calibration, places), "");
+TEST_F(PlaceFaults, NameTheFrameOfACommonOffset) {
+  EXPECT_FALSE(find_common_offset(frames, map, calibration, places));
   const Positioner positioner(map, calibration);
   CapturesTable rotating = places, constant = places, scattered = places;
   for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -157,11 +157,17 @@ TEST_F(PlaceFaults, NameAnotherCameraThatTookAll) {
     constant.at(frames[i].image).x_m.value() += 0.03;
     scattered.at(frames[i].image).x_m.value() += i % 2 == 0 ? 0.03 : -0.03;
   }
-  EXPECT_THAT(camera_fault(frames, map, calibration, rotating),
-              testing::AllOf(HasSubstr("are off by 30.0 mm in one direction of the camera"),
-                             HasSubstr(frames.front().image + " to ")));
-  EXPECT_EQ(camera_fault(frames, map, calibration, constant), "") << "the points are off";
-  EXPECT_EQ(camera_fault(frames, map, calibration, scattered), "");
+  const auto of_camera = find_common_offset(frames, map, calibration, rotating);
+  ASSERT_TRUE(of_camera);
+  EXPECT_TRUE(of_camera->in_camera);
+  EXPECT_THAT(describe(*of_camera),
+              HasSubstr("are off by 30.0 mm in one direction of the camera (x -30.0 mm, y "));
+  const auto of_room = find_common_offset(frames, map, calibration, constant);
+  ASSERT_TRUE(of_room);
+  EXPECT_FALSE(of_room->in_camera);
+  EXPECT_THAT(describe(*of_room),
+              HasSubstr("in one direction of the room (x -30.3 mm, y +0.0 mm): the known points"));
+  EXPECT_FALSE(find_common_offset(frames, map, calibration, scattered));
 }
 
 }  // namespace

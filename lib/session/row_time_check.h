@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera/lens.h"
+#include "evaluation/metric.h"
+#include "frontend/observation.h"
+#include "lamps/signal/row_time.h"
+#include "rig/lamp_map.h"
+
+namespace vlp {
+
+/// Row time that a file or an option states.
+struct StatedRowTime {
+  double row_time_s;
+  /// Name of the file or of the option.
+  std::string source;
+};
+
+/// Row time measured from identified lamps, compared with the stated one.
+struct RowTimeCheck {
+  /// std::nullopt: fewer than three lamps show trustworthy stripes.
+  std::optional<RowTime> measured = {};
+  /// Contradiction in one line; empty if there is none.
+  std::string error = {};
+};
+
+/// Estimates the row time from the identified lamps of the images (estimate_row_time()) and
+/// compares it with the stated one. They contradict each other if
+///
+///     |log(measured / stated)| > kLampDrift + 3 sd / measured.
+///
+/// A lamp may deviate from its frequency by kLampDrift (lamp_rule.h). The mean of several lamps
+/// then deviates by at most kLampDrift, whether their deviations are independent or common. The
+/// second term covers the measurement, and lamps that deviate by more.
+RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                            const StatedRowTime& stated);
+
+/// Finds another row time that makes the lights of the images lamps of the map, by their periods
+/// and places, however they were identified (choose_row_time()). Requires captures that are of no
+/// use with the stated row time: a wrong one leaves lights unknown or exchanges lamps.
+///
+/// @return  the contradiction in one line; empty without at least three lamps that contradict the
+///          stated row time as in check_row_time()
+std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
+                                const std::optional<Lens>& lens, const StatedRowTime& stated);
+
+/// Returns the error of check_row_time() with the row time of `camera`, or if the images are of no
+/// use that of find_row_time_error(). Returns an empty string if the row time is unknown.
+std::string describe_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
+                                    const Camera& camera, const std::string& source,
+                                    bool are_useful);
+
+/// Returns the metrics row_time_us and row_time_sd_us; none if the row time was not measured.
+std::vector<Metric> row_time_metrics(const RowTimeCheck& check);
+
+}  // namespace vlp

@@ -1,0 +1,109 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "session/row_time_check.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "lamps/signal/lamp_rule.h"
+#include "support/random.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr double kTrueRowTime_s = 2e-5;
+
+LampMap make_map() {
+  LampMap map;
+  for (const double frequency_hz : {1600., 2000., 2500., 3100., 3800.}) {
+    Lamp lamp{};
+    lamp.id = static_cast<int>(map.lamps.size()) + 1;
+    lamp.position_m = {0.5 * lamp.id, 0.1 * lamp.id * lamp.id, 2};
+    lamp.frequency_hz = frequency_hz;
+    map.lamps.push_back(lamp);
+  }
+  return map;
+}
+
+/// Image of all lamps. `deviations`: relative, of the lamps' frequencies from the map.
+Observation observe(const LampMap& map, const std::vector<double>& deviations, bool is_identified) {
+  Observation image{"0000.png"};
+  image.size_px = {800, 600};
+  image.lights.reserve(map.lamps.size());
+  for (std::size_t i = 0; i < map.lamps.size(); ++i) {
+    const Lamp& lamp = map.lamps[i];
+    Light light{};
+    light.kind = is_identified ? LightKind::lamp : LightKind::unknown;
+    if (is_identified) light.lamp = lamp.id;
+    const double frequency_hz = *lamp.frequency_hz * (1 + deviations[i]);
+    light.stripes.period_lines = 1 / (frequency_hz * kTrueRowTime_s);
+    light.stripes.clarity = 0.95;
+    light.stripes.periods = 5;
+    light.stripes.regular = true;
+    light.pixel = {100 + 120.0 * static_cast<double>(i), 300};
+    light.sigma_px = 0.1;
+    light.low = light.pixel - Eigen::Vector2d(40, 40);
+    light.high = light.pixel + Eigen::Vector2d(40, 40);
+    image.lights.push_back(light);
+  }
+  return image;
+}
+
+TEST(CheckRowTime, ReportsRowTimeOffBy5Percent) {
+  const LampMap map = make_map();
+  const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, true));
+  const RowTimeCheck check = check_row_time(images, map, {1.9e-5, "camera_type.yaml"});
+  ASSERT_TRUE(check.measured);
+  EXPECT_EQ(check.measured->lamps, 5);
+  EXPECT_NEAR(check.measured->row_time_s, kTrueRowTime_s, 1e-9);
+  EXPECT_THAT(check.error, StartsWith("row time is 19 us in camera_type.yaml, but the stripes of 5 "
+                                      "lamps measure 20.00 +- 0.01 us; correct it"));
+  const auto metrics = row_time_metrics(check);
+  ASSERT_TRUE(value_of(metrics, "row_time_us"));
+  EXPECT_NEAR(*value_of(metrics, "row_time_us"), 20, 1e-3);
+  ASSERT_TRUE(value_of(metrics, "row_time_sd_us"));
+  EXPECT_NEAR(*value_of(metrics, "row_time_sd_us"), 0.01, 0.005);
+}
+
+TEST(CheckRowTime, AcceptsLampsWithinTheirDrift) {
+  const LampMap map = make_map();
+  Random random(1);
+  constexpr int trials = 500;
+  int measured = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    std::vector<double> deviations(map.lamps.size());
+    // Independent deviations, and, in each second trial, one of all lamps.
+    for (double& deviation : deviations) deviation = kLampDrift * random.uniform(-1, 1);
+    if (trial % 2 == 0) deviations.assign(map.lamps.size(), kLampDrift * (trial % 4 == 0 ? 1 : -1));
+    const std::vector<Observation> images(4, observe(map, deviations, true));
+    const RowTimeCheck check = check_row_time(images, map, {kTrueRowTime_s, "camera_type.yaml"});
+    measured += check.measured ? 1 : 0;
+    EXPECT_EQ(check.error, "") << trial;
+  }
+  EXPECT_EQ(measured, trials);
+}
+
+TEST(CheckRowTime, ReturnsNoneForTwoLamps) {
+  LampMap map = make_map();
+  map.lamps.resize(2);
+  const std::vector<Observation> images(4, observe(map, {0, 0}, true));
+  const RowTimeCheck check = check_row_time(images, map, {1.9e-5, "camera_type.yaml"});
+  EXPECT_FALSE(check.measured);
+  EXPECT_EQ(check.error, "");
+}
+
+TEST(FindRowTimeError, ReportsRowTimeThatIdentifiesNoLamp) {
+  const LampMap map = make_map();
+  const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, false));
+  EXPECT_THAT(find_row_time_error(images, map, std::nullopt, {2.2e-5, "camera.yaml"}),
+              HasSubstr("row time is 22 us in camera.yaml, but the stripes of 5 lamps measure"));
+  EXPECT_EQ(find_row_time_error(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
+  EXPECT_EQ(find_row_time_error({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
+}
+
+}  // namespace
+}  // namespace vlp
