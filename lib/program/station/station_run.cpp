@@ -74,7 +74,8 @@ void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spoo
   if (golden_passed) note(config, record);
   std::string undone, mend;
   try {
-    mend = fmt::format("'vlp-station restore {}' writes the files", record.run);
+    mend = fmt::format("'vlp-station restore {} --station {}' writes the files", record.run,
+                       config.file.string());
     const fs::path folder = publish_run(record, pictures, config.results);
     spdlog::info("run {}: {}", record.run, folder.string());
     mend = "move the folder there before the next run";
@@ -149,7 +150,12 @@ RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions
   if (record.invalid())
     return record;  // the images of a unit that was not judged may be used again
   if (const std::string earlier = spool.repeated_run_of(record); !earlier.empty()) {
-    reject_repetition(record, earlier);
+    reject_repetition(record, earlier, options.station);
+  } else if (!spool.away().empty()) {
+    const std::string unchecked =
+        "the records are offline: whether an earlier run used the same images was not checked";
+    record.events.push_back(new_event(kUnchecked, unchecked));
+    spdlog::warn("{}", unchecked);
   }
   return record;
 }

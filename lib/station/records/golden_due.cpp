@@ -118,10 +118,12 @@ void note_for_golden(const StationConfig& config, const RunRecord& record) {
   throw InputError(file, "cannot be written");
 }
 
-void forget_golden(const StationConfig& config, const std::string& run) {
+bool forget_golden(const StationConfig& config, const std::string& run) {
   std::string noted;
   std::ifstream(note_of(config)) >> noted;
-  if (noted == run) forget(note_of(config));
+  if (noted != run) return false;
+  forget(note_of(config));
+  return true;
 }
 
 }  // namespace vlp

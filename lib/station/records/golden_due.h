@@ -31,6 +31,6 @@ std::string golden_problem(const StationConfig& config, GoldenAt at = GoldenAt::
 void note_for_golden(const StationConfig& config, const RunRecord& record);
 
 /// Of a golden run that counts no more: when it is the one that is noted, the golden unit is due.
-void forget_golden(const StationConfig& config, const std::string& run);
+bool forget_golden(const StationConfig& config, const std::string& run);
 
 }  // namespace vlp

@@ -190,12 +190,37 @@ std::string rename_files(const StationConfig* own_station, const RunRecord& reco
   }
 }
 
+/// Returns true if a hook was told since a run was voided.
+bool is_hook_told(const RunRecord& record) {
+  const auto begin = std::find_if(record.events.begin(), record.events.end(),
+                                  [](const RunEvent& event) { return event.what == kVoided; });
+  return std::any_of(begin, record.events.end(),
+                     [](const RunEvent& event) { return event.what == kHookWanted; });
+}
+
+/// Does at the station of a run what its voiding by the records alone (--records) left undone: the
+/// golden unit, the files and the hook. Returns false if nothing was left.
+bool finish_voiding(KnownRuns& known, RunRecord& record, const std::string& who,
+                    const std::optional<HookLock>& lock, Voided& result) {
+  const StationConfig& station = *known.station();
+  bool is_any_done = record.kind == "golden" && forget_golden(station, record.run);
+  is_any_done = mark_files_voided(record, station.results) || is_any_done;
+  if (!lock || is_hook_told(record)) return is_any_done;
+  Spool& spool = *known.spool();
+  record.events.push_back(hook_wanted(*station.hook, who));
+  spool.keep(record);
+  spool.deliver();
+  result.problem = call_hook(*station.hook, record, *lock, spool);
+  return true;
+}
+
 }  // namespace
 
 Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
                 const std::string& reason) {
   Voided result{known.find(run)};
   RunRecord& record = result.run;
+  const std::string who = printable(operator_name);
   const auto& station = known.station();
   const bool own = station && record.station == station->station;
   std::optional<HookLock> lock;
@@ -210,11 +235,10 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
   const StationConfig* own_station = own ? &*station : nullptr;
   if (own) check_may_void(*station, operator_name);
   if (const RunEvent* event = voided(record)) {
-    if (own) mark_files_voided(record, station->results);
+    if (own && finish_voiding(known, record, who, lock, result)) return result;
     throw std::invalid_argument(
         fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text));
   }
-  const std::string who = printable(operator_name);
   record.events.push_back(new_event(kVoided, printable(reason), who));
   if (!station) {
     known.records().keep(record);

@@ -96,10 +96,10 @@ struct Voided {
 };
 /// Voids a run: it counts no more, in no yield, trend or study, which its events tell, with who and
 /// why, and a golden run makes the golden unit due. At the station whose run it is, its files are
-/// renamed (mark_files_voided()), and its hook is told (call_hook()). Throws std::invalid_argument
-/// for an operator who is not among StationConfig::void_operators of that station, and for a run
-/// that was voided before, whose files are renamed all the same, InputError when it
-/// cannot be kept or its hook is being run.
+/// renamed (mark_files_voided()), and its hook is told (call_hook()). A run that was voided before
+/// with its records alone gets there what is missing. Throws std::invalid_argument for an operator
+/// who is not among StationConfig::void_operators of that station, and for a run that was voided
+/// before if nothing is missing, InputError when it cannot be kept or its hook is being run.
 Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
                 const std::string& reason);
 

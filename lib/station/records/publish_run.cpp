@@ -27,21 +27,24 @@ const char* calibration_name(const RunRecord& record) {
   return record.invalid() ? "invalid-calibration.yaml" : "failed-calibration.yaml";
 }
 
-void mark_files_voided(const RunRecord& record, const fs::path& results) {
+bool mark_files_voided(const RunRecord& record, const fs::path& results) {
   constexpr std::array names{std::pair("calibration.yaml", "voided-calibration.yaml"),
                              std::pair("failed-calibration.yaml", "voided-calibration.yaml"),
                              std::pair("invalid-calibration.yaml", "voided-calibration.yaml"),
                              std::pair("certificate.html", "voided-certificate.html"),
                              std::pair("report.html", "voided-report.html")};
   const fs::path folder = results / record.camera / record.run;
+  bool is_any_renamed = false;
   for (const auto& [name, voided_name] : names) {
     std::error_code error;
     fs::rename(folder / name, folder / voided_name, error);
+    is_any_renamed = is_any_renamed || !error;
     const bool is_missing =
         error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
     if (!error || is_missing) continue;
     throw InputError(folder / name, "cannot be renamed: " + error.message());
   }
+  return is_any_renamed;
 }
 
 fs::path publish_run(const RunRecord& record, const std::vector<ReportPicture>& pictures,

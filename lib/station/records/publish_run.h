@@ -21,8 +21,8 @@ const char* calibration_name(const RunRecord& record);
 
 /// Renames calibration, report and certificate in RESULTS/CAMERA/RUN/ to voided-calibration.yaml,
 /// voided-report.html and voided-certificate.html, so that nobody takes them for valid. Skips files
-/// that do not exist. Throws InputError.
-void mark_files_voided(const RunRecord& record, const std::filesystem::path& results);
+/// that do not exist. Returns true if it renamed any. Throws InputError.
+bool mark_files_voided(const RunRecord& record, const std::filesystem::path& results);
 
 /// Writes the files of RESULTS/CAMERA/RUN/ that are missing, and returns the folder: the
 /// calibration, if there is one, as calibration_name(); then report.html, which without `pictures`

@@ -416,7 +416,7 @@ void Records::check_writable() {
   });
 }
 
-std::string Records::owner_of(const std::string& sha256, const std::string& other_than_camera) {
+ImageOwner Records::owner_of(const std::string& sha256, const std::string& other_than_camera) {
   return database_->run([&](Watch&) {
     std::string camera, run;
     database_->sql << "SELECT runs.camera, runs.run FROM images JOIN runs ON runs.run = images.run "
@@ -424,7 +424,7 @@ std::string Records::owner_of(const std::string& sha256, const std::string& othe
                       ":camera AND " +
                           kNotVoided + " ORDER BY runs.run LIMIT 1",
         soci::into(camera), soci::into(run), soci::use(sha256), soci::use(other_than_camera);
-    return run.empty() ? std::string() : describe_owner(camera, run);
+    return ImageOwner{camera, run};
   });
 }
 

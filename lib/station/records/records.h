@@ -91,9 +91,9 @@ class Records {
   std::optional<RunRecord> find(const std::string& run);
   /// Throws InputError when no run could be kept now.
   void check_writable();
-  /// Returns describe_owner() of the first run of another camera, not voided, that uses an image of
+  /// Returns the first run of another camera, not voided, that uses an image of
   /// this digest; an empty string if there is none.
-  std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
+  ImageOwner owner_of(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the judged runs of a unit, not voided, that use an image of this digest, the earliest
   /// first.
   std::vector<std::string> judged_runs_with(const std::string& sha256, const std::string& camera);

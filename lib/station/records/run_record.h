@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,7 +30,8 @@ struct RunEvent {
 };
 inline constexpr const char *kHookWanted = "hook wanted", *kHookDone = "hook done",
                             *kHookFailed = "hook failed", *kImagesDeleted = "images deleted",
-                            *kResultsDeleted = "results deleted", *kVoided = "voided";
+                            *kResultsDeleted = "results deleted", *kVoided = "voided",
+                            *kUnchecked = "unchecked";
 
 /// One of now, by this program's account, as "Ann (vlp@station-7)" where an operator is known.
 RunEvent new_event(const std::string& what, const std::string& text,
@@ -71,8 +73,19 @@ struct RunRecord {
   void judge(const std::vector<Cause>& why);
 };
 
-/// Returns whose an image is that a run uses, and how it gets free: "camera 0001, run RUN: ...".
-std::string describe_owner(const std::string& camera, const std::string& run);
+/// Run that used an image; empty if none did.
+struct ImageOwner {
+  std::string camera = {}, run = {};
+
+  bool empty() const { return run.empty(); }
+  friend bool operator==(const ImageOwner&, const ImageOwner&) = default;
+};
+
+/// Returns the command that voids a run of the station of this file, with all its options.
+std::string void_command(const std::string& run, const std::filesystem::path& station_file);
+
+/// Describes the owner of an image, and how to free it if the owner's serial was wrong.
+std::string describe_owner(const ImageOwner& owner, const std::filesystem::path& station_file);
 
 /// Returns true if `run` uses images, and `earlier` used all of them; both of one camera.
 bool repeats_images(const RunRecord& run, const RunRecord& earlier);

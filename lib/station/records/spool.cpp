@@ -395,15 +395,15 @@ std::vector<std::string> Spool::with_open_hook(const std::string& station) {
   return {runs.begin(), runs.end()};
 }
 
-std::string Spool::owner_of(const std::string& sha256, const std::string& other_than_camera) {
+ImageOwner Spool::owner_of(const std::string& sha256, const std::string& other_than_camera) {
   read();
   for (const auto& [file, spooled] : known_) {
     const RunRecord& run = spooled.run;
     if (run.camera != other_than_camera && uses(run, sha256) && voided(run) == nullptr) {
-      return describe_owner(run.camera, run.run);
+      return {run.camera, run.run};
     }
   }
-  std::string owner;
+  ImageOwner owner;
   const auto look = [&](Records& records) { owner = records.owner_of(sha256, other_than_camera); };
   if (!may_ask() || !ask(look).empty()) ++not_asked_;
   return owner;

@@ -70,7 +70,7 @@ class Spool {
   /// Records::with_open_hook() of those that wait and, when they answer, the records.
   std::vector<std::string> with_open_hook(const std::string& station);
   /// Records::owner_of() of those that wait and, when they answer, the records.
-  std::string owner_of(const std::string& sha256, const std::string& other_than_camera);
+  ImageOwner owner_of(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the first judged run of the same unit, not voided, that used all images of `run`
   /// (repeats_images()), of those that wait and, if they answer, the records; an empty string if
   /// there is none.

@@ -168,10 +168,10 @@ void Unit::look(StationStep step, const std::vector<fs::path>& files) {
     images[i].level = level_in(levels, images[i].seen.name());
   });
   for (UnitImage& image : images) {
-    const std::string owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : "";
+    const ImageOwner owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : ImageOwner();
     if (!owner.empty()) {
       image.seen.reject(RejectionReason::used_elsewhere,
-                        "already of " + owner);
+                        "already of " + describe_owner(owner, config_.file));
     }
     at(step).last = image.seen.name();
     take(step, std::move(image));

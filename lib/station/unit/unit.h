@@ -47,9 +47,8 @@ class Unit {
   /// Solves what has enough; with `all_in`, nothing more comes, and what there is has to do: then,
   /// a captures.csv that cannot be read throws InputError, and is the step's problem before.
   void advance(bool all_in);
-  /// Whose an image is already, by its SHA-256, for people; empty when it is nobody's. Those of
-  /// another are refused by this name.
-  void refuse_images_of_others(std::function<std::string(const std::string& sha256)> owner) {
+  /// Refuses images that another camera's run used, by their SHA-256.
+  void refuse_images_of_others(std::function<ImageOwner(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
   /// Nothing more comes although a step has not enough; `why` for people, as "the operator ended
@@ -102,7 +101,7 @@ class Unit {
   ProgramVersion program_;
   int threads_;
   std::string ended_ = {}, distrusted_ = {};
-  std::function<std::string(const std::string&)> owner_ = {};
+  std::function<ImageOwner(const std::string&)> owner_ = {};
   BoardIntake boards_;
   std::array<UnitStep, 4> steps_;
 };

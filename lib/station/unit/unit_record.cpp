@@ -39,12 +39,13 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
   return record;
 }
 
-void reject_repetition(RunRecord& record, const std::string& earlier) {
+void reject_repetition(RunRecord& record, const std::string& earlier,
+                       const std::filesystem::path& station_file) {
   record.verdict = name_of(Verdict::invalid);
   record.causes = fmt::format(
-      "all images are those of run {}, which is no repetition: take new ones, or 'vlp-station void "
-      "{}' if that run should not count\n{}",
-      earlier, earlier, record.causes);
+      "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
+      "should not count\n{}",
+      earlier, void_command(earlier, station_file), record.causes);
 }
 
 }  // namespace vlp

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "station/records/run_record.h"
@@ -14,6 +15,7 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run, const Progr
 
 /// Makes a judged run of a unit INVALID because `earlier`, a judged run of the unit, used all of
 /// its images: it is no repetition, and would count twice.
-void reject_repetition(RunRecord& record, const std::string& earlier);
+void reject_repetition(RunRecord& record, const std::string& earlier,
+                       const std::filesystem::path& station_file);
 
 }  // namespace vlp

@@ -186,6 +186,22 @@ TEST_F(KnownRunsTest, LeaveNoValidCalibrationOfAVoidedPass) {
               HasSubstr("keep their names: the same command with --station of station-1"));
 }
 
+TEST_F(KnownRunsTest, FinishAVoidingByRecordsAlone) {
+  config.hook = Hook{{"sh", "-c", "cat >told.json"}, folder / ".", 20};
+  const std::string run = keep(1);
+  {
+    KnownRuns records(config.records);
+    void_run(records, run, "Ann", "wrong serial");
+  }
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "told.json"), "");
+  KnownRuns known(config);
+  const Voided finished = void_run(known, run, "Ben", "again");
+  EXPECT_EQ(finished.problem, "");
+  EXPECT_EQ(finished.run.events.back().what, kHookDone);
+  EXPECT_THAT(TemporaryFolder::content_of(folder / "told.json"), HasSubstr("wrong serial"));
+  EXPECT_THROW(void_run(known, run, "Ben", "again"), std::invalid_argument) << "nothing is left";
+}
+
 /// Labels and the factory's system have to hear of it.
 TEST_F(KnownRunsTest, TellTheHookWhatWasVoided) {
   config.hook = Hook{{"sh", "-c", "cat >told.json; echo taken back"}, folder / ".", 20};

@@ -87,7 +87,7 @@ TEST(Spool, OutlastsAFullDisk) {
     EXPECT_THAT(spool.waiting(), SizeIs(40 - there));
     EXPECT_THAT(spool.state(), HasSubstr("full"));
     // Records that are full are read all the same.
-    EXPECT_EQ(spool.owner_of("digest-0-1", "b"), describe_owner("camera-0", numbered_run(0).run));
+    EXPECT_EQ(spool.owner_of("digest-0-1", "b"), (ImageOwner{"camera-0", numbered_run(0).run}));
   }
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
   Spool(folder / "spool", where).deliver();
@@ -314,7 +314,7 @@ TEST(Spool, OutlastsItsServer) {
   connected.prepare();
   EXPECT_EQ(connected.state(), "");
   server.freeze();
-  EXPECT_LT(seconds_of([&] { EXPECT_EQ(connected.owner_of("digest-1-1", "b"), ""); }), 8);
+  EXPECT_LT(seconds_of([&] { EXPECT_EQ(connected.owner_of("digest-1-1", "b"), ImageOwner{}); }), 8);
   connected.keep(numbered_run(-3));
   EXPECT_LT(seconds_of([&] { connected.deliver(); }), 1);
   EXPECT_FALSE(connected.find("another"));

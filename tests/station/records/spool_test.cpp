@@ -94,8 +94,8 @@ TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
   EXPECT_FALSE(spool.find("another"));
   // Guards go on with what is known here.
   EXPECT_EQ(spool.owner_of("digest-2-7", "camera-1"),
-            describe_owner("camera-2", numbered_run(2).run));
-  EXPECT_EQ(spool.owner_of("digest-2-7", "camera-2"), "");
+            (ImageOwner{"camera-2", numbered_run(2).run}));
+  EXPECT_EQ(spool.owner_of("digest-2-7", "camera-2"), ImageOwner{});
   EXPECT_THAT(spool.state(), HasSubstr("; 1 images were not looked up in the records"));
 
   fs::create_directory(folder / "away");
@@ -106,7 +106,7 @@ TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
   EXPECT_THAT(whole_runs(where), SizeIs(3));
   EXPECT_EQ(Records(where).find(numbered_run(1).run)->figures[0].value, 0.1 + 0.2);
   EXPECT_EQ(later.owner_of("digest-2-7", "camera-1"),
-            describe_owner("camera-2", numbered_run(2).run));
+            (ImageOwner{"camera-2", numbered_run(2).run}));
 }
 
 TEST(Spool, KnowsWhichGoldenRunUsedAnImage) {
@@ -233,7 +233,7 @@ TEST(Spool, ReadsAFileAgainThatCouldNotBeRead) {
   EXPECT_THAT(spool.state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
   folder.file("spool/1.json", text);
   EXPECT_THAT(spool.waiting(), SizeIs(1));
-  EXPECT_EQ(spool.owner_of("digest-1-7", "b"), describe_owner("camera-1", numbered_run(1).run));
+  EXPECT_EQ(spool.owner_of("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
   EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), Not(HasSubstr("1.json"))));
 }
 
@@ -262,7 +262,7 @@ TEST(Spool, BringsRunsToTheRecordsTheyAreFor) {
   EXPECT_THAT(of_b.state(), AllOf(StartsWith("1 here for other records"), HasSubstr("a.db")));
   EXPECT_THAT(of_b.waiting(), IsEmpty());
   EXPECT_TRUE(of_b.find(numbered_run(1).run)) << "a run is not judged twice for that";
-  EXPECT_EQ(of_b.owner_of("digest-1-7", "b"), describe_owner("camera-1", numbered_run(1).run));
+  EXPECT_EQ(of_b.owner_of("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
   of_b.keep(numbered_run(2));
   of_b.deliver();
   EXPECT_THAT(whole_runs(b), SizeIs(1));

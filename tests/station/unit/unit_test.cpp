@@ -114,7 +114,6 @@ TEST(VerdictScreen, SaysWhyGatesAreNotMeasured) {
   };
   RunRecord record;
   record.kind = "unit";
-  record.judge({{"rotation: no image can be used"}});
   const std::vector<Gate> gates{{"blur_px", 1},
                                 {"rms_px", 1},
                                 {"rotation_px", 1},
@@ -123,12 +122,19 @@ TEST(VerdictScreen, SaysWhyGatesAreNotMeasured) {
   const auto measure = [&](const std::vector<Metric>& metrics) {
     record.figures = check_gates(gates, metrics);
   };
+  record.judge({{"boards: no image can be used"}});
   measure({{"blur_px", 0.5}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 4 gates, because boards did not finish");
+  // A figure of a step that failed, and one that a step has before it is solved.
+  record.judge({{"boards (36/36): two halves"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}});
+  EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because boards did not finish");
+  record.judge({{"the golden unit failed"}, {"rotation: no image can be used"}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because rotation did not finish");
+  record.judge({{"check: no image can be used"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 1 gate, because check did not finish");
+  record.judge({{"the station has moved"}});
   measure({{"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}, {"check_mean_mm", 1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: blur_px");
   measure({{"blur_px", 0.5},
@@ -145,18 +151,18 @@ TEST(VerdictScreen, SaysWhyGatesAreNotMeasured) {
 }
 
 TEST_F(UnitTest, TakesNoImageOfAnother) {
-  unit.refuse_images_of_others([](const std::string&) { return describe_owner("0001", "R"); });
+  unit.refuse_images_of_others([](const std::string&) { return ImageOwner{"0001", "R"}; });
   fs::copy_file(kView, folder / "0.png");
   unit.add(StationStep::boards, {folder / "0.png"});
   EXPECT_EQ(
       unit.step(StationStep::boards).images.at("0.png").refusal(),
-      "already of camera 0001, run R: if its serial was wrong, 'vlp-station void R' frees its "
-      "images");
+      "already of camera 0001, run R: if its serial was wrong, 'vlp-station void R --station " +
+          config.file.string() + " --operator NAME --reason WHY' frees its images");
   unit.advance(true);
   EXPECT_THAT(find_causes(unit),
               ElementsAre(Field(&Cause::text,
                                 HasSubstr("1 already of camera 0001, run R: if its serial was "
-                                          "wrong, 'vlp-station void R' frees its images"))));
+                                          "wrong, 'vlp-station void R --station "))));
   EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
 }
 
@@ -164,11 +170,12 @@ TEST(RejectRepetition, NamesTheEarlierRun) {
   RunRecord record;
   record.judge({});
   ASSERT_TRUE(record.passed());
-  reject_repetition(record, "R1");
+  reject_repetition(record, "R1", "station.yaml");
   EXPECT_TRUE(record.invalid());
   EXPECT_EQ(record.first_cause(),
             "all images are those of run R1, which is no repetition: take new ones, or "
-            "'vlp-station void R1' if that run should not count");
+            "'vlp-station void R1 --station station.yaml --operator NAME --reason WHY' if that run "
+            "should not count");
 }
 
 TEST(VerdictOf, IsDecidedByTheFirstCause) {
