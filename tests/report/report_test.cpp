@@ -21,6 +21,22 @@ TEST(Report, BeginsWithTheVerdictAndNamesTheGates) {
   EXPECT_LT(html.find("<h1>unit 7</h1>"), html.find("FAIL</strong>"));
 }
 
+TEST(Report, HasFactsAndFloorPlanBeforeTheGates) {
+  Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
+  report.facts = {{"operator", "<Ann>"}};
+  report.pictures = {
+      {ReportPart::floor, "<svg>", "the floor", "a plan", {{"image"}, {"0007.png"}}}};
+  const std::string html = report_html(report);
+  const auto verdict = html.find("<strong>PASS"), fact = html.find("&lt;Ann&gt;"),
+             floor = html.find("the floor"), worst = html.find("0007.png"),
+             gate = html.find("mean_mm");
+  ASSERT_NE(gate, std::string::npos);
+  EXPECT_LT(verdict, fact);
+  EXPECT_LT(fact, floor);
+  EXPECT_LT(floor, worst);
+  EXPECT_LT(worst, gate);
+}
+
 TEST(Report, ShowsAGateOfWhatIsNotKnown) {
   const std::string html =
       report_html({"unit 7", {{"halves_px", "px", {}, 1, Direction::at_most}}, {}, {}, {}, {}, {}});

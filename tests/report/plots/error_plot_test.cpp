@@ -63,6 +63,18 @@ TEST(ErrorPlot, SaysThatNotAllMissingFixesAreDrawn) {
   EXPECT_THAT(drawing_of(plot).commands, HasSubstr("no fix: every 5th of 1000 drawn"));
 }
 
+TEST(ErrorPlot, HasATableOfTheTenLargestErrors) {
+  ErrorPlot plot = grid(31);
+  plot.fixes[7].fix_m.y() += 0.002;
+  plot.fixes[7].image = "0007.png";
+  const auto table = drawing_of(plot).table;
+  ASSERT_EQ(table.size(), 11U);
+  EXPECT_EQ(table[0].back(), "error (mm)");
+  EXPECT_EQ(table[1], (std::vector<std::string>{"0007.png", "0.233, 0.100", "1.00, 2.00", "2.24"}));
+  EXPECT_EQ(table[2].back(), "1.00");
+  EXPECT_TRUE(drawing_of({"none", {}, {}, {}}).table.empty());
+}
+
 TEST(ErrorPlot, StaysSmallAndKeepsTheLargestErrors) {
   ErrorPlot plot = grid(100'000);
   plot.fixes[12'345].fix_m.y() += 0.0013;
