@@ -22,9 +22,6 @@ namespace vlp {
 
 namespace {
 
-/// How far the point spread reaches; less than 1e-4 of the light is beyond.
-int reach_px(double blur_px) { return static_cast<int>(std::ceil(4 * blur_px)); }
-
 cv::Mat1f vignetting_of(const PixelRays& rays, double power) {
   cv::Mat1f image(rays.lines(), rays.places());
   for (int line = 0; line < rays.lines(); ++line) {
@@ -43,21 +40,17 @@ cv::Mat1f vignetting_of(const PixelRays& rays, double power) {
 
 }  // namespace
 
-void blur(cv::Mat1f& image, double sigma_px) {
-  if (sigma_px == 0) return;
-  const int size = 2 * reach_px(sigma_px) + 1;
-  cv::GaussianBlur(image, image, {size, size}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
-}
-
 FrameRenderer::FrameRenderer(const Scene& scene)
     : scene_(scene),
-      rays_(scene.camera, reach_px(scene.optics.blur_px)),
-      vignetting_(vignetting_of(rays_, scene.optics.vignetting_power)) {
+      rays_(scene.camera, reach_px(scene.optics)),
+      optics_(scene.optics, rays_),
+      transmission_(vignetting_of(rays_, scene.optics.vignetting_power)) {
+  transmission_ = transmission_.mul(transmission_of(scene.optics.dust, rays_));
   if (scene.board) print_.emplace(*scene.board);
 }
 
 cv::Mat1f FrameRenderer::collected(const cv::Mat1f& electrons_per_s, double exposure_s) const {
-  return cv::Mat1f(rays_.without_margin(electrons_per_s).mul(vignetting_, exposure_s));
+  return cv::Mat1f(rays_.without_margin(electrons_per_s).mul(transmission_, exposure_s));
 }
 
 namespace {
@@ -100,9 +93,14 @@ Mosaic mosaic_of(const Panel& panel) {
 /// directly, or by a mirror.
 class LampFrame {
  public:
-  LampFrame(const Scene& scene, const PixelRays& rays, const LampShot& shot, const Shutter& part,
-            const Mirror* mirror = nullptr)
-      : scene_(scene), rays_(rays), shot_(shot), motion_(shot.motion), part_(part) {
+  LampFrame(const Scene& scene, const PixelRays& rays, const PointSpread& optics,
+            const LampShot& shot, const Shutter& part, const Mirror* mirror = nullptr)
+      : scene_(scene),
+        rays_(rays),
+        optics_(optics),
+        shot_(shot),
+        motion_(shot.motion),
+        part_(part) {
     if (!scene.clutter.occluders.empty() || mirror) open_ = rays_.image(1);
     for (const Panel& occluder : scene.clutter.occluders) {
       open_ = open_.mul(1 - covered_by(occluder));
@@ -139,7 +137,8 @@ class LampFrame {
       const cv::Mat1f hidden = covered_by(occluder);
       image = image.mul(1 - hidden) + occluder.radiance_e_per_s * hidden;
     }
-    blur(image, scene_.optics.blur_px);
+    optics_.spread(image, {-rays_.margin_px(), -rays_.margin_px()});
+    optics_.add_veil(image);
     return image;
   }
 
@@ -153,7 +152,8 @@ class LampFrame {
     cv::Mat1f patch = window.image(0);
     draw(glow, window, patch);
     if (!open_.empty()) patch = patch.mul(window.of(open_, rays_.margin_px()));
-    blur(patch, scene_.optics.blur_px);
+    optics_.spread(patch, {window.line_begin, window.place_begin});
+    add_scattered(optics_.scatter(patch), wave, image);
     cv::Mat1f target = window.of(image, rays_.margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
@@ -162,6 +162,16 @@ class LampFrame {
   }
 
  private:
+  /// Adds the light of a switched light that a veil scatters to all pixels.
+  template <typename Wave>
+  void add_scattered(float scattered_e_per_s, const Wave& wave, cv::Mat1f& image) const {
+    if (scattered_e_per_s == 0) return;
+    for (int row = 0; row < image.rows; ++row) {
+      const int line = row - rays_.margin_px();
+      image.row(row) += wave.lit_share(part_.begin_s(line), part_.end_s(line)) * scattered_e_per_s;
+    }
+  }
+
   /// Returns the ceiling's radiance while a line is exposed.
   double ceiling_of(int line) const {
     if (!scene_.clutter.ambient_flicker) return scene_.ambient_e_per_s;
@@ -257,6 +267,7 @@ class LampFrame {
 
   const Scene& scene_;
   const PixelRays& rays_;
+  const PointSpread& optics_;
   const LampShot& shot_;
   const CarrierMotion& motion_;
   const Shutter& part_;
@@ -318,7 +329,7 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
   }
   cv::Mat1f sum = rays_.image(0);
   for (; part.index < part.count; ++part.index) {
-    const LampFrame frame(scene_, rays_, shot, part);
+    const LampFrame frame(scene_, rays_, optics_, shot, part);
     sum += frame.steady();
     for (std::size_t i = 0; i < scene_.lamps.size(); ++i) {
       frame.add(scene_.lamps[i].glow, shot.waves[i], sum);
@@ -331,7 +342,7 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
       std::visit([&](const auto& wave) { frame.add(glow, wave, sum); }, shot.foreign_waves[i]);
     }
     for (const Mirror& mirror : scene_.clutter.mirrors) {
-      add_mirror_images(scene_, shot, LampFrame(scene_, rays_, shot, part, &mirror), sum);
+      add_mirror_images(scene_, shot, LampFrame(scene_, rays_, optics_, shot, part, &mirror), sum);
     }
   }
   return collected(sum, shot.exposure_s / part.count);
@@ -374,8 +385,9 @@ cv::Mat1f FrameRenderer::board_electrons(const BoardShot& shot) const {
     add_shape_in_halves(rays_, whole_window(rays_), board_from_camera, *print_, 1.0 / part.count,
                         halves);
   }
-  blur(halves, 2 * scene_.optics.blur_px);
+  optics_.spread(halves, {-rays_.margin_px(), -rays_.margin_px(), 2});
   cv::resize(halves, image, pixels, 0, 0, cv::INTER_AREA);
+  optics_.add_veil(image);
   return collected(image, shot.exposure_s);
 }
 

@@ -7,6 +7,7 @@
 
 #include "simulation/board_print.h"
 #include "simulation/pixel_rays.h"
+#include "simulation/point_spread.h"
 #include "simulation/shot.h"
 #include "simulation/shutter.h"
 
@@ -40,11 +41,10 @@ class FrameRenderer {
 
   const Scene& scene_;
   PixelRays rays_;
-  cv::Mat1f vignetting_;
+  PointSpread optics_;
+  /// Vignetting, and the dust on the lens.
+  cv::Mat1f transmission_;
   std::optional<BoardPrint> print_;
 };
-
-/// Sigma of the point spread; the image's edges are continued.
-void blur(cv::Mat1f& image, double sigma_px);
 
 }  // namespace vlp

@@ -187,11 +187,40 @@ struct Clutter {
   std::optional<RectifiedSine> ambient_flicker = {};
 };
 
+/// Disc of defocus, with the radius |radius_px + tilt_px . (x, y)|: x and y are -1 to 1 from one
+/// edge of the image to the other. A tilted focal plane crosses the sensor where the radius is 0.
+struct Defocus {
+  double radius_px;
+  Eigen::Vector2d tilt_px{0, 0};
+};
+
+/// Smear on the lens: in a soft spot around `at_px` a fraction of the light spreads into a Gaussian
+/// halo.
+struct LensSmear {
+  Eigen::Vector2d at_px;
+  double radius_px;
+  double fraction;
+  double sigma_px;
+};
+
+/// Speck of dust in front of the sensor, out of focus: a soft shadow that is fixed in the image and
+/// takes the fraction `depth` of the light in its middle.
+struct Dust {
+  Eigen::Vector2d at_px;
+  double radius_px;
+  double depth;
+};
+
 struct Optics {
   /// Sigma of the Gaussian point spread.
   double blur_px;
   /// A ray at the angle a from the optical axis arrives weakened by cos(a)^power; 4 is natural.
   double vignetting_power;
+  std::optional<Defocus> defocus = {};
+  /// Fraction of the light of all the scene that a veil spreads evenly over the image.
+  double veil = 0;
+  std::vector<LensSmear> smears = {};
+  std::vector<Dust> dust = {};
 };
 
 /// Charge above the full well: `share` of it goes to the pixels around, as a Gaussian.

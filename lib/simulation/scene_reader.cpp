@@ -43,9 +43,66 @@ Camera read_scene_camera(YamlMap map) {
   return camera;
 }
 
+constexpr double kMostDefocus_px = 20;
+constexpr double kMostSpot_px = 1e4;
+
+Defocus read_defocus(YamlMap map) {
+  Defocus defocus{map.required("radius_px").number_within(0, kMostDefocus_px, "px")};
+  if (const auto tilt = map.optional("tilt_px")) {
+    defocus.tilt_px = Eigen::Vector2d(tilt->numbers(2).data());
+    for (const YamlValue& component : tilt->list()) {
+      component.number_within(-kMostDefocus_px, kMostDefocus_px, "px");
+    }
+  }
+  map.finish();
+  return defocus;
+}
+
+Eigen::Vector2d read_spot(YamlMap& map) {
+  const YamlValue at = map.required("at_px");
+  const Eigen::Vector2d at_px(at.numbers(2).data());
+  for (const YamlValue& component : at.list()) {
+    component.number_within(-kMostSpot_px, kMostSpot_px, "px");
+  }
+  return at_px;
+}
+
+LensSmear read_smear(YamlMap map) {
+  const LensSmear smear{read_spot(map),
+                        map.required("radius_px").number_within(1, kMostSpot_px, "px"),
+                        map.required("fraction").number_within(0, 1, "(of the light)"),
+                        map.required("sigma_px").number_within(0.3, 50, "px")};
+  map.finish();
+  return smear;
+}
+
+Dust read_dust(YamlMap map) {
+  const Dust dust{read_spot(map), map.required("radius_px").number_within(1, kMostSpot_px, "px"),
+                  map.required("depth").number_within(0, 1, "(of the light)")};
+  map.finish();
+  return dust;
+}
+
+template <typename Item>
+std::vector<Item> read_each(const YamlValue& list, Item (*read)(YamlMap map)) {
+  const std::vector<YamlValue> values = list.list();
+  std::vector<Item> items;
+  items.reserve(values.size());
+  for (const YamlValue& value : values) items.push_back(read(value.map()));
+  return items;
+}
+
 Optics read_optics(YamlMap map) {
-  const Optics optics{map.required("blur_px").number_within(0, 20, "px"),
-                      map.required("vignetting_power").number_within(0, 20, "")};
+  Optics optics{map.required("blur_px").number_within(0, 20, "px"),
+                map.required("vignetting_power").number_within(0, 20, "")};
+  if (const auto defocus = map.optional("defocus")) optics.defocus = read_defocus(defocus->map());
+  if (const auto veil = map.optional("veil")) {
+    optics.veil = veil->number_within(0, 1, "(of the light)");
+  }
+  if (const auto smears = map.optional("smears")) {
+    optics.smears = read_each<LensSmear>(*smears, read_smear);
+  }
+  if (const auto dust = map.optional("dust")) optics.dust = read_each<Dust>(*dust, read_dust);
   map.finish();
   return optics;
 }

@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "simulation/pixel_rays.h"
+#include "simulation/scene.h"
+
+namespace vlp {
+
+/// Returns how far the point spread of the optics reaches, in px; less than 1e-3 of the light is
+/// beyond. The veil reaches everywhere.
+int reach_px(const Optics& optics);
+
+/// Part of an image, lines x places, as a lens spreads it.
+struct SpreadWindow {
+  /// Line and place of its first pixel.
+  int line_begin, place_begin;
+  /// Elements of the part per pixel along each axis.
+  int per_px = 1;
+};
+
+/// Point spread of a scene's optics, which varies over the image:
+///   - a Gaussian (Optics::blur_px), and a disc of defocus (Defocus), whose radius is interpolated
+///     between discs of whole multiples of 0.5 px;
+///   - a halo, a Gaussian into which a smear (LensSmear) scatters a fraction of the light;
+///   - a veil (Optics::veil): a fraction of the light of all the scene spreads evenly.
+/// Outside the image, edges are continued.
+class PointSpread {
+ public:
+  /// `optics` and `rays` outlive the object.
+  PointSpread(const Optics& optics, const PixelRays& rays) : optics_(optics), rays_(rays) {}
+
+  /// Applies all but the veil.
+  void spread(cv::Mat1f& part, const SpreadWindow& window) const;
+
+  /// Applies the veil to an image that holds all of the scene.
+  void add_veil(cv::Mat1f& image) const;
+
+  /// Removes the scattered fraction from a part of the scene; returns what each pixel of the image
+  /// receives of it.
+  float scatter(cv::Mat1f& part) const;
+
+ private:
+  void defocus(cv::Mat1f& part, const SpreadWindow& window) const;
+  void smear(const LensSmear& smear, cv::Mat1f& part, const SpreadWindow& window) const;
+
+  const Optics& optics_;
+  const PixelRays& rays_;
+};
+
+/// Returns the fraction of the light that passes the dust on the lens (Dust), lines x places.
+cv::Mat1f transmission_of(const std::vector<Dust>& dust, const PixelRays& rays);
+
+}  // namespace vlp
