@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 std::string settings_of(const Board& board) {
   std::string settings =
-      fmt::format("9 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+      fmt::format("10 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                   board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
                   board.border_bits, board.corner_squares, board.first_id, name_of(board.id_order));
   if (board.has_squares()) {
@@ -34,9 +34,11 @@ std::string settings_of(const Board& board) {
 }
 
 constexpr std::array kColumns{
-    "id",      "u0",    "v0",     "u1",      "v1",    "u2",     "v2",      "u3",    "v3",
-    "square0", "cube0", "reach0", "square1", "cube1", "reach1", "square2", "cube2", "reach2",
-    "square3", "cube3", "reach3", "sd0",     "sd1",   "sd2",    "sd3"};
+    "id",    "u0",      "v0",      "u1",      "v1",      "u2",    "v2",      "u3",
+    "v3",    "square0", "cube0",   "reach0",  "square1", "cube1", "reach1",  "square2",
+    "cube2", "reach2",  "square3", "cube3",   "reach3",  "sd0",   "sd1",     "sd2",
+    "sd3",   "blur0",   "dark0",   "bright0", "blur1",   "dark1", "bright1", "blur2",
+    "dark2", "bright2", "blur3",   "dark3",   "bright3"};
 
 /// With zeros to its end.
 std::vector<std::string> row_of(std::vector<std::string> begin) {
@@ -54,6 +56,9 @@ std::vector<std::string> row_of(int id, const SeenTag::Outline& outline) {
     row.insert(row.end(), {shortest(square_px), shortest(cube_px), shortest(reach)});
   }
   for (const double sd_px : outline.sds_px) row.push_back(shortest(sd_px));
+  for (const auto& [blur_px, dark, bright] : outline.steps) {
+    row.insert(row.end(), {shortest(blur_px), shortest(dark), shortest(bright)});
+  }
   return row;
 }
 
@@ -72,7 +77,7 @@ void write_view(const fs::path& file, const CachedView& cached) {
               shortest(cached.white_fraction)}));
   for (const auto* tags : {&view.seen.tags, &view.seen.foreign}) {
     for (const SeenTag& tag : *tags) {
-      csv.row(row_of(tag.id, {tag.corners_px, tag.bows, tag.sds_px}));
+      csv.row(row_of(tag.id, {tag.corners_px, tag.bows, tag.sds_px, tag.steps}));
     }
   }
   for (const SeenPoint& point : view.seen.points) {
@@ -115,14 +120,17 @@ CachedView read_view(const fs::path& file, const std::string& image) {
       outline.bows[k] = {at(row, kColumns[bow]), at(row, kColumns[bow + 1]),
                          at(row, kColumns[bow + 2])};
       outline.sds_px[k] = at(row, kColumns[21 + k]);
+      const std::size_t step = 25 + 3 * k;
+      outline.steps[k] = {at(row, kColumns[step]), at(row, kColumns[step + 1]),
+                          at(row, kColumns[step + 2])};
     }
     return outline;
   };
   std::size_t row = 1;
   for (const std::size_t end = row + tags_seen + foreign; row < end; ++row) {
     auto& tags = row <= tags_seen ? view.seen.tags : view.seen.foreign;
-    const auto [corners_px, bows, sds_px] = outline_of(row);
-    tags.push_back({static_cast<int>(at(row, "id")), corners_px, bows, sds_px});
+    const auto [corners_px, bows, sds_px, steps] = outline_of(row);
+    tags.push_back({static_cast<int>(at(row, "id")), corners_px, bows, sds_px, {}, steps});
   }
   for (const std::size_t end = row + points; row < end; ++row) {
     view.seen.points.push_back(

@@ -27,10 +27,11 @@ constexpr std::array<Kind, 8> kKinds = {
       "and "
       "without a pattern; long arrows that point the same way mean a lens that is not modelled "
       "well. "
-      "Uncertainty: how far the projection can be trusted, by one standard deviation.",
-      "Three maps of the image: corners of the board in all views, their residuals enlarged, and "
-      "the "
-      "standard deviation of the projection."},
+      "Uncertainty: how far the projection can be trusted, by one standard deviation. "
+      "Sharpness, with AprilTags: even, or falling equally towards all edges; a fall to one side "
+      "is a tilted lens, a spot is dust or a smear.",
+      "Maps of the image: corners of the board in all views, their residuals enlarged, the "
+      "standard deviation of the projection, and the MTF50 where it was measured."},
      {"rotation", ReportPart::rotation,
       "Left: the lamps while the camera turns on the spot; each goes round an ellipse. Right, "
       "enlarged: the centres of the ellipses, by lamp, with the rotation centre and the principal "

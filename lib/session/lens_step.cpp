@@ -93,8 +93,9 @@ LensResult solve_lens(LensInput input, HistoryEntry entry) {
   result.calibration = with_camera(camera, make_report(lens), std::move(entry));
   result.metrics = lens_metrics(lens);
   const std::string title = fmt::format("{}, {}", camera.id, name_of(camera.lens_model));
-  result.drawing = [title, solution = lens.solution, lattice = *lens.lattice] {
-    return drawing_of(plot_of(title, solution, lattice));
+  result.drawing = [title, solution = lens.solution, lattice = *lens.lattice,
+                    sharpness = lens.sharpness] {
+    return drawing_of(plot_of(title, solution, lattice, sharpness));
   };
   return result;
 }
@@ -106,6 +107,14 @@ std::vector<Metric> lens_metrics(const LensEstimate& lens) {
                               {"views", static_cast<double>(lens.solution.views.size())},
                               {"board_tilt_deg", deg_from_rad(lens.coverage.tilt_rad)}};
   if (lens.report.halves) metrics.push_back({"halves_px", lens.report.halves->rms_px});
+  if (const auto& sharpness = lens.sharpness) {
+    metrics.insert(metrics.end(), {{"mtf50", sharpness->mean_mtf50},
+                                   {"mtf50_worst_ratio", sharpness->worst_ratio},
+                                   {"mtf50_asymmetry", sharpness->asymmetry},
+                                   {"black_ratio", sharpness->black_level},
+                                   {"local_loss", sharpness->local_loss},
+                                   {"local_shadow", sharpness->local_shadow}});
+  }
   return metrics;
 }
 

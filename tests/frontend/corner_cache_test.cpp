@@ -89,6 +89,7 @@ TEST(CornerCache, KeepsCornersBehindCurves) {
     EXPECT_EQ(kept->view.seen.tags[i].bows, view.seen.tags[i].bows);
     EXPECT_EQ(kept->view.seen.tags[i].sds_px, view.seen.tags[i].sds_px);
     EXPECT_EQ(kept->view.seen.tags[i].behind_curves, view.seen.tags[i].behind_curves);
+    EXPECT_EQ(kept->view.seen.tags[i].steps, view.seen.tags[i].steps);
   }
 }
 

@@ -23,11 +23,11 @@ SeenBoard behind(const SeenBoard& seen, std::size_t curve) {
   SeenBoard coded;
   for (const SeenTag& tag : seen.tags) {
     if (curve == 0 || tag.behind_curves.empty()) {
-      coded.tags.push_back({tag.id, tag.corners_px, tag.bows, tag.sds_px});
+      coded.tags.push_back({tag.id, tag.corners_px, tag.bows, tag.sds_px, {}, tag.steps});
       continue;
     }
-    const auto& [corners_px, bows, sds_px] = tag.behind_curves[curve - 1];
-    coded.tags.push_back({tag.id, corners_px, bows, sds_px});
+    const auto& [corners_px, bows, sds_px, steps] = tag.behind_curves[curve - 1];
+    coded.tags.push_back({tag.id, corners_px, bows, sds_px, {}, steps});
   }
   return coded;
 }

@@ -264,6 +264,7 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
   result.coverage = coverage_of(solution, views.solved);
   result.held_out = held_out_fit(solution, views.held_out);
   result.lattice = views.solved.lattice;
+  result.sharpness = measure_sharpness(result.views, views.solved.imager_px);
   // The covariance of hundreds of control points would fill the file, without use for fixes.
   if (is_splined(solution.problem.lens_model)) return;
   const ProjectionUncertainty uncertainty(solution, views.solved.lattice);

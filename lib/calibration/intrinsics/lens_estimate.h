@@ -9,6 +9,7 @@
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/lens_choice.h"
+#include "calibration/intrinsics/lens_sharpness.h"
 #include "detection/boards/board_view.h"
 #include "rig/board.h"
 
@@ -44,6 +45,8 @@ struct LensEstimate {
   CalibrationReport report{};
   ViewCoverage coverage{};
   HeldOut held_out{};
+  /// Sharpness of all views; std::nullopt if the board's edges are not measured.
+  std::optional<LensSharpness> sharpness = {};
   /// Result of the selection of the lens model, if it was requested.
   std::optional<LensChoice> choice = {};
   /// A model that fits clearly better than the stated one, or equally well where the board is seen

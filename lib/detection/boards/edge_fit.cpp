@@ -178,7 +178,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   edge.blur_px = p[0];
   const double outside = p[2] < 0 ? -1 : 1;
   const double squares = 2 * solver.summary.final_cost - step.squares_of_priors(p);
-  EdgeFit result{squares, pixels.size(), runs_over, p[1] + outside * p[2]};
+  EdgeFit result{squares, pixels.size(), runs_over, p[1] + outside * p[2], p[1] - outside * p[2]};
   const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
   const double bright = Coded(p[1] + p[2], prior.gamma).level;
   const double contrast = std::abs(bright - Coded(p[1] - p[2], prior.gamma).level) / 2;

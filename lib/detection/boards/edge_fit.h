@@ -62,8 +62,9 @@ struct EdgeFit {
   std::size_t pixels;
   /// White runs over.
   bool runs_over;
-  /// The light on the brighter side, in levels behind no curve.
-  double bright_light;
+  /// Light on the brighter and on the darker side in the middle of the edge, in levels behind no
+  /// tone curve.
+  double bright_light, dark_light;
   /// Of where an end is across the edge, in the mean of both, by noise of one level and with the
   /// bow known, in px^2.
   double end_variance = 0;

@@ -92,6 +92,9 @@ class TagEdges {
   /// has gone too far.
   std::optional<SeenTag::Outline> crossed() const;
 
+  /// Returns the steps across the edges; unknown ones if an edge is missing or white runs over it.
+  SeenTag::Steps steps() const;
+
  private:
   void look_behind(const TagPrint& print);
   void look_beside(const cv::Mat1b& image, const Band& band);
@@ -252,6 +255,15 @@ std::optional<SeenTag::Outline> TagEdges::crossed() const {
   return outline;
 }
 
+SeenTag::Steps TagEdges::steps() const {
+  SeenTag::Steps steps;
+  for (std::size_t k = 0; found_ && k < steps.size(); ++k) {
+    const EdgeFit& fit = fits_[k];
+    if (!fit.runs_over) steps[k] = {edges_[k].blur_px, fit.dark_light, fit.bright_light};
+  }
+  return steps;
+}
+
 double TagEdges::squares() const {
   return fits_[0].squares + fits_[1].squares + fits_[2].squares + fits_[3].squares;
 }
@@ -394,9 +406,15 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
     if (costs.size() == 2 && costs[1] > costs[0] + surely) break;
     if (gamma != 1) fit(others, alone);
     const auto take = [&] {
-      for (const std::size_t i : widest) outlines[i] = edges[i].crossed().value_or(outlines[i]);
+      for (const std::size_t i : widest) {
+        const SeenTag::Steps steps = outlines[i].steps;
+        outlines[i] = edges[i].crossed().value_or(outlines[i]);
+        outlines[i].steps = steps;
+      }
     };
     take();
+    // The fits below share one blur, in which a blurred part of the image would be lost.
+    for (const std::size_t i : widest) outlines[i].steps = edges[i].steps();
     const SomeTags found{edges, widest};
     const bool over = found.run_over();
     if (over || gamma != 1) {
@@ -421,6 +439,7 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
     tags[i].corners_px = behind_none[i].corners_px;
     tags[i].bows = behind_none[i].bows;
     tags[i].sds_px = behind_none[i].sds_px;
+    tags[i].steps = behind_none[i].steps;
   }
   return costs;
 }

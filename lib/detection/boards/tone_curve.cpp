@@ -48,6 +48,14 @@ double least_log_gamma(const PerCurve& costs) {
   return near.least({costs[near.first], costs[near.first + 1], costs[near.first + 2]});
 }
 
+/// Interpolates between the steps behind two curves; unknown if one of them is.
+EdgeStep between(const EdgeStep& below, const EdgeStep& above, double share) {
+  if (!(below.blur_px > 0 && above.blur_px > 0)) return {};
+  const auto mix = [&](double a, double b) { return (1 - share) * a + share * b; };
+  return {mix(below.blur_px, above.blur_px), mix(below.dark, above.dark),
+          mix(below.bright, above.bright)};
+}
+
 }  // namespace
 
 PerCurve costs_of_levels(const std::vector<BoardView>& views) {
@@ -77,7 +85,7 @@ double take_curve(std::vector<BoardView>& views, const PerCurve& costs) {
   for (BoardView& view : views) {
     view.seen.curve_costs.clear();
     for (SeenTag& tag : view.seen.tags) {
-      std::vector<SeenTag::Outline> behind{{tag.corners_px, tag.bows, tag.sds_px}};
+      std::vector<SeenTag::Outline> behind{{tag.corners_px, tag.bows, tag.sds_px, tag.steps}};
       behind.insert(behind.end(), tag.behind_curves.begin(), tag.behind_curves.end());
       tag.behind_curves.clear();
       if (none || behind.size() < kGammas.size()) continue;
@@ -88,6 +96,7 @@ double take_curve(std::vector<BoardView>& views, const PerCurve& costs) {
         const double below_px = behind[below].sds_px[k], above_px = behind[below + 1].sds_px[k];
         const bool known = below_px > 0 && above_px > 0;
         tag.sds_px[k] = known ? (1 - share) * below_px + share * above_px : 0;
+        tag.steps[k] = between(behind[below].steps[k], behind[below + 1].steps[k], share);
         for (std::size_t i = 0; i < 3; ++i) {
           const SeenTag::Corners& corners_px = behind[near.first + i].corners_px;
           const SeenTag::Bows& bows = behind[near.first + i].bows;

@@ -10,7 +10,7 @@
 namespace vlp {
 
 IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution,
-                       const BoardLattice& lattice) {
+                       const BoardLattice& lattice, const std::optional<LensSharpness>& sharpness) {
   const BoardProblem& problem = solution.problem;
   IntrinsicsPlot plot{title, problem.imager_px, {}, 0, {}};
   const auto residuals_px = residuals_of(problem);
@@ -23,6 +23,10 @@ IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solut
   for (const Eigen::Vector2d& pixel : pixel_grid(problem.imager_px)) {
     if (pixel.y() == 0) ++plot.cols;
     plot.sd_px.push_back(uncertainty.worst_px(pixel));
+  }
+  if (sharpness) {
+    plot.mtf50_cols = sharpness->mtf50.cols;
+    plot.mtf50 = sharpness->mtf50.values;
   }
   return plot;
 }

@@ -116,6 +116,28 @@ std::string map_of(const IntrinsicsPlot& plot) {
   return commands + "\n";
 }
 
+/// Returns the commands that draw the map of the MTF50; empty if it was not measured.
+std::string draw_mtf50(const IntrinsicsPlot& plot) {
+  const bool is_measured = std::any_of(plot.mtf50.begin(), plot.mtf50.end(),
+                                       [](double value) { return std::isfinite(value); });
+  if (!is_measured) return "";
+  const auto cols = static_cast<std::size_t>(plot.mtf50_cols), rows = plot.mtf50.size() / cols;
+  const double half_u = plot.imager_px[0] / 2.0 / double(cols);
+  const double half_v = plot.imager_px[1] / 2.0 / double(rows);
+  std::string map;
+  for (std::size_t i = 0; i < plot.mtf50.size(); ++i) {
+    if (!std::isfinite(plot.mtf50[i])) continue;
+    map += data_row({(2 * double(i % cols) + 1) * half_u - 0.5,
+                     (2 * double(i / cols) + 1) * half_v - 0.5, plot.mtf50[i]});
+  }
+  return data_block("mtf50", map) +
+         "set title 'sharpness: MTF50 of lens and pixel'\n"
+         "unset logscale cb\nset cbrange [0:*]\nset cbtics autofreq\n"
+         "set cblabel 'cycles per pixel'\nplot $mtf50 using 1:2:(" +
+         significant(half_u, kPlotDigits) + "):(" + significant(half_v, kPlotDigits) +
+         "):3 with boxxyerror fillstyle solid linecolor palette notitle\n";
+}
+
 }  // namespace
 
 double residual_magnification(double rms_px, int width_px) {
@@ -152,7 +174,8 @@ Drawing drawing_of(const IntrinsicsPlot& plot) {
       "\n" +
       layers(plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
              arrows + "linewidth 2") +
-      "set title 'uncertainty of the projection'\n" + map_of(plot) + "unset multiplot\n";
+      "set title 'uncertainty of the projection'\n" + map_of(plot) + draw_mtf50(plot) +
+      "unset multiplot\n";
   return {"intrinsics", 900, 280 + 720 * height / width, commands};
 }
 

@@ -27,6 +27,10 @@ struct IntrinsicsPlot {
   /// the top left, `cols` (two or more) to a row; not finite where there is none: left blank.
   int cols;
   std::vector<double> sd_px;
+  /// MTF50 of equal parts of the image in cycles per pixel, row by row from the top left,
+  /// `mtf50_cols` to a row; parts that are not finite are left blank. Empty: not measured.
+  int mtf50_cols = 0;
+  std::vector<double> mtf50 = {};
 };
 
 /// How many times their length to draw residuals of this rms per axis, for an image so wide: a
@@ -35,7 +39,7 @@ struct IntrinsicsPlot {
 double residual_magnification(double rms_px, int width_px);
 
 /// Makes the plot for draw(): side by side the corners, their residuals enlarged, and the standard
-/// deviation of the projection.
+/// deviation of the projection, and the MTF50 if it was measured.
 Drawing drawing_of(const IntrinsicsPlot& plot);
 
 }  // namespace vlp

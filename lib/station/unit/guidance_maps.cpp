@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "calibration/intrinsics/lens_sharpness.h"
 #include "geometry/angles.h"
 
 namespace vlp {
@@ -42,6 +43,12 @@ std::vector<std::string> board_map(const Unit& unit) {
   lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
                           100 * coverage.fraction(), 100 * unit.config().enough.board_coverage);
   lines[3] += "   # many corners   + some   . none";
+  const UnitStep& boards = unit.step(StationStep::boards);
+  const auto last = boards.images.find(boards.last);
+  if (last == boards.images.end() || !last->second.seen.board) return lines;
+  if (const auto mtf50 = mtf50_of_view(last->second.seen.board->seen)) {
+    lines[5] += fmt::format("   sharpness of the last image: MTF50 {:.3f} cycles/px", *mtf50);
+  }
   return lines;
 }
 

@@ -90,7 +90,7 @@ TEST(LevellingScatter, OfARefinedMapIsTheReportedCovariance) {
 }
 
 /// A drive under a map with errors of its sd_m.
-struct MapErrors {
+struct LampErrors {
   const char* name;
   double map_sd_m;
   /// Yaws are within this of one heading.
@@ -99,11 +99,11 @@ struct MapErrors {
   int captures;
 };
 
-class LevellingUnderMapErrors : public testing::TestWithParam<MapErrors> {};
+class LevellingUnderMapErrors : public testing::TestWithParam<LampErrors> {};
 
 /// 300 maps of two axes know a standard deviation within 4 %.
 TEST_P(LevellingUnderMapErrors, ReportsTheErrorOfTheZenith) {
-  const MapErrors& errors = GetParam();
+  const LampErrors& errors = GetParam();
   constexpr int maps = 300;
   Random random(26);
   double squares = 0, worst_rad = 0, reported_rad2 = 0;
@@ -142,13 +142,13 @@ TEST_P(LevellingUnderMapErrors, ReportsTheErrorOfTheZenith) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Drives, LevellingUnderMapErrors,
-                         testing::Values(MapErrors{"NoMapErrors", 0, 3, true, 60},
-                                         MapErrors{"OneWay", 2e-3, rad_from_deg(10), true, 60},
-                                         MapErrors{"OneWayNoiseNotStated", 2e-3, rad_from_deg(10),
+                         testing::Values(LampErrors{"NoMapErrors", 0, 3, true, 60},
+                                         LampErrors{"OneWay", 2e-3, rad_from_deg(10), true, 60},
+                                         LampErrors{"OneWayNoiseNotStated", 2e-3, rad_from_deg(10),
                                                    false, 60},
-                                         MapErrors{"AnyYaw", 2e-3, 3, true, 60},
-                                         MapErrors{"AnyYawNoiseNotStated", 2e-3, 3, false, 60},
-                                         MapErrors{"AnyYawFewCaptures", 2e-3, 3, true, 8}),
+                                         LampErrors{"AnyYaw", 2e-3, 3, true, 60},
+                                         LampErrors{"AnyYawNoiseNotStated", 2e-3, 3, false, 60},
+                                         LampErrors{"AnyYawFewCaptures", 2e-3, 3, true, 8}),
                          [](const auto& errors) { return errors.param.name; });
 
 }  // namespace

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "detection/boards/board_view.h"
+
+namespace vlp {
+
+/// Returns the spatial frequency at which the modulation transfer of a Gaussian blur is 0.5, in
+/// cycles per pixel:
+///   exp(-2 (pi sigma f)^2) = 0.5,     f = sqrt(ln 2 / 2) / (pi sigma) = 0.1874 / sigma.
+/// `sigma_px` is positive. It includes the pixel's own aperture, about 0.29 px.
+double mtf50_from_blur(double sigma_px);
+
+/// Returns the median MTF50 of the edges of a view; std::nullopt if no edge has a known blur.
+std::optional<double> mtf50_of_view(const SeenBoard& seen);
+
+/// Sharpness and contrast of lens and pixel together over the image, from the steps of the light
+/// across the edges of tags (slanted edges as in ISO 12233, with the line spread of a Gaussian).
+///
+/// Each part of the image has the lower quartile of the blurs of the views there, so that a shaken
+/// image or one out of focus does not count as a bad lens.
+struct LensSharpness {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  /// Figures of equal parts of the image, row by row from the top left; NaN where unknown.
+  struct Map {
+    int cols, rows;
+    std::vector<double> values =
+        std::vector<double>(std::size_t(cols) * std::size_t(rows), kUnknown);
+
+    double at(int col, int row) const {
+      return values[std::size_t(row) * std::size_t(cols) + std::size_t(col)];
+    }
+  };
+  /// MTF50 in cycles per pixel; light of black over light of white.
+  Map mtf50{12, 9}, black_to_white{12, 9};
+  /// Light of white relative to a smooth field over each view, in smaller parts: specks of dust are
+  /// small.
+  Map light{24, 18};
+
+  double mean_mtf50 = kUnknown;
+  /// Least MTF50 of a part over the mean.
+  double worst_ratio = kUnknown;
+  /// Largest difference of the MTF50 between directions from the image's middle, over the mean:
+  /// 2 (|c1| + |c2|) of the terms c1 cos(t - t1) + c2 cos(2 (t - t2)) around the middle. A lens in
+  /// place is as sharp in all directions. A tilted or decentred one is sharper on one side, or
+  /// along one axis.
+  double asymmetry = kUnknown;
+  /// Median of black_to_white. A veil raises it.
+  double black_level = kUnknown;
+  /// Largest fraction by which MTF50 or contrast of a part is below that of the parts around it.
+  /// A smear raises it.
+  double local_loss = kUnknown;
+  /// Largest fraction by which the light of a part is below that of the parts around it, and the
+  /// middle of this part. Dust raises it.
+  double local_shadow = kUnknown;
+  Eigen::Vector2d local_shadow_px = Eigen::Vector2d::Zero();
+};
+
+/// Measures sharpness and contrast from views of a board of AprilTags, with corners behind the
+/// tone curve (take_common_curve()). Returns std::nullopt if fewer than half of the parts of the
+/// image are known, as for boards whose edges are not fitted singly.
+std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
+                                               const std::array<int, 2>& imager_px);
+
+}  // namespace vlp

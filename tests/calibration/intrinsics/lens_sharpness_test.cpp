@@ -1,0 +1,120 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/lens_sharpness.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+namespace vlp {
+namespace {
+
+constexpr std::array kSharpnessImager_px{800, 600};
+constexpr double kLensBlur_px = 0.8;
+
+/// Step of the light at a place of a view.
+using StepAt = std::function<EdgeStep(const Eigen::Vector2d& at_px, int view)>;
+
+EdgeStep even_step(const Eigen::Vector2d&, int) { return {kLensBlur_px, 14, 190}; }
+
+/// Returns views full of tags of 25 px, displaced from view to view, with noise of 2 % of the blur.
+std::vector<BoardView> make_views(const StepAt& step_at, int count = 24) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0, 0.02);
+  std::vector<BoardView> views;
+  views.reserve(static_cast<std::size_t>(count));
+  for (int view = 0; view < count; ++view) {
+    BoardView& added = views.emplace_back(BoardView{"view", kSharpnessImager_px, {}});
+    for (int i = 0; i < 16 * 12; ++i) {
+      const double size_px = 25, x = 50 * (i % 16) + view % 5 * 5, y = 50 * (i / 16) + view % 7 * 3;
+      SeenTag tag{i, {{{x, y + size_px}, {x + size_px, y + size_px}, {x + size_px, y}, {x, y}}}};
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Eigen::Vector2d at_px = (tag.corners_px[k] + tag.corners_px[(k + 1) % 4]) / 2;
+        tag.steps[k] = step_at(at_px, view);
+        tag.steps[k].blur_px *= 1 + noise(random);
+      }
+      added.seen.tags.push_back(std::move(tag));
+    }
+  }
+  return views;
+}
+
+LensSharpness measured(const StepAt& step_at) {
+  return measure_sharpness(make_views(step_at), kSharpnessImager_px).value();
+}
+
+TEST(MeasureSharpness, ReturnsMtf50OfEvenLens) {
+  const LensSharpness even = measured(even_step);
+  EXPECT_NEAR(even.mean_mtf50, mtf50_from_blur(kLensBlur_px), 0.02 * even.mean_mtf50);
+  EXPECT_GT(even.worst_ratio, 0.97);
+  EXPECT_LT(even.asymmetry, 0.02);
+  EXPECT_LT(even.local_loss, 0.03);
+  EXPECT_LT(even.local_shadow, 0.01);
+  EXPECT_NEAR(even.black_level, 14.0 / 190, 1e-6);
+}
+
+TEST(MeasureSharpness, IgnoresShakenViews) {
+  const LensSharpness still = measured(even_step);
+  const LensSharpness shaken = measured([](const Eigen::Vector2d& at_px, int view) {
+    EdgeStep step = even_step(at_px, view);
+    if (view % 2 == 0) step.blur_px = 2;
+    return step;
+  });
+  EXPECT_NEAR(shaken.mean_mtf50, still.mean_mtf50, 0.02 * still.mean_mtf50);
+}
+
+TEST(MeasureSharpness, ReportsAsymmetryOfTiltedFocalPlane) {
+  const LensSharpness tilted = measured([](const Eigen::Vector2d& at_px, int view) {
+    EdgeStep step = even_step(at_px, view);
+    step.blur_px = std::hypot(step.blur_px, 1.0 * (at_px.x() / 400 - 1));
+    return step;
+  });
+  EXPECT_GT(tilted.asymmetry, 0.15);
+  EXPECT_LT(tilted.worst_ratio, 0.9);
+}
+
+TEST(MeasureSharpness, HasNoAsymmetryOfRotationallySymmetricLens) {
+  const LensSharpness symmetric = measured([](const Eigen::Vector2d& at_px, int view) {
+    EdgeStep step = even_step(at_px, view);
+    step.blur_px *= 1 + 0.5 * (at_px - Eigen::Vector2d(400, 300)).squaredNorm() / 250000;
+    return step;
+  });
+  EXPECT_LT(symmetric.asymmetry, 0.03);
+  EXPECT_LT(symmetric.worst_ratio, 0.85);
+  EXPECT_LT(symmetric.local_loss, 0.05);
+}
+
+TEST(MeasureSharpness, LocatesShadowOfDust) {
+  const Eigen::Vector2d dust_px(500, 200);
+  const LensSharpness dusty = measured([&](const Eigen::Vector2d& at_px, int view) {
+    EdgeStep step = even_step(at_px, view);
+    const double light = (at_px - dust_px).norm() < 45 ? 0.8 : 1;
+    step.dark *= light;
+    step.bright *= light;
+    return step;
+  });
+  EXPECT_GT(dusty.local_shadow, 0.15);
+  EXPECT_LT((dusty.local_shadow_px - dust_px).norm(), 45);
+  EXPECT_LT(dusty.local_loss, 0.05);
+}
+
+TEST(MeasureSharpness, ReturnsNulloptWithoutEdges) {
+  auto views = make_views(even_step, 6);
+  for (BoardView& view : views) {
+    for (SeenTag& tag : view.seen.tags) tag.steps = {};
+  }
+  EXPECT_FALSE(measure_sharpness(views, kSharpnessImager_px));
+}
+
+TEST(Mtf50OfView, ReturnsMedianOfEdges) {
+  const auto views = make_views(even_step, 1);
+  const auto found = mtf50_of_view(views[0].seen);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(*found, mtf50_from_blur(kLensBlur_px), 0.01 * *found);
+}
+
+}  // namespace
+}  // namespace vlp

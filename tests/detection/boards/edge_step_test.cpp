@@ -1,0 +1,142 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Steps across edges of rendered tags: their MTF50 against that of the rendered optics.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "calibration/intrinsics/lens_sharpness.h"
+#include "detection/boards/tone_curve.h"
+#include "geometry/median.h"
+#include "simulation/exposure.h"
+#include "simulation/frame_renderer.h"
+#include "simulation/scene.h"
+#include "simulation/shot.h"
+
+namespace vlp {
+namespace {
+
+/// Returns the frequency, in cycles per pixel, at which a decreasing transfer is 0.5.
+template <typename Transfer>
+double solve_mtf50(const Transfer& transfer) {
+  double low = 0, high = 2;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (transfer(middle) > 0.5 ? low : high) = middle;
+  }
+  return low;
+}
+
+/// Returns the transfer of a pixel along one of its axes.
+double pixel_transfer(double f) {
+  const double x = std::numbers::pi * f;
+  return x == 0 ? 1 : std::sin(x) / x;
+}
+
+double gaussian_transfer(double sigma_px, double f) {
+  return std::exp(-2 * std::pow(std::numbers::pi * sigma_px * f, 2));
+}
+
+/// Width of a tag of the family tag36h11 with its black stripe, in bits.
+constexpr double kTagBits = 8;
+
+struct Found {
+  std::size_t edges = 0;
+  double mtf50 = 0, black_to_white = 0;
+};
+
+/// Returns the medians over the edges, of at least `min_side_px`, of `count` rendered views, rolled
+/// by up to 180 degrees.
+Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
+  const CaptureSet set = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
+  const FrameRenderer renderer(scene);
+  const BoardDetector detector(scene.board->print);
+  std::vector<BoardView> views;
+  views.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const BoardShot shot = board_shot(scene, set, i);
+    const cv::Mat image = expose(scene.sensor, renderer.board_electrons(shot), i, scene.picture);
+    views.push_back({shot.image, scene.camera.imager_px, detector.detect(image)});
+  }
+  take_curve(views, costs_of_levels(views));
+  std::vector<double> blurs_px, ratios;
+  for (const BoardView& view : views) {
+    for (const SeenTag& tag : view.seen.tags) {
+      for (std::size_t k = 0; k < tag.steps.size(); ++k) {
+        const EdgeStep& step = tag.steps[k];
+        const double side_px = (tag.corners_px[(k + 1) % 4] - tag.corners_px[k]).norm();
+        if (!(step.blur_px > 0) || side_px < min_side_px) continue;
+        blurs_px.push_back(step.blur_px);
+        ratios.push_back(step.dark / step.bright);
+      }
+    }
+  }
+  if (blurs_px.empty()) return {};
+  const std::size_t edges = blurs_px.size();
+  return {edges, mtf50_from_blur(upper_median(blurs_px)), upper_median(ratios)};
+}
+
+Scene station_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/station/scene.yaml"); }
+
+TEST(EdgeSteps, HaveMtf50OfRenderedBlur) {
+  for (const double sigma_px : {0.5, 0.7, 1.0, 1.5, 2.0}) {
+    Scene scene = station_scene();
+    scene.optics.blur_px = sigma_px;
+    const Found found = measure(scene, 4, 3 * kTagBits * sigma_px);
+    ASSERT_GT(found.edges, 50U) << sigma_px;
+    const double truth =
+        solve_mtf50([&](double f) { return gaussian_transfer(sigma_px, f) * pixel_transfer(f); });
+    EXPECT_NEAR(found.mtf50 / truth, 1, sigma_px > 1.5 ? 0.05 : 0.03) << sigma_px;
+    RecordProperty("mtf50_ratio_" + std::to_string(int(10 * sigma_px)),
+                   std::to_string(found.mtf50 / truth));
+  }
+}
+
+TEST(EdgeSteps, HaveMtf50OfDefocus) {
+  for (const double radius_px : {0.8, 1.6, 2.4}) {
+    Scene scene = station_scene();
+    scene.optics.defocus = Defocus{radius_px};
+    const Found found = measure(scene, 4);
+    ASSERT_GT(found.edges, 100U) << radius_px;
+    const double truth = solve_mtf50([&](double f) {
+      const double x = 2 * std::numbers::pi * radius_px * f;
+      const double disc = x < 1e-9 ? 1 : 2 * std::cyl_bessel_j(1.0, x) / x;
+      return gaussian_transfer(scene.optics.blur_px, f) * pixel_transfer(f) * disc;
+    });
+    // A disc is no Gaussian.
+    EXPECT_NEAR(found.mtf50 / truth, 1, 0.06) << radius_px;
+    RecordProperty("mtf50_ratio_" + std::to_string(int(10 * radius_px)),
+                   std::to_string(found.mtf50 / truth));
+  }
+}
+
+TEST(EdgeSteps, HaveMtf50BehindToneCurve) {
+  for (const double sigma_px : {0.7, 1.4}) {
+    Scene scene = station_scene();
+    scene.optics.blur_px = sigma_px;
+    scene.picture.emplace().gamma = 2.2;
+    const Found found = measure(scene, 6);
+    ASSERT_GT(found.edges, 100U) << sigma_px;
+    const double truth =
+        solve_mtf50([&](double f) { return gaussian_transfer(sigma_px, f) * pixel_transfer(f); });
+    EXPECT_NEAR(found.mtf50 / truth, 1, sigma_px > 1.5 ? 0.05 : 0.03) << sigma_px;
+    RecordProperty("mtf50_ratio_" + std::to_string(int(10 * sigma_px)),
+                   std::to_string(found.mtf50 / truth));
+  }
+}
+
+TEST(EdgeSteps, HaveLightOfBlackRaisedByVeil) {
+  const double clean = measure(station_scene(), 3).black_to_white;
+  Scene veiled = station_scene();
+  veiled.optics.veil = 0.25;
+  const Found found = measure(veiled, 3);
+  ASSERT_GT(found.edges, 100U);
+  EXPECT_NEAR(clean, 0.08, 0.02);  // 1.5e5 / 2.4e6, and the black level of the sensor
+  EXPECT_GT(found.black_to_white, 2 * clean);
+}
+
+}  // namespace
+}  // namespace vlp
