@@ -8,6 +8,8 @@
 #   tests/benchmarks/station_trials.sh faulty [COUNT [FIRST_SEED]]   5 of each of six kinds
 #   tests/benchmarks/station_trials.sh kinds [COUNT [FIRST_SEED]]    1 of each of 30 kinds
 #   tests/benchmarks/station_trials.sh mixed [COUNT [FIRST_SEED]]    10 units, each step with images of another
+#   tests/benchmarks/station_trials.sh sharpness [COUNT [FIRST_SEED]]  of each seed a good unit and 15
+#                                    with a veil, smear, dust, defocus or tilt, boards only; 1 seed
 #   tests/benchmarks/station_trials.sh timing [COUNT [FIRST_SEED]]   1 unit
 # A line for each; exit code 1 when one did not end as it should. A good unit takes 9 s of processor
 # time, six faulty ones 30 s. kinds needs /usr/bin/python3 with OpenCV (python3-opencv). timing: the
@@ -17,8 +19,8 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 PATH=$PWD/build/bin:$PATH
 what=${1:-good} count=${2:-} first=${3:-1}
-declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [mixed]=10 [timing]=1)
-[ -n "${counts[$what]:-}" ] || { sed -n '5,15s/^# \?//p' "$0"; exit 2; }
+declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [mixed]=10 [sharpness]=1 [timing]=1)
+[ -n "${counts[$what]:-}" ] || { sed -n '5,17s/^# \?//p' "$0"; exit 2; }
 count=${count:-${counts[$what]}}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -334,6 +336,56 @@ mixed() {
       wrong=$((wrong + 1))
       printf 'mixed %-18s %4d   NOT AS IT SHOULD: %s\n' "$step" "$1" "$(grep -m 1 -E 'PASS|FAIL|INVALID' <<<"$said")"
     fi
+
+# optics_of SEED LINE...: a unit whose focus, tilt and veil vary as those of good ones, and these
+# lines of the scene's optics. A lens has one defocus; a line with another takes its place.
+optics_of() {
+  local seed=$1 blur veil tilt_x tilt_y line optics
+  shift
+  scene_of "$seed" 514.8 525.2 5 0.7
+  uniform blur 0.66 0.74
+  uniform veil 0 0.01
+  uniform tilt_x -0.15 0.15
+  uniform tilt_y -0.15 0.15
+  optics="veil: $veil\\n  defocus: {radius_px: 0, tilt_px: [$tilt_x, $tilt_y]}"
+  for line; do
+    case $line in
+      veil*) optics=${optics/veil: $veil/$line} ;;
+      defocus*) optics="veil: $veil\\n  $line" ;;
+      *) optics+="\\n  $line" ;;
+    esac
+  done
+  scene_change "s/blur_px: 0.7.*/blur_px: $blur\\n  $optics/"
+  render --only boards
+}
+
+# Sharpness and cleanliness of the lens, with the boards alone: a good unit then lacks its turn.
+sharpness() {
+  local seed=$1 x y strength
+  optics_of "$seed"
+  tried good "$seed" 'rotation: not enough images'
+  uniform x 150 650
+  uniform y 120 480
+  for strength in 0.05 0.1 0.25; do
+    optics_of "$seed" "veil: $strength"
+    tried "veil-$strength" "$seed" 'a veil lies over the image'
+  done
+  for strength in 0.1 0.2 0.4; do
+    optics_of "$seed" "smears: [{at_px: [$x, $y], radius_px: 150, fraction: $strength, sigma_px: 8}]"
+    tried "smear-$strength" "$seed" 'a smear is on the lens'
+  done
+  for strength in 0.1 0.2 0.4; do
+    optics_of "$seed" "dust: [{at_px: [$x, $y], radius_px: 50, depth: $strength}]"
+    tried "dust-$strength" "$seed" 'dust is on the lens'
+  done
+  for strength in 1.2 1.8 2.4; do
+    optics_of "$seed" "defocus: {radius_px: $strength}"
+    tried "defocus-$strength" "$seed" 'out of focus'
+  done
+  for strength in 0.7 1.2 2; do
+    optics_of "$seed" "defocus: {radius_px: 0, tilt_px: [$(awk -v s="$strength" -v a="$seed" \
+      'BEGIN { printf "%.3f, %.3f", s * cos(a), s * sin(a) }')]}"
+    tried "tilt-$strength" "$seed" 'the focal plane is tilted'
   done
 }
 
