@@ -27,14 +27,6 @@ constexpr std::array kMetricKinds{
     MetricKind{"board_bend_mm", "mm", MetricSource::station,
                "how far the middle of the board is from flat", "the board is bent",
                Direction::at_most, kLargest, false},
-    MetricKind{"local_loss", "", MetricSource::lens,
-               "largest fraction by which a part of the image has less MTF50 or contrast than the "
-               "parts around it; needs AprilTags without corner squares",
-               "a smear is on the lens", Direction::at_most, 1},
-    MetricKind{"local_shadow", "", MetricSource::lens,
-               "largest fraction by which a part of the image has less light than the parts around "
-               "it; needs AprilTags without corner squares",
-               "dust is on the lens or the sensor", Direction::at_most, 1},
     MetricKind{"mtf50_asymmetry", "", MetricSource::lens,
                "difference of the MTF50 between directions from the image's middle, over the mean; "
                "needs AprilTags without corner squares",
@@ -43,6 +35,14 @@ constexpr std::array kMetricKinds{
                "mean over the image of the spatial frequency at which lens and pixel pass half of "
                "the contrast; needs AprilTags without corner squares",
                "the lens is not sharp: out of focus", Direction::at_least},
+    MetricKind{"local_loss", "", MetricSource::lens,
+               "largest fraction by which a part of the image has less MTF50 or contrast than the "
+               "parts around it; needs AprilTags without corner squares",
+               "a smear is on the lens", Direction::at_most, 1},
+    MetricKind{"local_shadow", "", MetricSource::lens,
+               "largest fraction by which a part of the image has less light than the parts around "
+               "it; needs AprilTags without corner squares",
+               "dust is on the lens or the sensor", Direction::at_most, 1},
     MetricKind{"mtf50_worst_ratio", "", MetricSource::lens,
                "least MTF50 of a part of the image over the mean; needs AprilTags without corner "
                "squares",

@@ -460,8 +460,8 @@ TEST(ExportRuns, WritesCsv) {
       first_line(csv),
       "run,kind,station,camera,operator_name,shift,begun_utc,ended_utc,verdict,causes,program,"
       "config_sha256,"
-      "blur_px,focal_percent,center_px,nominal_px,board_bend_mm,local_loss,local_shadow,"
-      "mtf50_asymmetry,mtf50,mtf50_worst_ratio,black_ratio,rms_px,uncertainty_px,halves_px,"
+      "blur_px,focal_percent,center_px,nominal_px,board_bend_mm,mtf50_asymmetry,mtf50,"
+      "local_loss,local_shadow,mtf50_worst_ratio,black_ratio,rms_px,uncertainty_px,halves_px,"
       "coverage,"
       "views,board_tilt_deg,rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_"
       "mm,row_time_us,row_time_sd_us,dispersion_mm,"

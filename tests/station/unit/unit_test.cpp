@@ -100,7 +100,7 @@ TEST_F(UnitTest, IsNotJudgedWhenItEndsEarly) {
   for (const ScreenLine& line : verdict_screen(record)) screen += line.text + "\n";
   EXPECT_THAT(screen,
               AllOf(HasSubstr("INVALID   camera"),
-                    HasSubstr("Gates    not measured: 21 gates, because boards did not finish\n"),
+                    HasSubstr("Gates    not measured: 27 gates, because boards did not finish\n"),
                     HasSubstr("Cause    boards: the operator ended"), Not(HasSubstr("NOT MET"))));
 }
 
