@@ -364,9 +364,9 @@ optics_of() {
 # Sharpness and cleanliness of the lens, with the boards alone: a good unit then lacks its turn.
 sharpness() {
   local seed=$1 x y strength
-  # A strong smear takes a view or two, in whose place the operator takes others.
+  # A strong smear hides tags of several views, in whose place an operator takes others.
   station_again
-  station_change station.yaml 's/board_views: 36/board_views: 32/'
+  station_change station.yaml 's/board_views: 36/board_views: 24/'
   optics_of "$seed"
   tried good "$seed" 'rotation: not enough images'
   uniform x 150 650
