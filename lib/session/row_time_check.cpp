@@ -36,6 +36,7 @@ std::string describe_contradiction(const RowTime& measured, const StatedRowTime&
 std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>& images) {
   std::vector<MeasuredPeriod> periods;
   for (const Observation& image : images) {
+    if (!image.is_kept()) continue;  // copies, and images of another camera
     for (const Light& light : image.lights) {
       const bool is_measured = light.kind == LightKind::lamp && light.lamp &&
                                !light.by_modulation && trustworthy(light.stripes);
@@ -67,10 +68,10 @@ std::string find_row_time_error(const std::vector<Observation>& images, const La
 
 std::string describe_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
                                     const Camera& camera, const std::string& source,
-                                    bool are_useful) {
+                                    bool has_result) {
   if (!camera.row_time_s) return "";
   const StatedRowTime stated{*camera.row_time_s, source};
-  if (are_useful) return check_row_time(images, lamps, stated).error;
+  if (has_result) return check_row_time(images, lamps, stated).error;
   return find_row_time_error(images, lamps, Lens(camera.lens_model, camera.intrinsics), stated);
 }
 

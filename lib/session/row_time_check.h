@@ -29,7 +29,7 @@ struct RowTimeCheck {
   std::string error = {};
 };
 
-/// Estimates the row time from the identified lamps of the images (estimate_row_time()) and
+/// Estimates the row time from the identified lamps of the kept images (estimate_row_time()) and
 /// compares it with the stated one. They contradict each other if
 ///
 ///     |log(measured / stated)| > kLampDrift + 3 sd / measured.
@@ -49,11 +49,11 @@ RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMa
 std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
                                 const std::optional<Lens>& lens, const StatedRowTime& stated);
 
-/// Returns the error of check_row_time() with the row time of `camera`, or if the images are of no
-/// use that of find_row_time_error(). Returns an empty string if the row time is unknown.
+/// Returns the error of check_row_time() with the row time of `camera`, or, without a result of the
+/// images, that of find_row_time_error(). Returns an empty string if the row time is unknown.
 std::string describe_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
                                     const Camera& camera, const std::string& source,
-                                    bool are_useful);
+                                    bool has_result);
 
 /// Returns the metrics row_time_us and row_time_sd_us; none if the row time was not measured.
 std::vector<Metric> row_time_metrics(const RowTimeCheck& check);

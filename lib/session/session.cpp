@@ -344,21 +344,31 @@ class SessionRun {
     add_remarks(seen, result);
     const Camera& camera = captures.calibration.camera;
     explain_by_row_time(captures, seen.images, result);
-    if (use == ImageUse::turn && camera.row_time_s) {
+    if (use == ImageUse::turn && is_row_time_stated() && camera.row_time_s) {
       result.metrics = row_time_metrics(
           check_row_time(seen.images, captures.lamps, {*camera.row_time_s, row_time_source()}));
     }
     return result.ok();
   }
 
-  /// Makes a row time that the images contradict the failure of a step (row_time_check.h). If the
-  /// step failed, another row time replaces the reason.
+  /// Adds a contradiction of the row time (row_time_check.h) to the result of a step: in place of
+  /// the reason if the step failed, as a warning otherwise, because fixes at rest are valid.
   void explain_by_row_time(const LampCaptures& captures, const std::vector<Observation>& images,
                            StepResult& result) const {
     if (session_.classifier()) return;  // the lamps are not identified by frequency
     std::string error = describe_row_time_error(images, captures.lamps, captures.calibration.camera,
                                                 row_time_source(), result.ok());
-    if (!error.empty()) result.fail(StepFailure::bad_input, std::move(error));
+    if (error.empty()) return;
+    if (result.ok()) {
+      result.warnings.push_back(std::move(error));
+    } else {
+      result.fail(StepFailure::bad_input, std::move(error));
+    }
+  }
+
+  /// Returns false if the row time was estimated by the step row-time, or is not used.
+  bool is_row_time_stated() const {
+    return !session_.classifier() && (session_.camera() || options_.frontend.row_time_s);
   }
 
   /// Name of the file or the option that states the row time.

@@ -149,9 +149,10 @@ RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions
   record.shift = options.shift;
   if (record.invalid())
     return record;  // the images of a unit that was not judged may be used again
-  if (const std::string earlier = spool.repeated_run_of(record); !earlier.empty()) {
-    reject_repetition(record, earlier, options.station);
-  } else if (!spool.away().empty()) {
+  const auto earlier = spool.repeated_run_of(record);
+  if (earlier && !earlier->empty()) {
+    reject_repetition(record, *earlier, options.station);
+  } else if (!earlier) {
     const std::string unchecked =
         "the records are offline: whether an earlier run used the same images was not checked";
     record.events.push_back(new_event(kUnchecked, unchecked));

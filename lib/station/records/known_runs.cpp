@@ -204,7 +204,13 @@ bool finish_voiding(KnownRuns& known, RunRecord& record, const std::string& who,
                     const std::optional<HookLock>& lock, Voided& result) {
   const StationConfig& station = *known.station();
   bool is_any_done = record.kind == "golden" && forget_golden(station, record.run);
-  is_any_done = mark_files_voided(record, station.results) || is_any_done;
+  try {
+    is_any_done = mark_files_voided(record, station.results) || is_any_done;
+  } catch (const InputError& error) {
+    result.files_problem =
+        fmt::format("the run is voided, but its files keep their names: {}", error.what());
+    is_any_done = true;
+  }
   if (!lock || is_hook_told(record)) return is_any_done;
   Spool& spool = *known.spool();
   record.events.push_back(hook_wanted(*station.hook, who));

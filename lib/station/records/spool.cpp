@@ -409,7 +409,7 @@ ImageOwner Spool::owner_of(const std::string& sha256, const std::string& other_t
   return owner;
 }
 
-std::string Spool::repeated_run_of(const RunRecord& run) {
+std::optional<std::string> Spool::repeated_run_of(const RunRecord& run) {
   const auto first = std::find_if(run.images.begin(), run.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
   if (first == run.images.end()) return "";
@@ -422,15 +422,15 @@ std::string Spool::repeated_run_of(const RunRecord& run) {
     }
   }
   std::string repeated;
-  if (!may_ask()) return repeated;  // state() has the images that were not looked up
-  ask([&](Records& records) {
+  const auto look = [&](Records& records) {
     for (const std::string& name : records.judged_runs_with(first->sha256, run.camera)) {
       const auto earlier = records.find(name);
       if (!earlier || voided_runs.contains(name) || !repeats_images(run, *earlier)) continue;
       repeated = name;
       return;
     }
-  });
+  };
+  if (!may_ask() || !ask(look).empty()) return std::nullopt;
   return repeated;
 }
 

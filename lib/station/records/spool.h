@@ -72,9 +72,9 @@ class Spool {
   /// Records::owner_of() of those that wait and, when they answer, the records.
   ImageOwner owner_of(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the first judged run of the same unit, not voided, that used all images of `run`
-  /// (repeats_images()), of those that wait and, if they answer, the records; an empty string if
-  /// there is none.
-  std::string repeated_run_of(const RunRecord& run);
+  /// (repeats_images()), of those that wait and of the records; an empty string if there is none.
+  /// Returns std::nullopt if the records do not answer and none that waits is one.
+  std::optional<std::string> repeated_run_of(const RunRecord& run);
   /// Records::golden_run_of() of those that wait and, when they answer, the records.
   std::string golden_run_of(const std::string& sha256);
 

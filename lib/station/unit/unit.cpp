@@ -67,6 +67,11 @@ void Unit::look_again(StationStep step) {
 }
 
 void Unit::advance(bool all_in) {
+  solve_steps(all_in);
+  row_time_ = check_row_time(lamp_observations(*this), config_.lamps, stated_row_time(config_));
+}
+
+void Unit::solve_steps(bool all_in) {
   for (const StationStep step : kStationSteps) {
     UnitStep& state = at(step);
     if (!calibration_before(step)) return;
@@ -352,10 +357,6 @@ std::optional<Calibration> Unit::calibration() const {
   return last;
 }
 
-RowTimeCheck Unit::row_time() const {
-  return check_row_time(lamp_observations(*this), config_.lamps, stated_row_time(config_));
-}
-
 std::vector<CheckedMetric> Unit::figures() const {
   std::vector<Metric> values;
   if (const auto blur_px = typical_blur_px(step(StationStep::boards))) {
@@ -365,7 +366,7 @@ std::vector<CheckedMetric> Unit::figures() const {
     if (!state.result) continue;
     values.insert(values.end(), state.result->metrics.begin(), state.result->metrics.end());
   }
-  const auto row_time = row_time_metrics(this->row_time());
+  const auto row_time = row_time_metrics(row_time_);
   values.insert(values.end(), row_time.begin(), row_time.end());
   return check_all(config_.gates, values, unit_metrics());
 }

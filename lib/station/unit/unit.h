@@ -63,8 +63,9 @@ class Unit {
   const std::string& distrusted() const { return distrusted_; }
 
   const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
-  /// Compares the row time of the camera's type with that of the lamps of all steps.
-  RowTimeCheck row_time() const;
+  /// Returns the row time of the camera's type compared with that of the lamps of all steps, as of
+  /// the last advance().
+  const RowTimeCheck& row_time() const { return row_time_; }
   /// The first step that is not done; nothing when all are.
   std::optional<StationStep> current() const;
   /// It is of no use to go on: a step has so many refused images in a row, or enough images that
@@ -83,6 +84,7 @@ class Unit {
  private:
   static std::size_t index(StationStep step) { return static_cast<std::size_t>(step); }
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
+  void solve_steps(bool all_in);
   void look(StationStep step, const std::vector<std::filesystem::path>& files);
   LevelRotations levels_of(StationStep step) const;
   void look_again(StationStep step);
@@ -104,6 +106,7 @@ class Unit {
   std::function<ImageOwner(const std::string&)> owner_ = {};
   BoardIntake boards_;
   std::array<UnitStep, 4> steps_;
+  RowTimeCheck row_time_ = {};
 };
 
 /// Returns the observations of the images with lamps, rejected ones too.

@@ -144,6 +144,16 @@ std::vector<Cause> find_lamp_step_causes(const Unit& unit,
   return causes;
 }
 
+/// Returns the gates that the metrics of row_time_metrics() miss. These are of all steps together.
+std::vector<Cause> find_missed_row_time_gates(const std::vector<CheckedMetric>& figures) {
+  std::vector<Cause> causes;
+  for (const CheckedMetric& figure : figures) {
+    const bool is_row_time = figure.name.starts_with("row_time_");
+    if (is_row_time && figure.value && !figure.met()) causes.push_back({cause_of(figure)});
+  }
+  return causes;
+}
+
 /// Returns the gates without a figure of a unit whose steps are all done.
 std::vector<Cause> find_missing_figures(const Unit& unit,
                                         const std::vector<CheckedMetric>& figures) {
@@ -160,7 +170,7 @@ std::vector<Cause> find_missing_figures(const Unit& unit,
 std::vector<Cause> find_station_faults(const Unit& unit) {
   const auto known = unit.calibration();
   if (!known) return {};
-  // First of all: with a wrong row time, lights are other lamps or none.
+  // A wrong row time exchanges lamps or leaves none, so it is tested first.
   const Lens lens(known->camera.lens_model, known->camera.intrinsics);
   std::string row_time = find_row_time_error(lamp_observations(unit), unit.config().lamps, lens,
                                              stated_row_time(unit.config()));
@@ -211,6 +221,7 @@ std::vector<Cause> find_causes(const Unit& unit) {
     append(causes, find_station_faults(unit));
   }
   append(causes, std::move(of_lamps));
+  append(causes, find_missed_row_time_gates(figures));
   return causes;
 }
 

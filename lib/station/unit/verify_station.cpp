@@ -85,9 +85,8 @@ class Verification {
   }
 
   RunRecord record(const std::string& run, const ProgramVersion& program) {
-    const RowTimeCheck row_time =
-        check_row_time(lamp_images_, config_.lamps,
-                       {*config_.type.row_time_s, "the calibration of the golden unit"});
+    const StatedRowTime stated{*config_.type.row_time_s, "the calibration of the golden unit"};
+    const RowTimeCheck row_time = check_row_time(lamp_images_, config_.lamps, stated);
     for (const Metric& metric : row_time_metrics(row_time)) values_.push_back(metric);
     const auto figures = check_all(golden_.gates, values_, unit_metrics());
     for (const CheckedMetric& figure : figures) {
@@ -108,7 +107,13 @@ class Verification {
     const bool is_offset = common_offset_ && !causes_.empty();
     if (first.empty() && is_offset) first.push_back({describe(*common_offset_), true});
     if (first.empty() && !place_fault_.empty()) first.push_back({place_fault_, false});
-    if (!row_time.error.empty()) first.insert(first.begin(), {row_time.error, false});
+    std::string row_time_error = row_time.error;
+    if (row_time_error.empty() && !causes_.empty()) {
+      const Camera& camera = golden_.calibration.camera;
+      row_time_error = find_row_time_error(lamp_images_, config_.lamps,
+                                           Lens(camera.lens_model, camera.intrinsics), stated);
+    }
+    if (!row_time_error.empty()) first.insert(first.begin(), {row_time_error, false});
     causes_.insert(causes_.begin(), first.begin(), first.end());
     RunRecord record = new_record("golden", config_, golden_.camera_id, run, program);
     record.figures = figures;
