@@ -6,6 +6,8 @@
 #include <pugixml.hpp>
 #include <sstream>
 
+#include "captures/printable.h"
+
 namespace vlp {
 namespace {
 
@@ -13,16 +15,17 @@ void append_test(pugi::xml_node suite, const std::string& suite_name, const JUni
   pugi::xml_node node = suite.append_child("testcase");
   node.append_attribute("classname") = suite_name.c_str();
   node.append_attribute("name") = test.name.c_str();
+  const std::string message = printable(test.message);  // XML has no control characters
   if (test.result == JUnitTest::Result::failed) {
-    node.append_child("failure").append_attribute("message") = test.message.c_str();
+    node.append_child("failure").append_attribute("message") = message.c_str();
   }
   if (test.result == JUnitTest::Result::error) {
     pugi::xml_node error = node.append_child("error");
     error.append_attribute("type") = test.error_type.c_str();
-    error.append_attribute("message") = test.message.c_str();
+    error.append_attribute("message") = message.c_str();
   }
   std::string warnings;
-  for (const std::string& warning : test.warnings) warnings.append(warning).append("\n");
+  for (const std::string& warning : test.warnings) warnings.append(printable(warning)).append("\n");
   if (!warnings.empty()) node.append_child("system-err").text() = warnings.c_str();
 }
 

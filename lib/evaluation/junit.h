@@ -24,7 +24,7 @@ struct JUnitTest {
   std::string message = {};
   /// Kind of an error, for example "wrong_map"; empty for the other results.
   std::string error_type = {};
-  /// Printed with the test whether it passed or not.
+  /// Text that is printed with the test, also if it passed.
   std::vector<std::string> warnings = {};
 };
 
@@ -34,6 +34,6 @@ std::vector<JUnitTest> make_junit_tests(std::span<const CheckedMetric> gates);
 
 /// Formats a report of one suite as JUnit XML, for CI systems. Errors become `error`, failures
 /// `failure`, warnings `system-err`.
-std::string format_junit(const std::string& suite, std::span<const JUnitTest> tests);
+std::string format_junit(const std::string& suite_name, std::span<const JUnitTest> tests);
 
 }  // namespace vlp

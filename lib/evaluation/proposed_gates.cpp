@@ -23,8 +23,9 @@ constexpr double kMinRelativeMargin = 0.01, kMinMargin = 0.001;
 
 double round_up(double value) {
   constexpr double last_digit = 2;  // of three
+  constexpr double numeric_tolerance = 1e-9;
   const double step = std::pow(10, std::floor(std::log10(value)) - last_digit);
-  return step * std::ceil(value / step - kMinRelativeMargin);
+  return step * std::ceil(value / step - numeric_tolerance);
 }
 
 double compute_limit(double value, double interval_high) {
@@ -77,15 +78,17 @@ std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& 
     add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->sizes.rms),
         deg_from_rad(yaw_rad->rms.high));
   }
-  gates.push_back({"missing", evaluation.missing_share()});
+  constexpr double millionth = 1e-6;  // as it is written
+  gates.push_back({"missing", millionth * std::ceil(evaluation.missing_share() / millionth)});
   return gates;
 }
 
 std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evaluation) {
   std::string text = fmt::format(
-      "# Proposed from {} fixes of {} captures; a run of the same accuracy exceeds a limit in 1 "
-      "of\n"
-      "# 1,000 cases.\nformat: vlp-gates/1\ngates:\n",
+      "# Proposed from {} fixes of {} captures. A run of the same accuracy exceeds the limit of "
+      "an\n"
+      "# error in 1 of 1,000 cases; the limit of missing is the fraction of this run.\n"
+      "format: vlp-gates/1\ngates:\n",
       evaluation.fixes, evaluation.captures);
   const std::vector<Metric> metrics = metrics_of(evaluation);
   for (const Gate& gate : gates) {

@@ -18,7 +18,7 @@ namespace vlp {
 /// from its bootstrap interval (error_intervals()): the difference between two runs of the same
 /// accuracy exceeds it with a probability of 0.1 % (z = 3.09). It is at least 1 % and 1 um (0.001
 /// degrees) above the value, and rounded up to three digits. The limit of `missing` is the fraction
-/// measured.
+/// measured, rounded up to a millionth.
 std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& evaluation);
 
 /// Formats gates as a file `vlp-gates/1`, with the value that each was derived from as a comment.

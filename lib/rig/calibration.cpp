@@ -169,7 +169,10 @@ Dispersion read_dispersion(YamlMap map, std::size_t intrinsics) {
     const auto items = value->list();
     dispersion.by_lamps.reserve(items.size());
     for (const YamlValue& item : items) {
-      dispersion.by_lamps.push_back(read_uncertain_lamp(item.map()));
+      const Dispersion::UncertainLamp lamp = read_uncertain_lamp(item.map());
+      const auto has_same_id = [&](const auto& earlier) { return earlier.id == lamp.id; };
+      if (std::ranges::any_of(dispersion.by_lamps, has_same_id)) throw item.error("stands twice");
+      dispersion.by_lamps.push_back(lamp);
     }
   }
   map.finish();

@@ -94,8 +94,8 @@ struct Dispersion {
   double radius_m;
   Eigen::Vector2d center_m;
   int captures;
-  /// Covariance of offset_px from the captures alone, in px^2, with lens, zenith and lamp map taken
-  /// as exact.
+  /// Covariance of offset_px in px^2, from the captures and the lever arm, with lens, zenith and
+  /// lamp map taken as exact. The lever arm's part may rest on the lamp map as well.
   std::optional<Matrix2> covariance = {};
   /// Derivatives of offset_px / f by the intrinsics and by the zenith's normalized point.
   std::optional<MatrixX> by_intrinsics = {};

@@ -245,6 +245,7 @@ StationConfig read_station(const fs::path& file) {
   }
   if (const auto operators = document.optional("void_operators")) {
     const std::vector<YamlValue> names = operators->list();
+    if (names.empty()) throw operators->error("names nobody; leave it out if all may void runs");
     std::ranges::transform(names, std::back_inserter(config.void_operators),
                            [](const YamlValue& name) { return name.text(); });
   }

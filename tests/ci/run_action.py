@@ -13,6 +13,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 
 import yaml
 
@@ -30,6 +31,7 @@ def main() -> int:
     if given:
         sys.exit(f"run_action.py: unknown inputs: {', '.join(given)}")
     ran = 0
+    outputs = tempfile.NamedTemporaryFile()
     for step in action["runs"]["steps"]:
         if "uses" in step:
             continue
@@ -37,10 +39,13 @@ def main() -> int:
             key: re.sub(r"\$\{\{ inputs\.(\w+) \}\}", lambda match: inputs[match[1]], value)
             for key, value in step.get("env", {}).items()
         }
+        unresolved = [value for value in values.values() if "${{" in value]
+        if unresolved:
+            sys.exit(f"run_action.py: cannot be resolved: {unresolved[0]}")
         print(f"== {step['name']}", flush=True)
         done = subprocess.run(
             [step["shell"], "--noprofile", "--norc", "-eo", "pipefail", "-c", step["run"]],
-            env={**os.environ, "GITHUB_ACTION_PATH": str(ACTION.parent), **values},
+            env={**os.environ, "GITHUB_ACTION_PATH": str(ACTION.parent), "GITHUB_OUTPUT": outputs.name, **values},
             check=False,
         )
         if done.returncode != 0:

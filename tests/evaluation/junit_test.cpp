@@ -30,7 +30,7 @@ TEST(FormatJUnit, WritesEachResultWithItsMessageAndWarnings) {
   const std::vector<JUnitTest> tests{
       {"lens", JUnitTest::Result::passed, "", "", {"one", "two & three"}},
       {"mean_mm", JUnitTest::Result::failed, "mean_mm is <2>"},
-      {"rotation", JUnitTest::Result::error, "lamp 2 moved", "wrong_map"}};
+      {"rotation", JUnitTest::Result::error, "lamp 2 moved \x01\xff", "wrong_map"}};
   pugi::xml_document document;
   ASSERT_TRUE(document.load_string(format_junit("vlp-calibrate", tests).c_str()));
   const pugi::xml_node suite = document.child("testsuites").child("testsuite");
@@ -49,7 +49,7 @@ TEST(FormatJUnit, WritesEachResultWithItsMessageAndWarnings) {
   EXPECT_STREQ(failed.child("failure").attribute("message").value(), "mean_mm is <2>");
   EXPECT_FALSE(failed.child("system-err"));
   EXPECT_STREQ(error.child("error").attribute("type").value(), "wrong_map");
-  EXPECT_STREQ(error.child("error").attribute("message").value(), "lamp 2 moved");
+  EXPECT_STREQ(error.child("error").attribute("message").value(), "lamp 2 moved \\x01\\xff");
 }
 
 }  // namespace

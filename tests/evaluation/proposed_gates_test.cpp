@@ -41,13 +41,14 @@ TEST(ProposeGates, AreMetByRunsOfTheSameAccuracy) {
     const auto gates = propose_gates(first, evaluate(first));
     ASSERT_EQ(gates.size(), 5);
     for (const auto& gate : check_gates(gates, metrics_of(evaluate(second)))) {
+      if (gate.name == "missing") continue;
       ++checked;
       if (!gate.met()) ++exceeded;
     }
   }
-  ASSERT_EQ(checked, 1000);
-  // 0.1 % each in theory; the bootstrap intervals of 40 units are somewhat narrow.
-  EXPECT_LE(exceeded, 10);
+  ASSERT_EQ(checked, 800);
+  // 0.1 % of 800 in theory; the bootstrap intervals of 40 units are somewhat narrow.
+  EXPECT_LE(exceeded, 5);
 }
 
 TEST(ProposeGates, CatchHeightsOfADifferentScale) {
@@ -76,6 +77,18 @@ TEST(ProposeGates, LeaveAMarginWithoutScatter) {
 TEST(ProposeGates, NeedFiveUnits) {
   const EvaluationInput input = draw_run(4, 1);
   EXPECT_TRUE(propose_gates(input, evaluate(input)).empty());
+}
+
+TEST(FormatGates, AreMetByTheirOwnRunWithMissingCaptures) {
+  EvaluationInput input = draw_run(21, 1);
+  for (std::size_t i = 0; i < 7; ++i) input.fixes.rows[3 * i].fix.reset();
+  const Evaluation evaluation = evaluate(input);
+  ASSERT_NEAR(evaluation.missing_share(), 1.0 / 3, 1e-12);
+  const TemporaryFolder folder;
+  const auto gates = read_gates(
+      folder.file("gates.yaml", format_gates(propose_gates(input, evaluation), evaluation)),
+      metric_kinds({MetricSource::evaluation}));
+  EXPECT_EQ(words_of_missed(check_gates(gates, metrics_of(evaluation))), "");
 }
 
 TEST(FormatGates, AreReadBack) {

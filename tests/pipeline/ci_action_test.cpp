@@ -36,7 +36,7 @@ class CiAction : public testing::Test {
     return run_program("cd '" + (folder / "").string() +
                        "' && python3 " VLP_SOURCE_DIR
                        "/tests/ci/run_action.py session=session "
-                       "'options=--row-time-s 3e-5 --readout rows' gates=gates.yaml " +
+                       "'options=--row-time-s 3e-5\n--readout rows' gates=gates.yaml " +
                        inputs);
   }
   std::string content(const std::string& name) const {
@@ -62,6 +62,7 @@ TEST_F(CiAction, NamesTheLampThatIsWrongInTheMap) {
   folder.file("session/lamps.yaml", std::string(lamps).replace(lamps.find(before), before.size(),
                                                                "position_m: [-0.57, -0.3,"));
   const auto result = run_action("");
+  EXPECT_EQ(result.exit_code, 0) << "the fixes reject it and stay accurate";
   const std::string lamp = "lamp 1 hangs 30 mm from where the map has it (x -30 mm, y +0 mm)";
   EXPECT_THAT(content("results/junit.xml"), HasSubstr(lamp));
   EXPECT_THAT(result.errors, HasSubstr(lamp));

@@ -187,6 +187,12 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   if (!options.output.empty()) draw_bias(options.output, options.figure, values, study);
 }
 
+/// Returns true if the filter keeps all runs of a camera, so that its first one is known.
+bool has_all_runs(const RunFilter& filter) {
+  return filter.verdict.empty() && filter.operator_name.empty() && filter.shift.empty() &&
+         filter.since.empty() && filter.until.empty() && filter.last == 0;
+}
+
 }  // namespace
 
 void list_runs(const StationRecordsOptions& options) {
@@ -210,9 +216,9 @@ void list_runs(const StationRecordsOptions& options) {
     fmt::print(": yield {:.1f} % of {}", percent * *yield, counts.units_judged);
   }
   fmt::print("\n");
-  if (const auto yield = counts.first_pass_yield()) {
-    fmt::print("{} cameras, {} with more than one run: first-pass yield {:.1f} %\n", counts.cameras,
-               counts.cameras_reworked, percent * *yield);
+  if (const auto yield = counts.first_pass_yield(); yield && has_all_runs(options.filter)) {
+    fmt::print("{} cameras, {} with more than one judged run: first-pass yield {:.1f} %\n",
+               counts.cameras, counts.cameras_reworked, percent * *yield);
   }
   const auto open = known->with_open_hook();
   const auto without = std::count_if(runs.begin(), runs.end(), [&](const RunSummary& run) {

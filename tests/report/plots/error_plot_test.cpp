@@ -72,7 +72,7 @@ TEST(ErrorPlot, HasATableOfTheTenLargestErrors) {
   EXPECT_EQ(table[0].back(), "error (mm)");
   EXPECT_EQ(table[1], (std::vector<std::string>{"0007.png", "0.233, 0.100", "1.00, 2.00", "2.24"}));
   EXPECT_EQ(table[2].back(), "1.00");
-  EXPECT_TRUE(drawing_of({"none", {}, {}, {}}).table.empty());
+  EXPECT_TRUE(drawing_of(ErrorPlot{"none", {}, {}, {}}).table.empty());
 }
 
 TEST(ErrorPlot, StaysSmallAndKeepsTheLargestErrors) {
