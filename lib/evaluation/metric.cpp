@@ -51,7 +51,8 @@ constexpr std::array kMetricKinds{
         "black_ratio", "", MetricSource::lens,
         "light of black over light of white at the edges of tags, the median over the image; "
         "needs AprilTags without corner squares",
-        "a veil lies over the image: the lens is dirty, or stray light falls into it",
+        "a veil lies over the image: the lens is dirty, stray light falls into it, or the "
+        "board's black is not dark",
         Direction::at_most, 1},
     MetricKind{"rms_px", "px", MetricSource::lens, "residuals of the corners, rms per axis",
                "the board's corners do not fit the lens model"},

@@ -29,7 +29,7 @@ constexpr std::array<Kind, 8> kKinds = {
       "well. "
       "Uncertainty: how far the projection can be trusted, by one standard deviation. "
       "Sharpness, with AprilTags: even, or falling equally towards all edges; a fall to one side "
-      "is a tilted lens, a spot is dust or a smear.",
+      "is a tilted lens, a spot is a smear.",
       "Maps of the image: corners of the board in all views, their residuals enlarged, the "
       "standard deviation of the projection, and the MTF50 where it was measured."},
      {"rotation", ReportPart::rotation,

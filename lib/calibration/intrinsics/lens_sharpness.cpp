@@ -19,8 +19,8 @@ namespace {
 
 using Map = LensSharpness::Map;
 
-/// Fewest views of a part of the image, so that a quartile is not that of a single image.
-constexpr std::size_t kMinViews = 3;
+/// Minimum number of views of a part of the image, so that the quartile lies between two of them.
+constexpr std::size_t kMinViews = 5;
 /// Fewest edges of a view from which the field of its light is fitted; of fewer, EdgeField is even.
 constexpr std::size_t kMinEdgesOfField = 32;
 
@@ -102,11 +102,16 @@ double compute_mean(const std::vector<double>& values) {
 
 double compute_median(const std::vector<double>& values) { return upper_median(values); }
 
-/// Returns the value below which 25 % of the values are.
+/// Returns the lower quartile, interpolated so that its median does not depend on the number of
+/// values (Hyndman and Fan, "Sample Quantiles in Statistical Packages", 1996, definition 8).
+/// Precondition: kMinViews values or more.
 double lower_quartile(std::vector<double> values) {
-  const auto quarter = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 4);
-  std::nth_element(values.begin(), quarter, values.end());
-  return *quarter;
+  std::sort(values.begin(), values.end());
+  constexpr double p = 0.25, third = 1.0 / 3;
+  const double position = p * (static_cast<double>(values.size()) + third) + third - 1;
+  const auto below = static_cast<std::size_t>(position);
+  const double fraction = position - static_cast<double>(below);
+  return (1 - fraction) * values[below] + fraction * values[below + 1];
 }
 
 std::vector<double> known_values(const Map& map) {
@@ -165,9 +170,9 @@ double expect_from_neighbours(const Map& map, int col, int row) {
   return means.empty() ? LensSharpness::kUnknown : upper_median(std::move(means));
 }
 
-/// Largest loss of a part of a map against the parts around it.
+/// Largest loss of a part of a map against the parts around it; NaN if no part can be compared.
 struct LocalLoss {
-  double fraction = 0;
+  double fraction = LensSharpness::kUnknown;
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
 };
 
@@ -176,7 +181,7 @@ LocalLoss find_local_loss(const Map& map, const std::array<int, 2>& imager_px) {
   for (int row = 0; row < map.rows; ++row) {
     for (int col = 0; col < map.cols; ++col) {
       const double loss = 1 - map.at(col, row) / expect_from_neighbours(map, col, row);
-      if (!std::isfinite(loss) || loss <= largest.fraction) continue;
+      if (!std::isfinite(loss) || loss <= largest.fraction) continue;  // not if that is NaN
       largest = {loss, middle_of_part(map, col, row, imager_px)};
     }
   }
@@ -243,6 +248,7 @@ std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
   const Map contrasts = compute_contrasts(result.black_to_white);
   result.local_loss = std::max(find_local_loss(result.mtf50, imager_px).fraction,
                                find_local_loss(contrasts, imager_px).fraction);
+  if (2 * known_values(result.light).size() < result.light.values.size()) return result;
   const LocalLoss shadow = find_local_loss(result.light, imager_px);
   result.local_shadow = shadow.fraction;
   result.local_shadow_px = shadow.at_px;

@@ -50,10 +50,10 @@ struct LensSharpness {
   double mean_mtf50 = kUnknown;
   /// Least MTF50 of a part over the mean.
   double worst_ratio = kUnknown;
-  /// Largest difference of the MTF50 between directions from the image's middle, over the mean:
-  /// 2 (|c1| + |c2|) of the terms c1 cos(t - t1) + c2 cos(2 (t - t2)) around the middle. A lens in
-  /// place is as sharp in all directions. A tilted or decentred one is sharper on one side, or
-  /// along one axis.
+  /// Upper bound of the difference of the MTF50 between directions from the image's middle, over
+  /// the mean: 2 (|c1| + |c2|) of the terms c1 cos(t - t1) + c2 cos(2 (t - t2)) around the middle.
+  /// A lens in place is as sharp in all directions. A tilted or decentred one is sharper on one
+  /// side, or along one axis.
   double asymmetry = kUnknown;
   /// Median of black_to_white. A veil raises it.
   double black_level = kUnknown;
@@ -61,14 +61,14 @@ struct LensSharpness {
   /// A smear raises it.
   double local_loss = kUnknown;
   /// Largest fraction by which the light of a part is below that of the parts around it, and the
-  /// middle of this part. Dust raises it.
+  /// middle of this part. Dust raises it. Unknown if fewer than half of the parts of `light` are.
   double local_shadow = kUnknown;
   Eigen::Vector2d local_shadow_px = Eigen::Vector2d::Zero();
 };
 
 /// Measures sharpness and contrast from views of a board of AprilTags, with corners behind the
 /// tone curve (take_common_curve()). Returns std::nullopt if fewer than half of the parts of the
-/// image are known, as for boards whose edges are not fitted singly.
+/// image are known, each from five views, as for boards with corner squares and of squares only.
 std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
                                                const std::array<int, 2>& imager_px);
 

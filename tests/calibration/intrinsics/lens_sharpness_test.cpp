@@ -101,6 +101,59 @@ TEST(MeasureSharpness, LocatesShadowOfDust) {
   EXPECT_LT(dusty.local_loss, 0.05);
 }
 
+TEST(MeasureSharpness, ReportsLossOfSmear) {
+  const Eigen::Vector2d smear_px(300, 350);
+  const LensSharpness smeared = measured([&](const Eigen::Vector2d& at_px, int view) {
+    EdgeStep step = even_step(at_px, view);
+    if ((at_px - smear_px).norm() < 60) step.blur_px *= 1.5;
+    return step;
+  });
+  EXPECT_NEAR(smeared.local_loss, 1 - 1 / 1.5, 0.05);
+  EXPECT_LT(smeared.worst_ratio, 0.75);
+  EXPECT_LT(smeared.local_shadow, 0.01);
+}
+
+/// A part of the image that few views show is no sharper than the rest.
+TEST(MeasureSharpness, DoesNotDependOnTheNumberOfViews) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> of_view(0, 0.1);
+  std::vector<double> ratios;
+  for (int set = 0; set < 20; ++set) {
+    std::array<double, 24> factors{};
+    for (double& factor : factors) factor = 1 + of_view(random);
+    const LensSharpness uneven =
+        measure_sharpness(make_views([&](const Eigen::Vector2d& at_px, int view) {
+                            EdgeStep step = even_step(at_px, view);
+                            step.blur_px *= factors[static_cast<std::size_t>(view)];
+                            if (at_px.x() < 200 && view >= 6) step.blur_px = 0;  // not measured
+                            return step;
+                          }),
+                          kSharpnessImager_px)
+            .value();
+    ratios.push_back(uneven.mtf50.at(1, 4) / uneven.mtf50.at(8, 4));
+  }
+  double mean = 0;
+  for (const double ratio : ratios) mean += ratio / 20;
+  EXPECT_NEAR(mean, 1, 0.03);
+}
+
+TEST(MeasureSharpness, LeavesTheShadowUnknownWithFewTagsInAView) {
+  // Seven tags in a view are 28 edges, too few for a field of the light; all views cover the image.
+  const auto dense = make_views(even_step, 140);
+  std::vector<BoardView> views;
+  for (std::size_t i = 0; i < dense.size(); ++i) {
+    BoardView& view = views.emplace_back(dense[i]);
+    std::erase_if(view.seen.tags, [&](const SeenTag& tag) {
+      return static_cast<std::size_t>(tag.id) % 28 != i % 28;
+    });
+    ASSERT_LT(view.seen.tags.size(), 8U);
+  }
+  const auto found = measure_sharpness(views, kSharpnessImager_px);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(std::isfinite(found->local_loss));
+  EXPECT_TRUE(std::isnan(found->local_shadow));
+}
+
 TEST(MeasureSharpness, ReturnsNulloptWithoutEdges) {
   auto views = make_views(even_step, 6);
   for (BoardView& view : views) {
