@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "geometry/median.h"
 
@@ -18,19 +19,23 @@ constexpr std::size_t kMinErrors = 5;
 constexpr double kMinRatio = 8;
 constexpr double kMmPerM = 1e3;
 
+/// Smaller residuals are no fault of the captures: stations accept a turn that has them on average.
+constexpr double kMinResidual_px = 0.2;
+
+/// Name of the image and index of the capture in the folder.
+using NamedCapture = std::pair<std::string, std::size_t>;
+
 /// Returns names of images with runs of successive captures joined: "0000.png to 0004.png,
-/// 0010.png". A capture without an error ends a run.
-std::string join_images(const std::vector<CheckError>& errors,
-                        const std::vector<std::size_t>& indices) {
+/// 0010.png". A capture that is not listed ends a run.
+std::string join_images(const std::vector<NamedCapture>& captures) {
   constexpr std::size_t max_groups = 5;
   std::vector<std::string> groups;
-  for (std::size_t begin = 0; begin < indices.size();) {
+  for (std::size_t begin = 0; begin < captures.size();) {
     std::size_t end = begin + 1;
-    const auto capture = [&](std::size_t i) { return errors[indices[i]].capture; };
-    while (end < indices.size() && capture(end) == capture(end - 1) + 1) ++end;
-    groups.push_back(errors[indices[begin]].image);
+    while (end < captures.size() && captures[end].second == captures[end - 1].second + 1) ++end;
+    groups.push_back(captures[begin].first);
     if (end > begin + 1) {
-      groups.back().append(end > begin + 2 ? " to " : ", ").append(errors[indices[end - 1]].image);
+      groups.back().append(end > begin + 2 ? " to " : ", ").append(captures[end - 1].first);
     }
     begin = end;
   }
@@ -48,29 +53,51 @@ std::string describe_check_outliers(const std::vector<CheckError>& errors) {
   sizes_m.reserve(errors.size());
   for (const CheckError& error : errors) sizes_m.push_back(error.horizontal_m);
   const double limit_m = std::max(kMinOutlierError_m, kMinRatio * upper_median(sizes_m));
-  std::vector<std::size_t> outliers;
+  std::vector<NamedCapture> outliers;
+  outliers.reserve(errors.size());
   std::vector<double> others_m;
   double max_m = 0;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    const double size_m = errors[i].horizontal_m;
-    if (size_m < limit_m) {
-      others_m.push_back(size_m);
+  for (const CheckError& error : errors) {
+    if (error.horizontal_m < limit_m) {
+      others_m.push_back(error.horizontal_m);
       continue;
     }
-    outliers.push_back(i);
-    max_m = std::max(max_m, size_m);
+    outliers.emplace_back(error.image, error.capture);
+    max_m = std::max(max_m, error.horizontal_m);
   }
   if (outliers.empty()) return "";
   const double others_median_m = upper_median(others_m);
   if (outliers.size() == 1) {
     return fmt::format(
         "{} was not taken where its table says: it is {:.1f} mm off, others {:.2g} mm",
-        errors[outliers.front()].image, kMmPerM * max_m, kMmPerM * others_median_m);
+        outliers.front().first, kMmPerM * max_m, kMmPerM * others_median_m);
   }
   return fmt::format(
       "captures {} are off by up to {:.1f} mm, the others by {:.2g} mm: taken "
       "elsewhere than their table says, or by another camera",
-      join_images(errors, outliers), kMmPerM * max_m, kMmPerM * others_median_m);
+      join_images(outliers), kMmPerM * max_m, kMmPerM * others_median_m);
+}
+
+std::string describe_residual_outliers(const std::vector<CaptureResidual>& residuals) {
+  if (residuals.size() < kMinErrors) return "";
+  std::vector<double> sizes_px;
+  sizes_px.reserve(residuals.size());
+  for (const CaptureResidual& each : residuals) sizes_px.push_back(each.residual_px);
+  const double median_px = upper_median(sizes_px);
+  const double limit_px = std::max(kMinResidual_px, kMinRatio * median_px);
+  std::vector<NamedCapture> outliers;
+  outliers.reserve(residuals.size());
+  double max_px = 0;
+  for (const CaptureResidual& each : residuals) {
+    if (each.residual_px < limit_px) continue;
+    outliers.emplace_back(each.image, each.capture);
+    max_px = std::max(max_px, each.residual_px);
+  }
+  if (outliers.size() < 2) return "";
+  return fmt::format(
+      "the lamps in captures {} do not fit lens and tilt of the others (residuals up to {:.2f} px, "
+      "typically {:.2g} px): of another camera, or with covered lamps; take them again",
+      join_images(outliers), max_px, median_px);
 }
 
 }  // namespace vlp

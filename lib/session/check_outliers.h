@@ -25,4 +25,19 @@ struct CheckError {
 /// than half, because the median is typical of the others.
 std::string describe_check_outliers(const std::vector<CheckError>& errors);
 
+/// Residual of the fix of a capture.
+struct CaptureResidual {
+  std::string image;
+  /// RMS distance of the lamps in the image from where the fix sees them.
+  double residual_px;
+  /// Index of the capture in the folder, which may have captures without a residual.
+  std::size_t capture = 0;
+};
+
+/// Describes captures whose lamps do not fit the lens and tilt of the others, in one line: two
+/// captures or more have residuals above 0.2 px and 8 times the median. A single one may show a
+/// covered lamp or a reflection. Returns an empty string if there are none, for fewer than five
+/// residuals, and if they are half of the captures or more.
+std::string describe_residual_outliers(const std::vector<CaptureResidual>& residuals);
+
 }  // namespace vlp

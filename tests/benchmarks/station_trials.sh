@@ -8,6 +8,7 @@
 #   tests/benchmarks/station_trials.sh faulty [COUNT [FIRST_SEED]]   5 of each of six kinds
 #   tests/benchmarks/station_trials.sh kinds [COUNT [FIRST_SEED]]    1 of each of 30 kinds
 #   tests/benchmarks/station_trials.sh mixed [COUNT [FIRST_SEED]]    10 units, each step with images of another
+#   tests/benchmarks/station_trials.sh loose [COUNT [FIRST_SEED]]    5 units that move before the check
 #   tests/benchmarks/station_trials.sh sharpness [COUNT [FIRST_SEED]]  of each seed a good unit and 15
 #                                    with a veil, smear, dust, defocus or tilt, boards only; 1 seed
 #   tests/benchmarks/station_trials.sh timing [COUNT [FIRST_SEED]]   1 unit
@@ -19,8 +20,8 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 PATH=$PWD/build/bin:$PATH
 what=${1:-good} count=${2:-} first=${3:-1}
-declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [mixed]=10 [sharpness]=1 [timing]=1)
-[ -n "${counts[$what]:-}" ] || { sed -n '5,17s/^# \?//p' "$0"; exit 2; }
+declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [mixed]=10 [loose]=5 [sharpness]=1 [timing]=1)
+[ -n "${counts[$what]:-}" ] || { sed -n '5,18s/^# \?//p' "$0"; exit 2; }
 count=${count:-${counts[$what]}}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -308,8 +309,8 @@ kinds() {
   tried few-boards "$seed" 'boards: not enough images'
 }
 
-# mixed SEED: a good unit of which three of the images of one step, each step in turn, are of another camera: INVALID,
-# with the name of one of them.
+# mixed SEED: a good unit with three images of another camera in one step, for each step: INVALID, with
+# the name of one of them. check-whole: all images of the check are of another camera: INVALID.
 mixed() {
   local step image said named
   scene_of $(($1 + 1000)) 505 510 9 0.7
@@ -323,7 +324,7 @@ mixed() {
   for step in boards rotation dispersion check; do
     unit_again
     named=''
-    for image in $(find "$work/good/$step" -name '*.png' -printf '%f\n' | sort | awk "NR % 4 == 1 + $1 % 4" | head -3); do
+    for image in $(find "$work/good/$step" -name '*.png' -printf '%f\n' | sort | awk "NR % 4 == $1 % 4" | head -3); do
       cp "$work/other/$step/$image" "$work/unit/$step/$image"
       echo "mixed $again" >>"$work/unit/$step/$image"
       named+="${named:+|}${image%.png}"
@@ -337,6 +338,37 @@ mixed() {
       printf 'mixed %-18s %4d   NOT AS IT SHOULD: %s\n' "$step" "$1" "$(grep -m 1 -E 'PASS|FAIL|INVALID' <<<"$said")"
     fi
   done
+  unit_again
+  cp "$work/other/check"/*.png "$work/unit/check/"
+  tried check-whole "$1" 'not judged: the images of check are of another camera'
+}
+
+# loose SEED: a unit that moves before the check, 6 mm sideways or by 0.3 degrees of tilt: FAIL.
+loose() {
+  local table tilt expected='fails: all 36 captures of the check are off by'
+  scene_of "$1" 514.8 525.2 5 0.7
+  render
+  rm -rf "$work/good"
+  cp -r "$work/unit" "$work/good"
+  # The truth has the yaws.
+  for table in captures truth; do
+    awk -F, -v OFS=, -v direction="$1" 'NR == FNR { yaw[$1] = $5; next }
+      FNR == 1 { x = $2 == "x_m" ? 2 : 3 }
+      FNR > 1 {
+        $x -= 0.006 * cos(yaw[$1] + direction)
+        $(x + 1) -= 0.006 * sin(yaw[$1] + direction)
+      } { print }' "$work/good/check/truth.csv" "$work/good/check/$table.csv" \
+      >"$work/unit/check/$table.csv"
+  done
+  tried loose-sideways "$1" "$expected 6.0 mm in one direction of the camera"
+  tilt=$(sed -n 's/.*tilt_deg: \([0-9.]*\)$/\1/p' "$work/scene.yaml")
+  scene_change "s/tilt_deg: $tilt\$/tilt_deg: $(awk -v t="$tilt" 'BEGIN { print t + 0.3 }')/"
+  render --only check
+  mv "$work/unit/check" "$work/tilted"
+  unit_again
+  rm -r "$work/unit/check"
+  mv "$work/tilted" "$work/unit/check"
+  tried loose-tilted "$1" "$expected"
 }
 
 # optics_of SEED LINE...: a unit whose focus, tilt and veil vary as those of good ones, and these

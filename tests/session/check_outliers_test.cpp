@@ -48,5 +48,23 @@ TEST(DescribeCheckOutliers, IsEmptyWithoutGrossOutliers) {
   EXPECT_EQ(describe_check_outliers({{"a", 1e-5}, {"b", 1}, {"c", 1e-5}}), "") << "too few";
 }
 
+TEST(DescribeResidualOutliers, NamesTwoCapturesOrMore) {
+  std::vector<CaptureResidual> residuals;
+  residuals.reserve(24);
+  for (std::size_t i = 0; i < 24; ++i) residuals.push_back({std::to_string(100 + i), 0.02, i});
+  EXPECT_EQ(describe_residual_outliers(residuals), "");
+  residuals[3].residual_px = 0.5;
+  EXPECT_EQ(describe_residual_outliers(residuals), "") << "a covered lamp";
+  residuals[4].residual_px = 0.19;
+  EXPECT_EQ(describe_residual_outliers(residuals), "") << "one camera may have it";
+  residuals[4].residual_px = 0.3;
+  EXPECT_EQ(describe_residual_outliers(residuals),
+            "the lamps in captures 103, 104 do not fit lens and tilt of the others (residuals up "
+            "to 0.50 px, typically 0.02 px): of another camera, or with covered lamps; take them "
+            "again");
+  for (CaptureResidual& each : residuals) each.residual_px = 0.3;
+  EXPECT_EQ(describe_residual_outliers(residuals), "") << "all of them";
+}
+
 }  // namespace
 }  // namespace vlp

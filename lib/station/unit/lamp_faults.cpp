@@ -81,6 +81,18 @@ std::string place_fault(std::span<const Frame> frames, const LampMap& map,
   return describe_check_outliers(errors);
 }
 
+std::string capture_fault(std::span<const Frame> frames, const LampMap& map,
+                          const Calibration& calibration) {
+  const Positioner positioner(map, calibration);
+  std::vector<CaptureResidual> residuals;
+  residuals.reserve(frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const Fix fix = positioner.locate(frames[i].detections);
+    if (fix.ok() && fix.lamps >= 3) residuals.push_back({frames[i].image, fix.residual_px, i});
+  }
+  return describe_residual_outliers(residuals);
+}
+
 std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
                                                const Calibration& calibration,
                                                const CapturesTable& places) {
@@ -124,7 +136,7 @@ std::string describe(const CommonOffset& offset) {
       "y {:+.1f} mm): {}",
       offset.captures, offset_mm.norm(), offset.in_camera ? "camera" : "room", offset_mm.x(),
       offset_mm.y(),
-      offset.in_camera ? "it is loose in its housing or on its mount, or another one took them"
+      offset.in_camera ? "it is loose in its housing or on its mount, or another camera took them"
                        : "the known points or the lamps have moved");
 }
 

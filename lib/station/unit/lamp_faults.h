@@ -32,6 +32,12 @@ std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampM
 std::string place_fault(std::span<const Frame> frames, const LampMap& map,
                         const Calibration& calibration, const CapturesTable& places);
 
+/// Describes captures whose lamps do not fit the calibration while those of the others do
+/// (describe_residual_outliers()), by fixes of three lamps or more. Returns an empty string if
+/// there are none.
+std::string capture_fault(std::span<const Frame> frames, const LampMap& map,
+                          const Calibration& calibration);
+
 /// Offset that the errors of all captures at known points share.
 struct CommonOffset {
   /// Fix minus known point: in the frame of the level camera if `in_camera`, otherwise in the

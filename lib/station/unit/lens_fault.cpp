@@ -6,10 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "calibration/adjustment/adjustment.h"
+#include "geometry/median.h"
+#include "positioning/positioner.h"
 #include "rig/calibration_error.h"
+#include "session/check_outliers.h"
 
 namespace vlp {
 namespace {
@@ -39,6 +43,31 @@ AdjustmentResult adjusted(std::span<const Frame> frames, const LampMap& map,
   for (Lamp& lamp : input.lamps.lamps) lamp.sd_m = 0;
   for (const Frame& frame : frames) input.captures.push_back({frame.image, frame.detections});
   return adjust_captures(input);
+}
+
+/// Errors of the heights of fixes at known points.
+struct HeightErrors {
+  double median_m;
+  /// Stated standard deviation of one height, the median.
+  double sd_m;
+};
+
+/// Returns the errors of fixes of three lamps or more; std::nullopt for fewer than five.
+std::optional<HeightErrors> find_height_errors(const PlacedCaptures& captures, const LampMap& map,
+                                               const Calibration& calibration) {
+  constexpr std::size_t min_heights = 5;  // of fewer, the median is not typical
+  const Positioner positioner(map, calibration);
+  std::vector<double> errors_m, sds_m;
+  for (const Frame& frame : captures.frames) {
+    const auto place = captures.places.find(frame.image);
+    if (place == captures.places.end() || !place->second.z_m) continue;
+    const Fix fix = positioner.locate(frame.detections);
+    if (!fix.ok() || fix.lamps < 3) continue;
+    errors_m.push_back(fix.estimate.pose.position_m.z() - *place->second.z_m);
+    sds_m.push_back(std::sqrt(fix.estimate.covariance(2, 2)));
+  }
+  if (errors_m.size() < min_heights) return std::nullopt;
+  return HeightErrors{upper_median(errors_m), upper_median(sds_m)};
 }
 
 /// By how much a corner of the image is elsewhere, the worst.
@@ -78,6 +107,36 @@ std::string lens_fault(std::span<const Frame> frames, const LampMap& map,
       "the lamps are seen through another lens than the boards: they show {}, the boards {}; are "
       "all images of this unit, or has its lens moved?",
       words(freed.camera), words(calibration.camera));
+}
+
+std::string find_other_focal_length(const PlacedCaptures& captures, const PlacedCaptures& own,
+                                    const LampMap& map, const Calibration& calibration) {
+  const auto heights = find_height_errors(captures, map, calibration);
+  const auto own_heights = find_height_errors(own, map, calibration);
+  if (!heights || !own_heights) return "";
+  // A unit that is loose sideways may have moved as far along its axis.
+  constexpr double min_difference_m = kMinOutlierError_m, sigmas = 3, mm_per_m = 1e3;
+  const double difference_m = heights->median_m - own_heights->median_m;
+  const double sd_m = std::hypot(heights->sd_m, own_heights->sd_m);
+  if (std::abs(difference_m) <= std::max(min_difference_m, sigmas * sd_m)) return "";
+  return fmt::format(
+      "its focal length differs, by heights that are off by {:+.1f} mm, in dispersion by {:+.1f} "
+      "mm",
+      mm_per_m * heights->median_m, mm_per_m * own_heights->median_m);
+}
+
+std::string find_other_lens(std::span<const Frame> frames, std::span<const Frame> own,
+                            const LampMap& map, const Calibration& calibration) {
+  const AdjustmentResult result = adjusted(frames, map, calibration);
+  const AdjustmentResult of_own = adjusted(own, map, calibration);
+  if (!result.ok() || !of_own.ok()) return "";
+  // The same ratio as in lens_fault(); 0.1 px is 0.3 mm at lamps 1.6 m above a lens of 520 px.
+  constexpr double min_ratio = 3, min_residual_px = 0.1;
+  if (result.residual_px < std::max(min_residual_px, min_ratio * of_own.residual_px)) return "";
+  return fmt::format(
+      "its lens differs, by residuals of the lamps of {:.2f} px at any tilt, in "
+      "dispersion {:.2g} px",
+      result.residual_px, of_own.residual_px);
 }
 
 }  // namespace vlp

@@ -17,6 +17,7 @@
 #include "session/lens_step.h"
 #include "session/locate_step.h"
 #include "session/rotation_step.h"
+#include "station/unit/lamp_faults.h"
 
 namespace vlp {
 namespace {
@@ -62,6 +63,16 @@ std::string places_problem(std::size_t known, std::size_t captures, int wanted) 
       "nothing tells where {} of the {} captures are: captures.csv or truth.csv of the step "
       "should, with x_m and y_m of each",
       captures - known, captures);
+}
+
+/// Fails a solved step if some captures do not fit the result: they are rejected as outliers, but
+/// may be those of another camera. The operator takes them again.
+StepResult fail_if_inconsistent(const StationConfig& config, const std::vector<Frame>& frames,
+                                StepResult result) {
+  if (!result.ok()) return result;
+  std::string fault = capture_fault(frames, config.lamps, result.calibration);
+  if (!fault.empty()) result.fail(StepFailure::undetermined, std::move(fault));
+  return result;
 }
 
 /// Those at known points, and the points.
@@ -133,7 +144,9 @@ StepResult solve_boards(const StationConfig& config, const std::string& camera_i
 StepResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                           const std::vector<Frame>& frames) {
   return named("the turn on the spot",
-               solve_rotation(captures_of(config, calibration, frames), RotationMethod::axis, {}));
+               fail_if_inconsistent(config, frames,
+                                    solve_rotation(captures_of(config, calibration, frames),
+                                                   RotationMethod::axis, {})));
 }
 
 StepResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
@@ -146,9 +159,11 @@ StepResult solve_dispersion(const StationConfig& config, const Calibration& cali
     result.fail(StepFailure::wrong_place, std::move(problem));
     return result;
   }
-  return named("the fixes at the station",
-               solve_dispersion(captures_of(config, calibration, frames), known,
-                                DispersionMethod::camera, DispersionCircle::mean, {}));
+  return named(
+      "the fixes at the station",
+      fail_if_inconsistent(config, frames,
+                           solve_dispersion(captures_of(config, calibration, frames), known,
+                                            DispersionMethod::camera, DispersionCircle::mean, {})));
 }
 
 StepResult check_fixes(const StationConfig& config, const Calibration& calibration,

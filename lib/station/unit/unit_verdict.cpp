@@ -165,6 +165,33 @@ std::vector<Cause> find_missing_figures(const Unit& unit,
   return causes;
 }
 
+/// Returns faults of the known points, of the images of the check, or of the camera there.
+std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibration) {
+  const UnitStep& check = unit.step(StationStep::check);
+  if (!is_solved(check)) return {};
+  const LampMap& lamps = unit.config().lamps;
+  const PlacedCaptures captures{frames_of(check), captures_in(check.folder)};
+  // One offset of all captures is no fault of single ones; one that rotates is the camera's.
+  const auto offset = find_common_offset(captures.frames, lamps, calibration, captures.places);
+  if (offset && !offset->in_camera) return {{describe(*offset)}};
+  if (!offset) {
+    std::string fault = place_fault(captures.frames, lamps, calibration, captures.places);
+    if (!fault.empty()) return {{std::move(fault)}};
+  }
+  const UnitStep& dispersion = unit.step(StationStep::dispersion);
+  const PlacedCaptures own{frames_of(dispersion), captures_in(dispersion.folder)};
+  std::string other = find_other_focal_length(captures, own, lamps, calibration);
+  // Without an offset, residuals may be those of a lens that is measured badly near the corners.
+  if (other.empty() && offset) {
+    other = find_other_lens(captures.frames, own.frames, lamps, calibration);
+  }
+  if (!other.empty()) {
+    return {{"the images of check are of another camera: " + other + "; take them with this unit"}};
+  }
+  if (offset) return {{describe(*offset), true}};
+  return {};
+}
+
 /// Returns faults of the lamps and of the lens that saw them, by the captures of all steps; without
 /// these, faults of the known points or of the camera there, by the captures of the check.
 std::vector<Cause> find_station_faults(const Unit& unit) {
@@ -191,17 +218,7 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
   if (std::string fault = lens_fault(frames, unit.config().lamps, *known); !fault.empty()) {
     return {{std::move(fault)}};
   }
-  const UnitStep& check = unit.step(StationStep::check);
-  if (!is_solved(check)) return {};
-  const auto check_frames = frames_of(check);
-  const auto places = captures_in(check.folder);
-  // One offset of all captures is no fault of single ones; one that rotates is the camera's.
-  if (const auto offset = find_common_offset(check_frames, unit.config().lamps, *known, places)) {
-    return {{describe(*offset), offset->in_camera}};
-  }
-  std::string fault = place_fault(check_frames, unit.config().lamps, *known, places);
-  if (fault.empty()) return {};
-  return {{std::move(fault)}};
+  return find_check_faults(unit, *known);
 }
 
 }  // namespace

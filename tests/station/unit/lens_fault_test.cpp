@@ -5,8 +5,11 @@
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
+#include "camera/lens.h"
+#include "positioning/positioner.h"
 #include "support/example_rig.h"
 
 namespace vlp {
@@ -66,6 +69,63 @@ TEST_F(LensFaultTest, IsNoneOfCapturesThatTellNothing) {
   calibration.camera.intrinsics[0] *= 1.02;
   EXPECT_EQ(lens_fault({}, map, calibration), "");
   EXPECT_EQ(lens_fault(std::span(frames).first(1), map, calibration), "");
+}
+
+/// Captures at known heights, as the fixes of the true camera give them.
+struct OtherCamera : LensFaultTest {
+  OtherCamera() {
+    const Positioner positioner(map, calibration);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const Fix fix = positioner.locate(frames[i].detections);
+      if (!fix.ok()) continue;
+      PlacedCaptures& captures = i % 2 == 0 ? own : check;
+      captures.places[frames[i].image].z_m = fix.estimate.pose.position_m.z();
+      captures.frames.push_back(frames[i]);
+    }
+  }
+  /// Moves the detections of the check to where a camera of another lens or tilt has them.
+  void look_through(const Lens& other, const Eigen::Matrix3d& other_from_camera) {
+    const Lens lens(calibration.camera.lens_model, calibration.camera.intrinsics);
+    for (Frame& frame : check.frames) {
+      for (Detection& lamp : frame.detections) {
+        const auto ray = lens.unproject(lamp.pixel);
+        ASSERT_TRUE(ray);
+        const auto pixel = other.project(other_from_camera * ray->direction);
+        ASSERT_TRUE(pixel);
+        lamp.pixel = *pixel;
+      }
+    }
+  }
+  PlacedCaptures own, check;
+};
+
+TEST_F(OtherCamera, IsNoneIfTheUnitTilted) {
+  ASSERT_GT(check.frames.size(), 10U);
+  look_through(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
+               Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());
+  EXPECT_EQ(find_other_focal_length(check, own, map, calibration), "");
+  EXPECT_EQ(find_other_lens(check.frames, own.frames, map, calibration), "");
+}
+
+TEST_F(OtherCamera, HasAnotherFocalLength) {
+  auto intrinsics = calibration.camera.intrinsics;
+  intrinsics[0] *= 0.99;
+  intrinsics[1] *= 0.99;
+  look_through(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
+  EXPECT_THAT(find_other_focal_length(check, own, map, calibration),
+              HasSubstr("its focal length differs, by heights that are off by "));
+  own.places.clear();
+  EXPECT_EQ(find_other_focal_length(check, own, map, calibration), "") << "no heights to compare";
+}
+
+TEST_F(OtherCamera, HasAnotherCenter) {
+  auto intrinsics = calibration.camera.intrinsics;
+  intrinsics[2] += 12;
+  intrinsics[3] -= 8;
+  look_through(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
+  EXPECT_THAT(find_other_lens(check.frames, own.frames, map, calibration),
+              HasSubstr("its lens differs, by residuals of the lamps of "));
+  EXPECT_EQ(find_other_lens(check.frames, {}, map, calibration), "") << "nothing to compare";
 }
 
 }  // namespace
