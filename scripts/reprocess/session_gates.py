@@ -10,7 +10,8 @@ import json
 
 import yaml
 
-AT_LEAST = ("coverage", "views", "board_tilt_deg")  # metrics with a lower limit; all others have an upper limit
+# Metrics with a lower limit; all others have an upper limit.
+AT_LEAST = ("mtf50", "mtf50_worst_ratio", "coverage", "views", "board_tilt_deg")
 UNITS = ("px", "mm", "deg")  # suffixes of the metrics' names
 
 
