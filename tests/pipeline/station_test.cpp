@@ -167,7 +167,7 @@ TEST_F(Station, GivesWhatVlpCalibrateGives) {
     EXPECT_EQ(of_station(name), metric.at("value").get<double>()) << name;
     ++same;
   }
-  EXPECT_EQ(same, 14);  // of lens, rotation and dispersion
+  EXPECT_EQ(same, 20);  // of lens, sharpness, rotation and dispersion
   // The errors have the station's names, and there their fixes go through a table of nanometres.
   const auto horizontal = of_session("evaluation.json").at("horizontal");
   EXPECT_NEAR(of_station("check_mean_mm"), horizontal.at("mean_mm").get<double>(), 1e-6);
