@@ -10,7 +10,6 @@
 #include "station/records/golden_due.h"
 #include "station/records/hook.h"
 #include "station/sample_records.h"
-#include "support/refused.h"
 
 namespace vlp {
 namespace {
@@ -145,8 +144,9 @@ TEST_F(KnownRunsTest, AreVoidedByThoseAloneWhoMay) {
   const std::string run = keep(1);
   config.void_operators = {"Bea"};
   KnownRuns known(config);
-  EXPECT_THAT(refusal_of([&] { void_run(known, run, "Ann", "wrong serial"); }),
-              HasSubstr("operator Ann may not void runs of station station-1: void_operators"));
+  EXPECT_THAT([&] { void_run(known, run, "Ann", "wrong serial"); },
+              testing::ThrowsMessage<std::invalid_argument>(HasSubstr(
+                  "operator Ann may not void runs of station station-1: void_operators")));
   EXPECT_THAT(known.find(run).events, IsEmpty());
   EXPECT_THAT(void_run(known, run, "Bea", "wrong serial").run.events, SizeIs(1));
 }
