@@ -11,7 +11,6 @@
 #include <optional>
 
 #include "evaluation/evaluation_metrics.h"
-#include "geometry/angles.h"
 
 namespace vlp {
 namespace {
@@ -28,8 +27,10 @@ double round_up(double value) {
   return step * std::ceil(value / step - numeric_tolerance);
 }
 
-double compute_limit(double value, double interval_high) {
-  const double standard_error = std::max(0.0, interval_high - value) / kNormalQuantile975;
+double compute_limit(double value, const Interval& interval) {
+  // The ends of the interval of a quantile are errors that occurred, so that one may be too near.
+  const double half_width = std::max(interval.high - value, value - interval.low);
+  const double standard_error = half_width / kNormalQuantile975;
   const double margin = std::max({kNormalQuantile999 * std::numbers::sqrt2 * standard_error,
                                   kMinRelativeMargin * value, kMinMargin});
   return round_up(value + margin);
@@ -59,25 +60,23 @@ std::optional<ErrorIntervals> compute_intervals(
 std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& evaluation) {
   std::vector<Gate> gates;
   if (!evaluation.intervals_m) return gates;
-  const auto add = [&](const char* name, double value, double interval_high) {
-    gates.push_back({name, compute_limit(value, interval_high)});
+  const auto add = [&](const char* name, double value, const Interval& interval, double scale) {
+    gates.push_back(
+        {name, compute_limit(scale * value, {scale * interval.low, scale * interval.high})});
   };
+  constexpr double millimetres = 1e3, degrees = 180 / std::numbers::pi;
   const ErrorIntervals& horizontal_m = *evaluation.intervals_m;
-  add("mean_mm", 1e3 * evaluation.horizontal_m.mean, 1e3 * horizontal_m.mean.high);
+  add("mean_mm", evaluation.horizontal_m.mean, horizontal_m.mean, millimetres);
   if (const auto& p90_m = horizontal_m.p90) {
-    add("p90_mm", 1e3 * evaluation.horizontal_m.p90, 1e3 * p90_m->high);
+    add("p90_mm", evaluation.horizontal_m.p90, *p90_m, millimetres);
   }
   const std::vector<FixError> errors = errors_of(input, input.fixes).errors;
   const auto height_m = compute_intervals(
       errors, [](const FixError& error) { return error.height_m; }, input.threads);
-  if (height_m)
-    add("height_rms_mm", 1e3 * evaluation.height_m->sizes.rms, 1e3 * height_m->rms.high);
+  if (height_m) add("height_rms_mm", evaluation.height_m->sizes.rms, height_m->rms, millimetres);
   const auto yaw_rad = compute_intervals(
       errors, [](const FixError& error) { return error.yaw_rad; }, input.threads);
-  if (yaw_rad) {
-    add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->sizes.rms),
-        deg_from_rad(yaw_rad->rms.high));
-  }
+  if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->sizes.rms, yaw_rad->rms, degrees);
   constexpr double millionth = 1e-6;  // as it is written
   gates.push_back({"missing", millionth * std::ceil(evaluation.missing_share() / millionth)});
   return gates;
@@ -87,7 +86,7 @@ std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evalu
   std::string text = fmt::format(
       "# Proposed from {} fixes of {} captures. A run of the same accuracy exceeds the limit of "
       "an\n"
-      "# error in 1 of 1,000 cases; the limit of missing is the fraction of this run.\n"
+      "# error in about 1 of 200 cases; the limit of missing is the fraction of this run.\n"
       "format: vlp-gates/1\ngates:\n",
       evaluation.fixes, evaluation.captures);
   const std::vector<Metric> metrics = metrics_of(evaluation);
