@@ -35,8 +35,8 @@ struct EdgeBow {
 /// Step of the light across an edge of a tag: sigma of the Gaussian blur of lens and pixel
 /// together, and the light on both sides in the middle of the edge, in levels behind no tone curve.
 /// A blur of 0 is unknown.
-/// The blur is accurate to 3 % from 0.5 to 1.5 px if the stripe inside the edge is three blurs wide,
-/// and 4 % too small at 2 px. In narrower stripes it is smaller still.
+/// The blur is accurate to 3 % from 0.5 to 1.5 px if the stripe inside the edge is three blurs
+/// wide, and 4 % too small at 2 px. In narrower stripes it is smaller still.
 struct EdgeStep {
   double blur_px = 0, dark = 0, bright = 0;
 
