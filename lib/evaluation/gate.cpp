@@ -197,6 +197,7 @@ std::string words_of_missed(const std::vector<CheckedMetric>& gates) {
 }
 
 std::string cause_of(const CheckedMetric& gate) {
+  if (!gate.value) return words_of(gate);
   const auto kind = metric_kind(gate.name);
   return std::string(kind ? kind->cause : "a gate is not met") + " (" + words_of(gate) + ")";
 }

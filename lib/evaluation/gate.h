@@ -97,7 +97,8 @@ std::string words_of_guard(const CheckedMetric& gate);
 /// words_of() of those that are not met, with "; " between them.
 std::string words_of_missed(const std::vector<CheckedMetric>& gates);
 
-/// What it means that a gate is not met, then words_of() it.
+/// Returns what it means that a gate is not met, then words_of() it; of a metric that was not
+/// measured words_of() alone.
 std::string cause_of(const CheckedMetric& gate);
 
 }  // namespace vlp

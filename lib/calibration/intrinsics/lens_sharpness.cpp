@@ -19,8 +19,8 @@ namespace {
 
 using Map = LensSharpness::Map;
 
-/// Minimum number of views of a part of the image, so that the quartile lies between two of them.
-constexpr std::size_t kMinViews = 5;
+/// Minimum number of views of a part of the image, for a median and for a quartile between two.
+constexpr std::size_t kMinViews = 3, kMinViewsOfQuartile = 5;
 /// Fewest edges of a view from which the field of its light is fitted; of fewer, EdgeField is even.
 constexpr std::size_t kMinEdgesOfField = 32;
 
@@ -47,9 +47,9 @@ class ViewValues {
 
   /// Sets the parts of the map that enough views show.
   template <typename Statistic>
-  void summarize(const Statistic& statistic, Map& map) const {
+  void summarize(std::size_t min_views, const Statistic& statistic, Map& map) const {
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (parts_[i].size() >= kMinViews) map.values[i] = statistic(parts_[i]);
+      if (parts_[i].size() >= min_views) map.values[i] = statistic(parts_[i]);
     }
   }
 
@@ -104,7 +104,7 @@ double compute_median(const std::vector<double>& values) { return upper_median(v
 
 /// Returns the lower quartile, interpolated so that its median does not depend on the number of
 /// values (Hyndman and Fan, "Sample Quantiles in Statistical Packages", 1996, definition 8).
-/// Precondition: kMinViews values or more.
+/// Precondition: kMinViewsOfQuartile values or more.
 double lower_quartile(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   constexpr double p = 0.25, third = 1.0 / 3;
@@ -215,10 +215,11 @@ void fill_maps(std::span<const BoardView> views, const std::array<int, 2>& image
     ratios.add(at_px, black_to_white, compute_median);
     lights.add(at_px, compute_relative_lights(edges), compute_mean);
   }
-  blurs.summarize([](const auto& values) { return mtf50_from_blur(lower_quartile(values)); },
-                  result.mtf50);
-  ratios.summarize(compute_median, result.black_to_white);
-  lights.summarize(compute_median, result.light);
+  blurs.summarize(
+      kMinViewsOfQuartile,
+      [](const auto& values) { return mtf50_from_blur(lower_quartile(values)); }, result.mtf50);
+  ratios.summarize(kMinViews, compute_median, result.black_to_white);
+  lights.summarize(kMinViews, compute_median, result.light);
 }
 
 }  // namespace
@@ -248,7 +249,6 @@ std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
   const Map contrasts = compute_contrasts(result.black_to_white);
   result.local_loss = std::max(find_local_loss(result.mtf50, imager_px).fraction,
                                find_local_loss(contrasts, imager_px).fraction);
-  if (2 * known_values(result.light).size() < result.light.values.size()) return result;
   const LocalLoss shadow = find_local_loss(result.light, imager_px);
   result.local_shadow = shadow.fraction;
   result.local_shadow_px = shadow.at_px;

@@ -61,7 +61,7 @@ struct LensSharpness {
   /// A smear raises it.
   double local_loss = kUnknown;
   /// Largest fraction by which the light of a part is below that of the parts around it, and the
-  /// middle of this part. Dust raises it. Unknown if fewer than half of the parts of `light` are.
+  /// middle of this part. Dust raises it. Unknown if no parts of `light` can be compared.
   double local_shadow = kUnknown;
   Eigen::Vector2d local_shadow_px = Eigen::Vector2d::Zero();
 };
