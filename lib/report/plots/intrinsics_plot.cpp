@@ -127,8 +127,9 @@ std::string draw_mtf50(const IntrinsicsPlot& plot) {
   std::string map;
   for (std::size_t i = 0; i < plot.mtf50.size(); ++i) {
     if (!std::isfinite(plot.mtf50[i])) continue;
-    map += data_row({(2 * double(i % cols) + 1) * half_u - 0.5,
-                     (2 * double(i / cols) + 1) * half_v - 0.5, plot.mtf50[i]});
+    const std::size_t col = i % cols, row = i / cols;
+    map += data_row({(2 * double(col) + 1) * half_u - 0.5, (2 * double(row) + 1) * half_v - 0.5,
+                     plot.mtf50[i]});
   }
   return data_block("mtf50", map) +
          "set title 'sharpness: MTF50 of lens and pixel'\n"
