@@ -89,10 +89,10 @@ void PointSpread::defocus(cv::Mat1f& part, const SpreadWindow& window) const {
     const Eigen::Vector2d from_middle = (at.array() + 0.5 - half) / half;
     return std::abs(optics_.defocus->radius_px + tilt_px.dot(from_middle));
   });
-  double least_px = 0, most_px = 0;
-  cv::minMaxLoc(radii, &least_px, &most_px);
-  const int first = static_cast<int>(least_px / kDiscStep_px);
-  const int last = static_cast<int>(most_px / kDiscStep_px) + 1;
+  double min_px = 0, max_px = 0;
+  cv::minMaxLoc(radii, &min_px, &max_px);
+  const int first = static_cast<int>(min_px / kDiscStep_px);
+  const int last = static_cast<int>(max_px / kDiscStep_px) + 1;
   cv::Mat1f result(part.size(), 0.F);
   for (int step = first; step <= last; ++step) {
     const cv::Mat1f blurred = blur_by_disc(part, step * kDiscStep_px * window.per_px);

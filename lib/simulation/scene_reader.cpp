@@ -43,15 +43,15 @@ Camera read_scene_camera(YamlMap map) {
   return camera;
 }
 
-constexpr double kMostDefocus_px = 20;
-constexpr double kMostSpot_px = 1e4;
+constexpr double kMaxDefocus_px = 20;
+constexpr double kMaxSpot_px = 1e4;
 
 Defocus read_defocus(YamlMap map) {
-  Defocus defocus{map.required("radius_px").number_within(0, kMostDefocus_px, "px")};
+  Defocus defocus{map.required("radius_px").number_within(0, kMaxDefocus_px, "px")};
   if (const auto tilt = map.optional("tilt_px")) {
     defocus.tilt_px = Eigen::Vector2d(tilt->numbers(2).data());
     for (const YamlValue& component : tilt->list()) {
-      component.number_within(-kMostDefocus_px, kMostDefocus_px, "px");
+      component.number_within(-kMaxDefocus_px, kMaxDefocus_px, "px");
     }
   }
   map.finish();
@@ -62,14 +62,14 @@ Eigen::Vector2d read_spot(YamlMap& map) {
   const YamlValue at = map.required("at_px");
   const Eigen::Vector2d at_px(at.numbers(2).data());
   for (const YamlValue& component : at.list()) {
-    component.number_within(-kMostSpot_px, kMostSpot_px, "px");
+    component.number_within(-kMaxSpot_px, kMaxSpot_px, "px");
   }
   return at_px;
 }
 
 LensSmear read_smear(YamlMap map) {
   const LensSmear smear{read_spot(map),
-                        map.required("radius_px").number_within(1, kMostSpot_px, "px"),
+                        map.required("radius_px").number_within(1, kMaxSpot_px, "px"),
                         map.required("fraction").number_within(0, 1, "(of the light)"),
                         map.required("sigma_px").number_within(0.3, 50, "px")};
   map.finish();
@@ -77,7 +77,7 @@ LensSmear read_smear(YamlMap map) {
 }
 
 Dust read_dust(YamlMap map) {
-  const Dust dust{read_spot(map), map.required("radius_px").number_within(1, kMostSpot_px, "px"),
+  const Dust dust{read_spot(map), map.required("radius_px").number_within(1, kMaxSpot_px, "px"),
                   map.required("depth").number_within(0, 1, "(of the light)")};
   map.finish();
   return dust;

@@ -190,7 +190,7 @@ std::string rename_files(const StationConfig* own_station, const RunRecord& reco
   }
 }
 
-/// Returns true if a hook was told since a run was voided.
+/// Returns true if a hook was called since a run was voided.
 bool is_hook_told(const RunRecord& record) {
   const auto begin = std::find_if(record.events.begin(), record.events.end(),
                                   [](const RunEvent& event) { return event.what == kVoided; });

@@ -18,7 +18,7 @@ namespace vlp {
 /// Which runs; what is empty is not asked for.
 struct RunFilter {
   std::string camera, station, verdict, kind;
-  /// Who measured, and in which shift.
+  /// Operator and shift of the run.
   std::string operator_name = {}, shift = {};
   /// Those that ended at this UTC or later, and before that one, as 2026-11-21 or 2026-11-21T13:45.
   std::string since = {}, until = {};
