@@ -86,7 +86,8 @@ std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evalu
   std::string text = fmt::format(
       "# Proposed from {} fixes of {} captures. A run of the same accuracy exceeds the limit of "
       "an\n"
-      "# error in about 1 of 200 cases; the limit of missing is the fraction of this run.\n"
+      "# error in about 1 of 200 cases (40 places; of fewer more often); the limit of missing is "
+      "the fraction of this run.\n"
       "format: vlp-gates/1\ngates:\n",
       evaluation.fixes, evaluation.captures);
   const std::vector<Metric> metrics = metrics_of(evaluation);
