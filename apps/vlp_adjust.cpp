@@ -70,7 +70,7 @@ void run(const CLI::App& app, const Options& options) {
   }
   check_outputs({{"--output", images.output}, {"--refine-map", options.refined_map}}, inputs);
   AdjustStepInput input;
-  input.lamps = read_lamp_map(images.lamps);
+  input.lamps = read_lamps_of_room(images.lamps, images.frontend.room);
   input.lamps_file = images.lamps;
   input.calibration = read_calibration(images.calibration);
   input.calibration_file = images.calibration;

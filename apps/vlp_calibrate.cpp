@@ -78,6 +78,7 @@ int calibrate(int argc, char** argv) {
                  "Time from one row of the read-out to the next (default: found from rotation)")
       ->check(CLI::Range(1e-8, 1e-3));
   add_readout_option(app, how.frontend.readout);
+  add_room_option(app, how.frontend.room);
   add_board_limit_options(app, how.frontend);
   app.add_option("--gates", how.gates_file,
                  "Gates, vlp-gates/1, for a session that has no gates.yaml; of the lens there are "

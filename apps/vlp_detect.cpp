@@ -46,7 +46,8 @@ void run(const CaptureOptions& options, const std::string& captures) {
     throw std::invalid_argument("--calibration, --row-time-s or --classifier has to tell lamps");
   }
   const Observations found =
-      observe_captures(options, ImageUse::fixes, read_lamp_map(options.lamps), calibration);
+      observe_captures(options, ImageUse::fixes,
+                       read_lamps_of_room(options.lamps, options.frontend.room), calibration);
   const std::vector<Frame> frames = kept_frames(found.images);
   write_detections(options.output, frames);
   if (!captures.empty()) write_times(captures, frame_times(found.images));

@@ -84,7 +84,7 @@ CapturesTable captures_of(const Options& options) {
 /// Returns everything that the options state except the frames.
 LocateInput make_input(const Options& options, const CapturesTable& captures) {
   LocateInput input{{},
-                    read_lamp_map(options.images.lamps),
+                    read_lamps_of_room(options.images.lamps, options.images.frontend.room),
                     read_calibration(options.images.calibration),
                     captures};
   if (const auto& readout = options.images.frontend.readout) {

@@ -56,7 +56,7 @@ std::vector<Frame> labels_in(const fs::path& folder, const std::string& table, b
 Inputs read_inputs(const Options& options) {
   check_output(options.output, {options.lamps, options.calibration});
   Inputs inputs;
-  inputs.lamps = read_lamp_map(options.lamps);
+  inputs.lamps = read_lamps_of_room(options.lamps, options.frontend.room);
   if (!options.calibration.empty()) inputs.calibration = read_calibration(options.calibration);
   for (const std::string& folder : options.folders) {
     for (const fs::path& image : list_images(folder))
@@ -123,6 +123,7 @@ int main(int argc, char** argv) {
          "show, the better")
       ->required();
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
+  vlp::add_room_option(app, options.frontend.room);
   app.add_option("--calibration", options.calibration,
                  "Calibration: its lens and read-out, when they are known");
   auto* row_time =

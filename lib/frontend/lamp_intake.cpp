@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/lamp_intake.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +16,7 @@
 #include "frontend/video.h"
 #include "lamps/readout.h"
 #include "lamps/signal/lamp_map_check.h"
+#include "lamps/signal/lamp_rule.h"
 #include "positioning/inclination_rotation.h"
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"
@@ -167,8 +168,28 @@ void warn_of_map(const LampImages& images, const DetectorCamera& camera,
   warn_of_rest(unreadable.size(), "lamps with stripes that can hardly be seen", warnings);
 }
 
+/// Returns the pairs of lamps that have one frequency, for example "1 and 7, 2 and 8"; empty if
+/// there are none.
+std::string list_shared_frequencies(const LampMap& map) {
+  std::vector<std::string> pairs;
+  for (std::size_t i = 0; i < map.lamps.size(); ++i) {
+    for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
+      const Lamp &a = map.lamps[i], &b = map.lamps[j];
+      if (!a.frequency_hz || !b.frequency_hz) continue;
+      if (std::abs(std::log(*a.frequency_hz / *b.frequency_hz)) >= kLampDrift) continue;
+      if (a.duty && b.duty && std::abs(*a.duty - *b.duty) >= 2 * kDutyMargin) continue;
+      std::string pair = fmt::format("{} and {}", a.id, b.id);
+      pairs.push_back(std::move(pair));
+    }
+  }
+  const std::size_t more = pairs.size() > kMaxLines ? pairs.size() - kMaxLines : 0;
+  pairs.resize(pairs.size() - more);
+  const std::string rest = more > 0 ? fmt::format(" and {} more pairs", more) : "";
+  return fmt::format("{}", fmt::join(pairs, ", ")) + rest;
+}
+
 /// Explains that no lamp is identified, with the reason that most of the lights have.
-std::string explain_no_lamp(const std::vector<Observation>& images) {
+std::string explain_no_lamp(const std::vector<Observation>& images, const LampMap& map) {
   const auto count = [&](LightKind kind) { return count_of(images, kind); };
   const auto skipped = std::count_if(images.begin(), images.end(),
                                      [](const Observation& image) { return !image.is_kept(); });
@@ -182,6 +203,13 @@ std::string explain_no_lamp(const std::vector<Observation>& images) {
     return message + ": are lamps lit and in view, and the exposure long enough?";
   }
   const auto& [kind, reason, lights] = reasons.front();
+  const std::string shared = list_shared_frequencies(map);
+  if (reason == LightReason::unknown_period && !shared.empty()) {
+    return message + fmt::format(
+                         "; lamps {} of the map have one frequency each: if they hang in "
+                         "two rooms, add the key room to each lamp and use --room",
+                         shared);
+  }
   return message + fmt::format("; most often, {} times: {}", lights, explanation_of(reason));
 }
 
@@ -352,14 +380,14 @@ Observations observe_lamps(const LampImages& images, ImageUse use, const Fronten
   Observations result = intake.observe_all(list_lamp_images(images.images), progress);
   result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
   result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(), remarks.warnings.end());
-  check_lamps_seen(images.images, result);
+  check_lamps_seen(images, result);
   return result;
 }
 
-void check_lamps_seen(const fs::path& images, Observations& result) {
-  check_any_readable(images, result.images);
+void check_lamps_seen(const LampImages& images, Observations& result) {
+  check_any_readable(images.images, result.images);
   if (count_of(result.images, LightKind::lamp) == 0) {
-    result.failure = {false, explain_no_lamp(result.images)};
+    result.failure = {false, explain_no_lamp(result.images, images.lamps)};
   } else if (std::none_of(result.images.begin(), result.images.end(),
                           [](const Observation& image) { return image.is_kept(); })) {
     result.failure = {false, describe_none_kept(result.images)};

@@ -107,7 +107,7 @@ Observations observe_lamps(const LampImages& images, ImageUse use, const Fronten
 
 /// Sets Observations::failure if no lamp is identified in any image, or no image is kept. Throws
 /// InputError if no image can be read.
-void check_lamps_seen(const std::filesystem::path& images, Observations& result);
+void check_lamps_seen(const LampImages& images, Observations& result);
 
 /// Estimates the readout direction from images unless it is known. A note, or a warning if rows are
 /// assumed because the images do not show it, is added to `result`.

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "rig/calibration.h"
 
@@ -41,6 +42,8 @@ struct FrontendOptions {
   std::optional<Readout> readout = {};
   /// Row time of a camera without a calibration.
   std::optional<double> row_time_s = {};
+  /// Room of the lamp map whose lamps are identified (read_lamps_of_room()); empty: all.
+  std::string room = {};
   /// Exposure of the images for the check of the lamp map; short if unknown.
   std::optional<double> exposure_s = {};
 };

@@ -7,6 +7,7 @@
 
 #include "rig/file.h"
 #include "rig/find_lamp.h"
+#include "rig/input_error.h"
 #include "rig/yaml_parts.h"
 #include "rig/yaml_writer.h"
 
@@ -57,19 +58,31 @@ const Lamp* find_lamp(std::span<const Lamp> lamps, int id) {
   return lamp == lamps.end() ? nullptr : &*lamp;
 }
 
-LampMap read_lamp_map(const std::filesystem::path& file) {
+LampMap read_lamp_map(const std::filesystem::path& file) { return read_lamps_of_room(file, ""); }
+
+LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string& room) {
   YamlMap document = read_yaml(file, kLampsFormat);
   const auto sd_m = optional_within(document, "sd_m", 0, kWorstSurvey_m, "m");
   const YamlValue list = document.required("lamps");
   document.finish();
   LampMap map;
+  std::vector<Lamp> other_rooms;
   for (const YamlValue& item : list.list()) {
     YamlMap keys = item.map();
     Lamp lamp = read_lamp(keys);
+    const auto lamp_room = keys.optional("room");
+    const bool is_in_room = room.empty() || (lamp_room && lamp_room->text() == room);
     if (!lamp.sd_m) lamp.sd_m = sd_m;
     keys.finish();
     check_lamp(map.lamps, lamp, item);
-    map.lamps.push_back(lamp);
+    if (find_lamp(other_rooms, lamp.id) != nullptr) {
+      throw item.error("id " + std::to_string(lamp.id) + " stands twice");
+    }
+    (is_in_room ? map.lamps : other_rooms).push_back(lamp);
+  }
+  if (map.lamps.empty() && !room.empty()) {
+    throw InputError(
+        file, "has no lamp with 'room: " + room + "': name another room, or correct the map");
   }
   if (map.lamps.empty()) throw list.error("holds no lamp");
   return map;

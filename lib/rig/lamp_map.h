@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "lamp_shape.h"
@@ -40,6 +41,12 @@ struct LampMap {
 /// Throws InputError: unknown or missing keys, an id that stands twice, two lamps within 1 mm,
 /// figures that cannot be in the right unit.
 LampMap read_lamp_map(const std::filesystem::path& file);
+
+/// Reads the lamps of one room of a map whose lamps state a `room`, such as
+///   - {id: 1, room: hall, position_m: [0.5, -0.3, 2.1], diameter_m: 0.18, frequency_hz: 2000}
+/// The frequencies of two rooms may be equal. An empty `room` reads all lamps. Throws InputError as
+/// above, and if no lamp is in the room.
+LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string& room);
 
 /// Writes what read_lamp_map() reads, whole or not at all. Throws InputError.
 void write_lamp_map(const std::filesystem::path& file, const LampMap& map);

@@ -178,7 +178,7 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
   seen.images = std::move(first.images);
   seen.notes.insert(seen.notes.end(), first.notes.begin(), first.notes.end());
   seen.warnings.insert(seen.warnings.end(), first.warnings.begin(), first.warnings.end());
-  check_lamps_seen(images.images, seen);
+  check_lamps_seen(images, seen);
   input.frames = kept_frames(seen.images);
   const LampIntake without_pictures = intake.with_annotate({});
   std::map<std::string, Observation> latest;

@@ -139,6 +139,7 @@ class SessionRun {
 
   fs::path out(const std::string& name) const { return results_.file(name); }
   fs::path lamps_file() const { return session_.lamps(); }
+  LampMap read_lamps() const { return read_lamps_of_room(lamps_file(), options_.frontend.room); }
 
   std::string without_folder(std::string text) const {
     return vlp::without_folder(vlp::without_folder(std::move(text), session_.path()),
@@ -177,7 +178,7 @@ class SessionRun {
   }
 
   std::string key_of(const std::vector<fs::path>& inputs, const std::string& options) {
-    std::string text = build_ + "\n" + options + "\n";
+    std::string text = build_ + "\n" + options + "\n" + options_.frontend.room + "\n";
     for (const fs::path& input : inputs) {
       if (input.empty()) continue;
       text += input.filename().string() + " ";
@@ -309,7 +310,7 @@ class SessionRun {
 
   bool find_row_time(const fs::path& camera_file) {
     return step("row-time", {session_.rotation(), lamps_file(), camera_file}, "", [&] {
-      const LampMap lamps = read_lamp_map(lamps_file());
+      const LampMap lamps = read_lamps();
       const Calibration camera = read_calibration(camera_file);
       FrontendOptions options = options_.frontend;
       options.readout.reset();
@@ -396,8 +397,7 @@ class SessionRun {
   bool find_rotation(const fs::path& camera_file) {
     const auto inputs = lamp_inputs(session_.rotation(), camera_file);
     return step("rotation", inputs, picture_setting(), [&] {
-      LampCaptures captures{
-          {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(camera_file)};
+      LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(camera_file)};
       StepResult remarks;
       Observations seen;
       // Inclinations are ignored: the axis is level.
@@ -419,8 +419,7 @@ class SessionRun {
     const fs::path folder = *session_.dispersion(), rotated = out("rotated.yaml");
     const auto inputs = lamp_inputs(folder, rotated);
     return step("dispersion", inputs, picture_setting(), [&] {
-      LampCaptures captures{
-          {}, read_lamp_map(lamps_file()), lamps_file(), read_calibration(rotated)};
+      LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(rotated)};
       StepResult remarks;
       Observations seen;
       if (!observe(folder, ImageUse::places, captures, rotated, seen, remarks))
@@ -532,8 +531,7 @@ class SessionRun {
     const std::string name = folder.filename().string();
     const fs::path calibration = out("calibration.yaml");
     return step(name, lamp_inputs(folder, calibration), "", [&] {
-      LocateInput input{
-          {}, read_lamp_map(lamps_file()), read_calibration(calibration), captures_table(folder)};
+      LocateInput input{{}, read_lamps(), read_calibration(calibration), captures_table(folder)};
       input.lamp_offsets = session_.check() == folder;
       const LampImages images{folder, input.lamps, lamps_file(), input.calibration, calibration};
       LocateResult found =
@@ -600,18 +598,18 @@ class SessionRun {
     if (std::string outliers = describe_check_outliers(errors); !outliers.empty()) {
       found.warnings.push_back(std::move(outliers));
     }
-    return {found, [=, this] {
-              write_file(out("evaluation.json"), json_of(found.evaluation, found.gates));
-              if (!options_.report) return;
-              Report page;
-              page.gates = result_.gates;
-              page.gates.insert(page.gates.end(), found.gates.begin(), found.gates.end());
-              page.calibration = result_.calibration;
-              page.pictures = pictures();
-              page.evaluation = history("", inputs);
-              write_file(out("report.html"),
-                         report_page({*input, found, read_lamp_map(lamps_file()), drives, page}));
-            }};
+    return {
+        found, [=, this] {
+          write_file(out("evaluation.json"), json_of(found.evaluation, found.gates));
+          if (!options_.report) return;
+          Report page;
+          page.gates = result_.gates;
+          page.gates.insert(page.gates.end(), found.gates.begin(), found.gates.end());
+          page.calibration = result_.calibration;
+          page.pictures = pictures();
+          page.evaluation = history("", inputs);
+          write_file(out("report.html"), report_page({*input, found, read_lamps(), drives, page}));
+        }};
   }
 
   std::vector<ReportPicture> pictures() const {

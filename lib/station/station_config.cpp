@@ -223,7 +223,9 @@ StationConfig read_station(const fs::path& file) {
   if (config.board.has_squares()) {
     throw board.error("is a board of squares: the station looks for one of AprilTags");
   }
-  config.lamps = read_lamp_map(files(document.required("lamps")));
+  const auto room = document.optional("room");
+  config.lamps =
+      read_lamps_of_room(files(document.required("lamps")), room ? room->text() : std::string());
   if (const auto place = document.optional("dispersion_station_m")) {
     config.dispersion_station_m = Eigen::Vector2d(place->numbers(2).data());
   }

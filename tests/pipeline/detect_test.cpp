@@ -8,6 +8,7 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <string>
 
 #include "captures/csv_reader.h"
@@ -35,6 +36,34 @@ class Detect : public testing::Test {
   }
   const TemporaryFolder folder;
 };
+
+/// Two rooms with the same frequencies in one map.
+TEST_F(Detect, IdentifiesTheLampsOfTheRoomThatIsNamed) {
+  std::istringstream lines(TemporaryFolder::content_of(kRig + "/lamps.yaml"));
+  std::string lamps;
+  int id = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const auto begin = line.find("id: ");
+    if (begin == std::string::npos) continue;
+    ++id;
+    const std::string shape = line.substr(line.find("diameter_m"));
+    lamps += line.insert(begin, "room: hall, ") + "\n  - {room: office, id: 90" +
+             std::to_string(id) + ", position_m: [9, " + std::to_string(id) + ", 1.6], " + shape +
+             "\n";
+  }
+  const auto file = folder.file("rooms.yaml", "format: vlp-lamps/1\nlamps:\n" + lamps);
+  const auto detect_in = [&](const std::string& room) {
+    return run_program("vlp-detect '" + kRig + "/sample' --lamps " + file.string() +
+                       " --calibration " + kRig + "/true_calibration.yaml -o " +
+                       (folder / "rooms.csv").string() + room);
+  };
+  const auto unknown = detect_in("");
+  EXPECT_EQ(unknown.exit_code, 3);
+  EXPECT_THAT(unknown.errors, testing::AllOf(HasSubstr("lamps 1 and 901, "),
+                                             HasSubstr("add the key room to each lamp")));
+  EXPECT_EQ(detect_in(" --room hall").exit_code, 0);
+  EXPECT_EQ(detect_in(" --room attic").exit_code, 2);
+}
 
 TEST_F(Detect, FindsWhatLocateTurnsIntoTheTruePlace) {
   ASSERT_EQ(detect(kRig + "/sample").exit_code, 0);

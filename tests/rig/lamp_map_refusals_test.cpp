@@ -31,7 +31,7 @@ TEST(LampMapRefusals, NameLineAndKeyOfAMissingKey) {
 TEST(LampMapRefusals, NameLineAndKeyOfAnUnknownKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], position_mm: [0, 0, 2000]"),
             "lamps.yaml:3: lamps[0]: key 'position_mm' is unknown here; the keys are: id, "
-            "position_m, shape, diameter_m, size_m, yaw_rad, frequency_hz, duty, sd_m");
+            "position_m, shape, diameter_m, size_m, yaw_rad, frequency_hz, duty, sd_m, room");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nunits: mm\nlamps: []\n"),
             "lamps.yaml:2: key 'units' is unknown here; the keys are: format, sd_m, lamps");
 }

@@ -10,6 +10,7 @@
 
 #include "rig/find_lamp.h"
 #include "rig/samples.h"
+#include "support/refused.h"
 
 namespace vlp {
 namespace {
@@ -39,6 +40,21 @@ lamps:
   EXPECT_EQ(map.lamps[1].sd_m, 0.01);
   write_lamp_map(folder / "written.yaml", map);
   expect_same(read_lamp_map(folder / "written.yaml"), map);
+}
+
+TEST(ReadLampsOfRoom, ReturnsLampsOfOneRoom) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("lamps.yaml", R"(format: vlp-lamps/1
+lamps:
+  - {id: 1, room: hall, position_m: [0.5, -0.3, 2.1], frequency_hz: 2000}
+  - {id: 7, room: office, position_m: [9.5, -0.3, 2.1], frequency_hz: 2000}
+)");
+  const LampMap hall = read_lamps_of_room(file, "hall");
+  ASSERT_EQ(hall.lamps.size(), 1U);
+  EXPECT_EQ(hall.lamps[0].id, 1);
+  EXPECT_EQ(read_lamp_map(file).lamps.size(), 2U);
+  EXPECT_THAT(refusal_of([&] { read_lamps_of_room(file, "attic"); }),
+              HasSubstr("has no lamp with 'room: attic'"));
 }
 
 TEST(LampMap, HasDiscsAndRectangles) {

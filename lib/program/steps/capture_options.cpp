@@ -69,6 +69,12 @@ void check_every(int every, const std::vector<std::string>& files) {
   throw std::invalid_argument("--every is for videos, and there is none");
 }
 
+void add_room_option(CLI::App& app, std::string& room) {
+  app.add_option("--room", room,
+                 "Room of the lamp map whose lamps are meant, as its lamps have it in the key "
+                 "room (default: all lamps)");
+}
+
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {
   app.add_option("--max-mpx", max_mpx,
                  "Skip images of more than so many million pixels, unread (default: 200)")
@@ -88,6 +94,7 @@ void add_board_limit_options(CLI::App& app, FrontendOptions& options) {
 }
 
 void add_detect_options(CLI::App& app, CaptureOptions& options) {
+  add_room_option(app, options.frontend.room);
   app.add_option("--classifier", options.frontend.classifier,
                  "Lamp classifier by vlp-train, instead of the map's frequencies");
   app.add_option("--annotate", options.frontend.annotate,
@@ -168,8 +175,10 @@ Observations observe_captures(const CaptureOptions& options, ImageUse use, const
 }
 
 LampCaptures read_captures_of(const CaptureOptions& options, ImageUse use) {
-  LampCaptures captures{
-      {}, read_lamp_map(options.lamps), options.lamps, read_calibration(options.calibration)};
+  LampCaptures captures{{},
+                        read_lamps_of_room(options.lamps, options.frontend.room),
+                        options.lamps,
+                        read_calibration(options.calibration)};
   const std::optional<Readout>& readout = options.frontend.readout;
   if (readout) captures.calibration.camera.readout = readout;
   captures.frames =

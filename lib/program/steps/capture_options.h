@@ -55,13 +55,16 @@ void add_every_option(CLI::App& app, int& every);
 /// Throws std::invalid_argument when `every` is asked of files among which there is no video.
 void check_every(int every, const std::vector<std::string>& files);
 
+/// Adds --room.
+void add_room_option(CLI::App& app, std::string& room);
+
 /// Adds --max-mpx.
 void add_max_mpx_option(CLI::App& app, double& max_mpx);
 
 /// Adds --max-blur-px and --max-white-fraction, the limits of board images.
 void add_board_limit_options(CLI::App& app, FrontendOptions& options);
 
-/// Adds --classifier, --annotate, --readout, --exposure-s, --max-mpx and --threads.
+/// Adds --room, --classifier, --annotate, --readout, --exposure-s, --max-mpx and --threads.
 void add_detect_options(CLI::App& app, CaptureOptions& options);
 
 /// How cameras move while their images are read.

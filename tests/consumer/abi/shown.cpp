@@ -69,6 +69,7 @@ struct Functions {
   decltype(&lens_model_names) lens_names = &lens_model_names;
   decltype(&parameter_count) parameters = &parameter_count;
   decltype(&read_lamp_map) read_map = &read_lamp_map;
+  decltype(&read_lamps_of_room) read_room = &read_lamps_of_room;
   decltype(&write_lamp_map) write_map = &write_lamp_map;
   decltype(&world_from_shape) from_shape = &world_from_shape;
   decltype(&outline_of) outline = &outline_of;
