@@ -13,9 +13,14 @@ std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::Vector
   const Eigen::MatrixXd lower = factor.matrixL();
   Eigen::MatrixXd moved(lower.cols(), exact.size());
   for (Eigen::Index i = 0; i < lower.cols(); ++i) {
-    const auto by_one = solved(lower.col(i));
+    double fraction = 1;
+    auto by_one = solved(lower.col(i));
+    if (!by_one) {
+      fraction = 1.0 / 16;
+      by_one = solved(fraction * lower.col(i));
+    }
     if (!by_one) return {};
-    moved.row(i) = (*by_one - exact).transpose();
+    moved.row(i) = (*by_one - exact).transpose() / fraction;
   }
   // J L = moved'.
   const MatrixX jacobian = factor.matrixU().solve(moved).transpose();

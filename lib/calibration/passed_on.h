@@ -20,8 +20,11 @@ using SolvedWith = std::function<std::optional<Eigen::VectorXd>(const Eigen::Vec
 /// Cholesky factor L of the errors' covariance,
 ///   J = (f(L_1) - f(0), f(L_2) - f(0), ...) L^-1,
 /// so that errors are tried as large as they are, and those that are known only together, as
-/// coefficients of a lens are, move together. Nothing where a solve finds nothing or the covariance
-/// is not positive definite. exact: f(0).
+/// coefficients of a lens are, move together. A column that has no solution is tried once more at a
+/// sixteenth of its size: a solve may select other data at a larger error. Returns std::nullopt if
+/// that has none either, or if the covariance is not positive definite.
+///
+/// @param exact  f(0)
 std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::VectorXd& exact,
                                    const MatrixX& covariance);
 

@@ -77,7 +77,8 @@ void pass_on_lens(
       "vlp-adjust states them");
 }
 
-/// The same, where the captures that it was estimated from stay what they are.
+/// Passes on the lens's errors through a fit of the same sightings: a fit that leaves out others
+/// differs by more than the lens does.
 void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMethod method) {
   const auto center_with = [&](const Camera& camera) -> std::optional<RotationCenter> {
     const SpotCaptures spot = spot_captures(input.frames, input.lamps, camera);
@@ -86,7 +87,8 @@ void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMet
       return {};
     }
     const RotationFit fit = fit_of(spot, camera, method);
-    return fit.converged ? std::optional(fit.center) : std::nullopt;
+    if (!fit.converged || fit.used_sightings != result.fit.used_sightings) return {};
+    return fit.center;
   };
   pass_on_lens(result.fit.center, input, center_with, result);
 }

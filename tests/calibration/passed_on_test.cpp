@@ -60,6 +60,17 @@ TEST(JacobianOf, OfACurveIsTheChordOverOneStandardDeviation) {
   EXPECT_EQ((*found)(1, 0), 0);
 }
 
+/// The solve has another answer, or none, beyond half a standard deviation.
+TEST(JacobianOf, TriesASmallerErrorWhereASolveHasNoResult) {
+  const auto solved = [](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
+    if (error.norm() > 0.05) return {};
+    return Eigen::VectorXd(3 * error);
+  };
+  const auto found = jacobian_of(solved, Eigen::Vector2d(0, 0), 0.01 * MatrixX::Identity(2, 2));
+  ASSERT_TRUE(found);
+  EXPECT_THAT(*found, IsNear(3 * Eigen::Matrix2d::Identity(), 1e-12));
+}
+
 TEST(JacobianOf, IsNothingWhereASolveFindsNothingOrTheCovarianceIsNone) {
   const auto nothing = [](const Eigen::VectorXd& error) {
     return error[2] != 0 ? std::nullopt : std::optional<Eigen::VectorXd>(Eigen::Vector2d(0, 0));

@@ -178,7 +178,8 @@ bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& poi
 /// Circles of all lamps at one height.
 struct HeightCircles {
   std::vector<LampCircle> circles;
-  std::vector<std::vector<Eigen::Vector2d>> points;
+  /// Of each circle, without outliers.
+  std::vector<Trace> traces;
   std::vector<SpotOutlier> outliers;
   /// Lamps with three sightings or more and no circle.
   int without_circle = 0;
@@ -198,7 +199,7 @@ HeightCircles fit_circles(const SpotCaptures& spot, std::size_t height, double f
     }
     const double count = static_cast<double>(trace.points.size());
     result.circles.push_back({lamp, height, *fit});
-    result.points.push_back(std::move(trace.points));
+    result.traces.push_back(std::move(trace));
     result.squares += fit->rms * fit->rms * count;
     result.freedom += count - 3;
   }
@@ -240,14 +241,20 @@ CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera)
   double squares = 0, freedom = 0;
   for (const HeightCircles& height : heights) {
     std::vector<LampCircle> determined;
+    std::vector<std::size_t> sightings;
     for (std::size_t i = 0; i < height.circles.size() && noise; ++i) {
       const LampCircle& circle = height.circles[i];
-      if (is_determined(circle.fit.circle, height.points[i], *noise)) determined.push_back(circle);
+      const Trace& trace = height.traces[i];
+      if (!is_determined(circle.fit.circle, trace.points, *noise)) continue;
+      determined.push_back(circle);
+      sightings.insert(sightings.end(), trace.sightings.begin(), trace.sightings.end());
     }
     const int undetermined =
         height.without_circle + static_cast<int>(height.circles.size() - determined.size());
     result.undetermined += undetermined;
     if (std::ssize(determined) <= undetermined) continue;
+    result.mean.used_sightings.insert(result.mean.used_sightings.end(), sightings.begin(),
+                                      sightings.end());
     result.circles.insert(result.circles.end(), determined.begin(), determined.end());
     result.mean.outliers.insert(result.mean.outliers.end(), height.outliers.begin(),
                                 height.outliers.end());

@@ -40,8 +40,10 @@ void describe(RotationFit& result, const RobustFit& fit, const SpotCaptures& spo
     result.outliers.push_back({i, fit.lengths()[i] * spot.sightings[i].sigma_px});
   }
   double squares = 0;
+  result.used_sightings.reserve(out.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     if (out[i]) continue;
+    result.used_sightings.push_back(i);
     squares += std::pow(fit.lengths()[i] * spot.sightings[i].sigma_px, 2);
   }
   const int freedom = fit.degrees_of_freedom();

@@ -34,6 +34,8 @@ struct RotationFit {
   /// many are measured as are unknown.
   double residual_px = 0;
   std::vector<SpotOutlier> outliers = {};
+  /// Sightings that the centre is computed from, as indices in SpotCaptures::sightings.
+  std::vector<std::size_t> used_sightings = {};
 };
 
 /// How far a camera leans, and towards where in its image up is: from x to y.

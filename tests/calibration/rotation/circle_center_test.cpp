@@ -89,22 +89,33 @@ TEST(CircleCenter, LeavesOutAPointThatIsWrong) {
   const SpotObservation& outlier = spot.sightings[found.mean.outliers[0].sighting];
   EXPECT_EQ(spot.captures[outlier.capture].image, "3.png");
   EXPECT_EQ(spot.lamps[outlier.lamp].id, frames[3].detections[2].lamp);
+  EXPECT_EQ(found.mean.used_sightings.size(), spot.sightings.size() - 1);
+}
+
+/// Returns frames of a camera at these yaws and one height, with noise of 0.3 px.
+std::vector<Frame> frames_at(SpotScene scene, const std::vector<double>& yaws_rad, double height_m,
+                             Random& random) {
+  scene.captures = 1;
+  scene.heights_m = {height_m};
+  std::vector<Frame> frames;
+  for (const double yaw_rad : yaws_rad) {
+    scene.first_rad = yaw_rad;
+    Frame frame = with_noise(scene.frames(0.3), random).front();
+    frame.image = std::to_string(height_m) + "-" + std::to_string(frames.size());
+    frames.push_back(std::move(frame));
+  }
+  return frames;
 }
 
 /// Returns captures of a level camera at these yaws, with noise of 0.3 px.
 SpotCaptures captures_at(const std::vector<double>& yaws_rad, bool noise_is_stated,
                          Random& random) {
-  SpotScene scene;
-  scene.captures = 1;
-  std::vector<Frame> frames;
-  for (const double yaw_rad : yaws_rad) {
-    scene.first_rad = yaw_rad;
-    Frame frame = with_noise(scene.frames(0.3), random).front();
-    frame.image = std::to_string(frames.size());
+  const SpotScene scene;
+  std::vector<Frame> frames = frames_at(scene, yaws_rad, 0, random);
+  for (Frame& frame : frames) {
     for (Detection& detection : frame.detections) {
       if (!noise_is_stated) detection.sigma_px.reset();
     }
-    frames.push_back(std::move(frame));
   }
   SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
   EXPECT_EQ(spot.status, SpotStatus::ok);
@@ -128,6 +139,53 @@ TEST(CircleCenter, DoesNotConvergeAtTwoOppositeYaws) {
         EXPECT_GT(found.undetermined, 0);
       }
     }
+  }
+}
+
+/// Two places of a lamp determine no circle for a tilted camera either.
+TEST(CircleCenter, DoesNotConvergeAtTwoOppositeYawsOfATiltedCamera) {
+  constexpr int draws = 25;
+  Random random(33);
+  const SpotScene scene = tilted_scene();
+  for (int i = 0; i < draws; ++i) {
+    const double yaw_rad = random.uniform(-M_PI, M_PI);
+    std::vector<double> yaws_rad;
+    for (int k = 0; k < 12; ++k) yaws_rad.push_back(yaw_rad + k % 2 * M_PI);
+    const SpotCaptures spot =
+        spot_captures(frames_at(scene, yaws_rad, 0, random), scene.map, scene.camera);
+    ASSERT_EQ(spot.status, SpotStatus::ok);
+    EXPECT_FALSE(fit_circle_centers(spot, scene.camera).mean.converged) << "draw " << i;
+  }
+}
+
+/// Of two heights, one with captures at two opposite yaws alone, the other one is used.
+TEST(CircleCenter, LeavesOutAHeightWithTwoOppositeYaws) {
+  constexpr int draws = 25;
+  Random random(34);
+  const SpotScene scene;
+  for (int i = 0; i < draws; ++i) {
+    const double yaw_rad = random.uniform(-M_PI, M_PI);
+    std::vector<double> all, opposite;
+    for (int k = 0; k < 8; ++k) {
+      all.push_back(yaw_rad + k * M_PI / 4);
+      opposite.push_back(yaw_rad + k % 2 * M_PI);
+    }
+    const std::vector<Frame> below = frames_at(scene, all, 0, random);
+    std::vector<Frame> both = below;
+    for (Frame& frame : frames_at(scene, opposite, 0.3, random)) both.push_back(std::move(frame));
+    const SpotCaptures spot_below = spot_captures(below, scene.map, scene.camera);
+    const SpotCaptures spot_both = spot_captures(both, scene.map, scene.camera);
+    ASSERT_EQ(spot_below.status, SpotStatus::ok);
+    ASSERT_EQ(spot_both.status, SpotStatus::ok);
+    ASSERT_EQ(spot_both.heights.size(), 2U);
+    const CircleCenters expected = fit_circle_centers(spot_below, scene.camera);
+    const CircleCenters found = fit_circle_centers(spot_both, scene.camera);
+    ASSERT_TRUE(expected.mean.converged);
+    ASSERT_TRUE(found.mean.converged);
+    EXPECT_THAT(found.mean.center.center_px, IsNear(expected.mean.center.center_px, 1e-9));
+    EXPECT_EQ(found.circles.size(), expected.circles.size());
+    EXPECT_EQ(found.mean.used_sightings, expected.mean.used_sightings);
+    EXPECT_GT(found.undetermined, 0);
   }
 }
 
