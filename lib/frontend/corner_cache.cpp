@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 std::string settings_of(const Board& board) {
   std::string settings =
-      fmt::format("10 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
+      fmt::format("11 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
                   board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
                   board.border_bits, board.corner_squares, board.first_id, name_of(board.id_order));
   if (board.has_squares()) {

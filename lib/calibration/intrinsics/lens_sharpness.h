@@ -24,7 +24,8 @@ double mtf50_from_blur(double sigma_px);
 std::optional<double> mtf50_of_view(const SeenBoard& seen);
 
 /// Sharpness and contrast of lens and pixel together over the image, from the steps of the light
-/// across the edges of tags (slanted edges as in ISO 12233, with the line spread of a Gaussian).
+/// across the edges of tags (slanted edges as in ISO 12233). The line spread is that of a Gaussian
+/// with an excess kurtosis.
 ///
 /// Each part of the image has the lower quartile of the blurs of the views there, so that a shaken
 /// image or one out of focus does not count as a bad lens.

@@ -30,11 +30,15 @@ struct BlurredStep {
     value = erf.value;
     slope = erf.slope * blur.per_scale;
     by_blur = -distance_px * blur.per_px * slope;
+    const double u = distance_px * blur.per_px;
+    by_kurtosis = (3 - u * u) / 24 * distance_px * slope;
   }
 
   double value;
-  /// Derivatives by the distance and by the blur.
-  double slope, by_blur;
+  /// Derivatives by the distance, by the blur and by the excess kurtosis k of the line spread
+  ///   exp(-u^2 / 2) (1 + k (u^4 - 6 u^2 + 3) / 24) / (sqrt(2 pi) blur),     u = distance / blur,
+  /// at k = 0 (Gram-Charlier series).
+  double slope, by_blur, by_kurtosis;
 };
 
 }  // namespace vlp

@@ -32,11 +32,11 @@ struct EdgeBow {
   bool operator==(const EdgeBow&) const = default;
 };
 
-/// Step of the light across an edge of a tag: sigma of the Gaussian blur of lens and pixel
-/// together, and the light on both sides in the middle of the edge, in levels behind no tone curve.
-/// A blur of 0 is unknown.
-/// The blur is accurate to 3 % from 0.5 to 1.5 px if the stripe inside the edge is three blurs
-/// wide, and 4 % too small at 2 px. In narrower stripes it is smaller still.
+/// Step of the light across an edge of a tag: blur of lens and pixel together, as the sigma of the
+/// Gaussian that has the same MTF50, and the light on both sides in the middle of the edge, in
+/// levels behind no tone curve. A blur of 0 is unknown.
+/// The blur is accurate to 3 % from 0.5 to 2 px, also of a disc of defocus, if the stripe inside
+/// the edge is three blurs wide. In narrower stripes it is too small.
 struct EdgeStep {
   double blur_px = 0, dark = 0, bright = 0;
 

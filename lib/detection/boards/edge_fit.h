@@ -68,6 +68,9 @@ struct EdgeFit {
   /// Of where an end is across the edge, in the mean of both, by noise of one level and with the
   /// bow known, in px^2.
   double end_variance = 0;
+  /// Sigma of the Gaussian whose MTF50 is that of the step, in px: the line spread may be flatter
+  /// or more peaked than a Gaussian.
+  double equivalent_blur_px = 0;
   /// Of blur and bright_light, by noise of one level; of edges behind no curve, and not over
   /// white, 0 for that they are well known.
   double blur_variance = 0, bright_variance = 0;

@@ -32,12 +32,12 @@ struct Behind {
 
   double stripe_px(double w) const { return start_px + by_along_px * w; }
 
-  double white_at(double w, double half_px) const {
-    const Blur along_edge(0.8);  // about; it is not solved for
+  double white_at(double w, const EdgeCurve& edge) const {
+    const Blur along_edge(edge.blur_px);  // about; it is not solved for
     double sum = 0;
     for (const auto& [from, to] : white) {
-      sum += BlurredStep((w - from) * half_px, along_edge).value -
-             BlurredStep((w - to) * half_px, along_edge).value;
+      sum += BlurredStep((w - from) * edge.half_px, along_edge).value -
+             BlurredStep((w - to) * edge.half_px, along_edge).value;
     }
     return sum / 2;
   }
@@ -48,9 +48,10 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
                                      const std::array<EdgeCurve, 4>& roughly, std::size_t k,
                                      const Behind& behind, const Band& band) {
   // Of the edges beside it, which are as blurred; so the corners, which are round, are away.
-  constexpr double free_px = 2.5;
+  constexpr double free_blurs = 3.125;
   const EdgeCurve &edge = roughly[k], &next = roughly[(k + 1) % 4],
                   &previous = roughly[(k + 3) % 4];
+  const double free_px = free_blurs * edge.blur_px;
   const double reach_px = std::max(band.inside_px, band.outside_px) + edge.coefficients.lpNorm<1>();
   const Eigen::Vector2d wide =
       edge.along.cwiseAbs() * edge.half_px + edge.across.cwiseAbs() * reach_px;
@@ -66,7 +67,7 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
       if (off < -band.inside_px || off > band.outside_px) continue;
       if (next.off(at) > -free_px || previous.off(at) > -free_px) continue;
       pixels.push_back({w, v, static_cast<double>(image(row, column)), behind.stripe_px(w),
-                        behind.white_at(w, edge.half_px)});
+                        behind.white_at(w, edge)});
     }
   }
   return pixels;
@@ -149,6 +150,15 @@ double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCur
   return most_px;
 }
 
+/// Blur of edges before it is known, and the least that is assumed of them.
+constexpr double kMinRoughBlur_px = 0.8;
+
+/// Returns true if the edges are more blurred than is assumed at first, by a half or more.
+bool is_more_blurred(const std::array<EdgeCurve, 4>& edges) {
+  return std::any_of(edges.begin(), edges.end(),
+                     [](const EdgeCurve& edge) { return edge.blur_px > 1.5 * kMinRoughBlur_px; });
+}
+
 EdgePrior without_curve(const EdgeCurve&) { return {}; }
 
 /// From the sides of the quad, which libapriltag has.
@@ -179,10 +189,14 @@ TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& p
   look_beside(image, band);
   fit(without_curve);
   // A wide lens bends an edge out of a band along the quad's side, which ends beside the corners.
-  for (int round = 0; round < most_rounds && found_ && bow_px_ > bent_px; ++round) {
-    if (round > 0 && difference_px(edges_, roughly_) < settled_px) break;
+  // A large blur rounds more of the corners.
+  for (int round = 0; round < most_rounds && found_; ++round) {
+    const bool is_bent =
+        bow_px_ > bent_px && (round == 0 || difference_px(edges_, roughly_) >= settled_px);
+    if (!is_bent && !(round == 0 && is_more_blurred(edges_))) break;
     for (EdgeCurve& edge : edges_) {
       edge.cubic = edge.cubic || std::abs(edge.coefficients[2]) > no_parabola_px;
+      edge.blur_px = std::max(edge.blur_px, kMinRoughBlur_px);
     }
     roughly_ = edges_;
     look_beside(image, band);
@@ -259,7 +273,7 @@ SeenTag::Steps TagEdges::steps() const {
   SeenTag::Steps steps;
   for (std::size_t k = 0; found_ && k < steps.size(); ++k) {
     const EdgeFit& fit = fits_[k];
-    if (!fit.runs_over) steps[k] = {edges_[k].blur_px, fit.dark_light, fit.bright_light};
+    if (!fit.runs_over) steps[k] = {fit.equivalent_blur_px, fit.dark_light, fit.bright_light};
   }
   return steps;
 }

@@ -38,5 +38,23 @@ TEST(BlurredStep, HasTheSlopesOfDifferences) {
   }
 }
 
+/// The integral of the term of the Gram-Charlier series, by the midpoint rule.
+TEST(BlurredStep, HasTheDerivativeByTheKurtosisOfTheLineSpread) {
+  constexpr int intervals = 4000;
+  for (const double distance_px : {-2.0, -0.3, 0.7, 3.0}) {
+    for (const double blur_px : {0.3, 0.8, 2.0}) {
+      const double end = distance_px / blur_px;
+      double integral = 0;
+      for (int i = 0; i < intervals; ++i) {
+        const double u = end * (i + 0.5) / intervals;
+        integral += std::exp(-u * u / 2) * (std::pow(u, 4) - 6 * u * u + 3) / 24;
+      }
+      integral *= end / intervals / std::sqrt(2 * std::numbers::pi);
+      const BlurredStep step(distance_px, Blur(blur_px));
+      EXPECT_NEAR(step.by_kurtosis, 2 * integral, 1e-6) << distance_px << ", " << blur_px;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace vlp

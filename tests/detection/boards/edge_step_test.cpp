@@ -89,7 +89,7 @@ TEST(EdgeSteps, HaveMtf50OfRenderedBlur) {
     ASSERT_GT(found.edges, 50U) << sigma_px;
     const double truth =
         solve_mtf50([&](double f) { return gaussian_transfer(sigma_px, f) * pixel_transfer(f); });
-    EXPECT_NEAR(found.mtf50 / truth, 1, sigma_px > 1.5 ? 0.05 : 0.03) << sigma_px;
+    EXPECT_NEAR(found.mtf50 / truth, 1, 0.03) << sigma_px;
     RecordProperty("mtf50_ratio_" + std::to_string(int(10 * sigma_px)),
                    std::to_string(found.mtf50 / truth));
   }
@@ -106,8 +106,7 @@ TEST(EdgeSteps, HaveMtf50OfDefocus) {
       const double disc = x < 1e-9 ? 1 : 2 * std::cyl_bessel_j(1.0, x) / x;
       return gaussian_transfer(scene.optics.blur_px, f) * pixel_transfer(f) * disc;
     });
-    // A disc is no Gaussian.
-    EXPECT_NEAR(found.mtf50 / truth, 1, 0.06) << radius_px;
+    EXPECT_NEAR(found.mtf50 / truth, 1, 0.03) << radius_px;
     RecordProperty("mtf50_ratio_" + std::to_string(int(10 * radius_px)),
                    std::to_string(found.mtf50 / truth));
   }
@@ -122,7 +121,7 @@ TEST(EdgeSteps, HaveMtf50BehindToneCurve) {
     ASSERT_GT(found.edges, 100U) << sigma_px;
     const double truth =
         solve_mtf50([&](double f) { return gaussian_transfer(sigma_px, f) * pixel_transfer(f); });
-    EXPECT_NEAR(found.mtf50 / truth, 1, sigma_px > 1.5 ? 0.05 : 0.03) << sigma_px;
+    EXPECT_NEAR(found.mtf50 / truth, 1, 0.03) << sigma_px;
     RecordProperty("mtf50_ratio_" + std::to_string(int(10 * sigma_px)),
                    std::to_string(found.mtf50 / truth));
   }
