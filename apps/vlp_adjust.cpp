@@ -94,7 +94,9 @@ void run(const CLI::App& app, const Options& options) {
   const AdjustStepResult result = solve_adjustment(input, history_entry(app, inputs));
   tell(result);
   require(result);
-  if (input.refine_map) write_lamp_map(options.refined_map, result.found.refined);
+  if (input.refine_map) {
+    write_refined_map(options.refined_map, result.found.refined, images.frontend.room);
+  }
   write_calibration(images.output, result.calibration);
   const auto& report = input.calibration.intrinsics_report;
   const bool lens_stated = input.lens_sd_px || (report && report->covariance);

@@ -45,18 +45,35 @@ class Adjust : public testing::Test {
   }
 
   ProgramResult adjust(const std::string& options) {
-    rig.calibration.rotation_center.reset();
     write_lamp_map(folder / "lamps.yaml", rig.map);
+    return adjust_with_map("lamps.yaml", options);
+  }
+  ProgramResult adjust_with_map(const char* map, const std::string& options) {
+    rig.calibration.rotation_center.reset();
     write_calibration(folder / "camera.yaml", rig.calibration);
     write_detections(folder / "detections.csv", frames);
     folder.file("captures.csv", captures);
     const auto path = [&](const char* name) { return (folder / name).string() + " "; };
-    return run_program("vlp-adjust " + path("detections.csv") + "--lamps " + path("lamps.yaml") +
+    return run_program("vlp-adjust " + path("detections.csv") + "--lamps " + path(map) +
                        "--calibration " + path("camera.yaml") + "-o " + path("adjusted.yaml") +
                        options);
   }
   std::string refined() { return "--refine-map " + (folder / "refined.yaml").string(); }
 };
+
+TEST_F(Adjust, RefinesTheMapOfOneRoom) {
+  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
+  write_lamp_map(folder / "lamps.yaml", rig.map);
+  std::string lamps = TemporaryFolder::content_of(folder / "lamps.yaml");
+  for (std::size_t at = 0; (at = lamps.find("{id: ", at)) != std::string::npos; at += 20) {
+    lamps.insert(at + 1, "room: hall, ");
+  }
+  folder.file("rooms.yaml", lamps + "  - {room: office, id: 901, position_m: [9, 9, 1.6]}\n");
+  const ProgramResult result = adjust_with_map("rooms.yaml", refined() + " --room hall");
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("has the lamps of room hall alone: use it without --room"));
+  EXPECT_EQ(read_lamp_map(folder / "refined.yaml").lamps.size(), rig.map.lamps.size());
+}
 
 TEST_F(Adjust, CalibratesRefinesTheMapAndTellsFixesWhatTheyAreWorth) {
   const LampMap truth = rig.map;

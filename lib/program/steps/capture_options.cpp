@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "camera/lens_model.h"
+#include "captures/printable.h"
 #include "frontend/image_folder.h"
 #include "frontend/lights_table.h"
 #include "frontend/video.h"
@@ -73,6 +74,14 @@ void add_room_option(CLI::App& app, std::string& room) {
   app.add_option("--room", room,
                  "Room of the lamp map whose lamps are meant, as its lamps have it in the key "
                  "room (default: all lamps)");
+}
+
+void write_refined_map(const std::filesystem::path& file, const LampMap& map,
+                       const std::string& room) {
+  write_lamp_map(file, map);
+  if (room.empty()) return;
+  fmt::print("{} has the lamps of room {} alone: use it without --room\n", printable(file.string()),
+             printable(room));
 }
 
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {

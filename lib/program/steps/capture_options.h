@@ -58,6 +58,10 @@ void check_every(int every, const std::vector<std::string>& files);
 /// Adds --room.
 void add_room_option(CLI::App& app, std::string& room);
 
+/// Writes a corrected lamp map, and prints which lamps are in it if there is a `room`.
+void write_refined_map(const std::filesystem::path& file, const LampMap& map,
+                       const std::string& room);
+
 /// Adds --max-mpx.
 void add_max_mpx_option(CLI::App& app, double& max_mpx);
 

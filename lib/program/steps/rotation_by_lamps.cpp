@@ -69,7 +69,9 @@ void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOpti
       solve_levelling(input, !refined_map.empty(), history_entry(app, inputs));
   tell(result);
   require(result);
-  if (!refined_map.empty()) write_lamp_map(refined_map, result.levelling.map);
+  if (!refined_map.empty()) {
+    write_refined_map(refined_map, result.levelling.map, images.frontend.room);
+  }
   write_calibration(images.output, result.calibration);
   report(result.levelling, input.calibration.camera);
 }
