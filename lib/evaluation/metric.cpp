@@ -56,6 +56,10 @@ constexpr std::array kMetricKinds{
         Direction::at_most, 1},
     MetricKind{"rms_px", "px", MetricSource::lens, "residuals of the corners, rms per axis",
                "the board's corners do not fit the lens model"},
+    MetricKind{"board_print_px", "px", MetricSource::lens,
+               "change of projections by one standard deviation of the board's print (print_sd of "
+               "board.yaml), rms over the image",
+               "the board is not printed accurately enough"},
     MetricKind{"uncertainty_px", "px", MetricSource::lens,
                "worst standard deviation of a projection over the region where the lens is known",
                "the lens is not known well enough: other board views", Direction::at_most, kLargest,

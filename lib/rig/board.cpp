@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "rig/file.h"
 #include "rig/yaml_parts.h"
@@ -27,6 +28,7 @@ constexpr int kMostTags = 1000;
 constexpr int kLeastSquares = 4, kMostSquares = 100;
 constexpr int kLargestId = 1'000'000;  // families have fewer
 constexpr double kLeastTag_m = 1e-4, kLargestTag_m = 2;
+constexpr double kMaxPrintSd = 0.02;  // beyond, the board shows it (check_board())
 
 IdOrder read_id_order(const YamlValue& value) {
   std::string names;
@@ -129,6 +131,10 @@ Board read_kalibr_target(YamlMap& map) {
   return board;
 }
 
+void emit_print(YAML::Emitter& out, const Board& board) {
+  if (board.print_sd > 0) emit_number(out, "print_sd", board.print_sd);
+}
+
 }  // namespace
 
 std::string name_of(const IdOrder& order) {
@@ -158,6 +164,9 @@ Board read_board(const std::filesystem::path& file) {
   const bool kalibr = document.has("target_type");
   if (!kalibr) require_format(document, kBoardFormat);
   Board board = kalibr ? read_kalibr_target(document) : read_board(document);
+  if (const auto print_sd = kalibr ? std::nullopt : document.optional("print_sd")) {
+    board.print_sd = print_sd->number_within(0, kMaxPrintSd, "(relative)");
+  }
   document.finish();
   return board;
 }
@@ -177,6 +186,7 @@ void write_board(const std::filesystem::path& file, const Board& board) {
       emit_integer(out, "first_id", board.first_id);
       emit_word(out, "top_left", board.top_left_white ? "white" : "black");
     }
+    emit_print(out, board);
     out << YAML::EndMap << YAML::Newline;
     return write_file(file, out.c_str());
   }
@@ -189,6 +199,7 @@ void write_board(const std::filesystem::path& file, const Board& board) {
   emit_word(out, "corner_squares", board.corner_squares ? "true" : "false");
   emit_integer(out, "first_id", board.first_id);
   emit_word(out, "id_order", name_of(board.id_order));
+  emit_print(out, board);
   out << YAML::EndMap << YAML::Newline;
   write_file(file, out.c_str());
 }

@@ -50,13 +50,17 @@ struct Board {
   /// OpenCV before version 4.6 drew ("legacy pattern"). Ids go along the rows of white squares,
   /// from the top left.
   bool top_left_white = false;
+  /// Relative standard deviation of printed lengths along the board's width and along its height,
+  /// each by itself; 0 if it is not stated.
+  double print_sd = 0;
 
   bool has_squares() const { return kind != BoardKind::apriltags; }
 };
 
 /// Reads `vlp-board/1`: of a board of AprilTags every field up to id_order is a key of the same
 /// name, of a chessboard `kind`, `cols`, `rows` and `square_size_m`, of a ChArUco board these and
-/// `marker_size_m`, `dictionary`, `first_id?` (0) and `top_left?` (black, or white). Or the YAML
+/// `marker_size_m`, `dictionary`, `first_id?` (0) and `top_left?` (black, or white); of all
+/// `print_sd?`. Or the YAML
 /// file that Kalibr describes a target by: an AprilGrid (target_type, tagCols, tagRows, tagSize in
 /// m, tagSpacing, codeOffset), or a checkerboard (targetCols, targetRows: of corners;
 /// rowSpacingMeters, colSpacingMeters). Throws InputError.

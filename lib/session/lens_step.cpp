@@ -107,6 +107,7 @@ std::vector<Metric> lens_metrics(const LensEstimate& lens) {
                               {"views", static_cast<double>(lens.solution.views.size())},
                               {"board_tilt_deg", deg_from_rad(lens.coverage.tilt_rad)}};
   if (lens.report.halves) metrics.push_back({"halves_px", lens.report.halves->rms_px});
+  if (lens.print_px) metrics.push_back({"board_print_px", *lens.print_px});
   if (const auto& sharpness = lens.sharpness) {
     metrics.insert(metrics.end(), {{"mtf50", sharpness->mean_mtf50},
                                    {"mtf50_worst_ratio", sharpness->worst_ratio},

@@ -36,7 +36,8 @@ struct LensResult : StepResult {
 /// Failures: wrong_board, undetermined. Throws std::invalid_argument as BoardLattice does.
 LensResult solve_lens(LensInput input, HistoryEntry entry);
 
-/// Returns rms_px, uncertainty_px, halves_px, coverage, views, board_tilt_deg; with the edges of
+/// Returns rms_px, uncertainty_px, halves_px, coverage, views, board_tilt_deg; board_print_px of a
+/// board with print_sd; with the edges of
 /// AprilTags mtf50, mtf50_worst_ratio, mtf50_asymmetry, black_ratio, local_loss, local_shadow.
 std::vector<Metric> lens_metrics(const LensEstimate& lens);
 

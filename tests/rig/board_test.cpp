@@ -156,6 +156,17 @@ TEST(Board, KeepsTheOtherValueOfEachSwitch) {
   expect_same(read_board(folder / "board.yaml"), board);
 }
 
+TEST(Board, KeepsTheStandardDeviationOfThePrint) {
+  const TemporaryFolder folder;
+  const Board board = read_board(folder.file("board.yaml", kBoardYaml + "print_sd: 0.0002\n"));
+  EXPECT_EQ(board.print_sd, 0.0002);
+  write_board(folder / "written.yaml", board);
+  EXPECT_EQ(read_board(folder / "written.yaml").print_sd, 0.0002);
+  EXPECT_EQ(sample_board().print_sd, 0);
+  EXPECT_THAT(refusal(read_board, folder.file("board.yaml", kBoardYaml + "print_sd: 0.2\n")),
+              HasSubstr("print_sd: 0.2 (relative) is not within 0 and 0.02"));
+}
+
 TEST(Board, NamesLineAndKeyOfEachMissingKey) {
   for (const std::string key : {"family", "cols", "rows", "tag_size_m", "tag_spacing",
                                 "border_bits", "corner_squares", "first_id", "id_order"}) {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/board_print.h"
 #include "calibration/intrinsics/common_curve.h"
 #include "calibration/intrinsics/inconsistent_views.h"
 #include "calibration/intrinsics/projection_difference.h"
@@ -250,9 +251,9 @@ std::string explain_no_lens(const SplitViews& views, const std::optional<Fisheye
   return problem.empty() ? std::string(explanation_of(status)) : problem;
 }
 
-/// Adds the uncertainty of a solution.
+/// Adds the uncertainty of a solution. `print_sd` is Board::print_sd.
 void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& fisheye,
-                     bool is_chosen, LensEstimate& result) {
+                     bool is_chosen, double print_sd, LensEstimate& result) {
   IntrinsicsSolution& solution = result.solution;
   solution.another_fits = fisheye && fits_as_well(fisheye->solution, solution);
   result.report = report_on(solution, views.solved);
@@ -265,11 +266,20 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
   result.held_out = held_out_fit(solution, views.held_out);
   result.lattice = views.solved.lattice;
   result.sharpness = measure_sharpness(result.views, views.solved.imager_px);
+  std::optional<PrintEffect> print;
+  if (print_sd > 0) print = compute_print_effect(solution, print_sd);
+  if (print) result.print_px = print->rms_px;
+  if (print_sd > 0 && !print) {
+    result.warnings.emplace_back(
+        "the effect of print_sd of board.yaml cannot be computed, and the lens's uncertainty lacks "
+        "it");
+  }
   // The covariance of hundreds of control points would fill the file, without use for fixes.
   if (is_splined(solution.problem.lens_model)) return;
   const ProjectionUncertainty uncertainty(solution, views.solved.lattice);
   const Eigen::VectorXd& pull = uncertainty.intrinsics_pull();
-  const MatrixX covariance = uncertainty.intrinsics_covariance() + pull * pull.transpose();
+  MatrixX covariance = uncertainty.intrinsics_covariance() + pull * pull.transpose();
+  if (print) covariance += print->intrinsics * print->intrinsics.transpose();
   if (covariance.allFinite()) result.intrinsics_covariance = covariance;
 }
 
@@ -335,7 +345,7 @@ LensEstimate estimate_lens(LensViews input) {
   }
   warn_of_inconsistent_views(result);
   warn_of_edge_shift(result.solution, result);
-  add_uncertainty(views, fisheye, input.choose_lens_model, result);
+  add_uncertainty(views, fisheye, input.choose_lens_model, input.board.print_sd, result);
   return result;
 }
 

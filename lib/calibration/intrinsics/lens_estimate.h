@@ -52,8 +52,11 @@ struct LensEstimate {
   /// A model that fits clearly better than the stated one, or equally well where the board is seen
   /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
+  /// Change of projections by one standard deviation of the board's print (compute_print_effect()),
+  /// rms over the image, in px; std::nullopt if the board does not state it.
+  std::optional<double> print_px = {};
   /// Lattice of the corners in `solution`. Covariance of the intrinsics, with the pull of the
-  /// regularization; std::nullopt for a splined lens or if it is not finite.
+  /// regularization and the board's print; std::nullopt for a splined lens or if it is not finite.
   std::optional<BoardLattice> lattice = {};
   std::optional<MatrixX> intrinsics_covariance = {};
 

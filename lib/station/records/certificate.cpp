@@ -71,7 +71,23 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
                       {"images", fmt::format("{} taken, {} used", record.images.size(), used)}}});
 }
 
-std::string results_part(const Calibration& calibration) {
+/// Describes the inputs that the uncertainty includes, and those that are taken as exact.
+std::string describe_inputs(const RunRecord& record) {
+  const auto print = std::find_if(
+      record.figures.begin(), record.figures.end(),
+      [](const auto& figure) { return figure.name == "board_print_px" && figure.value; });
+  if (print == record.figures.end()) {
+    return "The board and the known points are taken as exact (print_sd of board.yaml states how "
+           "accurate the print is).";
+  }
+  return fmt::format(
+      "That of the focal length and the principal point includes the print of the board, as far as "
+      "board.yaml states it: {:.3g} px, rms over the image, for one standard deviation. The known "
+      "points are taken as exact.",
+      *print->value);
+}
+
+std::string results_part(const RunRecord& record, const Calibration& calibration) {
   HtmlTable table{"", {"quantity", "value and expanded uncertainty"}, {}};
   for (const CertifiedValue& value : certified_values(calibration)) {
     table.rows.push_back({value.name, words_of(value)});
@@ -84,8 +100,8 @@ std::string results_part(const Calibration& calibration) {
                       "expanded uncertainty is the standard uncertainty times k = 2, for "
                       "about 95 % of a normal distribution. It includes the scatter of the "
                       "captures, the lamp map as far as lamps.yaml states its sd_m, and for the "
-                      "zenith and the dispersion the lens. The board and the known points are "
-                      "taken as exact.");
+                      "zenith and the dispersion the lens. " +
+                      describe_inputs(record));
 }
 
 /// "rms_px: residuals of the board's corners, ..." for a reader who has only the certificate.
@@ -222,7 +238,7 @@ std::string certificate(const RunRecord& record, const Calibration& calibration)
   return html_page("Calibration certificate: camera " + record.camera,
                    verdict_part(record) +
                        html_section("Unit and calibration", subject_part(record, calibration)) +
-                       html_section("Results", results_part(calibration)) +
+                       html_section("Results", results_part(record, calibration)) +
                        html_section("Statement of conformity", conformity_part(record)) +
                        html_section("Traceability", traceability_part(record, calibration)) +
                        html_section("To be filled in by who issues it", part_to_fill_in()));

@@ -20,8 +20,8 @@ struct CertifiedValue {
 
 /// Focal length, principal point, and what else there is: rotation centre, zenith, lever arm,
 /// dispersion offset; each along x and y. The uncertainty is of the captures' scatter, that of the
-/// zenith and the dispersion with the parts of the steps before; board, lamp map and known points
-/// are taken as exact.
+/// zenith and the dispersion with the parts of the steps before. The board is taken as exact unless
+/// it states print_sd, the lamp map unless it states sd_m, and the known points always.
 std::vector<CertifiedValue> certified_values(const Calibration& calibration);
 
 /// "12.346 +- 0.012 px": the value to the last digit of the expanded uncertainty U = 2 u, which has

@@ -65,6 +65,8 @@ struct SyntheticViews {
   double tilt_rad = 0.7;
   /// Distance over what fills the image with the board.
   double farthest = 1.8;
+  /// Printed width and height over those stated.
+  Eigen::Vector2d stretch{1, 1};
 
   /// The tags wholly in the image, of a board somewhere in front of the camera.
   SeenBoard random_view(Random& random, double noise_px) const {
@@ -94,7 +96,7 @@ struct SyntheticViews {
       for (std::size_t k = 0; k < 4; ++k) {
         const Eigen::Array2d share = 2 * place.corners_m[k].array() / field_m.array() - 1;
         Eigen::Vector3d point;
-        point << place.corners_m[k] - field_m / 2, warp_m.dot((1 - share.square()).matrix());
+        point << stretch.cwiseProduct(place.corners_m[k] - field_m / 2), warp_m.dot((1 - share.square()).matrix());
         const auto pixel = lens.project(rotation * point + middle_m);
         whole = whole && pixel && (pixel->array() > 3).all() && pixel->x() < imager_px[0] - 3 &&
                 pixel->y() < imager_px[1] - 3;

@@ -112,6 +112,16 @@ TEST(Certificate, HasWhatARecordHas) {
   EXPECT_THAT(page, HasSubstr("counter(pages)"));
 }
 
+TEST(Certificate, HasThePrintOfTheBoardAsAnInput) {
+  EXPECT_THAT(certificate(certified_run(), measured()),
+              HasSubstr("The board and the known points are taken as exact"));
+  RunRecord record = certified_run();
+  record.figures.push_back({"board_print_px", "px", 0.0625, {}, Direction::at_most});
+  EXPECT_THAT(certificate(record, measured()),
+              AllOf(HasSubstr("includes the print of the board"), HasSubstr("0.0625 px, rms"),
+                    Not(HasSubstr("The board and"))));
+}
+
 TEST(Certificate, SaysThatAUnitDoesNotConform) {
   RunRecord record = certified_run();
   record.figures[0].value = 0.4;

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/board_print.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "calibration/intrinsics/projection_difference.h"
+
+namespace vlp {
+namespace {
+
+/// Returns the points of a board as BoardProblem has them, row by row.
+std::vector<Eigen::Vector3d> points_of_board(const BoardProblem& problem) {
+  std::vector<Eigen::Vector3d> points;
+  points.reserve(problem.points_of_a_board());
+  for (int j = 0; j < problem.rows; ++j) {
+    for (int i = 0; i < problem.cols; ++i) {
+      const Eigen::Array2d share(2.0 * i / (problem.cols - 1) - 1,
+                                 2.0 * j / (problem.rows - 1) - 1);
+      points.emplace_back(i * problem.spacing_m, j * problem.spacing_m,
+                          problem.warp_m.dot((1 - share.square()).matrix()));
+    }
+  }
+  return points;
+}
+
+}  // namespace
+
+std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& solution,
+                                                double print_sd) {
+  const double wider = std::numbers::sqrt2 * print_sd;
+  const Lens lens = solution.lens();
+  BoardProblem problem = solution.problem;
+  const std::vector<Eigen::Vector3d> points = points_of_board(problem);
+  for (std::size_t pose = 0; pose < problem.poses.size(); ++pose) {
+    const Eigen::Vector3d& turn = problem.poses[pose].rotation;
+    const Eigen::AngleAxisd rotation(turn.norm(), turn.normalized());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      Eigen::Vector3d& seen = problem.points[pose * points.size() + i];
+      if (seen.z() < 0) continue;
+      const Eigen::Vector3d in_camera = rotation * points[i] + problem.poses[pose].translation_m;
+      const Eigen::Vector3d along = rotation * Eigen::Vector3d::UnitX();
+      const auto stated = lens.project(in_camera);
+      const auto printed = lens.project(in_camera + wider * points[i].x() * along);
+      if (!stated || !printed) return {};
+      seen.head<2>() += *stated - *printed;
+    }
+  }
+  if (!solve(problem, solution.solved_for)) return {};
+  const auto difference =
+      projection_difference(lens, Lens(problem.lens_model, problem.intrinsics), problem.imager_px,
+                            [](const Eigen::Vector2d&) { return 1.0; });
+  if (!difference) return {};
+  const auto count = static_cast<Eigen::Index>(problem.intrinsics.size());
+  return PrintEffect{
+      Eigen::Map<const Eigen::VectorXd>(problem.intrinsics.data(), count) -
+          Eigen::Map<const Eigen::VectorXd>(solution.problem.intrinsics.data(), count),
+      difference->rms_px};
+}
+
+}  // namespace vlp

@@ -1,0 +1,34 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "calibration/intrinsics/intrinsics.h"
+
+namespace vlp {
+
+/// Effect of an error of the board's print on a lens: the change if the board is wider than stated,
+/// and as high.
+struct PrintEffect {
+  /// Change of the intrinsics.
+  Eigen::VectorXd intrinsics;
+  /// Change of projections over the image, rms per axis, in px.
+  double rms_px;
+};
+
+/// Computes the effect of one standard deviation of the board's width over its height. A common
+/// scale of the board changes its distances alone, and not the lens.
+///
+/// With the points x of the boards at the solution, D = diag(1 + sqrt(2) print_sd, 1, 1) and the
+/// projection p, the problem is solved again from the solution with each corner seen moved by
+///   p(x) - p(D x),
+/// which is the same to first order as a solve with the points D x.
+///
+/// @param print_sd  Board::print_sd, > 0
+/// @return std::nullopt if that solve fails
+std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& solution,
+                                                double print_sd);
+
+}  // namespace vlp

@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/board_print.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/synthetic_views.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kPrintSd = 5e-4;
+
+class PrintEffects : public testing::TestWithParam<bool> {};
+
+/// Returns the solution from views of a board that is wider than stated by this factor, with
+/// exact corners.
+IntrinsicsSolution solve_stretched(bool kalibr, double factor) {
+  SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
+  views.stretch = {factor, 1};
+  Random random(3);
+  return solve_intrinsics(views.input(20, random, 0));
+}
+
+/// The lens of a board that is wider, against the lens of the board as stated, by full solves.
+TEST_P(PrintEffects, HasTheEffectOfABoardThatIsWider) {
+  const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
+  const IntrinsicsSolution wider = solve_stretched(GetParam(), 1 + std::sqrt(2) * kPrintSd);
+  ASSERT_TRUE(stated.ok() && wider.ok());
+  const auto effect = compute_print_effect(stated, kPrintSd);
+  ASSERT_TRUE(effect);
+  const auto expected = projection_difference(stated.lens(), wider.lens(), {800, 600}, even);
+  ASSERT_TRUE(expected);
+  EXPECT_GT(expected->rms_px, 0.01);
+  // A full solve also estimates the shift of the edges, which a board that is wider changes.
+  EXPECT_NEAR(effect->rms_px / expected->rms_px, 1, 0.2);
+  // The lens of a wider board has the opposite change: its points are stated too near.
+  const auto& a = stated.problem.intrinsics;
+  const auto& b = wider.problem.intrinsics;
+  const Eigen::Vector2d change(a[0] - b[0], a[1] - b[1]);
+  EXPECT_GT(change.norm(), 0.05);
+  EXPECT_LT((effect->intrinsics.head<2>() - change).norm(), 0.2 * change.norm());
+}
+
+TEST_P(PrintEffects, IsInProportionToTheStandardDeviation) {
+  const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
+  ASSERT_TRUE(stated.ok());
+  const auto one = compute_print_effect(stated, kPrintSd);
+  const auto two = compute_print_effect(stated, 2 * kPrintSd);
+  ASSERT_TRUE(one && two);
+  EXPECT_NEAR(two->rms_px / one->rms_px, 2, 0.05);
+}
+
+INSTANTIATE_TEST_SUITE_P(Boards, PrintEffects, testing::Bool(),
+                         [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
+
+}  // namespace
+}  // namespace vlp
