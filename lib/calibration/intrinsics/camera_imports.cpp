@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Longest file of a camera: mrcal's holds the corners that went into its solve.
-constexpr std::size_t kMaxCameraBytes = std::size_t{256} << 20;
+constexpr std::size_t kMaxCameraBytes = std::size_t{64} << 20;
 /// Largest width and height of an image, as in a calibration.
 constexpr int kMaxImager_px = 1 << 20;
 
