@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <thread>
@@ -74,7 +75,7 @@ struct Terminal::Saved {
   termios settings{};
 };
 
-Terminal::Terminal() : interactive_(::isatty(STDOUT_FILENO) == 1), saved_(new Saved) {
+Terminal::Terminal() : interactive_(::isatty(::fileno(stdout)) == 1), saved_(new Saved) {
   const char* no_colour = std::getenv("NO_COLOR");
   colour_ = interactive_ && (no_colour == nullptr || *no_colour == '\0');
   std::signal(SIGINT, [](int) { stop_asked = true; });
@@ -99,7 +100,8 @@ Terminal::~Terminal() {
 
 Terminal::Size Terminal::size() {
   winsize known{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &known) != 0 || known.ws_col == 0 || known.ws_row == 0) {
+  if (::ioctl(::fileno(stdout), TIOCGWINSZ, &known) != 0 || known.ws_col == 0 ||
+      known.ws_row == 0) {
     return {80, 24};
   }
   return {known.ws_col, known.ws_row};
