@@ -8,8 +8,8 @@
 #include "program/station/station_records.h"
 #include "program/station/station_run.h"
 #include "program/station/station_shift.h"
-#include "station/records/records.h"
 #include "station/database_name.h"
+#include "station/records/records.h"
 #include "station/station_config.h"
 
 namespace vlp {
@@ -67,10 +67,10 @@ void add_hook(CLI::App& app, StationRunOptions& options) {
 
 /// Refuses a password: all users of the machine see command lines.
 std::string find_password(const std::string& where) {
-  return states_password(where)
-             ? "a password on the command line is shown to all users of the machine: give it in the "
-               "variable PGPASSWORD, or in the file that PGPASSFILE names"
-             : "";
+  return states_password(where) ? "a password on the command line is shown to all users of the "
+                                  "machine: give it in the "
+                                  "variable PGPASSWORD, or in the file that PGPASSFILE names"
+                                : "";
 }
 
 /// Where records are.
