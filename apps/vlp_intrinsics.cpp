@@ -163,10 +163,15 @@ void run(const CLI::App& app, const Options& options) {
   if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
   possible_warp(board, options.warp);  // refused before the images are looked at
-  const LensResult result =
-      solve_lens({observe(images, board, corners, options), board, options.board,
-                  known_camera(options), options.held_out, options.warp, chooses_lens(options)},
-                 history_entry(app, inputs));
+  LensInput input{observe(images, board, corners, options),
+                  board,
+                  options.board,
+                  known_camera(options),
+                  options.held_out,
+                  options.warp,
+                  chooses_lens(options)};
+  // After the images: of those that cannot be used none is read for its digest.
+  const LensResult result = solve_lens(std::move(input), history_entry(app, inputs));
   tell(result);
   const LensEstimate& lens = result.lens;
   if (!options.corners.empty() && !lens.views.empty()) {

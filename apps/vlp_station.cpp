@@ -8,6 +8,7 @@
 #include "program/station/station_records.h"
 #include "program/station/station_run.h"
 #include "program/station/station_shift.h"
+#include "station/database_name.h"
 #include "station/records/records.h"
 #include "station/station_config.h"
 
@@ -64,13 +65,23 @@ void add_hook(CLI::App& app, StationRunOptions& options) {
   hook->add_option("--station", options.station, "The station, station.yaml")->required();
 }
 
+/// Refuses a password: all users of the machine see command lines.
+std::string find_password(const std::string& where) {
+  return states_password(where) ? "a password on the command line is shown to all users of the "
+                                  "machine: give it in the "
+                                  "variable PGPASSWORD, or in the file that PGPASSFILE names"
+                                : "";
+}
+
 /// Where records are.
 CLI::App* add_where(CLI::App& app, const char* name, const char* what,
                     StationRecordsOptions& options) {
   CLI::App* command = app.add_subcommand(name, what);
   command->add_option("--station", options.station, "The station, station.yaml");
-  command->add_option("--records", options.records,
-                      "Or its records: a file of SQLite, or postgresql://USER@HOST/NAME");
+  command
+      ->add_option("--records", options.records,
+                   "Or its records: a file of SQLite, or postgresql://USER@HOST/NAME")
+      ->check(find_password);
   return command;
 }
 
@@ -157,7 +168,8 @@ void add_transfer(CLI::App& app, StationRecordsOptions& options) {
   imported
       ->add_option("--records", options.records,
                    "A file of SQLite, made when it is not there, or postgresql://USER@HOST/NAME")
-      ->required();
+      ->required()
+      ->check(find_password);
 }
 
 constexpr const char* kFigureHelp = "Which: rms_px, check_mean_mm, ...";

@@ -118,14 +118,23 @@ case $(realpath -m "$results")/ in
   "$(realpath -m "${folders[0]}")"/*) usage "$results: is in the archive, which is only read" ;;
 esac
 [ -d "${folders[0]}" ] || usage "${folders[0]}: is not a folder"
+# A .state that something else made is never written into or deleted: ours says so in "owner" and, once planned, in
+# run.json.
+made=''
+if [ ! -e "$results/.state" ]; then
+  made=1
+elif [ ! -e "$results/.state/owner" ] && ! grep -qs '^ "archive": ' "$results/.state/run.json"; then
+  refuse "$results: holds a .state that is not of reprocess.sh; give the results a folder of their own"
+fi
 mkdir -p "$results/.state" 2>/dev/null && : 2>/dev/null >>"$results/.state/lock" ||
   refuse "$results: cannot be written to"
 exec 9>>"$results/.state/lock"
 flock --nonblock 9 || refuse "$results: another run is at work there"
+[ -e "$results/.state/owner" ] || echo 'scripts/reprocess.sh' >"$results/.state/owner"
 code=0
 "$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}" || code=$?
 if [ "$code" != 0 ]; then
-  if [ ! -e "$results/.state/run.json" ]; then rm -r "$results/.state"; fi
+  if [ -n "$made" ] && [ ! -e "$results/.state/run.json" ]; then rm -r "$results/.state"; fi
   rmdir "$results" 2>/dev/null || true
   exit "$code"
 fi
@@ -134,10 +143,25 @@ mapfile -t again <"$results/.state/again.txt"
 [ ${#again[@]} = 0 ] || how+=(--forcerun "${again[@]}")
 # A run that was killed leaves Snakemake's own lock, which the one above stands for: Snakemake holds it to
 # its end, should this shell end before, and its jobs do not.
-if ! "$python" -m snakemake --snakefile "$scripts/Snakefile" --directory "$results" --nolock \
+"$python" -m snakemake --snakefile "$scripts/Snakefile" --directory "$results" --nolock \
   --rerun-incomplete --rerun-triggers mtime --keep-going --scheduler greedy "${how[@]}" \
-  >"$log" 2>&1
-then
+  >"$log" 2>&1 &
+run=$!
+# Snakemake would finish its shards first: what it has started on this machine is ended with it.
+stop() {
+  trap '' HUP INT TERM
+  local started=("$run") level=$run
+  while level=$(pgrep --parent "$level" | paste -sd,) && [ -n "$level" ]; do started+=(${level//,/ }); done
+  kill -TERM "${started[@]}" 2>/dev/null || true
+  wait "$run" || true
+  echo "reprocess.sh: error: interrupted; the same command goes on" >&2
+  exit 3
+}
+trap stop HUP INT TERM
+code=0
+wait "$run" || code=$?
+trap - HUP INT TERM
+if [ "$code" != 0 ]; then
   mapfile -t failed < <(grep -A 12 '^Error in rule' "$log" | sed -n 's/^ *log: \([^ ]*\).*/\1/p' | sort -u | head -n 5)
   [ ${#failed[@]} -gt 0 ] || tail -n 20 "$log" >&2
   for said in "${failed[@]}"; do

@@ -7,8 +7,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <unordered_set>
 
+#include "captures/csv_formula.h"
 #include "rig/file.h"
+#include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
@@ -49,6 +52,7 @@ struct CsvParsing {
 
   void field(std::string_view text) {
     if (row_fields++ == 0) row_line = line;
+    if (text.starts_with('\'') && begins_like_formula(text)) text.remove_prefix(1);
     if (in_header) {
       table.header_.emplace_back(text);
     } else {
@@ -93,19 +97,19 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   fields_.reserve(text.size());
   CsvParsing(*this).parse(text);
-  for (auto name = header_.begin(); name != header_.end(); ++name) {
-    if (std::find(header_.begin(), name, *name) != name) {
-      throw InputError(file_, 1, *name, "this column stands twice");
-    }
+  std::unordered_set<std::string_view> names;
+  for (const std::string& name : header_) {
+    if (!names.insert(name).second) throw InputError(file_, 1, name, "this column stands twice");
   }
 }
 
 CsvTable::Column CsvTable::required(std::string_view name) const {
   if (const auto column = optional(name)) return *column;
+  constexpr std::size_t enough = 500;  // of a table of ours all
   std::string names;
   for (const std::string& have : header_) names += (names.empty() ? "" : ", ") + have;
   throw InputError(file_, 1, std::string(name),
-                   "this column is missing; the columns are: " + names);
+                   "this column is missing; the columns are: " + shortened(names, enough));
 }
 
 std::optional<CsvTable::Column> CsvTable::optional(std::string_view name) const {

@@ -18,7 +18,8 @@ inline constexpr double kFarthest_m = 1e6;
 
 /// A CSV file with a header line, read whole: RFC 4180 quoting, LF or CRLF, an optional UTF-8
 /// byte order mark. Columns are found by name in any order; columns that nobody asks for are
-/// kept out of the way. Errors name file, line and column.
+/// kept out of the way. The apostrophe that CsvWriter puts before a formula is taken away. Errors
+/// name file, line and column.
 class CsvTable {
  public:
   /// Throws InputError when the file cannot be read, is longer than 2 GiB, is not CSV, has a

@@ -4,6 +4,10 @@
 
 #include <csv.h>
 
+#include <charconv>
+
+#include "captures/csv_formula.h"
+
 namespace vlp {
 namespace {
 
@@ -11,6 +15,13 @@ std::string quoted(std::string_view field) {
   std::string text(2 * field.size() + 2, '\0');
   text.resize(csv_write(text.data(), text.size(), field.data(), field.size()));
   return text;
+}
+
+bool is_number(std::string_view field) {
+  if (field.starts_with('+')) field.remove_prefix(1);
+  double value = 0;
+  const auto [end, failure] = std::from_chars(field.data(), field.data() + field.size(), value);
+  return failure == std::errc() && end == field.data() + field.size();
 }
 
 }  // namespace
@@ -28,10 +39,15 @@ void CsvWriter::write_row(std::span<const std::string_view> fields) {
   const char* separator = "";
   for (const std::string_view field : fields) {
     waiting_ += separator;
+    separator = ",";
+    if (begins_like_formula(field) && !is_number(field)) {
+      const std::string text = "'" + std::string(field);
+      waiting_ += quoted(std::string_view(text));
+      continue;
+    }
     const bool plain = field.find_first_of(",\"\r\n") == std::string_view::npos &&
                        !field.starts_with(' ') && !field.ends_with(' ');
     waiting_ += plain ? std::string(field) : quoted(field);
-    separator = ",";
   }
   waiting_ += '\n';
   constexpr std::size_t enough = 1 << 16;

@@ -14,8 +14,9 @@
 namespace vlp {
 
 /// A CSV file in the making: rows go in and, a few at a time, on to the disk; with save() the file
-/// is there, whole. Fields are quoted where they must be. Each throws InputError when the file
-/// cannot be written.
+/// is there, whole. Fields are quoted where they must be. Text that a spreadsheet would calculate
+/// gets an apostrophe first (csv_formula.h). Each throws InputError when the file cannot be
+/// written.
 class CsvWriter {
  public:
   CsvWriter(const std::filesystem::path& file, std::initializer_list<std::string_view> header)

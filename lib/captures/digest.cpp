@@ -6,11 +6,11 @@
 #include <openssl/evp.h>
 
 #include <array>
-#include <fstream>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 
-#include "rig/input_error.h"
+#include "rig/file.h"
 
 namespace vlp {
 namespace {
@@ -48,15 +48,12 @@ std::string sha256_of_text(std::string_view text) {
 }
 
 std::string sha256_of_file(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file)) throw InputError(file, "cannot be read");
+  InputFile input(file, std::numeric_limits<std::size_t>::max());
   Sha256 sha;
   std::array<char, 1 << 16> block;
-  while (stream) {
-    stream.read(block.data(), block.size());
-    sha.add({block.data(), static_cast<std::size_t>(stream.gcount())});
+  while (const std::size_t count = input.read(block.data(), block.size())) {
+    sha.add({block.data(), count});
   }
-  if (stream.bad()) throw InputError(file, "cannot be read");
   return sha.digits();
 }
 

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/image_file.h"
 
-#include <fstream>
-#include <iterator>
+#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
 #include "frontend/image_header.h"
+#include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/yaml_text.h"
 
@@ -32,6 +32,15 @@ bool is_cut_png(const std::string& bytes) {
   return bytes.starts_with("\x89PNG\r\n\x1a\n") && bytes.rfind(end) == std::string::npos;
 }
 
+/// Returns how long the file of an image of `max_mpx` megapixels can be: uncompressed with four
+/// channels of 16 bits, and as much again of previews and metadata as the largest profile needs.
+std::size_t max_file_bytes(double max_mpx) {
+  constexpr double bytes_per_mpx = 8e6, metadata_bytes = 64e6;
+  constexpr double max_of_decoder = std::numeric_limits<int>::max();
+  return static_cast<std::size_t>(
+      std::min(max_mpx * bytes_per_mpx + metadata_bytes, max_of_decoder));
+}
+
 }  // namespace
 
 void check_size(const fs::path& file, std::int64_t width, std::int64_t height, double max_mpx) {
@@ -45,12 +54,16 @@ void check_size(const fs::path& file, std::int64_t width, std::int64_t height, d
 }
 
 cv::Mat read_image(const fs::path& file, double max_mpx) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  std::string bytes = read_file(file, max_file_bytes(max_mpx));
   if (bytes.empty()) throw InputError(file, "cannot be read as an image");
   const char* const cut = "cannot be read as an image: it is cut short";
   if (is_cut_jpeg(bytes)) throw InputError(file, cut);
-  if (const auto size = size_in_header(bytes)) check_size(file, (*size)[0], (*size)[1], max_mpx);
+  // Other formats are not decoded: nothing states in advance how much memory they take.
+  const auto size = size_in_header(bytes);
+  if (!size) {
+    throw InputError(file, "cannot be read as an image: is no PNG, JPEG, BMP, TIFF or PGM");
+  }
+  check_size(file, (*size)[0], (*size)[1], max_mpx);
   if (is_cut_png(bytes)) throw InputError(file, cut);
   cv::Mat image;
   try {
@@ -61,6 +74,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
     throw InputError(file, "cannot be read as an image: " + failure.err);
   }
   if (image.empty()) throw InputError(file, "cannot be read as an image");
+  check_size(file, image.cols, image.rows, max_mpx);
   if (image.depth() != CV_8U && image.depth() != CV_16U) {
     throw InputError(file, "has neither 8 nor 16 bits");
   }

@@ -58,9 +58,12 @@ Size bmp_size(std::string_view bytes) {
 Size jpeg_size(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 4 <= bytes.size()) {
-    if (bytes[at] != '\xff') return {};
+    if (bytes[at] != '\xff') {  // decoders look for the next marker, too
+      ++at;
+      continue;
+    }
     const auto marker = static_cast<unsigned char>(bytes[at + 1]);
-    if (marker == 0xff) {  // filled up
+    if (marker == 0xff || marker == 0) {  // filled up, or no marker
       ++at;
       continue;
     }

@@ -8,11 +8,13 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <opencv2/videoio/registry.hpp>
 
+#include "rig/file.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -55,6 +57,8 @@ Video::Video(const std::string& source, const std::optional<std::array<int, 2>>&
     throw InputError(source, is_camera() ? "there is no such camera: is it connected?"
                                          : "there is no such video");
   }
+  // FFmpeg would wait for the writer of a pipe.
+  if (!is_url && !is_camera()) InputFile(source, std::numeric_limits<std::size_t>::max());
   // For a file OpenCV would try sequences of images, too.
   const bool has_ffmpeg = cv::videoio_registry::hasBackend(cv::CAP_FFMPEG);
   const int file_api = !is_url && has_ffmpeg ? cv::CAP_FFMPEG : cv::CAP_ANY;

@@ -70,6 +70,14 @@ bool is_at(const Lamp& lamp, const Eigen::Vector3d& position_m) {
   return (position_m - lamp.position_m).norm() < tolerance_m;
 }
 
+/// Returns the place of a lamp in an adjustment or a dispersion; nullptr if it is not in it.
+template <typename Place>
+const Place* find_place(const std::vector<Place>& places, int id) {
+  const auto place =
+      std::find_if(places.begin(), places.end(), [&](const Place& one) { return one.id == id; });
+  return place == places.end() ? nullptr : &*place;
+}
+
 }  // namespace
 
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
@@ -84,12 +92,45 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   if (turned) add_turns(turns_, calibration, correction, with_zenith_error);
   if (shifted) add_turns(turns_, calibration, correction, with_offset_error);
   offset_ = intrinsics_ + (turned ? 2 : 0);
-  const Eigen::Index size = shared() + 3 * std::ssize(lamps);
-  covariance_ = Eigen::MatrixXd::Zero(size, size);
+  assign_rows(lamps, calibration);
   state_lens_and_zenith(calibration);
   state_lamps(lamps, calibration.adjustment);
   if (turned || shifted) propagate_to_zenith_and_offset(lamps, calibration);
-  stated_ = calibration.adjustment || covariance_.diagonal().maxCoeff() > 0;
+  stated_ =
+      calibration.adjustment || covariance_.diagonal().maxCoeff() > 0 ||
+      std::ranges::any_of(lamps_, [](const LampErrors& lamp) { return lamp.variance_m2 > 0; });
+}
+
+void CommonErrors::assign_rows(std::span<const Lamp> lamps, const Calibration& calibration) {
+  const auto is_correlated = [&](const Lamp& lamp) {
+    const auto* adjusted =
+        calibration.adjustment ? find_place(calibration.adjustment->lamps, lamp.id) : nullptr;
+    if (adjusted != nullptr && is_at(lamp, adjusted->position_m)) return true;
+    const auto* uncertain =
+        has_offset() ? find_place(calibration.dispersion->by_lamps, lamp.id) : nullptr;
+    return uncertain != nullptr && is_at(lamp, uncertain->position_m);
+  };
+  lamps_.resize(lamps.size());
+  Eigen::Index size = shared();
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    if (!is_correlated(lamps[i])) continue;
+    lamps_[i].row = size;
+    size += 3;
+  }
+  covariance_ = Eigen::MatrixXd::Zero(size, size);
+}
+
+Eigen::Matrix3d CommonErrors::covariance_of_lamp(std::size_t lamp) const {
+  const auto& [row, variance_m2] = lamps_[lamp];
+  if (!row) return variance_m2 * Eigen::Matrix3d::Identity();
+  return covariance_.block<3, 3>(*row, *row);
+}
+
+Eigen::Matrix3d CommonErrors::covariance_of_lamps(std::size_t lamp, std::size_t other) const {
+  if (lamp == other) return covariance_of_lamp(lamp);
+  const auto &row = lamps_[lamp].row, &column = lamps_[other].row;
+  if (!row || !column) return Eigen::Matrix3d::Zero();
+  return covariance_.block<3, 3>(*row, *column);
 }
 
 void CommonErrors::state_lens_and_zenith(const Calibration& calibration) {
@@ -124,24 +165,24 @@ void CommonErrors::state_lamps(std::span<const Lamp> lamps,
     for (Eigen::Index i = 0; i < offset_; ++i) adjusted.emplace_back(i, i);
   }
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    const Eigen::Index row = row_of_lamp(i);
-    if (adjustment) {
-      const auto& places = adjustment->lamps;
-      const auto place = std::find_if(places.begin(), places.end(),
-                                      [&](const auto& one) { return one.id == lamps[i].id; });
-      if (place != places.end() && is_at(lamps[i], place->position_m)) {
-        const Eigen::Index from = intrinsics_ + 4 + 3 * (place - places.begin());
-        for (Eigen::Index k = 0; k < 3; ++k) adjusted.emplace_back(row + k, from + k);
-        continue;
-      }
-      if (place != places.end()) ++lamps_elsewhere_;
+    const auto& row = lamps_[i].row;
+    const auto* place = adjustment ? find_place(adjustment->lamps, lamps[i].id) : nullptr;
+    if (place != nullptr && is_at(lamps[i], place->position_m)) {
+      const Eigen::Index from = intrinsics_ + 4 + 3 * (place - adjustment->lamps.data());
+      for (Eigen::Index k = 0; k < 3; ++k) adjusted.emplace_back(*row + k, from + k);
+      continue;
     }
+    if (place != nullptr) ++lamps_elsewhere_;
     if (!lamps[i].sd_m) {
       complete_ = part_stated_.back() = false;
       continue;
     }
-    covariance_.block<3, 3>(row, row) =
-        *lamps[i].sd_m * *lamps[i].sd_m * Eigen::Matrix3d::Identity();
+    const double variance_m2 = *lamps[i].sd_m * *lamps[i].sd_m;
+    if (row) {
+      covariance_.block<3, 3>(*row, *row) = variance_m2 * Eigen::Matrix3d::Identity();
+    } else {
+      lamps_[i].variance_m2 = variance_m2;
+    }
   }
   for (const auto& [row, from_row] : adjusted) {
     for (const auto& [col, from_col] : adjusted) {
@@ -190,9 +231,9 @@ std::optional<Eigen::Index> CommonErrors::find_stated_row(
     std::span<const Lamp> lamps, const Dispersion::UncertainLamp& uncertain) const {
   const Lamp* lamp = find_lamp(lamps, uncertain.id);
   if (lamp == nullptr || !is_at(*lamp, uncertain.position_m)) return std::nullopt;
-  const Eigen::Index row = row_of_lamp(static_cast<std::size_t>(lamp - lamps.data()));
-  const bool is_stated = lamp->sd_m || covariance_.block<3, 3>(row, row).trace() > 0;
-  return is_stated ? std::optional(row) : std::nullopt;
+  const auto row = lamps_[static_cast<std::size_t>(lamp - lamps.data())].row;
+  const bool is_stated = lamp->sd_m || covariance_.block<3, 3>(*row, *row).trace() > 0;
+  return is_stated ? row : std::nullopt;
 }
 
 CommonErrors CommonErrors::only(CommonPart part) const {
@@ -205,7 +246,12 @@ CommonErrors CommonErrors::only(CommonPart part) const {
     if (kCommonParts[i] == part) break;
     rest -= one.covariance_;
   }
-  one.stated_ = one.covariance_.diagonal().maxCoeff() > 0;
+  if (part != CommonPart::lamps) {
+    for (LampErrors& lamp : one.lamps_) lamp.variance_m2 = 0;
+  }
+  one.stated_ =
+      one.covariance_.diagonal().maxCoeff() > 0 ||
+      std::ranges::any_of(one.lamps_, [](const LampErrors& lamp) { return lamp.variance_m2 > 0; });
   one.complete_ = false;
   return one;
 }
@@ -312,17 +358,16 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::covariance
   const ByShared& by_shared = gain.by_shared;
   const auto& by_lamp = gain.by_lamp;
   const Eigen::Index n = shared();
-  const auto at = [&gain, n](std::size_t i) {
-    return n + 3 * static_cast<Eigen::Index>(gain.lamps[i]);
-  };
   const ByShared with_shared = by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
   Covariance sum = with_shared.lazyProduct(by_shared.transpose());
   for (std::size_t i = 0; i < gain.size; ++i) {
     // Half of the lamp's own, the shared ones, and the lamps before it.
-    ByLamp other = 0.5 * by_lamp[i] * covariance_.block<3, 3>(at(i), at(i));
-    other += by_shared.lazyProduct(covariance_.block(0, at(i), n, 3));
+    ByLamp other = 0.5 * by_lamp[i] * covariance_of_lamp(gain.lamps[i]);
+    if (const auto& row = lamps_[gain.lamps[i]].row) {
+      other += by_shared.lazyProduct(covariance_.block(0, *row, n, 3));
+    }
     for (std::size_t j = 0; j < i; ++j) {
-      other += by_lamp[j] * covariance_.block<3, 3>(at(j), at(i));
+      other += by_lamp[j] * covariance_of_lamps(gain.lamps[j], gain.lamps[i]);
     }
     const Covariance half = other * by_lamp[i].transpose();
     sum += half + half.transpose();
@@ -381,15 +426,18 @@ template Matrix4 CommonErrors::covariance_of(const Gain& gain) const;
 template BodyCovariance CommonErrors::covariance_of(const BodyGain& gain) const;
 
 Matrix2 CommonErrors::covariance_of(const Effect& effect, std::size_t lamp) const {
-  const Eigen::Index n = shared(), at = n + 3 * static_cast<Eigen::Index>(lamp);
+  const Eigen::Index n = shared();
   const Effect& e = effect;
   const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> with_shared =
       e.by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
   Eigen::Matrix2d sum = with_shared.lazyProduct(e.by_shared.transpose());
-  const Eigen::Matrix<double, 2, 3> mixed = e.by_shared.lazyProduct(covariance_.block(0, at, n, 3));
-  const Eigen::Matrix2d half = mixed * e.by_lamp.transpose();
-  sum +=
-      half + half.transpose() + e.by_lamp * covariance_.block<3, 3>(at, at) * e.by_lamp.transpose();
+  Eigen::Matrix2d half = Eigen::Matrix2d::Zero();
+  if (const auto& row = lamps_[lamp].row) {
+    const Eigen::Matrix<double, 2, 3> mixed =
+        e.by_shared.lazyProduct(covariance_.block(0, *row, n, 3));
+    half = mixed * e.by_lamp.transpose();
+  }
+  sum += half + half.transpose() + e.by_lamp * covariance_of_lamp(lamp) * e.by_lamp.transpose();
   return sum;
 }
 

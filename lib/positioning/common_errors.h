@@ -126,8 +126,8 @@ class CommonErrors {
   /// Of one sighting's z.
   Matrix2 covariance_of(const Effect& effect, std::size_t lamp) const;
 
-  /// The joint covariance, of the intrinsics, zenith, offset (where there are such), then the
-  /// lamps.
+  /// Returns the joint covariance of the intrinsics, zenith, offset (where there are such), then of
+  /// the lamps whose errors are correlated with others, in the order of the map.
   const MatrixX& joint() const { return covariance_; }
   Eigen::Index intrinsics() const { return intrinsics_; }
   Eigen::Index shared() const { return intrinsics_ + std::ssize(turns_); }
@@ -135,9 +135,21 @@ class CommonErrors {
  private:
   bool has_zenith() const { return offset_ > intrinsics_; }
   bool has_offset() const { return shared() > offset_; }
-  Eigen::Index row_of_lamp(std::size_t lamp) const {
-    return shared() + 3 * static_cast<Eigen::Index>(lamp);
-  }
+  /// Errors of a lamp of the map. A large map has few lamps whose errors are correlated with
+  /// others: those of an adjustment or of a dispersion have rows in the joint covariance.
+  struct LampErrors {
+    /// First row of the lamp, if it has rows.
+    std::optional<Eigen::Index> row;
+    /// Variance per axis of a lamp without rows; 0 if unknown.
+    double variance_m2 = 0;
+  };
+  /// Gives rows to the lamps that are correlated with other errors, and sets the size of the joint
+  /// covariance.
+  void assign_rows(std::span<const Lamp> lamps, const Calibration& calibration);
+  /// Returns the covariance of a lamp's place.
+  Eigen::Matrix3d covariance_of_lamp(std::size_t lamp) const;
+  /// Returns the covariance of two lamps of the map.
+  Eigen::Matrix3d covariance_of_lamps(std::size_t lamp, std::size_t other) const;
   /// Sets which parts are stated, and the covariances of lens and zenith without an adjustment.
   void state_lens_and_zenith(const Calibration& calibration);
   /// Sets the covariances of the lamps, and all that an adjustment states.
@@ -155,6 +167,7 @@ class CommonErrors {
   /// Derivatives of base_from_camera by the zenith's and the offset's coordinates.
   std::vector<Eigen::Matrix3d> turns_;
   MatrixX covariance_;
+  std::vector<LampErrors> lamps_;
   bool stated_ = false, complete_ = false;
   std::array<bool, kCommonParts.size()> part_stated_ = {};
   int lamps_elsewhere_ = 0;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -77,11 +78,25 @@ Eigen::Vector3d center_of(const std::vector<Lamp>& lamps) {
   return lamps.front().position_m + sum / static_cast<double>(lamps.size());
 }
 
-double distance_to_nearest(const std::vector<Lamp>& lamps, const Lamp& lamp) {
-  double nearest_m = std::numeric_limits<double>::infinity();
-  for (const Lamp& other : lamps) {
-    if (other.id == lamp.id) continue;
-    nearest_m = std::min(nearest_m, (other.position_m - lamp.position_m).head<2>().norm());
+/// Returns the horizontal distance of each lamp to the nearest other one; infinity if there is
+/// none. Goes along x from each lamp, and no farther than the nearest lamp so far.
+std::vector<double> distances_to_nearest(const std::vector<Lamp>& lamps) {
+  std::vector<std::size_t> by_x(lamps.size());
+  std::iota(by_x.begin(), by_x.end(), 0U);
+  std::ranges::sort(by_x, {}, [&](std::size_t i) { return lamps[i].position_m.x(); });
+  std::vector<double> nearest_m(lamps.size(), std::numeric_limits<double>::infinity());
+  // Returns false once lamps are too far apart along x.
+  const auto try_pair = [&](std::size_t i, std::size_t j) {
+    const Eigen::Vector3d offset_m = lamps[j].position_m - lamps[i].position_m;
+    if (std::abs(offset_m.x()) >= nearest_m[i]) return false;
+    if (lamps[j].id != lamps[i].id) {
+      nearest_m[i] = std::min(nearest_m[i], offset_m.head<2>().norm());
+    }
+    return true;
+  };
+  for (std::size_t k = 0; k < by_x.size(); ++k) {
+    for (std::size_t j = k + 1; j < by_x.size() && try_pair(by_x[k], by_x[j]);) ++j;
+    for (std::size_t j = k; j > 0 && try_pair(by_x[k], by_x[j - 1]);) --j;
   }
   return nearest_m;
 }
@@ -206,7 +221,7 @@ Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
       computes_common_chi_squared_(options.computes_common_chi_squared),
       row_clock_(row_clock_of(calibration.camera)) {
   for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
-  for (const Lamp& lamp : lamps_) nearest_m_.push_back(distance_to_nearest(lamps_, lamp));
+  nearest_m_ = distances_to_nearest(lamps_);
   if (mount_ &&
       !(mount_->position_in_robot_m.allFinite() && std::isfinite(mount_->yaw_in_robot_rad))) {
     throw std::invalid_argument("the camera's place on the robot is not finite");

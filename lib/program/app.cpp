@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <ctime>
 #include <exception>
@@ -87,6 +88,21 @@ std::string command_problem(const CLI::App& app) {
   return "there is no command '" + words.front() + "'; the commands are: " + names;
 }
 
+/// Sends all that is printed to nowhere. The descriptor stays open for `--output /dev/stdout`.
+bool silence_stdout() {
+  std::FILE* nowhere = std::fopen("/dev/null", "w");
+  if (nowhere == nullptr) return false;
+  stdout = nowhere;
+  return true;
+}
+
+/// Reports it if what was printed could not be written, and returns the exit code of the program.
+int check_stdout(int exit_code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
+  spdlog::error("stdout cannot be written");
+  return kBadInput;
+}
+
 /// Whether two outputs, which need not exist, are one file; an empty name is none.
 bool same_file(const std::string& one, const std::string& other) {
   const auto of = [](const std::string& file) {
@@ -161,24 +177,22 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   app.add_flag("-v,--verbose", verbose, "Details on stderr")->excludes(quiet_flag);
   app.set_version_flag("--version", app.get_name() + " " + VLP_VERSION);
   log_to_stderr(app.get_name(), false, false);
+  std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a limit fails, and what is temporary is removed
   if (argc == 3 && std::string_view(argv[1]) == "--reference") {
     const std::string text = reference_of(app, argv[2]);
     if (!text.empty()) {  // of another name the parser complains
       std::fputs(text.c_str(), stdout);
-      return std::fflush(stdout) != 0 ? kBadInput : kDone;
+      return check_stdout(kDone);
     }
   }
   try {
     app.parse(argc, argv);
     log_to_stderr(app.get_name(), quiet, verbose);
-    if (quiet && std::freopen("/dev/null", "w", stdout) == nullptr) return kBadInput;
+    if (quiet && !silence_stdout()) return kBadInput;
     run();
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-      throw std::runtime_error("stdout cannot be written");
-    }
-    return kDone;
+    return check_stdout(kDone);
   } catch (const CLI::Success& success) {  // --help, --version
-    return app.exit(success);
+    return check_stdout(app.exit(success));
   } catch (const CLI::ParseError& error) {
     const auto unknown = unknown_options(app);  // a misspelt option says more than what it lacks
     if (const auto problem = command_problem(app); !problem.empty()) {
@@ -191,12 +205,10 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
     return kBadInput;
   } catch (const GateNotMet& error) {
     spdlog::error("{}", error.what());
-    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return kGateNotMet;
-    spdlog::error("stdout cannot be written");
-    return kBadInput;
+    return check_stdout(kGateNotMet);
   } catch (const Undetermined& error) {
     spdlog::error("{}", error.what());
-    return kUndetermined;
+    return check_stdout(kUndetermined);
   } catch (const std::exception& error) {  // vlp::InputError and std::invalid_argument among them
     spdlog::error("{}", error.what());
     return kBadInput;

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <pugixml.hpp>
 #include <string_view>
 
+#include "rig/file.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -97,12 +97,7 @@ ReportPicture picture_of(std::string image, const std::string& name) {
 }  // namespace
 
 ReportPicture read_report_picture(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string image(kMostBytes + 1, '\0');
-  if (!stream) throw InputError(file, "cannot be read");
-  stream.read(image.data(), static_cast<std::streamsize>(image.size()));
-  image.resize(static_cast<std::size_t>(stream.gcount()));
-  if (image.size() > kMostBytes) throw InputError(file, "is longer than 16 MiB; draw less into it");
+  std::string image = read_file(file, kMostBytes);
   constexpr std::size_t head = 1024;
   const bool png = image.starts_with("\x89PNG");
   if (!png && image.substr(0, head).find("<svg") == std::string::npos) {

@@ -16,6 +16,14 @@ namespace {
 
 constexpr int kLarge = std::numeric_limits<int>::max();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Largest standard deviation of a pixel, a lens parameter or a place: nothing is known beyond it,
+/// and products of covariances stay finite.
+constexpr double kMaxSd = 1e6;
+/// Largest derivative of a calibrated quantity by another, for the same reason.
+constexpr double kMaxDerivative = 1e12;
+/// Most lamps that share errors with a dispersion, which is of a few captures: their joint
+/// covariance is dense.
+constexpr std::size_t kMaxUncertainLamps = 1000;
 
 /// `rows` rows of `cols` numbers.
 Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_t cols) {
@@ -29,7 +37,16 @@ Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_
     matrix.row(static_cast<Eigen::Index>(row)) = Eigen::Map<const Eigen::RowVectorXd>(
         list[row].numbers(cols).data(), static_cast<Eigen::Index>(cols));
   }
+  if (matrix.cwiseAbs().maxCoeff() > kMaxDerivative) {
+    throw value.error("holds a derivative beyond 1e12: is the file damaged?");
+  }
   return matrix;
+}
+
+/// Throws InputError if a variance is beyond what can be known.
+void check_variances(const YamlValue& value, const Eigen::MatrixXd& covariance) {
+  if (covariance.diagonal().maxCoeff() <= kMaxSd * kMaxSd) return;
+  throw value.error("states a standard deviation beyond 1,000,000: is it in the right unit?");
 }
 
 /// The rows of the lower triangle, 1, 2, 3 ... numbers.
@@ -57,6 +74,7 @@ Eigen::MatrixXd read_joint_covariance(const YamlValue& value, std::size_t size) 
       }
     }
   }
+  check_variances(value, matrix);
   return matrix;
 }
 
@@ -73,6 +91,7 @@ Matrix2 read_covariance(const YamlValue& value) {
       covariance(0, 1) * covariance(0, 1) > product * (1 + rounding)) {
     throw value.error("is not a covariance: it should be symmetric and not negative");
   }
+  check_variances(value, covariance);
   return covariance;
 }
 
@@ -144,7 +163,7 @@ Dispersion::UncertainLamp read_uncertain_lamp(YamlMap map) {
   Dispersion::UncertainLamp lamp;
   lamp.id = map.required("id").integer_within(0, kLarge);
   lamp.position_m = Eigen::Vector3d(map.required("position_m").numbers(3).data());
-  lamp.sd_m = map.required("sd_m").number_within(0, kInfinity, "m");
+  lamp.sd_m = map.required("sd_m").number_within(0, kMaxSd, "m");
   lamp.by_position = read_matrix(map.required("by_position"), 2, 3);
   map.finish();
   return lamp;
@@ -167,6 +186,7 @@ Dispersion read_dispersion(YamlMap map, std::size_t intrinsics) {
   }
   if (const auto value = map.optional("by_lamps")) {
     const auto items = value->list();
+    if (items.size() > kMaxUncertainLamps) throw value->error("holds more than 1,000 lamps");
     dispersion.by_lamps.reserve(items.size());
     for (const YamlValue& item : items) {
       const Dispersion::UncertainLamp lamp = read_uncertain_lamp(item.map());

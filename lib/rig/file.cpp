@@ -3,12 +3,14 @@
 #include "rig/file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
-#include <fstream>
+#include <optional>
 
 #include "rig/input_error.h"
 
@@ -22,27 +24,96 @@ namespace fs = std::filesystem;
   throw InputError(wanted, std::string("cannot be written: ") + std::strerror(errno));
 }
 
-/// Where a symbolic link leads, though nothing may be there yet.
-fs::path without_links(fs::path path) {
+/// Returns the target of a symbolic link, which need not exist. Stops at a link in `descriptors`,
+/// the folder of this process' open descriptors, if it is given.
+fs::path without_links(fs::path path, const std::optional<fs::path>& descriptors) {
   std::error_code error;
   const fs::path wanted = path;
   for (int most_links = 40; fs::is_symlink(fs::symlink_status(path, error)); --most_links) {
     if (most_links == 0) throw InputError(wanted, "is a link that leads to itself");
+    if (descriptors && fs::canonical(path.parent_path(), error) == *descriptors) break;
     path = path.parent_path() / fs::read_symlink(path, error);
   }
   return path;
 }
 
+/// A path without its links.
+struct Target {
+  fs::path path;
+  /// Descriptor of this process that the path names, as /dev/stdout does.
+  std::optional<int> descriptor;
+};
+
+/// Only a path that begins so names a descriptor: a link elsewhere, which others may have made,
+/// does not lead to one.
+bool can_name_descriptor(const fs::path& path) {
+  return path.native().starts_with("/dev/") || path.native().starts_with("/proc/");
+}
+
+Target find_target(const fs::path& path) {
+  std::error_code error;
+  std::optional<fs::path> descriptors;
+  if (can_name_descriptor(path)) descriptors = fs::canonical("/proc/self/fd", error);
+  if (error) descriptors.reset();
+  Target target{without_links(path, descriptors), std::nullopt};
+  if (!descriptors || !fs::is_symlink(fs::symlink_status(target.path, error))) return target;
+  const std::string name = target.path.filename().string();
+  int number = 0;
+  std::from_chars(name.data(), name.data() + name.size(), number);  // the system names them
+  target.descriptor = number;
+  return target;
+}
+
+std::string describe_bytes(std::size_t bytes) {
+  constexpr std::size_t mebibyte = std::size_t{1} << 20;
+  return bytes < mebibyte ? std::to_string(bytes) + " bytes"
+                          : std::to_string(bytes / mebibyte) + " MiB";
+}
+
+[[noreturn]] void fail_as_too_long(const fs::path& path, std::size_t max_bytes) {
+  throw InputError(path, "is longer than " + describe_bytes(max_bytes) + ": is it the right file?");
+}
+
+/// Checks that an open file is a regular one, or the stream that `path` names, and returns its
+/// size; 0 for a stream.
+std::size_t check_kind(const fs::path& path, int descriptor, std::size_t max_bytes) {
+  struct stat status {};
+  if (::fstat(descriptor, &status) != 0) throw InputError(path, "cannot be read");
+  if (S_ISDIR(status.st_mode)) throw InputError(path, "is a folder, not a file");
+  if (!S_ISREG(status.st_mode)) {
+    if (find_target(path).descriptor) return 0;
+    throw InputError(path, "is a pipe or a device, not a file");
+  }
+  const auto bytes = static_cast<std::size_t>(status.st_size);
+  if (bytes > max_bytes) fail_as_too_long(path, max_bytes);
+  return bytes;
+}
+
 /// Opens a file with a name that nobody else has, not even another thread, beside `target`.
-int create_beside(const fs::path& target, fs::path& temporary) {
+int create_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
   constexpr std::size_t most_bytes = 200;  // of the 255 of a file name
   const std::string name = "." + target.filename().string().substr(0, most_bytes) + ".tmp-" +
                            std::to_string(::getpid()) + "-";
   for (int number = 0;; ++number) {
     temporary = target.parent_path() / (name + std::to_string(number));
-    const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
     if (descriptor >= 0 || errno != EEXIST) return descriptor;
   }
+}
+
+/// Creates the file that will replace `target`, with its permissions, and its owner and group as
+/// far as the system allows. Nobody but the owner can read it before it has them.
+int create_replacement(const fs::path& target, fs::path& temporary) {
+  constexpr mode_t as_user_set = 0666, private_to_owner = 0600, permissions = 0777;
+  struct stat old {};
+  if (::stat(target.c_str(), &old) != 0) return create_beside(target, as_user_set, temporary);
+  const int descriptor = create_beside(target, private_to_owner, temporary);
+  if (descriptor < 0) return descriptor;
+  if (::fchown(descriptor, old.st_uid, old.st_gid) != 0) {
+    [[maybe_unused]] const int kept = ::fchown(descriptor, static_cast<uid_t>(-1), old.st_gid);
+  }
+  ::fchmod(descriptor, old.st_mode & permissions);
+  return descriptor;
 }
 
 /// Makes a rename last through a power cut. Not every file system can; the file is whole anyway.
@@ -73,23 +144,53 @@ bool has_control_characters(const std::string& text) {
 
 }  // namespace
 
-std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
-  std::error_code error;
-  if (fs::is_directory(path, error)) throw InputError(path, "is a folder, not a file");
-  errno = 0;
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(path, std::string("cannot be opened: ") + std::strerror(errno));
-  std::string content;
-  const auto bytes = fs::file_size(path, error);
-  if (!error) content.reserve(std::min<std::size_t>(bytes, max_bytes) + 1);
-  for (char block[65536]; stream.read(block, sizeof block), stream.gcount() > 0;) {
-    content.append(block, static_cast<std::size_t>(stream.gcount()));
-    if (content.size() > max_bytes) {
-      throw InputError(path, "is longer than " + std::to_string(max_bytes >> 20) +
-                                 " MiB: is it the right file?");
-    }
+// Opening a pipe would wait for its writer without O_NONBLOCK; a stream's data are waited for.
+InputFile::InputFile(const fs::path& path, std::size_t max_bytes)
+    : path_(path),
+      max_bytes_(max_bytes),
+      descriptor_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)) {
+  if (descriptor_ < 0) {
+    throw InputError(path, std::string("cannot be opened: ") + std::strerror(errno));
   }
-  if (stream.bad()) throw InputError(path, "cannot be read");
+  try {
+    bytes_ = check_kind(path, descriptor_, max_bytes);
+  } catch (const InputError&) {
+    ::close(descriptor_);
+    throw;
+  }
+  ::fcntl(descriptor_, F_SETFL, 0);
+}
+
+InputFile::~InputFile() { ::close(descriptor_); }
+
+std::size_t InputFile::read(char* data, std::size_t bytes) {
+  for (;;) {
+    const ssize_t count = ::read(descriptor_, data, bytes);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw InputError(path_, std::string("cannot be read: ") + std::strerror(errno));
+    read_bytes_ += static_cast<std::size_t>(count);
+    if (read_bytes_ > max_bytes_) fail_as_too_long(path_, max_bytes_);
+    return static_cast<std::size_t>(count);
+  }
+}
+
+std::string read_file(const fs::path& path, std::size_t max_bytes) {
+  constexpr std::size_t block_bytes = 1 << 16;
+  InputFile file(path, max_bytes);
+  std::string content;
+  content.reserve(file.bytes() + block_bytes);
+  for (;;) {
+    const std::size_t before = content.size();
+    const std::size_t wanted = before < file.bytes() ? file.bytes() - before : block_bytes;
+    content.resize(before + wanted);
+    const std::size_t count = file.read(content.data() + before, wanted);
+    content.resize(before + count);
+    if (count == 0) return content;
+  }
+}
+
+std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
+  std::string content = read_file(path, max_bytes);
   if (content.empty()) throw InputError(path, "is empty");
   const auto line_at = [&](std::string::const_iterator end) {
     return static_cast<std::size_t>(std::count(content.cbegin(), end, '\n')) + 1;
@@ -107,11 +208,14 @@ std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
 }
 
 WholeFile::WholeFile(const fs::path& path) : path_(path) {
-  if (is_special(path)) {
+  const Target target = find_target(path);
+  if (target.descriptor) {
+    descriptor_ = ::fcntl(*target.descriptor, F_DUPFD_CLOEXEC, 0);
+  } else if (is_special(path)) {
     descriptor_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
   } else {
-    target_ = without_links(path);
-    descriptor_ = create_beside(target_, temporary_);
+    target_ = target.path;
+    descriptor_ = create_replacement(target_, temporary_);
   }
   if (descriptor_ < 0) {
     temporary_.clear();

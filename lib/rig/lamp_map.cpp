@@ -40,16 +40,22 @@ Lamp read_lamp(YamlMap& map) {
   return lamp;
 }
 
-void check_lamp(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item) {
-  if (find_lamp(earlier, lamp.id) != nullptr) {
-    throw item.error("id " + std::to_string(lamp.id) + " stands twice");
-  }
-  for (const Lamp& other : earlier) {
+void EarlierLamps::check(const Lamp& lamp, const YamlValue& item) const {
+  if (ids_.contains(lamp.id)) throw item.error("id " + std::to_string(lamp.id) + " stands twice");
+  const double x_m = lamp.position_m.x();
+  const auto end = lamps_.upper_bound(x_m + kCoincident_m);
+  for (auto near = lamps_.lower_bound(x_m - kCoincident_m); near != end; ++near) {
+    const Lamp& other = near->second;
     if ((other.position_m - lamp.position_m).norm() < kCoincident_m) {
       throw item.error("lamp " + std::to_string(lamp.id) + " is where lamp " +
                        std::to_string(other.id) + " is");
     }
   }
+}
+
+void EarlierLamps::add(const Lamp& lamp) {
+  ids_.insert(lamp.id);
+  lamps_.emplace(lamp.position_m.x(), lamp);
 }
 
 const Lamp* find_lamp(std::span<const Lamp> lamps, int id) {
@@ -66,19 +72,27 @@ LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string&
   const YamlValue list = document.required("lamps");
   document.finish();
   LampMap map;
-  std::vector<Lamp> other_rooms;
-  for (const YamlValue& item : list.list()) {
+  EarlierLamps in_room;
+  std::unordered_set<int> ids_of_other_rooms;
+  const auto items = list.list();
+  map.lamps.reserve(items.size());
+  for (const YamlValue& item : items) {
     YamlMap keys = item.map();
     Lamp lamp = read_lamp(keys);
     const auto lamp_room = keys.optional("room");
     const bool is_in_room = room.empty() || (lamp_room && lamp_room->text() == room);
     if (!lamp.sd_m) lamp.sd_m = sd_m;
     keys.finish();
-    check_lamp(map.lamps, lamp, item);
-    if (find_lamp(other_rooms, lamp.id) != nullptr) {
+    in_room.check(lamp, item);
+    if (ids_of_other_rooms.contains(lamp.id)) {
       throw item.error("id " + std::to_string(lamp.id) + " stands twice");
     }
-    (is_in_room ? map.lamps : other_rooms).push_back(lamp);
+    if (is_in_room) {
+      in_room.add(lamp);
+      map.lamps.push_back(std::move(lamp));
+    } else {
+      ids_of_other_rooms.insert(lamp.id);
+    }
   }
   if (map.lamps.empty() && !room.empty()) {
     throw InputError(

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
+#include <unordered_set>
+
 #include "board.h"
 #include "calibration.h"
 #include "lamp_map.h"
@@ -23,8 +26,18 @@ Camera read_camera(YamlMap& map);
 /// Writes the keys that read_shape() reads.
 void emit_shape(YAML::Emitter& out, const LampShape& shape);
 
-/// Refuses a lamp that has the id or the place of an earlier one.
-void check_lamp(const std::vector<Lamp>& earlier, const Lamp& lamp, const YamlValue& item);
+/// Lamps that were read so far, by id and place.
+class EarlierLamps {
+ public:
+  /// Throws InputError at `item` if an earlier lamp has the id or the place of this one.
+  void check(const Lamp& lamp, const YamlValue& item) const;
+  void add(const Lamp& lamp);
+
+ private:
+  std::unordered_set<int> ids_;
+  /// By x in metres.
+  std::multimap<double, Lamp> lamps_;
+};
 
 }  // namespace vlp
 #pragma GCC visibility pop

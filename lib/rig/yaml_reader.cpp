@@ -60,7 +60,9 @@ class Inspection : public YAML::EventHandler {
   int depth_ = 0;
 };
 
-YAML::Node parse(const std::filesystem::path& file, const std::string& text) {
+}  // namespace
+
+YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text) {
   const std::size_t valid = utf8_length(text);
   if (valid < text.size()) {
     const auto line = std::count(text.begin(), text.begin() + std::ptrdiff_t(valid), '\n') + 1;
@@ -81,8 +83,6 @@ YAML::Node parse(const std::filesystem::path& file, const std::string& text) {
                          (tabs ? " (there are tabs: YAML is indented with spaces)" : ""));
   }
 }
-
-}  // namespace
 
 YamlMap::YamlMap(const YAML::Node& node, const std::filesystem::path* file, std::string key)
     : file_(file), prefix_(std::move(key)), line_(line_of(node.Mark())) {
@@ -136,8 +136,7 @@ InputError YamlMap::error(std::size_t line, const std::string& problem) const {
 }
 
 YamlMap read_yaml(const std::filesystem::path& file) {
-  constexpr std::size_t max_bytes = 1 << 20;  // yaml-cpp needs 500 times as much memory
-  const YAML::Node node = parse(file, read_text_file(file, max_bytes));
+  const YAML::Node node = parse_yaml(file, read_text_file(file, kMaxYamlBytes));
   return YamlValue(node, &file, "", line_of(node.Mark())).map();
 }
 

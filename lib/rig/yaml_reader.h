@@ -77,6 +77,12 @@ class YamlMap {
   std::vector<std::string> known_;
 };
 
+/// Parses the text of a YAML file. Throws InputError as read_yaml().
+YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text);
+
+/// Longest YAML file that is parsed: yaml-cpp needs 500 times as much memory.
+inline constexpr std::size_t kMaxYamlBytes = std::size_t{1} << 20;
+
 /// A YAML file that is a mapping. Throws InputError when it cannot be read or parsed, is longer
 /// than 1 MiB, is not UTF-8, holds aliases or a second document, or is nested more than 20 levels
 /// deep.

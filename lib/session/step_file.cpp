@@ -3,11 +3,11 @@
 #include "session/step_file.h"
 
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
 #include "rig/file.h"
+#include "rig/input_error.h"
 
 namespace vlp {
 namespace {
@@ -15,6 +15,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "vlp-step/1";
+/// Longest record of a step: one of 100,000 images with the reason why each is not used.
+constexpr std::size_t kMaxStepBytes = std::size_t{64} << 20;
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 double number_of(const Json& json) {
@@ -89,14 +91,15 @@ Json json_of(const StepResult& result) {
 }
 
 std::optional<KeptStep> read_step(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  const Json json = Json::parse(stream, nullptr, false);
-  if (!json.is_object()) return std::nullopt;
   try {
+    const Json json = Json::parse(read_file(file, kMaxStepBytes), nullptr, false);
+    if (!json.is_object()) return std::nullopt;
     if (json.at("format").get<std::string>() != kFormat) return std::nullopt;
     return KeptStep{json.at("key").get<std::string>(), json.at("outputs").get<std::string>(),
                     result_of(json.at("result"))};
   } catch (const Json::exception&) {
+    return std::nullopt;
+  } catch (const InputError&) {
     return std::nullopt;
   }
 }

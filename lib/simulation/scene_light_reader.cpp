@@ -107,12 +107,12 @@ void read_profile(YamlMap& map, Glow& glow) {
 
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room) {
   std::vector<SceneLamp> lamps;
-  std::vector<Lamp> earlier;
+  EarlierLamps earlier;
   for (const YamlValue& item : list.list()) {
     YamlMap map = item.map();
     const Lamp lamp = read_lamp(map);
-    check_lamp(earlier, lamp, item);
-    earlier.push_back(lamp);
+    earlier.check(lamp, item);
+    earlier.add(lamp);
     SceneLamp read{lamp.id,
                    read_glow(map, room),
                    map.required("frequency_hz").number(),

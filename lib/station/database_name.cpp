@@ -74,6 +74,10 @@ std::string name_of_machine() {
 
 bool is_server(const std::string& where) { return where.find(kScheme) != std::string::npos; }
 
+bool states_password(const std::string& where) {
+  return is_server(where) && !parts_of(where)["password"].empty();
+}
+
 std::string name_of_database(const std::string& where) {
   const std::string form = "is not of the form postgresql://USER@HOST/NAME";
   if (!is_server(where)) {

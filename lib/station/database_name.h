@@ -9,6 +9,9 @@ namespace vlp {
 /// Whether records are on a server, postgresql://... or postgres://...; otherwise in a file.
 bool is_server(const std::string& where);
 
+/// Returns true if a connection string states a password.
+bool states_password(const std::string& where);
+
 /// The database for a message: a server without user and passwords, wherever they stand. Throws
 /// InputError, which has no part of it that may be a password, when it is no connection string, or
 /// could be misread as another: a '@', ':', '/' or '?' in user or password is %40, %3A, %2F or %3F.

@@ -28,7 +28,7 @@ from concurrent.futures import ThreadPoolExecutor
 from hashlib import blake2b
 from urllib.parse import quote
 
-from files import INPUTS
+from files import INPUTS, MOST_FOLDERS, folder_id
 
 LOOKS = ("files", "folders")
 FEW_SESSIONS = 10_000
@@ -64,30 +64,35 @@ class Seen:
 
     def __init__(self, session, archive):
         self.files, self.numbers, self.places, self.of_places = [], [], [], []
-        self._below(session, archive, "")
+        self.folders = 0
+        self._below(session, archive, "", set())
 
-    def _below(self, folder, above, prefix):
+    def _below(self, folder, archive, prefix, above):
+        """above: device and inode of the folders on the way to this one."""
         self.places.append(prefix)
+        self.folders += 1
         try:
-            opened = os.open(folder, os.O_RDONLY, dir_fd=above)
+            opened = os.open(folder, os.O_RDONLY, dir_fd=archive)
         except OSError:  # it is for the programs to say so
             self.of_places += NOTHING
             return
         try:
-            self.of_places += numbers_of(os.fstat(opened))  # before what is in it
+            status = os.fstat(opened)
+            self.of_places += numbers_of(status)  # before what is in it
+            above = above | {(status.st_dev, status.st_ino)}
             with os.scandir(opened) as entries:
                 entries = sorted(entries, key=lambda entry: entry.name)
             for entry in entries:
                 if prefix or entry.name in INPUT_NAMES:
-                    self._add(entry, opened, prefix + entry.name)
+                    self._add(entry, opened, prefix + entry.name, above)
         except OSError:  # in the middle of it
             pass
         finally:
             os.close(opened)
 
-    def _add(self, entry, folder, name):
-        if entry.is_dir():
-            return self._below(entry.name, folder, name + "/")
+    def _add(self, entry, folder, name, above):
+        if folder_id(entry, above) and self.folders < MOST_FOLDERS:
+            return self._below(entry.name, folder, name + "/", above)
         try:
             numbers = numbers_of(entry.stat())
         except OSError:  # a link to nowhere

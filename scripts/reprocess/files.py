@@ -6,11 +6,41 @@ import hashlib
 import io
 import json
 import os
+import re
 from pathlib import Path
 
 # What vlp-calibrate reads of a session (lib/session/session_folder.h), but for drives, which are for its report.
 INPUTS = ["board.yaml", "boards", "camera.yaml", "check", "classifier.yaml", "dispersion", "gates.yaml", "lamps.yaml"]
 INPUTS += ["rotation"]
+# Of a session that are looked at: links that lead to each other's folders have more ways through them than can be gone.
+MOST_FOLDERS = 1000
+
+
+# What a spreadsheet takes for a formula at the beginning of a field, and for text behind an apostrophe: OWASP's
+# "CSV injection". lib/captures/csv_writer.cpp writes the same.
+FIRST_CHARACTERS = tuple("'=+-@\t\r")
+FORMULA = re.compile(r"'*[=+\-@\t\r].", re.DOTALL)
+
+
+def is_number(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def as_text(field):
+    """Puts an apostrophe before a field that a spreadsheet would calculate; numbers stay."""
+    text = str(field)
+    if text[:1] not in FIRST_CHARACTERS:
+        return field
+    return "'" + text if FORMULA.match(text) and not is_number(text) else field
+
+
+def without_apostrophe(field):
+    """The opposite of as_text()."""
+    return field[1:] if field.startswith("'") and FORMULA.match(field) else field
 
 
 def write_whole(file, text):
@@ -35,7 +65,7 @@ def table(columns, rows):
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows([row.get(column, "") for column in columns] for row in rows)
+    writer.writerows([as_text(row.get(column, "")) for column in columns] for row in rows)
     return text.getvalue()
 
 
@@ -44,7 +74,7 @@ def read_table(file):
     with open(file, newline="") as stream:
         lines = csv.reader(stream)
         columns = next(lines, [])
-        return [dict(zip(columns, line)) for line in lines if line]
+        return [dict(zip(columns, map(without_apostrophe, line))) for line in lines if line]
 
 
 def json_text(value):
@@ -63,11 +93,29 @@ def file_digest(file):
     return sha.hexdigest()
 
 
+def folder_id(entry, above):
+    """Device and inode of a folder; None of what is no folder, and of one in `above`, the folders on the way to it: a
+    link that leads back to one of these would have no end."""
+    try:
+        if not entry.is_dir():
+            return None
+        status = entry.stat()
+    except OSError:  # a link that leads to itself
+        return None
+    found = status.st_dev, status.st_ino
+    return None if found in above else found
+
+
 def input_files(session):
     """The files below a session that the stages read: (name, entry), in order. Folders that cannot be
-    read have none; it is for the programs to say so."""
+    read have none; it is for the programs to say so. A link to a folder on the way to it is a file that cannot be
+    read."""
 
-    def below(folder, prefix, wanted=None):
+    folders = 0
+
+    def below(folder, prefix, above, wanted=None):
+        nonlocal folders
+        folders += 1
         try:
             entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
         except OSError:
@@ -75,12 +123,17 @@ def input_files(session):
         for entry in entries:
             if wanted and entry.name not in wanted:
                 continue
-            if entry.is_dir():
-                yield from below(entry.path, prefix + entry.name + "/")
+            found = folder_id(entry, above)
+            if found and folders < MOST_FOLDERS:
+                yield from below(entry.path, prefix + entry.name + "/", above | {found})
             else:
                 yield prefix + entry.name, entry
 
-    yield from below(session, "", set(INPUTS))
+    try:
+        status = os.stat(session)
+    except OSError:
+        return
+    yield from below(session, "", {(status.st_dev, status.st_ino)}, set(INPUTS))
 
 
 def entry_digest(entry):

@@ -97,5 +97,41 @@ TEST_F(Csv, WritesWhatItReads) {
   }
 }
 
+TEST_F(Csv, WritesFormulasAsTextAndReadsThemBack) {
+  const std::vector<std::string> formulas{"=1+1", "+A1", "-A1",    "@sum(a)", "\tx",  "\rx",
+                                          "'=1",  "''=", "=\"a\"", "=a,b",    "-1-1", "+1 m"};
+  CsvWriter writer(folder / "b.csv", {"one", "=two"});
+  for (const std::string& formula : formulas) writer.row({formula, "x"});
+  writer.save();
+  const std::string content = folder.content_of(folder / "b.csv");
+  EXPECT_THAT(content, HasSubstr("\n\"'=1+1\",x\n"));
+  const CsvTable table(folder / "b.csv");
+  ASSERT_EQ(table.rows(), formulas.size());
+  EXPECT_TRUE(table.optional("=two"));
+  for (std::size_t row = 0; row < formulas.size(); ++row) {
+    EXPECT_EQ(table.text(row, table.required("one")), formulas[row]);
+  }
+}
+
+TEST_F(Csv, WritesNumbersAndOtherTextAsTheyAre) {
+  CsvWriter writer(folder / "b.csv", {"a", "b", "c", "d", "e", "f"});
+  writer.row({"-0.5", "+1.5e-3", "-", "'quoted'", "a=b", "-inf"});
+  writer.save();
+  EXPECT_EQ(folder.content_of(folder / "b.csv"), "a,b,c,d,e,f\n-0.5,+1.5e-3,-,'quoted',a=b,-inf\n");
+}
+
+TEST_F(Csv, NamesTheColumnThatStandsTwiceAmongMany) {
+  std::string header = "twice", row = "0";
+  for (int i = 0; i < 200'000; ++i) {
+    header += ",c" + std::to_string(i);
+    row += ",0";
+  }
+  EXPECT_EQ(read(header + "\n" + row + "\n").rows(), 1);
+  EXPECT_THAT(refusal(header + ",twice\n" + row + ",0\n"),
+              HasSubstr("a.csv:1: twice: this column stands twice"));
+  const CsvTable table = read(header + "\n" + row + "\n");
+  EXPECT_LT(refusal_of([&] { (void)table.required("u_px"); }).size(), 1000);
+}
+
 }  // namespace
 }  // namespace vlp

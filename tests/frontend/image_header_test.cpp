@@ -61,6 +61,25 @@ TEST(SizeInHeaderOf, OtherFilesIsNotKnown) {
   EXPECT_FALSE(size_in_header("P5 # never ends"));
 }
 
+TEST(SizeInHeaderOf, JpegIsFoundBehindBytesThatAreNoMarker) {
+  std::string bytes = encoded_as(".jpg", 33, 21);
+  bytes.insert(2, std::string("\x01\xff\x00\x02", 4));
+  EXPECT_EQ(size_in_header(bytes), (Size{33, 21}));
+}
+
+TEST(ReadImage, RefusesOtherFormatsUndecoded) {
+  const TemporaryFolder folder;
+  const std::string webp("RIFF\x10\0\0\0WEBPVP8L\x04\0\0\0\x2f\xff\xff\xff", 24);
+  for (const std::string& content : {webp, std::string("no image"), std::string(100, '\0')}) {
+    try {
+      read_image(folder.file("a.png", content));
+      ADD_FAILURE() << "is read";
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("is no PNG, JPEG, BMP, TIFF or PGM"));
+    }
+  }
+}
+
 TEST(ReadImage, RefusesWhatItsHeaderSaysIsTooLargeUndecoded) {
   std::string bytes = encoded_as(".png", 30, 30);
   for (const std::size_t at : {16U, 20U}) bytes.replace(at, 4, std::string("\0\0\x75\x30", 4));

@@ -45,7 +45,7 @@ TEST(ObservePixels, RejectsWithTheReasonInOneLine) {
   observe_pixels(SourceImage("none.png"), {}, {}, missing, [](const cv::Mat&) { FAIL(); });
   ASSERT_FALSE(missing.is_kept());
   EXPECT_EQ(missing.rejection->reason, RejectionReason::unreadable);
-  EXPECT_EQ(missing.rejection->message, "cannot be read as an image");
+  EXPECT_EQ(missing.rejection->message, "cannot be opened: No such file or directory");
 }
 
 TEST(ObservePixels, RejectsLargeImagesUnread) {

@@ -497,7 +497,7 @@ TEST_F(SmallSession, TellsOfImagesThatAreDamaged) {
   fs::resize_file(folder / "a session/check/0001.png", 100);
   const auto run = calibrate("--no-report --row-time-s 3e-5 --readout rows");
   EXPECT_EQ(run.exit_code, 0) << run.errors;
-  EXPECT_THAT(run.errors, HasSubstr("0003.png: cannot be read as an image; skipped"));
+  EXPECT_THAT(run.errors, HasSubstr("0003.png: cannot be read as an image: is no PNG"));
   const auto json = nlohmann::json::parse(result("session.json"));
   std::map<std::string, std::string> skipped;
   for (const auto& step : json["steps"]) {

@@ -223,7 +223,7 @@ TEST_F(Detect, SkipsAndCountsImagesThatItCannotUse) {
   EXPECT_THAT(result.errors, HasSubstr("cut.jpg: cannot be read as an image: it is cut short"));
   EXPECT_THAT(result.errors, HasSubstr("half.PNG: cannot be read as an image: it is cut short"));
   EXPECT_THAT(result.errors, testing::Not(HasSubstr("libpng")));
-  EXPECT_THAT(result.errors, HasSubstr("text.png: cannot be read as an image; skipped"));
+  EXPECT_THAT(result.errors, HasSubstr("text.png: cannot be read as an image: is no PNG, JPEG"));
   EXPECT_THAT(result.errors, HasSubstr("the camera's images are 800 x 600 px; skipped"));
   EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
 }

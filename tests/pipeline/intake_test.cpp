@@ -148,7 +148,8 @@ TEST_F(Intake, IsTheSameAtTheStationAndInASession) {
         << step;
     EXPECT_EQ(reason("0003e-copy.png"), "is the same image as 0003.png") << step;
     EXPECT_EQ(reason("0003f-saved-again.png"), "is the same image as 0003.png") << step;
-    EXPECT_EQ(reason("0003g-text.png"), "cannot be read as an image") << step;
+    EXPECT_THAT(reason("0003g-text.png"), testing::StartsWith("cannot be read as an image"))
+        << step;
   }
   EXPECT_THAT(reasons.at("boards/0003h-foreign.png"), HasSubstr("tags that the board does not"));
   EXPECT_THAT(reasons.at("boards/0003i-blurred.png"), HasSubstr("blurred: "));

@@ -135,7 +135,7 @@ TEST_F(IntrinsicsRefusals, SkipsImagesOfAnotherSizeAndWhatIsNoImage) {
   folder.file("images/2.png", "no image\n");
   const auto bad = calibrate(images, kRig + "/board.yaml");
   EXPECT_EQ(bad.exit_code, 3) << bad.errors;
-  EXPECT_THAT(bad.errors, HasSubstr("2.png: cannot be read as an image; skipped"));
+  EXPECT_THAT(bad.errors, HasSubstr("2.png: cannot be read as an image: is no PNG"));
   const auto only = calibrate((folder / "images/2.png").string(), kRig + "/board.yaml");
   EXPECT_EQ(only.exit_code, 2);
   EXPECT_THAT(only.errors, HasSubstr("none of its 1 images can be used"));

@@ -98,7 +98,7 @@ TEST_F(ReportTest, RefusesWhatItCannotShow) {
     return errors;
   };
   EXPECT_THAT(refusal(" --picture" + in("fixes.csv")), HasSubstr("is neither an SVG nor a PNG"));
-  EXPECT_THAT(refusal(" --picture" + in("none.svg")), HasSubstr("none.svg: cannot be read"));
+  EXPECT_THAT(refusal(" --picture" + in("none.svg")), HasSubstr("none.svg: cannot be opened"));
   EXPECT_THAT(refusal(" --track" + in("track.csv") + " 1 0 1 0"),
               HasSubstr("begins where it ends"));
   EXPECT_THAT(refusal(" --json" + in("report.html")),

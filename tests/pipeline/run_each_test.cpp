@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
 #include <gmock/gmock.h>
-#include <sys/stat.h>
 
 #include <csignal>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "support/datasets.h"
 #include "support/program.h"
 #include "support/schema.h"
 #include "support/temporary_folder.h"
@@ -58,10 +58,19 @@ TEST_F(RunEach, AnswersEachAsVlpCalibrateAlone) {
 }
 
 TEST_F(RunEach, KillsAtTheLimitAndGoesOn) {
+  // Images of 200 million pixels, which take no room on the disk.
   const auto session = folder / "endless";
   std::filesystem::create_directories(session / "rotation");
-  std::ofstream(session / "lamps.yaml") << "format: vlp-lamps/1\n";
-  ASSERT_EQ(::mkfifo((session / "camera.yaml").c_str(), 0600), 0);  // nobody writes into it
+  std::filesystem::create_directories(session / "boards");
+  for (const char* name : {"lamps.yaml", "board.yaml"}) {
+    std::filesystem::copy_file(kRig + "/" + name, session / name);
+  }
+  const auto image = session / "boards/0.pgm";
+  std::ofstream(image) << "P5\n20000 10000\n255\n";
+  std::filesystem::resize_file(image, 200'000'019);
+  for (int i = 1; i < 100; ++i) {
+    std::filesystem::create_hard_link(image, session / "boards" / (std::to_string(i) + ".pgm"));
+  }
   const auto [code, output, errors] = run(line("endless", 1) + line("nowhere"));
   EXPECT_EQ(code, 0);
   const auto all = answers(output);

@@ -167,6 +167,28 @@ TEST_F(CommonToFixes, OfASurveyIsItsStandardDeviationThroughTheFix) {
   EXPECT_NEAR(std::sqrt(common(0, 0)), 0.00075, 0.00008);
 }
 
+/// Lamps of a dispersion have rows in the joint covariance; a derivative of 0 adds no error to it.
+TEST_F(CommonToFixes, OfASurveyAreTheSameWithAndWithoutRows) {
+  rig.calibrate_in_a_row();
+  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
+  rig.calibration.dispersion->by_lamps.clear();
+  const auto detections = seen_from(rig, 0.1);
+  const Fix without = Positioner(rig.map, rig.calibration).locate(detections);
+  const CommonErrors small(rig.map.lamps, rig.calibration, Correction::all);
+  for (const Lamp& lamp : rig.map.lamps) {
+    rig.calibration.dispersion->by_lamps.push_back(
+        {lamp.id, lamp.position_m, *lamp.sd_m, Eigen::Matrix<double, 2, 3>::Zero()});
+  }
+  const CommonErrors large(rig.map.lamps, rig.calibration, Correction::all);
+  EXPECT_EQ(small.joint().rows(), small.shared());
+  EXPECT_EQ(large.joint().rows(), large.shared() + 3 * std::ssize(rig.map.lamps));
+  const Fix with = Positioner(rig.map, rig.calibration).locate(detections);
+  ASSERT_TRUE(with.ok() && without.ok());
+  const double scale = with.estimate.covariance.norm();
+  EXPECT_THAT(without.estimate.covariance, IsNear(with.estimate.covariance, 1e-12 * scale));
+  EXPECT_TRUE(small.stated() && small.only(CommonPart::lamps).stated());
+}
+
 TEST_F(CommonToFixes, NamesALampThatNothingUncertainExplains) {
   rig.adjust(0.3);
   Random random(8);

@@ -2,7 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "program/app.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <cstdio>
 
 #include <CLI/CLI.hpp>
 
@@ -38,6 +42,31 @@ TEST(RunApp, SaysWhyInOneLineThatATerminalCanShow) {
   EXPECT_THAT(said, HasSubstr("vlp-something: error: lamp "));
   EXPECT_EQ(said.find('\x1b'), std::string::npos);
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
+}
+
+/// End of a program that does this while its stdout is full.
+std::pair<int, std::string> end_with_full_stdout(const std::function<void()>& run) {
+  const int kept = ::dup(STDOUT_FILENO), full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
+  std::fflush(stdout);
+  ::dup2(full, STDOUT_FILENO);
+  const auto end = end_of([&] {
+    std::fputs("figures\n", stdout);
+    run();
+  });
+  std::clearerr(stdout);
+  ::dup2(kept, STDOUT_FILENO);
+  ::close(kept);
+  ::close(full);
+  return end;
+}
+
+TEST(RunApp, ReportsAFullStdoutHoweverItEnds) {
+  for (const std::function<void()>& run : std::vector<std::function<void()>>{
+           [] {}, [] { throw GateNotMet("mean_mm"); }, [] { throw Undetermined("add lamps"); }}) {
+    const auto [code, said] = end_with_full_stdout(run);
+    EXPECT_EQ(code, kBadInput);
+    EXPECT_THAT(said, HasSubstr("stdout cannot be written"));
+  }
 }
 
 TEST(Outputs, AreNoInputs) {

@@ -40,7 +40,7 @@ TEST(ReportPicture, TakesOthersByTheirName) {
 TEST(ReportPicture, RefusesWhatIsNone) {
   const TemporaryFolder folder;
   EXPECT_THAT(refusal_of([&] { read_report_picture(folder / "none.svg"); }),
-              HasSubstr("none.svg: cannot be read"));
+              HasSubstr("none.svg: cannot be opened"));
   EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("a.svg", "")); }),
               HasSubstr("a.svg: is neither an SVG nor a PNG"));
   EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("b.svg", "x,y\n")); }),

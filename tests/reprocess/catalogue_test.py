@@ -15,6 +15,20 @@ import catalogue
 import files
 
 
+class Tables(unittest.TestCase):
+    """Tables that people open with a spreadsheet."""
+
+    def test_formulas_are_text_and_come_back(self):
+        rows = [{"name": name, "mm": "-0.5"} for name in ("=1+1", "+A1", "-A1", "@a", "\tx", "'=1", "plain", "-", "'a'")]
+        text = files.table(["name", "mm"], rows)
+        self.assertIn("\n'=1+1,-0.5\n", text)
+        self.assertIn("\n-,-0.5\n'a',-0.5\n", text)
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "a.csv"
+            file.write_text(text)
+            self.assertEqual(files.read_table(file), rows)
+
+
 class Look(unittest.TestCase):
     """What the plan notices of what happens to a session's files."""
 
@@ -99,6 +113,33 @@ class Look(unittest.TestCase):
         self.written_over("boards/0.png", "two")
         self.assertEqual(self.glance("folders"), said[-1])  # as the page says
         self.assertNotEqual(self.glance("files"), said[-1])
+
+    def test_links_that_lead_back_end_and_hide_nothing(self):
+        first, digest = self.glance(), files.input_digests(self.session)
+        os.symlink("..", self.session / "boards/up")
+        os.symlink(".", self.session / "check/here")
+        os.symlink("itself", self.session / "check/itself")
+        for folder in "boards", "check":
+            os.symlink(self.session, self.session / folder / "session")
+        said = [first, self.glance()]
+        self.assertNotEqual(files.input_digests(self.session), digest)
+        self.written_over("check/more/2.png", "two")
+        said += [self.glance(), self.glance("folders")]
+        self.assertEqual(len(set(said)), 3)
+        names = [name for name, _ in files.input_files(self.session)]
+        self.assertIn("check/more/2.png", names)
+        self.assertIn("check/itself", names)
+        self.assertLess(len(names), 20)
+
+    def test_links_to_each_other_have_an_end(self):
+        for folder in range(9):
+            (self.session / f"rotation/{folder}").mkdir(parents=True)
+            for other in range(9):
+                os.symlink(f"../{other}", self.session / f"rotation/{folder}/to{other}")
+        begun = time.monotonic()
+        self.glance()
+        self.assertLessEqual(len(list(files.input_files(self.session))), 20 * files.MOST_FOLDERS)
+        self.assertLess(time.monotonic() - begun, 5)
 
     def looked(self, days=0):
         """How, where nothing is asked for and sessions are many, so many days later."""

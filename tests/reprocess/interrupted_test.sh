@@ -39,6 +39,22 @@ redone() {  # since the last time
 }
 redone >/dev/null 2>&1 || true
 
+# A signal to the script alone ends all that it started, and the same command goes on.
+gone() { ! pgrep --session "$run"; }
+for signal in TERM HUP; do
+  start_reprocess "$results-signal" --shard-size 3 --cores 1
+  run=$!
+  patiently 60 pgrep --session "$run" --full 'shard\.py'
+  kill -$signal "$run"
+  code=0
+  wait "$run" || code=$?
+  [ $code = 3 ] && grep -q 'interrupted; the same command goes on' "$said" || fail "$signal: $code: $(cat "$said")"
+  patiently 5 flock --nonblock "$results-signal/.state/lock" true
+  patiently 5 gone
+done
+reprocess "$results-signal" --shard-size 3 --cores 2 >"$said"
+expect_baseline "$results-signal" "${sessions[@]:0:2}"
+
 # A worker that is lost, as for want of memory, is replaced by the run itself; here with a session at work.
 start_reprocess "$results-lost" --shard-size 3 --cores 1
 worker() { pgrep --session "$run" --full 'shard\.py'; }

@@ -23,6 +23,16 @@ mkdir -p "$scratch/layout-empty/camera/session"
 incomplete 3 'none of its 1 sessions has any input; the layout is ARCHIVE/CAMERA/SESSION/' "$scratch/layout-empty" "$results"
 [ ! -e "$results" ] || fail "something is left of an archive that has no session"
 
+# What another program keeps there is neither written into nor deleted.
+mkdir -p "$results/.state"
+echo precious >"$results/.state/notes"
+before=$(find "$results" | sort)
+for folder in "$scratch/layout-empty" "$archive"; do
+  incomplete 2 'holds a .state that is not of reprocess.sh; give the results a folder of their own' "$folder" "$results"
+  [ "$(find "$results" | sort)" = "$before" ] || fail "another program's .state was changed"
+done
+rm -r "$results"
+
 # One of two has no rotation: that passes unless a fraction is given. With both, nothing could be done.
 rm -r "$archive/camera-00002/session-01/rotation"
 reprocess "$results" >"$said"

@@ -46,6 +46,46 @@ TEST(WriteFile, MakesAFileThatOthersMayReadAsTheUserHasSetIt) {
   EXPECT_EQ(fs::status(folder / "a.yaml").permissions(), fs::perms(0640));
 }
 
+TEST(WriteFile, KeepsThePermissionsOfTheFileItReplaces) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("a.yaml", "old\n");
+  for (const fs::perms mode : {fs::perms(0600), fs::perms(0664), fs::perms(0444)}) {
+    fs::permissions(file, mode);
+    write_file(file, "new\n");
+    EXPECT_EQ(fs::status(file).permissions(), mode);
+  }
+  fs::create_symlink("a.yaml", folder / "link");
+  write_file(folder / "link", "new\n");
+  EXPECT_EQ(fs::status(file).permissions(), fs::perms(0444));
+}
+
+TEST(WriteFile, KeepsOwnerAndGroupOfTheFileItReplaces) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root gives files away";
+  const TemporaryFolder folder;
+  const auto file = folder.file("a.yaml", "old\n");
+  constexpr uid_t owner = 12345;
+  constexpr gid_t group = 12346;
+  ASSERT_EQ(::chown(file.c_str(), owner, group), 0);
+  fs::permissions(file, fs::perms(0640));
+  write_file(file, "new\n");
+  struct stat found {};
+  ASSERT_EQ(::stat(file.c_str(), &found), 0);
+  EXPECT_EQ(found.st_uid, owner);
+  EXPECT_EQ(found.st_gid, group);
+  EXPECT_EQ(fs::status(file).permissions(), fs::perms(0640));
+}
+
+TEST(WriteFile, WritesToTheStreamThatTheProcessHas) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("log", "old\n");
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  ASSERT_GE(descriptor, 0);
+  write_file("/dev/fd/" + std::to_string(descriptor), "new\n");
+  write_file("/proc/self/fd/" + std::to_string(descriptor), "newer\n");
+  ::close(descriptor);
+  EXPECT_EQ(folder.content_of(file), "old\nnew\nnewer\n");
+}
+
 TEST(WriteFile, TakesAPathFromTheCurrentFolder) {
   const TemporaryFolder folder;
   const fs::path before = fs::current_path();

@@ -52,6 +52,23 @@ const char* ros_distortion(LensModel model) {
   }
 }
 
+/// Returns a camera's name as YAML. Throws std::invalid_argument if it holds control characters or
+/// is not UTF-8, which not every reader takes.
+std::string quoted_name(const std::string& name) {
+  constexpr unsigned char first_printable = 0x20, del = 0x7f;
+  std::string quoted = "'";
+  for (const char character : name) {
+    const auto byte = static_cast<unsigned char>(character);
+    if (byte < first_printable || byte == del || utf8_length(name) < name.size()) {
+      throw std::invalid_argument(
+          "the camera's name holds control characters or is not UTF-8; give it another by "
+          "--camera-id");
+    }
+    quoted += character == '\'' ? std::string("''") : std::string(1, character);
+  }
+  return quoted + "'";
+}
+
 std::string opencv_matrix(const char* name, int rows, const std::vector<double>& values) {
   const std::size_t cols = values.size() / static_cast<std::size_t>(rows);
   std::string text(name);
@@ -71,7 +88,7 @@ std::string ros_camera_info(const Camera& camera) {
   const auto& p = camera.intrinsics;
   std::string text = "image_width: " + std::to_string(camera.imager_px[0]);
   text.append("\nimage_height: ").append(std::to_string(camera.imager_px[1]));
-  text.append("\ncamera_name: ").append(in_quotes(camera.id));
+  text.append("\ncamera_name: ").append(quoted_name(camera.id));
   text.append("\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: ")
       .append(list_of(matrix_of(camera)));
   text.append("\ndistortion_model: ").append(distortion);

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <locale>
 #include <optional>
 #include <sstream>
@@ -22,18 +20,19 @@
 #include "calibration/intrinsics/spline_fit.h"
 #include "camera/spline_grid.h"
 #include "geometry/symmetric.h"
+#include "rig/file.h"
 #include "rig/input_error.h"
+#include "rig/yaml_reader.h"
 
 namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw InputError(file, "cannot be read");
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
+/// Longest file of a camera: mrcal's holds the corners that went into its solve.
+constexpr std::size_t kMaxCameraBytes = std::size_t{64} << 20;
+/// Largest width and height of an image, as in a calibration.
+constexpr int kMaxImager_px = 1 << 20;
 
 /// A Python literal without its comments, from a # that is in no string to the end of the line.
 std::string without_comments(const std::string& text) {
@@ -141,9 +140,8 @@ AnyCamera camera_from_mrcal(const fs::path& file, const std::string& text) {
     throw InputError(file, "has lens model " + name + "; the models are: " + lens_model_names());
   }
   const auto imager = python_numbers(file, head, "imagersize");
-  constexpr double largest = 1e6;
-  if (imager.size() != 2 || !(imager[0] >= 1 && imager[1] >= 1) ||
-      !(imager[0] <= largest && imager[1] <= largest)) {
+  const auto is_size = [](double value) { return value >= 1 && value <= kMaxImager_px; };
+  if (imager.size() != 2 || !std::ranges::all_of(imager, is_size)) {
     throw InputError(file, "'imagersize' should be the image's width and height in pixels");
   }
   Camera camera;
@@ -312,7 +310,7 @@ void compare_lenses(const Lens& from, const Lens& to, const std::array<int, 2>& 
 }  // namespace
 
 AnyCamera read_any_camera(const fs::path& file) {
-  std::string text = text_of(file);
+  std::string text = read_file(file, kMaxCameraBytes);
   AnyCamera found;
   Camera& camera = found.camera;
   if (text.find("'lensmodel'") != std::string::npos ||
@@ -324,8 +322,11 @@ AnyCamera read_any_camera(const fs::path& file) {
     }
     // "%YAML:1.0" of OpenCV is no directive of YAML.
     if (text.starts_with("%YAML:")) text.erase(0, text.find('\n'));
+    if (text.size() > kMaxYamlBytes) {
+      throw InputError(file, "holds no camera: as YAML it would be shorter than 1 MiB");
+    }
     try {
-      const YAML::Node document = YAML::Load(text);
+      const YAML::Node document = parse_yaml(file, text);
       if (!document.IsMap()) throw InputError(file, "holds no camera");
       if (document["format"]) {
         const Calibration calibration = read_calibration(file);
@@ -340,8 +341,10 @@ AnyCamera read_any_camera(const fs::path& file) {
     }
   }
   if (camera.id.empty()) camera.id = "camera";
-  if (camera.imager_px[0] < 1 || camera.imager_px[1] < 1) {
-    throw InputError(file, "the image has no size");
+  for (const int size_px : camera.imager_px) {
+    if (size_px >= 1 && size_px <= kMaxImager_px) continue;
+    throw InputError(file, "the image should be 1 to " + std::to_string(kMaxImager_px) +
+                               " px wide and high, not " + std::to_string(size_px));
   }
   try {
     const Lens lens(camera.lens_model, camera.intrinsics);

@@ -10,8 +10,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <thread>
@@ -22,6 +24,28 @@ namespace vlp {
 namespace {
 
 std::atomic<bool> stop_asked = false;
+
+/// Settings of the terminal before a Terminal and while it reads keys, for handlers of signals.
+termios modes_before{}, modes_of_keys{};
+std::atomic<bool> resumed = false;
+
+/// Puts the terminal's settings back and lets the signal end or stop the process as it does by
+/// default. A process that goes on afterwards reads keys again.
+void put_back_and_raise(int signal) {
+  const int error_before = errno;
+  ::tcsetattr(STDIN_FILENO, TCSANOW, &modes_before);
+  std::signal(signal, SIG_DFL);
+  sigset_t signals, blocked;
+  sigemptyset(&signals);
+  sigaddset(&signals, signal);
+  ::raise(signal);
+  ::pthread_sigmask(SIG_UNBLOCK, &signals, &blocked);  // it takes effect here
+  ::pthread_sigmask(SIG_SETMASK, &blocked, nullptr);
+  std::signal(signal, put_back_and_raise);
+  ::tcsetattr(STDIN_FILENO, TCSANOW, &modes_of_keys);
+  resumed = true;
+  errno = error_before;
+}
 
 const char* colour_of(Tone tone) {
   switch (tone) {
@@ -51,7 +75,7 @@ struct Terminal::Saved {
   termios settings{};
 };
 
-Terminal::Terminal() : interactive_(::isatty(STDOUT_FILENO) == 1), saved_(new Saved) {
+Terminal::Terminal() : interactive_(::isatty(::fileno(stdout)) == 1), saved_(new Saved) {
   const char* no_colour = std::getenv("NO_COLOR");
   colour_ = interactive_ && (no_colour == nullptr || *no_colour == '\0');
   std::signal(SIGINT, [](int) { stop_asked = true; });
@@ -60,29 +84,38 @@ Terminal::Terminal() : interactive_(::isatty(STDOUT_FILENO) == 1), saved_(new Sa
   termios settings = saved_->settings;
   settings.c_lflag &= static_cast<tcflag_t>(~(ICANON | ECHO));
   saved_->keys = ::tcsetattr(STDIN_FILENO, TCSANOW, &settings) == 0;
+  modes_before = saved_->settings;
+  modes_of_keys = settings;
+  std::signal(SIGQUIT, put_back_and_raise);
+  std::signal(SIGTSTP, put_back_and_raise);
 }
 
 Terminal::~Terminal() {
   if (saved_->keys) ::tcsetattr(STDIN_FILENO, TCSANOW, &saved_->settings);
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
+  std::signal(SIGQUIT, SIG_DFL);
+  std::signal(SIGTSTP, SIG_DFL);
 }
 
 Terminal::Size Terminal::size() {
   winsize known{};
-  if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &known) != 0 || known.ws_col == 0 || known.ws_row == 0) {
+  if (::ioctl(::fileno(stdout), TIOCGWINSZ, &known) != 0 || known.ws_col == 0 ||
+      known.ws_row == 0) {
     return {80, 24};
   }
   return {known.ws_col, known.ws_row};
 }
 
-bool Terminal::resized() const { return interactive_ && drawn_ > 0 && size() != size_; }
+bool Terminal::resized() const {
+  return interactive_ && drawn_ > 0 && (size() != size_ || resumed);
+}
 
-/// Puts the text in the place of what was drawn. After a change of size nobody knows where that is:
-/// all is cleared.
+/// Puts the text in the place of what was drawn. After a change of size, or a stop, the place is
+/// unknown: all is cleared.
 void Terminal::show(const std::string& text, std::size_t lines) {
   const Size now = size();
-  const bool moved = drawn_ > 0 && now != size_;
+  const bool moved = drawn_ > 0 && (resumed.exchange(false) || now != size_);
   if (text == last_ && !moved) return;
   const std::string home = moved        ? "\x1b[2J\x1b[H"
                            : drawn_ > 0 ? fmt::format("\x1b[{}A\r", drawn_)

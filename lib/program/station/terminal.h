@@ -28,7 +28,8 @@ class Terminal {
   void draw(const std::vector<ScreenLine>& lines);
   /// Prints in place of what was drawn, to stay.
   void print(const std::vector<ScreenLine>& lines);
-  /// Whether the terminal has another size than when it was drawn.
+  /// Returns true if the terminal has another size than when it was drawn, or if the process was
+  /// stopped (Ctrl-Z) since then.
   bool resized() const;
   /// The key that was pressed, if one was, waiting so long at most. Several that come together are
   /// a scanner's, and none; but one key many times is an impatient operator's.

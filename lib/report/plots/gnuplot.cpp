@@ -2,10 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "report/plots/gnuplot.h"
 
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstdio>
-#include <cstdlib>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <iterator>
+#include <optional>
+#include <string_view>
 
 #include "rig/file.h"
 #include "rig/input_error.h"
@@ -15,48 +23,90 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A temporary file that goes with its scope.
-class Script {
+/// A descriptor that is closed at the end of its scope.
+class Descriptor {
  public:
-  Script(const std::string& content, const fs::path& picture)
-      : path_((fs::temp_directory_path() / "vlp-plot-XXXXXX").string()) {
-    const int descriptor = ::mkstemp(path_.data());
-    if (descriptor < 0) throw InputError(picture, "cannot be drawn: no room for temporary files");
-    ::close(descriptor);
-    write_file(path_, content);
-  }
-  ~Script() {
-    std::error_code ignored;
-    fs::remove(path_, ignored);
-  }
-  Script(const Script&) = delete;
-  Script& operator=(const Script&) = delete;
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() { close(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
 
-  const std::string& path() const { return path_; }
+  int number() const { return number_; }
+  void close() {
+    if (number_ >= 0) ::close(number_);
+    number_ = -1;
+  }
 
  private:
-  std::string path_;
+  int number_;
 };
 
-std::string shell_quoted(const std::string& text) {
-  std::string quoted = "'";
-  for (const char c : text) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
+/// Puts the script into memory that gnuplot reads as its stdin, so that no temporary file is
+/// needed.
+void write_script(const Descriptor& script, std::string_view text, const fs::path& picture) {
+  while (!text.empty()) {
+    const ssize_t count = ::write(script.number(), text.data(), text.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw InputError(picture, "cannot be drawn: no room for gnuplot's script");
+    text.remove_prefix(static_cast<std::size_t>(count));
+  }
+  ::lseek(script.number(), 0, SEEK_SET);
+}
+
+/// Starts gnuplot with these descriptors as stdin and stdout. -d: without ~/.gnuplot, which may run
+/// commands and change the picture. Returns std::nullopt if it cannot be started.
+std::optional<pid_t> start_gnuplot(int script, int output) {
+  std::string words[] = {"env", "LC_ALL=C.UTF-8", "gnuplot", "-d", "-"};
+  std::array<char*, std::size(words) + 1> arguments{};
+  std::ranges::transform(words, arguments.begin(), [](std::string& word) { return word.data(); });
+  posix_spawn_file_actions_t actions;
+  ::posix_spawn_file_actions_init(&actions);
+  ::posix_spawn_file_actions_adddup2(&actions, script, STDIN_FILENO);
+  ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  pid_t process = 0;
+  const int failure =
+      ::posix_spawnp(&process, arguments[0], &actions, nullptr, arguments.data(), environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  return failure == 0 ? std::optional(process) : std::nullopt;
+}
+
+std::string read_all(const Descriptor& pipe) {
+  std::string content;
+  char block[65536];
+  for (;;) {
+    const ssize_t count = ::read(pipe.number(), block, sizeof block);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return content;
+    content.append(block, static_cast<std::size_t>(count));
+  }
+}
+
+bool has_succeeded(pid_t process) {
+  int status = 0;
+  while (::waitpid(process, &status, 0) < 0) {
+    if (errno != EINTR) return false;
+  }
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
 /// `picture` is for the messages.
 std::string drawn(const std::string& terminal, const Drawing& drawing, const fs::path& picture) {
-  const Script script("set terminal " + terminal + " size " + std::to_string(drawing.width_px) +
-                          "," + std::to_string(drawing.height_px) + "\n" + drawing.commands,
-                      picture);
-  FILE* pipe = ::popen(("LC_ALL=C.UTF-8 gnuplot " + shell_quoted(script.path())).c_str(), "r");
-  if (pipe == nullptr) throw InputError(picture, "cannot be drawn: gnuplot cannot be started");
-  std::string image;
-  char block[65536];
-  while (const std::size_t size = std::fread(block, 1, sizeof block, pipe)) {
-    image.append(block, size);
+  const Descriptor script(::memfd_create("vlp-plot", MFD_CLOEXEC));
+  int ends[2] = {-1, -1};
+  if (script.number() < 0 || ::pipe2(ends, O_CLOEXEC) != 0) {
+    throw InputError(picture, "cannot be drawn: no room for gnuplot's script");
   }
-  if (::pclose(pipe) != 0 || image.empty()) {
+  const Descriptor output(ends[0]);
+  Descriptor input(ends[1]);
+  write_script(script,
+               "set terminal " + terminal + " size " + std::to_string(drawing.width_px) + "," +
+                   std::to_string(drawing.height_px) + "\n" + drawing.commands,
+               picture);
+  const auto process = start_gnuplot(script.number(), input.number());
+  if (!process) throw InputError(picture, "cannot be drawn: gnuplot cannot be started");
+  input.close();  // gnuplot's end is the last one
+  std::string image = read_all(output);
+  if (!has_succeeded(*process) || image.empty()) {
     throw InputError(picture, "cannot be drawn: gnuplot failed; is it installed?");
   }
   return image;
