@@ -3,10 +3,12 @@
 #include "session/step_file.h"
 
 #include <cmath>
-#include <fstream>
+#include <exception>
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "captures/json_bounds.h"
+#include "captures/shared_folder.h"
 #include "rig/file.h"
 
 namespace vlp {
@@ -89,14 +91,17 @@ Json json_of(const StepResult& result) {
 }
 
 std::optional<KeptStep> read_step(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  const Json json = Json::parse(stream, nullptr, false);
-  if (!json.is_object()) return std::nullopt;
+  constexpr std::size_t max_bytes = 1 << 26;
   try {
+    const auto text = SharedFolder(file.parent_path()).read(file.filename().string(), max_bytes);
+    if (!text) return std::nullopt;
+    check_json_bounds(*text);
+    const Json json = Json::parse(*text, nullptr, false);
+    if (!json.is_object()) return std::nullopt;
     if (json.at("format").get<std::string>() != kFormat) return std::nullopt;
     return KeptStep{json.at("key").get<std::string>(), json.at("outputs").get<std::string>(),
                     result_of(json.at("result"))};
-  } catch (const Json::exception&) {
+  } catch (const std::exception&) {
     return std::nullopt;
   }
 }
