@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <system_error>
@@ -187,6 +188,10 @@ std::optional<std::string> SharedFolder::read(const std::string& name,
     fail(path, "cannot be opened");
   }
   std::string content;
+  struct stat status {};
+  if (::fstat(file.get(), &status) == 0) {
+    content.reserve(std::min(static_cast<std::size_t>(status.st_size), max_bytes) + 1);
+  }
   constexpr std::size_t block_bytes = 1 << 16;
   for (std::array<char, block_bytes> block{};;) {
     const ssize_t count = ::read(file.get(), block.data(), block.size());
@@ -195,8 +200,11 @@ std::optional<std::string> SharedFolder::read(const std::string& name,
     if (count == 0) return content;
     content.append(block.data(), static_cast<std::size_t>(count));
     if (content.size() > max_bytes) {
-      throw InputError(
-          path, "is longer than " + std::to_string(max_bytes) + " bytes: is it the right file?");
+      constexpr int mebibyte_bits = 20;
+      const std::size_t mebibytes = max_bytes >> mebibyte_bits;
+      const std::string limit =
+          mebibytes > 0 ? std::to_string(mebibytes) + " MiB" : std::to_string(max_bytes) + " bytes";
+      throw InputError(path, "is longer than " + limit + ": is it the right file?");
     }
   }
 }

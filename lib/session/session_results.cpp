@@ -159,7 +159,9 @@ void SessionResults::plan(std::vector<StepOutputs> steps) {
     list.append(name).append("\n");
   }
   remove_outputs(wanted);
-  steps_in(folder_).replace(kOutputs, list);
+  const SharedFolder records = steps_in(folder_);
+  // The same list need not wait for the disk again.
+  if (wanted != written || !records.has(kOutputs)) records.replace(kOutputs, list);
 }
 
 std::optional<StepResult> SessionResults::kept(const std::string& step,
