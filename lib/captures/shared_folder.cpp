@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "rig/input_error.h"
 
@@ -234,6 +235,21 @@ void SharedFolder::remove(const std::string& name) const {
   if (::unlinkat(descriptor_, name.c_str(), 0) != 0 && errno != ENOENT) {
     fail(path, "cannot be removed");
   }
+}
+
+void SharedFolder::remove_content() const {
+  // The open folder, though its name may lead elsewhere by now.
+  const fs::path open = "/proc/self/fd/" + std::to_string(descriptor_);
+  std::error_code error;
+  std::vector<fs::path> entries;
+  for (fs::directory_iterator entry(open, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    entries.push_back(entry->path());
+  }
+  for (auto entry = entries.begin(); !error && entry != entries.end(); ++entry) {
+    fs::remove_all(*entry, error);
+  }
+  if (error) throw InputError(path_, "cannot be deleted: " + error.message());
 }
 
 }  // namespace vlp

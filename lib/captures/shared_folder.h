@@ -45,6 +45,8 @@ class SharedFolder {
   bool rename(const std::string& from, const std::string& to) const;
   /// Removes a file if it exists.
   void remove(const std::string& name) const;
+  /// Removes all that is in the folder, with its folders; of a link, the link.
+  void remove_content() const;
 
  private:
   SharedFolder(std::filesystem::path path, int descriptor);

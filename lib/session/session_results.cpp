@@ -110,6 +110,7 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
   if (not_made) throw InputError(folder_, "cannot be made: " + not_made.message());
   const SharedFolder steps = steps_in(folder_);
   lock_ = lock_of(steps, folder_);
+  steps.find_folder({"corners", folder_, "step"});  // throws if it is a link
   if (steps.has("session")) return;
   // Before the mark, without which the folder is not taken: the files that need no plan.
   steps.replace(kOutputs, "junit.xml\nsession.json\n");

@@ -196,16 +196,17 @@ class CountedIterator {
   long* steps_ = nullptr;
 };
 
-bool matches_pattern(const std::string& serial, const StationConfig& config) {
+/// Returns why a serial is not of the form of a pattern; an empty string if it is.
+std::string pattern_problem(const std::string& serial, const std::string& pattern) {
   long steps = 0;
   const CountedIterator begin(serial.data(), &steps), end(serial.data() + serial.size(), &steps);
   try {
-    return std::regex_match(begin, end, std::regex(config.serial_pattern));
+    if (std::regex_match(begin, end, std::regex(pattern))) return "";
   } catch (const std::length_error&) {
-    throw InputError(config.file,
-                     "serial_pattern: takes too long to be compared with '" + serial +
-                         "': write it without a repetition in a repetition, such as (a+)+");
+    return "serial_pattern: takes too long to be compared with '" + serial +
+           "': write it without a repetition in a repetition, such as (a+)+";
   }
+  return "'" + serial + "' is not of the form " + pattern;
 }
 
 std::string read_pattern(const YamlValue& value) {
@@ -261,8 +262,7 @@ std::string camera_id_problem(const std::string& camera_id) {
 std::string serial_problem(const StationConfig& config, const std::string& serial) {
   std::string problem = camera_id_problem(serial);
   if (!problem.empty() || config.serial_pattern.empty()) return problem;
-  if (matches_pattern(serial, config)) return "";
-  return "'" + serial + "' is not of the form " + config.serial_pattern;
+  return pattern_problem(serial, config.serial_pattern);
 }
 
 std::vector<MetricKind> unit_metrics() {

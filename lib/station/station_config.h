@@ -104,8 +104,8 @@ struct StationConfig {
 /// Returns why a text cannot be a camera's id, which names folders; an empty string if it can.
 std::string camera_id_problem(const std::string& camera_id);
 
-/// Returns why a text cannot be the id of a unit of the station, which names folders; an empty
-/// string if it can. Throws InputError if `serial_pattern` takes too long to be compared with it.
+/// Returns why a text cannot be the id of a unit of the station, which names folders, or that
+/// `serial_pattern` takes too long to be compared with it; an empty string if it can.
 std::string serial_problem(const StationConfig& config, const std::string& serial);
 
 /// The metrics of a unit, and those that its gates can be of.

@@ -96,6 +96,19 @@ TEST_F(SharedFolderTest, NamesNothingOutside) {
   EXPECT_EQ(TemporaryFolder::content_of(outside), "mine");
 }
 
+TEST_F(SharedFolderTest, RemovesItsContentWhateverItsNameLeadsTo) {
+  fs::create_directories(folder / "elsewhere/kept");
+  fs::create_directories(path / "sub");
+  folder.file("shared/sub/file", "");
+  fs::create_directory_symlink(folder / "elsewhere", path / "link");
+  const SharedFolder shared(path);
+  fs::rename(path, folder / "moved");
+  fs::create_directory_symlink(folder / "elsewhere", path);
+  shared.remove_content();
+  EXPECT_TRUE(fs::is_empty(folder / "moved"));
+  EXPECT_TRUE(fs::exists(folder / "elsewhere/kept"));
+}
+
 TEST_F(SharedFolderTest, ReadsRegularFilesOnly) {
   ASSERT_EQ(::mkfifo((path / "pipe").c_str(), 0600), 0);
   const SharedFolder shared(path);

@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
 #include <set>
 #include <sstream>
 #include <string>
@@ -192,6 +194,19 @@ const std::vector<Trial> kFolderTrials{
        return s.empty_run();
      },
      2, "captures/0001/boards: is a symbolic link"},
+    {"NextFrameOfASourceIsALink",
+     [](const HostileStation& s) {
+       s.link("captures/0001/boards/frame-000000.png", s.elsewhere / "frame.png");
+       const std::string video = (s.home / "boards.avi").string();
+       cv::VideoWriter(video, cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10,
+                       {800, 600})
+           .write(cv::Mat::zeros(600, 800, CV_8UC3));
+       return s.empty_run("--source boards=" + video);
+     },
+     3, "is not judged",
+     [](const HostileStation& s, const ProgramResult&) {
+       EXPECT_THAT(s.vlp_station("show").output, HasSubstr("images     1, 0 used"));
+     }},
     {"ResultsOfACameraAreALink",
      [](const HostileStation& s) {
        s.link("results/0001", s.elsewhere);
@@ -478,6 +493,14 @@ const std::vector<Trial> kResultsTrials{
                           (s.home / "results").string());
      },
      2, "results/steps: is a symbolic link"},
+    {"CornersOfTheStepsAreALink",
+     [](const HostileStation& s) {
+       s.link("results/steps/corners", s.elsewhere);
+       fs::create_directory(s.home / "session");
+       return run_program("vlp-calibrate " + (s.home / "session").string() + " -o " +
+                          (s.home / "results").string());
+     },
+     2, "steps/corners: is a symbolic link"},
     {"LockOfTheStepsIsALink",
      [](const HostileStation& s) {
        s.link("results/steps/lock", s.elsewhere / "lock");

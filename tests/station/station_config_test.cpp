@@ -150,11 +150,10 @@ TEST_F(StationYaml, HasAPatternOfSerials) {
 /// Nested repetitions have exponentially many ways to match.
 TEST(SerialProblem, EndsWhateverThePattern) {
   StationConfig config{};
-  config.file = "station.yaml";
   config.serial_pattern = "(a+)+b";
   EXPECT_EQ(serial_problem(config, "aaab"), "");
-  EXPECT_THAT(refusal_of([&] { serial_problem(config, std::string(60, 'a')); }),
-              HasSubstr("station.yaml: serial_pattern: takes too long to be compared with"));
+  EXPECT_THAT(serial_problem(config, std::string(60, 'a')),
+              HasSubstr("serial_pattern: takes too long to be compared with"));
   config.serial_pattern = "[A-Za-z0-9_.-]{1,64}";
   EXPECT_EQ(serial_problem(config, std::string(64, 'a')), "");
 }

@@ -9,7 +9,10 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 
+#include "captures/id.h"
+#include "captures/shared_folder.h"
 #include "rig/input_error.h"
 #include "station/database_name.h"
 
@@ -86,17 +89,12 @@ void add_if_expired(Retained& found, Records& records, const StationConfig& conf
   }
 }
 
-void delete_content(const ExpiredFolder& expired) {
-  std::error_code error;
-  std::vector<fs::path> entries;
-  for (fs::directory_iterator entry(expired.folder, error);
-       !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    entries.push_back(entry->path());
-  }
-  for (auto entry = entries.begin(); !error && entry != entries.end(); ++entry) {
-    fs::remove_all(*entry, error);
-  }
-  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
+/// Opens an expired folder from the one that it is in, so that no link is followed.
+SharedFolder open_expired(const fs::path& folder) {
+  auto found =
+      SharedFolder(folder.parent_path()).find_folder({folder.filename().string(), folder, "run"});
+  if (!found) throw InputError(folder, "cannot be deleted: it is not there");
+  return std::move(*found);
 }
 
 void delete_folder(const ExpiredFolder& expired) {
@@ -157,7 +155,7 @@ void check_clock(const StationConfig& config, Records& records) {
 }
 
 void delete_expired(const ExpiredFolder& expired, Spool& spool) {
-  delete_content(expired);
+  open_expired(expired.folder).remove_content();
   const auto& events = expired.run.events;
   const bool told = std::any_of(events.begin(), events.end(),
                                 [&](const RunEvent& event) { return event.what == expired.what; });
