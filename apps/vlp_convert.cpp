@@ -10,6 +10,7 @@
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/camera_imports.h"
 #include "calibration/intrinsics/known_region.h"
+#include "captures/printable.h"
 #include "program/app.h"
 #include "program/steps/history.h"
 #include "rig/file.h"
@@ -63,7 +64,8 @@ void run(const CLI::App& app, const Options& options) {
   if (options.to == "calibration") {
     fmt::print("kept          the camera alone; vlp-rotation and vlp-dispersion add the rest\n");
   }
-  fmt::print("camera        {}, {} x {} px\n", camera.id, camera.imager_px[0], camera.imager_px[1]);
+  fmt::print("camera        {}, {} x {} px\n", printable_line(camera.id), camera.imager_px[0],
+             camera.imager_px[1]);
   if (was == name_of(camera.lens_model)) {
     fmt::print("lens          {}, unchanged\n", was);
   } else {

@@ -3,11 +3,28 @@
 #include "captures/printable.h"
 
 #include <cstddef>
+#include <utility>
 
 namespace vlp {
 namespace {
 
-/// Bytes of the character that begins here, 0 when none does (RFC 3629, but for surrogates).
+/// Range of the second byte of a character, by its first (RFC 3629, section 4).
+std::pair<unsigned char, unsigned char> second_byte_range(unsigned char first) {
+  switch (first) {
+    case 0xe0:
+      return {0xa0, 0xbf};
+    case 0xed:
+      return {0x80, 0x9f};  // no surrogates
+    case 0xf0:
+      return {0x90, 0xbf};
+    case 0xf4:
+      return {0x80, 0x8f};
+    default:
+      return {0x80, 0xbf};
+  }
+}
+
+/// Returns the bytes of the character that begins here; 0 if none does (RFC 3629).
 std::size_t length_of_character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);
@@ -17,27 +34,51 @@ std::size_t length_of_character(std::string_view text) {
                              : first >= 0xf0 && first < 0xf5 ? 4
                                                              : 0;
   if (length > text.size()) return 0;
+  const auto [min_second, max_second] = second_byte_range(first);
+  if (length > 1 && (byte(1) < min_second || byte(1) > max_second)) return 0;
   for (std::size_t i = 1; i < length; ++i) {
     if (byte(i) < 0x80 || byte(i) >= 0xc0) return 0;
   }
   return length;
 }
 
+/// Returns true for separators of lines and marks that change the direction of the text around
+/// them (Unicode Standard Annex 9, section 2): U+061C, U+200E, U+200F, U+2028 to U+202E, U+2066 to
+/// U+2069.
+bool changes_order(std::string_view character) {
+  if (character == "\u061c") return true;
+  if (character.size() != 3) return false;
+  const auto is_within = [&](const char* low, const char* high) {
+    return character >= low && character <= high;
+  };
+  return is_within("\u200e", "\u200f") || is_within("\u2028", "\u202e") ||
+         is_within("\u2066", "\u2069");
+}
+
+/// Returns true for the code points that are no characters, such as U+FFFE (The Unicode Standard,
+/// section 23.7): readers of YAML replace or refuse them.
+bool is_noncharacter(std::string_view character) {
+  if (character.size() == 3 && character >= "\ufdd0" && character <= "\ufdef") return true;
+  if (!character.ends_with("\xbf\xbe") && !character.ends_with("\xbf\xbf")) return false;
+  const auto before = static_cast<unsigned char>(character[character.size() - 3]);
+  return character.size() == 3 ? before == 0xef : character.size() == 4 && (before & 0x0f) == 0x0f;
+}
+
 bool is_control(std::string_view character) {
   const auto first = static_cast<unsigned char>(character[0]);
   if (first == 0xc2) return static_cast<unsigned char>(character[1]) < 0xa0;
-  return (first < 0x20 && first != '\n' && first != '\t') || first == 0x7f;
+  return first < 0x20 || first == 0x7f || changes_order(character) || is_noncharacter(character);
 }
 
-}  // namespace
-
-std::string printable(std::string_view text) {
+/// Replaces what is not shown as it is, except characters in `kept`.
+std::string escape(std::string_view text, std::string_view kept) {
   constexpr std::string_view digits = "0123456789abcdef";
   std::string result;
   while (!text.empty()) {
     const std::size_t length = length_of_character(text);
-    if (length > 0 && !is_control(text.substr(0, length))) {
-      result += text.substr(0, length);
+    const std::string_view character = text.substr(0, length);
+    if (length > 0 && (!is_control(character) || kept.find(character) != kept.npos)) {
+      result += character;
       text.remove_prefix(length);
       continue;
     }
@@ -49,6 +90,12 @@ std::string printable(std::string_view text) {
   }
   return result;
 }
+
+}  // namespace
+
+std::string printable(std::string_view text) { return escape(text, "\n\t"); }
+
+std::string printable_line(std::string_view text) { return escape(text, ""); }
 
 std::string first_characters(std::string text, std::size_t most_bytes) {
   const auto goes_on = [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "captures/id.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -73,7 +74,9 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
     need("boards");
   }
   for (const auto& entry : fs::directory_iterator(folder_)) {
-    if (is_drive(entry.path())) lines_.push_back(entry.path());
+    if (!is_drive(entry.path())) continue;
+    const Id name(entry.path().filename().string(), folder_, "drive");  // names outputs
+    lines_.push_back(folder_ / name.text());
   }
   std::sort(lines_.begin(), lines_.end());
 }

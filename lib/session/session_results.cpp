@@ -8,10 +8,13 @@
 #include <unistd.h>
 
 #include <array>
-#include <set>
+#include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "captures/digest.h"
+#include "captures/id.h"
+#include "captures/shared_folder.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "session/step_file.h"
@@ -21,20 +24,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What a run may have written, but for the fixes of drives.
+/// Outputs that runs may have written, except the fixes of drives.
 constexpr std::array kResults{
     "lens.yaml",    "lens.cameramodel", "lens.svg",       "camera.yaml",     "rotated.yaml",
     "rotation.svg", "calibration.yaml", "dispersion.svg", "check-fixes.csv", "evaluation.json",
     "junit.xml",    "report.html",      "session.json"};
-
-/// Fixes of drives, but for those that are wanted.
-void forget_drives(const fs::path& results, const std::set<std::string>& wanted) {
-  for (const auto& entry : fs::directory_iterator(results)) {
-    const std::string name = entry.path().filename().string();
-    const bool drive = name.starts_with("line-") && name.ends_with("-fixes.csv");
-    if (drive && !wanted.contains(name)) fs::remove(entry.path());
-  }
-}
 
 /// Says whose results they are.
 fs::path mark_of(const fs::path& results) { return results / "steps/session"; }
@@ -62,12 +56,48 @@ void check_owner(const fs::path& results, const fs::path& session) {
   }
 }
 
-int lock_of(const fs::path& results) {
-  const int lock = ::open((results / "steps/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+constexpr const char* kOutputs = "outputs";
+constexpr std::string_view kSteps = "steps/";
+
+/// Returns the name of a step's record in the folder of results.
+std::string record_name(const std::string& step) { return std::string(kSteps) + step + ".json"; }
+
+SharedFolder steps_in(const fs::path& results) {
+  return SharedFolder(results).make_folder({"steps", results, "step"});
+}
+
+int lock_of(const SharedFolder& steps, const fs::path& results) {
+  const int lock = steps.open("lock", O_RDWR | O_CREAT);
   if (lock < 0) throw InputError(results, "cannot be written to");
   if (::flock(lock, LOCK_EX | LOCK_NB) == 0) return lock;
   ::close(lock);
   throw InputError(results, "another run is at work there");
+}
+
+bool is_there(const fs::path& file) {
+  std::error_code missing;
+  return fs::symlink_status(file, missing).type() != fs::file_type::not_found;
+}
+
+/// Returns the outputs in a folder of results that an earlier version wrote, without their list:
+/// kResults, records of steps, and fixes of drives whose steps are recorded.
+std::set<std::string> unlisted_outputs(const fs::path& results) {
+  std::set<std::string> names(kResults.begin(), kResults.end());
+  for (const char* step : {"lens", "row-time", "rotation", "dispersion", "check", "evaluate"}) {
+    names.insert(record_name(step));
+  }
+  for (const auto& entry : fs::directory_iterator(results / "steps")) {
+    const std::string step = entry.path().stem().string();
+    if (!step.starts_with("line-") || !read_step(entry.path())) continue;
+    names.insert({record_name(step), step + "-fixes.csv"});
+  }
+  return names;
+}
+
+/// Returns true for the name of a file in the folder of results or in steps/, whoever wrote it.
+bool is_output_name(std::string_view name) {
+  if (name.starts_with(kSteps)) name.remove_prefix(kSteps.size());
+  return Id::accepts(name);
 }
 
 }  // namespace
@@ -76,34 +106,63 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
     : folder_(std::move(folder)) {
   check_owner(folder_, session);
   std::error_code not_made;
-  fs::create_directories(folder_ / "steps", not_made);
+  fs::create_directories(folder_, not_made);
   if (not_made) throw InputError(folder_, "cannot be made: " + not_made.message());
-  lock_ = lock_of(folder_);
-  if (!fs::exists(mark_of(folder_))) write_file(mark_of(folder_), mark_text(session));
+  const SharedFolder steps = steps_in(folder_);
+  lock_ = lock_of(steps, folder_);
+  steps.find_folder({"corners", folder_, "step"});  // throws if it is a link
+  if (steps.has("session")) return;
+  // Before the mark, without which the folder is not taken: the files that need no plan.
+  steps.replace(kOutputs, "junit.xml\nsession.json\n");
+  steps.replace("session", mark_text(session));
 }
 
 SessionResults::~SessionResults() { ::close(lock_); }
 
 fs::path SessionResults::record_of(const std::string& step) const {
-  return folder_ / "steps" / (step + ".json");
+  return file(record_name(step));
+}
+
+std::set<std::string> SessionResults::outputs() const {
+  constexpr std::size_t max_bytes = 1 << 20;
+  const auto list = steps_in(folder_).read(kOutputs, max_bytes);
+  if (!list) return unlisted_outputs(folder_);
+  std::set<std::string> names;
+  std::istringstream lines(*list);
+  for (std::string name; std::getline(lines, name);) {
+    if (is_output_name(name)) names.insert(name);
+  }
+  return names;
+}
+
+void SessionResults::remove_outputs(const std::set<std::string>& wanted) const {
+  for (const std::string& name : outputs()) {
+    std::error_code ignored;
+    if (!wanted.contains(name)) fs::remove(file(name), ignored);
+  }
 }
 
 void SessionResults::plan(std::vector<StepOutputs> steps) {
   steps_ = std::move(steps);
-  std::set<std::string> wanted, names;
+  std::set<std::string> wanted{"session.json", "junit.xml"};
   for (const auto& [step, files] : steps_) {
     wanted.insert(files.begin(), files.end());
-    names.insert(step);
+    wanted.insert(record_name(step));
   }
-  for (const char* name : kResults) {
-    std::error_code ignored;
-    if (!wanted.contains(name)) fs::remove(file(name), ignored);
+  const std::set<std::string> written = outputs();
+  std::string list;
+  for (const std::string& name : wanted) {
+    if (is_there(file(name)) && (!written.contains(name) || fs::is_symlink(file(name)))) {
+      throw InputError(folder_, fmt::format("holds {}, which is not of vlp-calibrate; give the "
+                                            "results a folder of their own",
+                                            name));
+    }
+    list.append(name).append("\n");
   }
-  forget_drives(folder_, wanted);
-  for (const auto& entry : fs::directory_iterator(folder_ / "steps")) {
-    const bool step = entry.path().extension() == ".json";
-    if (step && !names.contains(entry.path().stem().string())) fs::remove(entry.path());
-  }
+  remove_outputs(wanted);
+  const SharedFolder records = steps_in(folder_);
+  // The same list need not wait for the disk again.
+  if (wanted != written || !records.has(kOutputs)) records.replace(kOutputs, list);
 }
 
 std::optional<StepResult> SessionResults::kept(const std::string& step,
@@ -150,16 +209,12 @@ void SessionResults::forget_behind(const std::string& step) const {
 }
 
 void SessionResults::forget_evaluation() const {
-  for (const char* name : {"evaluation.json", "report.html"}) fs::remove(file(name));
-  fs::remove(record_of("evaluate"));
-}
-
-void SessionResults::forget_all() const {
-  for (const char* name : kResults) fs::remove(file(name));
-  forget_drives(folder_, {});
-  for (const auto& entry : fs::directory_iterator(folder_ / "steps")) {
-    if (entry.path().extension() == ".json") fs::remove(entry.path());
+  const std::set<std::string> written = outputs();
+  for (const char* name : {"evaluation.json", "report.html", "steps/evaluate.json"}) {
+    if (written.contains(name)) fs::remove(file(name));
   }
 }
+
+void SessionResults::forget_all() const { remove_outputs({}); }
 
 }  // namespace vlp

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,10 @@ struct StepOutputs {
 ///   session.json                  how the last run went
 ///   steps/STEP.json               how a step ended, on what inputs, with which outputs
 ///   steps/session                 whose results these are
+///   steps/outputs                 names of all files above that runs wrote or may have written
 ///   steps/lock                    held while a run is at work
+///
+/// Only files named in steps/outputs are ever removed or overwritten.
 class SessionResults {
  public:
   /// Takes the folder for this session, and makes it where it is not there. Throws InputError when
@@ -41,7 +45,7 @@ class SessionResults {
   std::filesystem::path corners() const { return folder_ / "steps/corners"; }
 
   /// The steps of this run, in their order. What another run wrote and this one does not is
-  /// removed.
+  /// removed. Throws InputError if the run would overwrite a file that no run wrote.
   void plan(std::vector<StepOutputs> steps);
 
   /// How a step ended when it last ran, when that holds still: `key`, the digest of all that it
@@ -60,6 +64,8 @@ class SessionResults {
 
  private:
   std::filesystem::path record_of(const std::string& step) const;
+  std::set<std::string> outputs() const;
+  void remove_outputs(const std::set<std::string>& wanted) const;
   std::string digest_of_outputs(const std::string& step) const;
 
   std::filesystem::path folder_;

@@ -3,11 +3,13 @@
 #include "session/step_file.h"
 
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "captures/json_bounds.h"
+#include "captures/shared_folder.h"
 #include "rig/file.h"
-#include "rig/input_error.h"
 
 namespace vlp {
 namespace {
@@ -92,14 +94,15 @@ Json json_of(const StepResult& result) {
 
 std::optional<KeptStep> read_step(const std::filesystem::path& file) {
   try {
-    const Json json = Json::parse(read_file(file, kMaxStepBytes), nullptr, false);
+    const auto text = SharedFolder(file.parent_path()).read(file.filename().string(), kMaxStepBytes);
+    if (!text) return std::nullopt;
+    check_json_bounds(*text);
+    const Json json = Json::parse(*text, nullptr, false);
     if (!json.is_object()) return std::nullopt;
     if (json.at("format").get<std::string>() != kFormat) return std::nullopt;
     return KeptStep{json.at("key").get<std::string>(), json.at("outputs").get<std::string>(),
                     result_of(json.at("result"))};
-  } catch (const Json::exception&) {
-    return std::nullopt;
-  } catch (const InputError&) {
+  } catch (const std::exception&) {
     return std::nullopt;
   }
 }

@@ -4,10 +4,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <regex>
+#include <stdexcept>
 
 #include "captures/digest.h"
+#include "captures/id.h"
 #include "geometry/angles.h"
+#include "rig/input_error.h"
 #include "rig/yaml_reader.h"
 #include "station/database_name.h"
 
@@ -69,12 +73,17 @@ class Files {
     return file;
   }
   std::string sha256() const { return sha256_of_text(digests_); }
+  const std::vector<fs::path>& names() const { return names_; }
 
  private:
-  void add(const fs::path& file) { digests_ += sha256_of_file(file) + "\n"; }
+  void add(const fs::path& file) {
+    digests_ += sha256_of_file(file) + "\n";
+    names_.push_back(file);
+  }
 
   const fs::path& station_;
   std::string digests_;
+  std::vector<fs::path> names_;
 };
 
 /// A calibration whose camera tells lamps.
@@ -113,7 +122,9 @@ void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
 }
 
 GoldenUnit read_golden(YamlMap map, Files& files) {
-  GoldenUnit golden{map.required("camera_id").text(), {}, {}};
+  const YamlValue camera = map.required("camera_id");
+  if (!Id::accepts(camera.text())) throw camera.error("is no id of a camera: it names a folder");
+  GoldenUnit golden{camera.text(), {}, {}};
   const YamlValue calibration = map.required("calibration");
   golden.calibration = read_shutter(calibration, files);
   if (!golden.calibration.rotation_center) {
@@ -145,6 +156,57 @@ Retention read_retention(YamlMap map) {
   days("results_days", keep.results_days);
   map.finish();
   return keep;
+}
+
+/// Iterator over a text that counts its steps, shared by its copies, and throws std::length_error
+/// beyond a limit. std::regex tries nested repetitions in exponentially many ways and knows no
+/// limit of its own.
+class CountedIterator {
+ public:
+  using iterator_category = std::bidirectional_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = const char&;
+
+  CountedIterator() = default;
+  CountedIterator(const char* at, long* steps) : at_(at), steps_(steps) {}
+
+  reference operator*() const {
+    constexpr long max_steps = 1'000'000;  // a serial of 64 characters takes some hundreds
+    if (++*steps_ > max_steps) throw std::length_error("steps");
+    return *at_;
+  }
+  CountedIterator& operator++() {
+    ++at_;
+    return *this;
+  }
+  CountedIterator operator++(int) { return {at_++, steps_}; }
+  CountedIterator& operator--() {
+    --at_;
+    return *this;
+  }
+  CountedIterator operator--(int) { return {at_--, steps_}; }
+  friend bool operator==(const CountedIterator& a, const CountedIterator& b) {
+    return a.at_ == b.at_;
+  }
+
+ private:
+  const char* at_ = nullptr;
+  long* steps_ = nullptr;
+};
+
+/// Returns why a serial is not of the form of a pattern; an empty string if it is.
+std::string pattern_problem(const std::string& serial, const std::string& pattern) {
+  long steps = 0;
+  const CountedIterator begin(serial.data(), &steps), end(serial.data() + serial.size(), &steps);
+  try {
+    if (std::regex_match(begin, end, std::regex(pattern))) return "";
+  } catch (const std::length_error&) {
+    return "serial_pattern: takes too long to be compared with '" + serial +
+           "': write it without a repetition in a repetition, such as (a+)+";
+  }
+  return "'" + serial + "' is not of the form " + pattern;
 }
 
 std::string read_pattern(const YamlValue& value) {
@@ -200,8 +262,7 @@ std::string camera_id_problem(const std::string& camera_id) {
 std::string serial_problem(const StationConfig& config, const std::string& serial) {
   std::string problem = camera_id_problem(serial);
   if (!problem.empty() || config.serial_pattern.empty()) return problem;
-  if (std::regex_match(serial, std::regex(config.serial_pattern))) return "";
-  return "'" + serial + "' is not of the form " + config.serial_pattern;
+  return pattern_problem(serial, config.serial_pattern);
 }
 
 std::vector<MetricKind> unit_metrics() {
@@ -264,6 +325,7 @@ StationConfig read_station(const fs::path& file) {
     throw InputError(file,
                      "no lamp of the map has a frequency_hz: none could be told from another");
   }
+  config.inputs = files.names();
   config.sha256 = files.sha256();
   return config;
 }

@@ -90,7 +90,9 @@ struct StationConfig {
   std::filesystem::path captures, results;
   /// A file of SQLite, or postgresql://...
   std::string records;
-  /// SHA-256 of the digests of station.yaml and of the files that it names.
+  /// Files that are read: station.yaml, then those that it names.
+  std::vector<std::filesystem::path> inputs = {};
+  /// SHA-256 of the digests of `inputs`.
   std::string sha256;
   /// The folder in which runs wait for the records, `spool` beside the station unless it says
   /// another.
@@ -102,7 +104,8 @@ struct StationConfig {
 /// Returns why a text cannot be a camera's id, which names folders; an empty string if it can.
 std::string camera_id_problem(const std::string& camera_id);
 
-/// Why a text cannot be the id of a unit of the station, which names folders; empty when it can.
+/// Returns why a text cannot be the id of a unit of the station, which names folders, or that
+/// `serial_pattern` takes too long to be compared with it; an empty string if it can.
 std::string serial_problem(const StationConfig& config, const std::string& serial);
 
 /// The metrics of a unit, and those that its gates can be of.

@@ -4,7 +4,6 @@
 
 #include <fmt/core.h>
 
-#include "rig/file.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -17,20 +16,19 @@ void make_folder(const fs::path& folder) {
   if (error) throw InputError(folder, "cannot be made: " + error.message());
 }
 
-void check_room(const fs::path& folder, std::uintmax_t bytes) {
+void check_room(const SharedFolder& folder, std::uintmax_t bytes) {
   constexpr double megabyte = 1e6;
-  make_folder(folder);
   std::error_code error;
-  const fs::space_info space = fs::space(folder, error);
+  const fs::space_info space = fs::space(folder.path(), error);
   if (!error && space.available < bytes) {
-    throw InputError(folder,
+    throw InputError(folder.path(),
                      fmt::format("has room for {:.1f} MB, the results of a run may need "
                                  "{:.0f}: make room before the unit is begun",
                                  double(space.available) / megabyte, double(bytes) / megabyte));
   }
-  const fs::path probe = folder / ".writable";
-  write_file(probe, "results can be written here\n");
-  fs::remove(probe, error);
+  constexpr const char* probe = ".writable";
+  folder.replace(probe, "results can be written here\n");
+  folder.remove(probe);
 }
 
 }  // namespace vlp

@@ -5,13 +5,15 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "captures/shared_folder.h"
+
 namespace vlp {
 
 /// Makes a folder of a station unless it is there. Throws InputError.
 void make_folder(const std::filesystem::path& folder);
 
-/// That a folder is there, or can be, takes a file, and has room for so much: what is asked before
-/// a unit is begun. Throws InputError.
-void check_room(const std::filesystem::path& folder, std::uintmax_t bytes);
+/// Checks before a unit is begun that a file can be written into a folder, and that there is room
+/// for so many bytes. Throws InputError.
+void check_room(const SharedFolder& folder, std::uintmax_t bytes);
 
 }  // namespace vlp

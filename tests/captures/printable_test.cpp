@@ -31,6 +31,31 @@ TEST(Printable, EscapesWhatIsNoUtf8) {
   EXPECT_EQ(printable("\xc3z"), "\\xc3z");
   EXPECT_EQ(printable("\xe2\x82"), "\\xe2\\x82");
   EXPECT_EQ(printable("\xff\xc0\xaf"), "\\xff\\xc0\\xaf");
+  // Overlong, a surrogate, beyond U+10FFFF.
+  EXPECT_EQ(printable("\xe0\x80\xaf"), "\\xe0\\x80\\xaf");
+  EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80");
+  EXPECT_EQ(printable("\xf0\x80\x80\xaf"), "\\xf0\\x80\\x80\\xaf");
+  EXPECT_EQ(printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");
+}
+
+TEST(Printable, EscapesMarksThatReorderTheText) {
+  EXPECT_EQ(printable("\u202egnp.FAIL"), "\\xe2\\x80\\xaegnp.FAIL");
+  EXPECT_EQ(printable("a\u2028b"), "a\\xe2\\x80\\xa8b");
+  EXPECT_EQ(printable("\u061c"), "\\xd8\\x9c");
+  EXPECT_EQ(printable("\u2065\u2070\u2027\u202f"), "\u2065\u2070\u2027\u202f");
+}
+
+TEST(Printable, EscapesWhatIsNoCharacter) {
+  EXPECT_EQ(printable("\xef\xbf\xbe"), "\\xef\\xbf\\xbe");
+  EXPECT_EQ(printable("\xef\xb7\x90"), "\\xef\\xb7\\x90");
+  EXPECT_EQ(printable("\xf1\x8f\xbf\xbe"), "\\xf1\\x8f\\xbf\\xbe");
+  EXPECT_EQ(printable("\ufffd\xc2\xbf\xe2\xbf\xbf\xf1\x8e\xbf\xbe"),
+            "\ufffd\xc2\xbf\xe2\xbf\xbf\xf1\x8e\xbf\xbe");
+}
+
+TEST(PrintableLine, IsOneLine) {
+  EXPECT_EQ(printable_line("a\n2026 PASS\tb"), "a\\x0a2026 PASS\\x09b");
+  EXPECT_EQ(printable_line("r\u00f6tlich"), "r\u00f6tlich");
 }
 
 TEST(FirstCharacters, CutNoneInTwo) {

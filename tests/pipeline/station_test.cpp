@@ -298,7 +298,7 @@ TEST_F(Station, NoticesAtOnceThatResultsCannotBeWritten) {
   folder.file("station/results", "a file");
   const auto result = run_program(run("0001", "--idle-s 60"));
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("results/0001: cannot be made"));
+  EXPECT_THAT(result.errors, HasSubstr("results: cannot be made"));
 }
 
 /// Whatever cannot be written, the verdict is on the screen, in the record, and can be restored.

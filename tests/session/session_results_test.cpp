@@ -59,7 +59,11 @@ TEST_F(SessionResultsTest, NothingStaysThatTheRunDoesNotMake) {
   {
     SessionResults before(results, session);
     keep_two_steps(before);
+    std::vector<StepOutputs> with_drive = kPlan;
+    with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
+    before.plan(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
+    before.keep("line-x", "key", StepResult());
     folder.file("results/mine.txt", "of somebody");
   }
   SessionResults now(results, session);
@@ -68,7 +72,72 @@ TEST_F(SessionResultsTest, NothingStaysThatTheRunDoesNotMake) {
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
   EXPECT_FALSE(fs::exists(results / "steps/rotation.json"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
+  EXPECT_FALSE(fs::exists(results / "steps/line-x.json"));
   EXPECT_TRUE(fs::exists(results / "mine.txt"));
+}
+
+TEST_F(SessionResultsTest, FilesThatNoRunWroteAreNeitherRemovedNorOverwritten) {
+  fs::create_directories(results / "steps");
+  const std::vector<std::string> mine{"line-a-fixes.csv", "steps/mine.json", "steps/line-a.json"};
+  for (const std::string& name : mine) folder.file("results/" + name, "mine");
+  {
+    SessionResults first(results, session);
+    first.plan(kPlan);
+    folder.file("results/lens.svg", "mine, beside results");
+    first.plan(kPlan);
+    first.forget_evaluation();
+    first.forget_all();
+  }
+  for (const std::string& name : mine) {
+    EXPECT_EQ(TemporaryFolder::content_of(results / name), "mine") << name;
+  }
+  EXPECT_TRUE(fs::exists(results / "lens.svg"));
+  SessionResults next(results, session);
+  EXPECT_THAT(
+      [&] {
+        next.plan({{"lens", {"lens.yaml", "lens.svg"}}});
+      },
+      ThrowsMessage<InputError>(HasSubstr("holds lens.svg, which is not of vlp-calibrate")));
+}
+
+TEST_F(SessionResultsTest, AListOfOthersRemovesNothingOutside) {
+  folder.file("outside.txt", "mine");
+  { const SessionResults taken(results, session); }
+  folder.file("results/steps/outputs", "../outside.txt\nsteps/../../outside.txt\n" +
+                                           (folder / "outside.txt").string() + "\n..\n");
+  SessionResults taken(results, session);
+  taken.plan(kPlan);
+  taken.forget_all();
+  EXPECT_TRUE(fs::exists(folder / "outside.txt"));
+}
+
+TEST_F(SessionResultsTest, OutputsThatAreLinksAreRefused) {
+  { const SessionResults taken(results, session); }
+  fs::create_symlink(folder.file("mine.txt", "mine"), results / "lens.yaml");
+  SessionResults taken(results, session);
+  EXPECT_THAT([&] { taken.plan(kPlan); },
+              ThrowsMessage<InputError>(HasSubstr("holds lens.yaml, which is not of")));
+  EXPECT_EQ(TemporaryFolder::content_of(folder / "mine.txt"), "mine");
+}
+
+TEST_F(SessionResultsTest, OfAnEarlierVersionAreTakenOverWithoutAList) {
+  {
+    SessionResults before(results, session);
+    std::vector<StepOutputs> with_drive = kPlan;
+    with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
+    before.plan(with_drive);
+    keep_two_steps(before);
+    before.plan(with_drive);
+    folder.file("results/line-x-fixes.csv", "of a drive");
+    before.keep("line-x", "key", StepResult());
+  }
+  fs::remove(results / "steps/outputs");
+  folder.file("results/line-y-fixes.csv", "mine");
+  SessionResults now(results, session);
+  now.plan(kPlan);
+  EXPECT_TRUE(now.kept("lens", "key of the lens"));
+  EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
+  EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
 
 TEST_F(SessionResultsTest, WhatIsBehindAStepThatFailedIsForgotten) {

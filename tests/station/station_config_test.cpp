@@ -147,6 +147,17 @@ TEST_F(StationYaml, HasAPatternOfSerials) {
   EXPECT_THAT(refusal(), HasSubstr("serial_pattern: is no regular expression"));
 }
 
+/// Nested repetitions have exponentially many ways to match.
+TEST(SerialProblem, EndsWhateverThePattern) {
+  StationConfig config{};
+  config.serial_pattern = "(a+)+b";
+  EXPECT_EQ(serial_problem(config, "aaab"), "");
+  EXPECT_THAT(serial_problem(config, std::string(60, 'a')),
+              HasSubstr("serial_pattern: takes too long to be compared with"));
+  config.serial_pattern = "[A-Za-z0-9_.-]{1,64}";
+  EXPECT_EQ(serial_problem(config, std::string(64, 'a')), "");
+}
+
 TEST_F(StationYaml, SaysWhenTheGoldenUnitIsDueAndWhatIsKept) {
   change("station.yaml", "records: records.db",
          "records: records.db\nkeep: {images_days: 90}\nverify_due: {hours: 24, units: 200}");

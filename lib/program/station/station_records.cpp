@@ -33,8 +33,9 @@ namespace {
 
 constexpr const char* kAny = "any";
 
-/// To stdout; what records hold of names is not for the terminal to obey.
-void say(const std::string& text) { fmt::print("{}", printable(text)); }
+/// Prints a line to stdout. Names that records hold can neither add a line nor control the
+/// terminal.
+void say_line(const std::string& text) { fmt::print("{}\n", printable_line(text)); }
 
 /// Opens the runs of a station, or of records alone. Reports the state of the spool, unless the
 /// records are away: then it is for commands that go on without them (warn_if_away()).
@@ -106,6 +107,18 @@ void check_one_station(const std::vector<TrendPoint>& points,
   if (options.station.empty() && options.filter.station.empty()) check_one_station(points);
 }
 
+/// Checks that --output is none of the files that the command reads: the records, station.yaml and
+/// the files that it names.
+void check_output_of(const StationRecordsOptions& options, const KnownRuns& known) {
+  if (options.output.empty()) return;
+  std::vector<std::string> inputs{options.station, options.records};
+  if (const StationConfig* station = station_of(known)) {
+    inputs.push_back(station->records);
+    for (const auto& file : station->inputs) inputs.push_back(file.string());
+  }
+  check_output(options.output, inputs);
+}
+
 /// The folder into which files of a run go.
 std::filesystem::path results_of(const StationRecordsOptions& options) {
   if (!options.output.empty()) return options.output;
@@ -149,6 +162,7 @@ std::string words_of(const TestedEstimate& estimate) {
 void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   const auto references = references_of(options.references);
   const auto known = known_runs(options);
+  check_output_of(options, *known);
   const auto points = judged_values(known->records(), options.figure, comparable(options, *known));
   check_one_station(points, options);
   const auto values = reference_values(points, references);
@@ -159,13 +173,15 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
     check_repetitions(known->records(), points, study_values(points, units));
     return bias_study(values);
   });
-  constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}\n";
-  say(fmt::format("{}: bias against {} reference units, {}\n\n", options.figure, study.units.size(),
-                  std::string_view(kind.unit).empty() ? "a share" : kind.unit));
-  say(fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
+  constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}";
+  say_line(fmt::format("{}: bias against {} reference units, {}", options.figure,
+                       study.units.size(),
+                       std::string_view(kind.unit).empty() ? "a share" : kind.unit));
+  fmt::print("\n");
+  say_line(fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
   for (const UnitBias& unit : study.units) {
-    say(fmt::format("{:<20}{:>10.4g}{:>6}{}{}\n", unit.unit, unit.reference, unit.count,
-                    words_of(unit.bias), unit.bias.shows() ? "   shows" : ""));
+    say_line(fmt::format("{:<20}{:>10.4g}{:>6}{}{}", unit.unit, unit.reference, unit.count,
+                         words_of(unit.bias), unit.bias.shows() ? "   shows" : ""));
   }
   const auto line = [](const char* name, const TestedEstimate& estimate) {
     fmt::print("{:<36}{}{}\n", name, words_of(estimate), estimate.shows() ? "   shows" : "");
@@ -180,8 +196,9 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
                linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
     for (const UnitBias& unit : study.units) {
       const double at = linearity.bias_at(unit.reference), half = linearity.band_at(unit.reference);
-      say(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}\n", unit.unit, unit.reference,
-                      at, at - half, at + half, std::abs(at) > half ? "   without 0" : ""));
+      say_line(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}", unit.unit,
+                           unit.reference, at, at - half, at + half,
+                           std::abs(at) > half ? "   without 0" : ""));
     }
   }
   if (!options.output.empty()) draw_bias(options.output, options.figure, values, study);
@@ -198,14 +215,15 @@ bool has_all_runs(const RunFilter& filter) {
 void list_runs(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
   const auto runs = known->list(requested_runs(options, *known));
-  constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}\n";
-  say(fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
+  constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}";
+  say_line(
+      fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
   for (const RunSummary& run : runs) {
     const bool counts = run.voided.empty();
-    say(fmt::format(line, run.run, run.ended_utc, counts ? run.verdict : "VOID", run.kind,
-                    run.station, run.camera,
-                    counts ? run.causes.substr(0, run.causes.find('\n'))
-                           : "was " + run.verdict + ": " + run.voided));
+    say_line(fmt::format(line, run.run, run.ended_utc, counts ? run.verdict : "VOID", run.kind,
+                         run.station, run.camera,
+                         counts ? run.causes.substr(0, run.causes.find('\n'))
+                                : "was " + run.verdict + ": " + run.voided));
   }
   const RunCounts counts = count_runs(runs);
   fmt::print("\n{} runs, {} passed, {} failed, {} invalid", runs.size(), counts.passed,
@@ -234,23 +252,23 @@ void list_runs(const StationRecordsOptions& options) {
 void show_run(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
   const RunRecord record = run_of(*known, options);
-  for (const ScreenLine& line : verdict_screen(record)) say(fmt::format("{}\n", line.text));
+  for (const ScreenLine& line : verdict_screen(record)) say_line(line.text);
   fmt::print("\nfigures without a gate\n");
   for (const CheckedMetric& figure : record.figures) {
     if (figure.limit || !figure.value) continue;
-    say(fmt::format("{:<24}{:>12.4g} {}\n", figure.name, *figure.value, figure.unit));
+    say_line(fmt::format("{:<24}{:>12.4g} {}", figure.name, *figure.value, figure.unit));
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
   fmt::print("\n");
   for (const RunField& field : run_fields()) {
     if (field.label == nullptr || (record.*field.text).empty()) continue;
-    say(fmt::format("{:<11}{}\n", field.label, record.*field.text));
+    say_line(fmt::format("{:<11}{}", field.label, record.*field.text));
   }
   fmt::print("images     {}, {} used\n", record.images.size(), used);
   for (const RunEvent& event : record.events) {
     const std::string who = event.who.empty() ? "" : event.who + ": ";
-    say(fmt::format("{:<11} {} {}{}\n", event.what, event.utc(), who, event.text));
+    say_line(fmt::format("{:<11} {} {}{}", event.what, event.utc(), who, event.text));
   }
 }
 
@@ -260,14 +278,14 @@ void restore_run(const StationRecordsOptions& options) {
   const RunRecord record = run_of(*known, options);
   const std::string no_verdict = why_no_verdict(record);
   if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
-  say(fmt::format("{}\n", publish_run(record, {}, results).string()));
+  say_line(publish_run(record, {}, results, ExistingReport::replace).string());
 }
 
 void write_certificate(const StationRecordsOptions& options) {
   const std::filesystem::path results = results_of(options);
   const auto known = known_runs(options);
   const RunRecord record = run_of(*known, options);
-  say(fmt::format("{}\n", write_certificate(record, results).string()));
+  say_line(write_certificate(record, results).string());
 }
 
 void clean_up(const StationRecordsOptions& options) {
@@ -276,6 +294,7 @@ void clean_up(const StationRecordsOptions& options) {
   if (!config.keep.images_days && !config.keep.results_days) {
     throw InputError(options.station, "keeps all for ever: add the key 'keep'");
   }
+  check_clock(config, known->records());
   const Retained found = look_for_expired(config, known->records());
   constexpr double megabyte = 1e6;
   double all_mb = 0;
@@ -290,11 +309,16 @@ void clean_up(const StationRecordsOptions& options) {
     }
     ++done;
     all_mb += mb;
-    say(fmt::format("{:>10.1f} MB  {} of {}, {} {}\n", mb, expired.folder.string(),
-                    expired.run.ended_utc, expired.run.verdict, options.remove ? "(deleted)" : ""));
+    say_line(fmt::format("{:>10.1f} MB  {} of {}, {} {}", mb, expired.folder.string(),
+                         expired.run.ended_utc, expired.run.verdict,
+                         options.remove ? "(deleted)" : ""));
   }
   for (const auto& folder : found.without_record) {
     spdlog::warn("{}: is of no run of the records: left", folder.string());
+  }
+  for (const auto& folder : found.in_use) {
+    spdlog::warn("{}: has something that station.yaml names: left; move that elsewhere",
+                 folder.string());
   }
   fmt::print("{} folders, {:.1f} MB{}\n", done, all_mb,
              options.remove ? " deleted" : ": --delete deletes them");
@@ -311,14 +335,14 @@ void void_run(const StationRecordsOptions& options) {
   if (!problem.empty()) spdlog::error("{}", printable(problem));
   if (!files_problem.empty()) spdlog::warn("{}", printable(files_problem));
   warn_if_away(*known);
-  say(fmt::format("{} {} {}: voided\n", record.run, record.camera, record.verdict));
-  for (const ScreenLine& line : hook_lines(record)) say(fmt::format("{}\n", line.text));
+  say_line(fmt::format("{} {} {}: voided", record.run, record.camera, record.verdict));
+  for (const ScreenLine& line : hook_lines(record)) say_line(line.text);
 }
 
 void verify_records(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
   const TrailCheck found = known->records().check(options.noted);
-  for (const std::string& problem : found.problems) say(fmt::format("{}\n", problem));
+  for (const std::string& problem : found.problems) say_line(problem);
   fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
   if (found.problems.empty()) return;
@@ -329,6 +353,7 @@ void verify_records(const StationRecordsOptions& options) {
 
 void export_runs(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
+  check_output_of(options, *known);
   const auto runs = known->whole(requested_runs(options, *known));
   write_runs(options.output, runs);
   fmt::print("{} runs\n", runs.size());
@@ -358,8 +383,8 @@ void import_archive(const StationRecordsOptions& options) {
     }
     progress.update(i + 1, sessions.size());
   }
-  say(fmt::format("station {}: {} runs taken, {} were there\n", sessions.front().run.station, taken,
-                  sessions.size() - taken - other.size()));
+  say_line(fmt::format("station {}: {} runs taken, {} were there", sessions.front().run.station,
+                       taken, sessions.size() - taken - other.size()));
   if (other.empty()) return;
   throw std::invalid_argument(fmt::format(
       "{} sessions, the first {}, have another result than these records have: take new records",
@@ -369,6 +394,7 @@ void import_archive(const StationRecordsOptions& options) {
 void show_trend(const StationRecordsOptions& options) {
   const MetricKind kind = run_figure(options.figure);
   const auto known = known_runs(options);
+  check_output_of(options, *known);
   Records& records = known->records();
   RunFilter filter = comparable(options, *known);
   if (options.filter.verdict.empty()) filter.verdict = name_of(Verdict::pass);
@@ -384,14 +410,15 @@ void show_trend(const StationRecordsOptions& options) {
   const ControlChart chart = control_chart(values);
   const auto gate = gate_of(options.figure, station_of(*known), records, points);
   if (!options.output.empty()) draw_trend(options.output, options.figure, points, alarms, gate);
-  say(fmt::format("{} of {} runs, {} to {}\nmean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n",
-                  options.figure, points.size(), points.front().ended_utc, points.back().ended_utc,
-                  chart.mean, kind.unit, chart.lower, chart.upper));
+  say_line(fmt::format("{} of {} runs, {} to {}", options.figure, points.size(),
+                       points.front().ended_utc, points.back().ended_utc));
+  fmt::print("mean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n", chart.mean, kind.unit,
+             chart.lower, chart.upper);
   if (gate) fmt::print("gate      {} {:.4g}\n", words_of(kind.asked), *gate);
   for (const ChartAlarm& alarm : alarms) {
     const TrendPoint& point = points[alarm.index];
-    say(fmt::format("{} {} {} {:.4g}  {}: {}\n", point.ended_utc, point.run, point.camera,
-                    point.value, alarm.rule, alarm.meaning));
+    say_line(fmt::format("{} {} {} {:.4g}  {}: {}", point.ended_utc, point.run, point.camera,
+                         point.value, alarm.rule, alarm.meaning));
   }
   if (alarms.empty()) return;
   throw GateNotMet(fmt::format("{}: {} alarms, the last {} at {}", options.figure, alarms.size(),
@@ -404,8 +431,9 @@ void show_capability(const StationRecordsOptions& options) {
   const auto known = known_runs(options);
   Records& records = known->records();
   const RunFilter filter = comparable(options, *known);
-  constexpr const char* head = "{:<22}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}\n";
-  std::string rows;
+  constexpr const char* head = "{:<22}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
+  std::vector<std::string> rows;
+  rows.reserve(kinds.size());
   for (const MetricKind& kind : kinds) {
     const auto points = judged_values(records, kind.name, filter);
     check_one_station(points, options);
@@ -415,19 +443,19 @@ void show_capability(const StationRecordsOptions& options) {
     const auto index = [](const CapabilityIndex& of) {
       return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
     };
-    rows += fmt::format(
+    rows.push_back(fmt::format(
         head, kind.name, found->count, fmt::format("{:.4g}", found->mean),
         fmt::format("{:.3g}", found->within_sd), fmt::format("{:.3g}", found->overall_sd),
         fmt::format("{} {:.4g}", kind.asked == Direction::at_least ? ">=" : "<=", gate.value_or(0)),
-        index(found->cpk), index(found->ppk));
+        index(found->cpk), index(found->ppk)));
   }
   if (rows.empty()) {
     throw Undetermined(
         "no figure with a gate has two values that differ, of runs that were judged");
   }
-  say(fmt::format(head, "figure", "runs", "mean", "sd within", "overall", "gate", "Cpk (95 %)",
-                  "Ppk (95 %)") +
-      rows);
+  say_line(fmt::format(head, "figure", "runs", "mean", "sd within", "overall", "gate", "Cpk (95 %)",
+                       "Ppk (95 %)"));
+  for (const std::string& row : rows) say_line(row);
 }
 
 void show_study(const StationRecordsOptions& options) {
@@ -444,8 +472,9 @@ void show_study(const StationRecordsOptions& options) {
     return measurement_study(values);
   });
   const auto gate = gate_of(options.figure, station_of(*known), records, points);
-  say(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}\n\n", options.figure,
-                  study.units, study.stations, study.repeats, study.mean, kind.unit));
+  say_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.figure,
+                       study.units, study.stations, study.repeats, study.mean, kind.unit));
+  fmt::print("\n");
   fmt::print("{:<18}{:>5}{:>14}{:>14}\n", "", "dof", "squares", "mean square");
   for (const auto& [name, line] :
        {std::pair("units", study.unit), std::pair("stations", study.station),

@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "captures/printable.h"
 #include "frontend/image_folder.h"
@@ -50,9 +51,10 @@ std::string spool_notice(Spool& spool) {
 
 /// Keeps the run, says the verdict, writes its files; then the records, which may be away, and the
 /// hook.
-void conclude(RunRecord record, const std::vector<ReportPicture>& pictures, Spool& spool,
+void conclude(RunRecord measured, const std::vector<ReportPicture>& pictures, Spool& spool,
               const StationConfig& config, Terminal& terminal,
               const std::function<void()>& mark_kept, const std::function<void()>& put_away) {
+  RunRecord record = printable_run(std::move(measured));  // as the records will have it
   auto lines = verdict_screen(record);
   std::optional<HookLock> lock;
   if (config.hook) {
@@ -244,8 +246,8 @@ void run_hooks(const StationRunOptions& options) {
   spool.deliver();
   const HooksRun hooks =
       run_open_hooks(config, spool, [](const RunRecord& run, const std::string& outcome) {
-        fmt::print("{}\n", printable(fmt::format("{} {} {}: {}", run.run, run.camera, run.verdict,
-                                                 outcome)));
+        fmt::print("{}\n", printable_line(fmt::format("{} {} {}: {}", run.run, run.camera,
+                                                      run.verdict, outcome)));
       });
   if (const auto notice = spool_notice(spool); !notice.empty()) {
     spdlog::warn("{}", printable(notice));

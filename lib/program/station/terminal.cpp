@@ -135,7 +135,7 @@ void Terminal::draw(const std::vector<ScreenLine>& lines) {
   for (std::size_t i = 0; i < shown; ++i) {
     // The last line, with the keys, stays.
     const auto& [line, tone] = i + 1 == shown ? lines.back() : lines[i];
-    text += toned(first_characters(printable(line), columns), tone) + "\x1b[K\n";
+    text += toned(first_characters(printable_line(line), columns), tone) + "\x1b[K\n";
   }
   show(text, shown);
 }
@@ -143,7 +143,7 @@ void Terminal::draw(const std::vector<ScreenLine>& lines) {
 void Terminal::print(const std::vector<ScreenLine>& lines) {
   std::string text;
   for (const auto& [line, tone] : lines) {
-    text += toned(printable(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
+    text += toned(printable_line(line), tone) + (interactive_ ? "\x1b[K\n" : "\n");
   }
   if (!interactive_) {
     fmt::print("{}", text);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "captures/printable.h"
 #include "geometry/angles.h"
 
 namespace vlp {
@@ -40,8 +41,9 @@ void print_residuals(const RotationFit& fit, const SpotCaptures& spot) {
   fmt::print("outliers    {}\n", fit.outliers.size());
   for (const auto& [index, distance_px] : fit.outliers) {
     const SpotObservation& sighting = spot.sightings[index];
-    fmt::print("  outlier   {} lamp {}: {:.2f} px off\n", spot.captures[sighting.capture].image,
-               spot.lamps[sighting.lamp].id, distance_px);
+    fmt::print("  outlier   {} lamp {}: {:.2f} px off\n",
+               printable_line(spot.captures[sighting.capture].image), spot.lamps[sighting.lamp].id,
+               distance_px);
   }
 }
 
@@ -81,7 +83,7 @@ void print_summary(const RotationFit& fit, const SpotCaptures& spot, const Circl
   for (std::size_t i = 0; i < spot.captures.size(); ++i) {
     const SpotCapture& capture = spot.captures[i];
     fmt::print("{:>10} {:10.3f}  {}\n", metres(spot.heights[capture.height].z_m),
-               deg_from_rad(wrapped_rad(fit.yaws_rad[i])), capture.image);
+               deg_from_rad(wrapped_rad(fit.yaws_rad[i])), printable_line(capture.image));
   }
 }
 

@@ -12,8 +12,10 @@
 
 #include "captures/csv_reader.h"
 #include "captures/digest.h"
+#include "captures/id.h"
+#include "captures/json_bounds.h"
+#include "captures/shared_folder.h"
 #include "evaluation/gate.h"
-#include "rig/file.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -59,6 +61,17 @@ void add_figures(const nlohmann::json& metrics, std::vector<CheckedMetric>& figu
   }
 }
 
+/// Opens RESULTS/KIND/CAMERA/SESSION/; std::nullopt if it does not exist.
+std::optional<SharedFolder> open_session(const fs::path& folder) {
+  const fs::path camera = folder.parent_path(), kind = camera.parent_path();
+  const SharedFolder results(kind.parent_path());
+  const auto kinds = results.find_folder({kind.filename().string(), folder, "folder"});
+  if (!kinds) return std::nullopt;
+  const auto cameras = kinds->find_folder({camera.filename().string(), folder, "camera"});
+  if (!cameras) return std::nullopt;
+  return cameras->find_folder({folder.filename().string(), folder, "session"});
+}
+
 }  // namespace
 
 ReprocessedArchive sessions_of_archive(const fs::path& results) {
@@ -79,8 +92,10 @@ ReprocessedArchive sessions_of_archive(const fs::path& results) {
     RunRecord run;
     run.kind = "unit";
     run.station = last.string();
-    run.camera = text(row, "camera");
-    const std::string session = run.camera + "/" + text(row, "session");
+    const fs::path line =
+        (results / "summary.csv").string() + ":" + std::to_string(summary.line(row));
+    run.camera = Id(text(row, "camera"), line, "camera").text();
+    const std::string session = run.camera + "/" + Id(text(row, "session"), line, "session").text();
     run.begun_utc = run.ended_utc = utc_of_date(date);
     run.run = run_name(run.ended_utc, run.station + "/" + session);
     run.program = "vlp-calibrate " + text(row, "version");
@@ -99,16 +114,19 @@ ReprocessedArchive sessions_of_archive(const fs::path& results) {
 RunRecord run_of(const ReprocessedSession& session) {
   RunRecord run = session.run;
   const fs::path file = session.folder / "session.json";
-  const fs::path calibration = session.folder / "calibration.yaml";
+  const auto folder = open_session(session.folder);
+  const auto text = folder ? folder->read("session.json", kMostBytes) : std::nullopt;
+  if (!text) throw InputError(file, "cannot be opened: there is none");
   try {
-    const auto document = nlohmann::json::parse(read_text_file(file, kMostBytes));
+    check_json_bounds(*text);
+    const auto document = nlohmann::json::parse(*text);
     for (const char* part : {"metrics", "gates"}) {
       if (document.contains(part)) add_figures(document[part], run.figures);
     }
-  } catch (const nlohmann::json::exception& error) {
+  } catch (const std::exception& error) {
     throw InputError(file, fmt::format("is not as vlp-calibrate writes it: {}", error.what()));
   }
-  if (fs::exists(calibration)) run.calibration = read_text_file(calibration, kMostBytes);
+  run.calibration = folder->read("calibration.yaml", kMostBytes).value_or("");
   return run;
 }
 

@@ -14,7 +14,6 @@
 #include "report/calibration_sections.h"
 #include "report/html.h"
 #include "rig/calibration_error.h"
-#include "rig/file.h"
 #include "rig/input_error.h"
 #include "station/records/publish_run.h"
 
@@ -247,10 +246,12 @@ std::string certificate(const RunRecord& record, const Calibration& calibration)
 std::filesystem::path write_certificate(const RunRecord& record,
                                         const std::filesystem::path& results) {
   check_certifiable(record);
-  const std::filesystem::path folder = publish_run(record, {}, results);
-  std::filesystem::path file = folder / "certificate.html";
-  write_file(file, certificate(record, read_calibration(folder / calibration_name(record))));
-  return file;
+  const std::filesystem::path calibration =
+      publish_run(record, {}, results) / calibration_name(record);
+  const SharedFolder folder = open_run_folder(record, results);
+  constexpr const char* name = "certificate.html";
+  folder.replace(name, certificate(record, read_calibration(calibration)));
+  return folder.path() / name;
 }
 
 }  // namespace vlp

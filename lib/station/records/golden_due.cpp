@@ -8,12 +8,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <fstream>
 #include <sstream>
 #include <system_error>
 
 #include "captures/digest.h"
-#include "rig/file.h"
+#include "captures/shared_folder.h"
 #include "rig/input_error.h"
 #include "station/records/measuring_digest.h"
 #include "station/station_folders.h"
@@ -25,9 +24,11 @@ namespace fs = std::filesystem;
 
 constexpr const char* kUnitLine = "unit\n";
 
-fs::path note_of(const StationConfig& config) {
+constexpr std::size_t kMaxBytes = 1 << 24;
+
+std::string name_of_note(const StationConfig& config) {
   constexpr std::size_t digits = 16;
-  return config.spool / (".golden-" + sha256_of_text(config.station).substr(0, digits));
+  return ".golden-" + sha256_of_text(config.station).substr(0, digits);
 }
 
 /// Of a note that is no whole one.
@@ -37,9 +38,19 @@ std::string damaged(const std::string& why) {
 }
 
 /// An earlier PASS must not stand where this run could not be noted: without a note it is due.
-void forget(const fs::path& file) {
+void forget(const StationConfig& config) {
   std::error_code ignored;
-  fs::remove(file, ignored);
+  fs::remove(config.spool / name_of_note(config), ignored);
+}
+
+/// Adds a line to the note if it exists. Throws InputError if it cannot be written.
+void append(const SharedFolder& spool, const std::string& note, std::string_view line) {
+  const int file = spool.open(note, O_WRONLY | O_APPEND);
+  if (file < 0 && errno == ENOENT) return;
+  const bool is_written =
+      file >= 0 && ::write(file, line.data(), line.size()) == static_cast<ssize_t>(line.size());
+  if (file >= 0) ::close(file);
+  if (!is_written) throw InputError(spool.path() / note, "cannot be written");
 }
 
 }  // namespace
@@ -47,18 +58,18 @@ void forget(const fs::path& file) {
 std::string golden_problem(const StationConfig& config, GoldenAt at) {
   constexpr const char* verify = "'vlp-station verify' is due";
   if (!config.verify_due) return "";
-  const fs::path file = note_of(config);
+  const fs::path file = config.spool / name_of_note(config);
   std::error_code none;
-  if (fs::status(file, none).type() == fs::file_type::not_found) {
+  if (fs::symlink_status(file, none).type() == fs::file_type::not_found) {
     return fmt::format("the golden unit was not measured here yet: {}", verify);
   }
-  constexpr std::size_t most_bytes = 1 << 24;
   std::string text;
   try {
-    text = read_text_file(file, most_bytes);
+    text = SharedFolder(config.spool).read(name_of_note(config), kMaxBytes).value_or("");
   } catch (const InputError& error) {
     return damaged(error.what());
   }
+  if (!text.ends_with('\n')) return damaged(file.string() + ": is the file cut short?");
   std::istringstream words(text.substr(0, text.find('\n')));
   std::string run, verdict, ended_utc, measured_with;
   words >> run >> verdict >> ended_utc >> measured_with;
@@ -97,32 +108,30 @@ std::string golden_problem(const StationConfig& config, GoldenAt at) {
 
 void note_for_golden(const StationConfig& config, const RunRecord& record) {
   if (!config.verify_due || record.invalid()) return;
-  const fs::path file = note_of(config);
   make_folder(config.spool);
-  if (record.kind == "golden") {
-    try {
-      return write_file(file, fmt::format("{} {} {} {}\n", record.run, record.verdict,
-                                          record.ended_utc, measuring_digest(config)));
-    } catch (const InputError&) {
-      forget(file);
-      throw;
+  const SharedFolder spool(config.spool);
+  const std::string note = name_of_note(config);
+  try {
+    if (record.kind == "golden") {
+      spool.replace(note, fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
+                                      measuring_digest(config)));
+    } else {
+      append(spool, note, kUnitLine);  // never measured: nothing to count from
     }
+  } catch (const InputError&) {
+    forget(config);
+    throw;
   }
-  const int note = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
-  if (note < 0 && errno == ENOENT) return;  // never measured: nothing to count from
-  const std::string_view line = kUnitLine;
-  const bool written = note >= 0 && ::write(note, line.data(), line.size()) == ssize_t(line.size());
-  if (note >= 0) ::close(note);
-  if (written) return;
-  forget(file);
-  throw InputError(file, "cannot be written");
 }
 
 bool forget_golden(const StationConfig& config, const std::string& run) {
-  std::string noted;
-  std::ifstream(note_of(config)) >> noted;
-  if (noted != run) return false;
-  forget(note_of(config));
+  try {
+    const auto note = SharedFolder(config.spool).read(name_of_note(config), kMaxBytes);
+    if (!note || note->substr(0, note->find(' ')) != run) return false;
+  } catch (const InputError&) {  // no spool, or no note that counts (golden_problem())
+    return false;
+  }
+  forget(config);
   return true;
 }
 

@@ -29,6 +29,8 @@
 #include <vector>
 
 #include "captures/printable.h"
+#include "captures/shared_folder.h"
+#include "rig/input_error.h"
 #include "station/records/export_runs.h"
 
 namespace vlp {
@@ -234,7 +236,7 @@ bool is_that(int descriptor, const std::filesystem::path& file) {
 }  // namespace
 
 RunEvent hook_wanted(const Hook& hook, const std::string& operator_name) {
-  return new_event(kHookWanted, printable(fmt::format("{}", fmt::join(hook.command, " "))),
+  return new_event(kHookWanted, printable_line(fmt::format("{}", fmt::join(hook.command, " "))),
                    operator_name);
 }
 
@@ -291,7 +293,11 @@ std::string hook_problem(const RunRecord& record) {
 HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)
     : file_(spool / (".hook-" + run)) {
   for (;;) {
-    descriptor_ = ::open(file_.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+    try {
+      descriptor_ = SharedFolder(spool).open(".hook-" + run, O_CREAT | O_RDWR);
+    } catch (const InputError&) {  // no folder, or no regular file: nobody shares a lock there
+      descriptor_ = -1;
+    }
     if (descriptor_ < 0) return;
     // Where the file system has no locks, no other program holds one.
     held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;

@@ -41,7 +41,7 @@ void check_may_void(const StationConfig& station, const std::string& operator_na
   throw std::invalid_argument(
       fmt::format("operator {} may not void runs of station {}: void_operators in station.yaml has "
                   "those who may",
-                  printable(operator_name), station.station));
+                  printable_line(operator_name), station.station));
 }
 
 }  // namespace
@@ -226,7 +226,7 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
                 const std::string& reason) {
   Voided result{known.find(run)};
   RunRecord& record = result.run;
-  const std::string who = printable(operator_name);
+  const std::string who = printable_line(operator_name);
   const auto& station = known.station();
   const bool own = station && record.station == station->station;
   std::optional<HookLock> lock;
@@ -245,7 +245,7 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
     throw std::invalid_argument(
         fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text));
   }
-  record.events.push_back(new_event(kVoided, printable(reason), who));
+  record.events.push_back(new_event(kVoided, printable_line(reason), who));
   if (!station) {
     known.records().keep(record);
     result.files_problem = rename_files(own_station, record);

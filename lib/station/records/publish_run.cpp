@@ -4,21 +4,51 @@
 
 #include <array>
 #include <cstdint>
-#include <system_error>
+#include <optional>
 #include <utility>
 
-#include "rig/file.h"
+#include "captures/id.h"
 #include "rig/input_error.h"
 #include "station/records/unit_report.h"
 #include "station/station_folders.h"
 
 namespace vlp {
 
+namespace {
+
 namespace fs = std::filesystem;
+
+Id camera_of(const RunRecord& record) { return {record.camera, "the record of a run", "camera"}; }
+Id run_of(const RunRecord& record) { return {record.run, "the record of a run", "run"}; }
+
+/// Writes the calibration of a record, or checks the one that is there. Returns its path.
+fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) {
+  const char* name = calibration_name(record);
+  fs::path file = folder.path() / name;
+  const auto existing = folder.read(name, 2 * record.calibration.size());
+  if (!existing) {
+    folder.replace(name, record.calibration);
+  } else if (*existing != record.calibration) {
+    throw InputError(file, "is not what the record has: move it away");
+  }
+  return file;
+}
+
+/// Returns true if a file has this content. A longer one, a link and a pipe do not.
+bool holds(const SharedFolder& folder, const std::string& name, const std::string& content) {
+  try {
+    return folder.read(name, content.size()) == content;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+}  // namespace
 
 void check_results(const fs::path& results, const std::string& camera) {
   constexpr std::uintmax_t room_bytes = 8'000'000;
-  check_room(results / camera, room_bytes);
+  make_folder(results);
+  check_room(SharedFolder(results).make_folder({camera, results, "camera"}), room_bytes);
 }
 
 const char* calibration_name(const RunRecord& record) {
@@ -33,36 +63,37 @@ bool mark_files_voided(const RunRecord& record, const fs::path& results) {
                              std::pair("invalid-calibration.yaml", "voided-calibration.yaml"),
                              std::pair("certificate.html", "voided-certificate.html"),
                              std::pair("report.html", "voided-report.html")};
-  const fs::path folder = results / record.camera / record.run;
+  std::error_code missing;
+  if (!fs::is_directory(results, missing)) return false;
+  const auto camera = SharedFolder(results).find_folder(camera_of(record));
+  const auto folder = camera ? camera->find_folder(run_of(record)) : std::nullopt;
+  if (!folder) return false;
   bool is_any_renamed = false;
   for (const auto& [name, voided_name] : names) {
-    std::error_code error;
-    fs::rename(folder / name, folder / voided_name, error);
-    is_any_renamed = is_any_renamed || !error;
-    const bool is_missing =
-        error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
-    if (!error || is_missing) continue;
-    throw InputError(folder / name, "cannot be renamed: " + error.message());
+    is_any_renamed = folder->rename(name, voided_name) || is_any_renamed;
   }
   return is_any_renamed;
 }
 
+SharedFolder open_run_folder(const RunRecord& record, const fs::path& results) {
+  const Id camera = camera_of(record), run = run_of(record);
+  make_folder(results);
+  return SharedFolder(results).make_folder(camera).make_folder(run);
+}
+
 fs::path publish_run(const RunRecord& record, const std::vector<ReportPicture>& pictures,
-                     const fs::path& results) {
-  const fs::path folder = results / record.camera / record.run;
-  make_folder(folder);
+                     const fs::path& results, ExistingReport existing) {
+  const SharedFolder folder = open_run_folder(record, results);
   fs::path calibration;
-  if (!record.calibration.empty()) {
-    calibration = folder / calibration_name(record);
-    if (!fs::exists(calibration)) {
-      write_file(calibration, record.calibration);
-    } else if (read_text_file(calibration, 2 * record.calibration.size()) != record.calibration) {
-      throw InputError(calibration, "is not what the record has: move it away");
-    }
-  }
-  const fs::path report = folder / (voided(record) ? "voided-report.html" : "report.html");
-  if (!fs::exists(report)) write_file(report, unit_report(record, calibration, pictures));
-  return folder;
+  if (!record.calibration.empty()) calibration = write_calibration(record, folder);
+  const std::string name = voided(record) ? "voided-report.html" : "report.html";
+  const bool is_there = folder.has(name);
+  if (is_there && existing == ExistingReport::keep) return folder.path();
+  const std::string report = unit_report(record, calibration, pictures);
+  if (is_there && holds(folder, name, report)) return folder.path();
+  if (is_there) folder.rename(name, "replaced-" + name);
+  folder.replace(name, report);
+  return folder.path();
 }
 
 }  // namespace vlp

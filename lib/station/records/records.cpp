@@ -53,6 +53,9 @@ void open(soci::session& sql, const std::string& where) {
   if (is_server(where)) {
     sql.open(soci::postgresql, connection_of(where));
   } else {
+    if (where.find('"') != std::string::npos) {
+      throw InputError(where, "the name of a database cannot have a quote (\"): rename its folder");
+    }
     sql.open(soci::sqlite3,
              "dbname=\"" + where + "\" timeout=" + std::to_string(patience_s(where)));
   }

@@ -28,6 +28,8 @@ struct Retained {
   std::vector<ExpiredFolder> expired;
   /// As old, but of no run of the records: left.
   std::vector<std::filesystem::path> without_record;
+  /// As old, but with something in them that station.yaml names: left.
+  std::vector<std::filesystem::path> in_use;
 };
 
 /// What of a station's runs is kept no longer, by StationConfig::keep and the end of each run as
@@ -35,6 +37,11 @@ struct Retained {
 /// RESULTS/CAMERA/RUN. What has another name, such as images that still arrive, is not looked at,
 /// nor are runs of other stations and symbolic links.
 Retained look_for_expired(const StationConfig& config, Records& records);
+
+/// Checks that the clock is not years ahead, by which all runs seem to be kept no longer: the
+/// station was used within the last year by it. Throws InputError. A clock by which a run was
+/// recorded cannot be told from a right one.
+void check_clock(const StationConfig& config, Records& records);
 
 /// Deletes the folder of a run; links are not followed. Its record tells of it as soon as nothing
 /// is in the folder, which goes last, so that a program that is killed before it has told of it

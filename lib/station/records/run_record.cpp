@@ -16,8 +16,10 @@
 #include <opencv2/core/utility.hpp>
 #include <random>
 #include <set>
+#include <string_view>
 
 #include "calibration/intrinsics/mrcal_files.h"
+#include "captures/printable.h"
 #include "station/database_name.h"
 
 namespace vlp {
@@ -100,6 +102,15 @@ std::string new_run() {
   return utc("%Y%m%dT%H%M%SZ-") + fmt::format("{:08x}{:08x}", random(), random());
 }
 
+bool is_name_of_run(const std::string& text) {
+  constexpr std::string_view form = "00000000T000000Z-xxxxxxxxxxxxxxxx";
+  return std::ranges::equal(text, form, [](char c, char kind) {
+    const bool is_digit = c >= '0' && c <= '9';
+    if (kind == '0') return is_digit;
+    return kind == 'x' ? is_digit || (c >= 'a' && c <= 'f') : c == kind;
+  });
+}
+
 std::string begun_utc(const std::string& run) {
   constexpr std::size_t length = 16;  // 20261121T134501Z
   if (run.size() < length || run[8] != 'T' || run[15] != 'Z') return "";
@@ -155,6 +166,31 @@ std::span<const RunField> run_fields() {
       RunField{"config_sha256", &RunRecord::config_sha256, "config"},
       RunField{"calibration", &RunRecord::calibration, nullptr, false}};
   return fields;
+}
+
+RunRecord printable_run(RunRecord run) {
+  for (const RunField& field : run_fields()) {
+    const bool has_lines =
+        field.text == &RunRecord::causes || field.text == &RunRecord::calibration;
+    std::string& text = run.*field.text;
+    text = has_lines ? printable(text) : printable_line(text);
+  }
+  for (RunRecord::Image& image : run.images) {
+    image.name = printable_line(image.name);
+    image.refused = printable_line(image.refused);
+  }
+  for (RunEvent& event : run.events) {
+    event.text = printable_line(event.text);
+    event.who = printable_line(event.who);
+  }
+  return run;
+}
+
+std::string clock_problem(const RunRecord& run) {
+  if (run.begun_utc <= run.ended_utc) return "";
+  return fmt::format(
+      "the clock went back: the run ended {}, before it began {}: set the clock, and measure again",
+      run.ended_utc, run.begun_utc);
 }
 
 RunRecord new_record(const char* kind, const StationConfig& config, const std::string& camera,

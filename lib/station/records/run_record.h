@@ -115,11 +115,21 @@ std::span<const RunField> run_fields();
 /// A name for a run that begins now: the time and 16 random hexadecimal digits,
 /// 20261121T134501Z-0123456789abcdef.
 std::string new_run();
+/// Returns true if a text has the form of new_run().
+bool is_name_of_run(const std::string& text);
 /// When it began, as 2026-11-21T13:45:01Z; empty for what is no name of a run.
 std::string begun_utc(const std::string& run);
 std::string now_utc();
 /// Since a UTC as 2026-11-21T13:45:01Z; below 0 for one to come, NaN for what is none.
 double seconds_since(const std::string& utc);
+
+/// Returns the run with each text as a terminal, a report and the spool take it: printable(), and
+/// printable_line() for who measured, names of images and events.
+RunRecord printable_run(RunRecord run);
+
+/// Returns the cause that makes a run INVALID whose clock went back; an empty string if the run
+/// ended after it began.
+std::string clock_problem(const RunRecord& run);
 
 /// What is alike in the record of a unit and of a golden one that ends now: all but the verdict,
 /// what it rests on, and who measured.

@@ -11,8 +11,10 @@
 #include <system_error>
 #include <utility>
 
+#include "captures/id.h"
+#include "captures/json_bounds.h"
 #include "captures/printable.h"
-#include "rig/file.h"
+#include "captures/shared_folder.h"
 #include "rig/input_error.h"
 #include "station/database_name.h"
 #include "station/records/hook.h"
@@ -51,6 +53,10 @@ SpooledRun run_from(const Json& json) {
     run.*field.text = json.value(field.name, std::string());
   }
   if (run.run.empty() || run.verdict.empty()) throw std::runtime_error("no run, or no verdict");
+  // Both name folders and files.
+  for (const std::string& id : {run.run, run.camera}) {
+    if (!Id::accepts(id)) throw std::runtime_error("its run or camera is no id");
+  }
   for (const Json& figure : json.at("figures")) {
     run.figures.push_back(
         {figure.at("name").get<std::string>(), figure.at("unit").get<std::string>(),
@@ -66,15 +72,16 @@ SpooledRun run_from(const Json& json) {
   for (const Json& event : json.value("events", Json::array())) {
     run.events.push_back({event.at("event").get<std::string>(), event.at("what").get<std::string>(),
                           event.at("text").get<std::string>(), event.value("who", std::string())});
+    if (!Id::accepts(run.events.back().event)) throw std::runtime_error("an event is no id");
   }
   return spooled;
 }
 
 /// With another event another file: programs that bring the one before to the records take away no
 /// other.
-fs::path file_of_run(const fs::path& folder, const RunRecord& run) {
+std::string file_name(const RunRecord& run) {
   const std::string last = run.events.empty() ? "" : "." + run.events.back().event;
-  return folder / (run.run + last + kRunEnding);
+  return run.run + last + kRunEnding;
 }
 
 /// The run of several files, with the events of all.
@@ -131,11 +138,11 @@ std::string notice_of(const InputError& error) {
 }  // namespace
 
 std::string text_of_run(const SpooledRun& spooled) {
-  const RunRecord& run = spooled.run;
+  const RunRecord run = printable_run(spooled.run);
   Json json;
   json["format"] = kRunFormat;
-  json["records"] = printable(spooled.records);
-  for (const RunField& field : run_fields()) json[field.name] = printable(run.*field.text);
+  json["records"] = printable_line(spooled.records);
+  for (const RunField& field : run_fields()) json[field.name] = run.*field.text;
   json["figures"] = Json::array();
   for (const CheckedMetric& figure : run.figures) {
     json["figures"].push_back({{"name", figure.name},
@@ -149,26 +156,24 @@ std::string text_of_run(const SpooledRun& spooled) {
   }
   json["images"] = Json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {
-    json["images"].push_back({{"step", step},
-                              {"image", printable(name)},
-                              {"sha256", sha256},
-                              {"refused", printable(refused)}});
+    json["images"].push_back(
+        {{"step", step}, {"image", name}, {"sha256", sha256}, {"refused", refused}});
   }
   json["events"] = Json::array();
   for (const RunEvent& event : run.events) {
-    json["events"].push_back({{"event", event.event},
-                              {"what", event.what},
-                              {"text", printable(event.text)},
-                              {"who", printable(event.who)}});
+    json["events"].push_back(
+        {{"event", event.event}, {"what", event.what}, {"text", event.text}, {"who", event.who}});
   }
   constexpr int indent = 1;
   return json.dump(indent) + "\n";
 }
 
 SpooledRun read_run(const fs::path& file) {
-  const std::string text = read_text_file(file, kMostRunBytes);
+  const auto text = SharedFolder(file.parent_path()).read(file.filename().string(), kMostRunBytes);
+  if (!text) throw InputError(file, "cannot be opened: it was taken away");
   try {
-    return run_from(Json::parse(text));
+    check_json_bounds(*text);
+    return run_from(Json::parse(*text));
   } catch (const std::exception& error) {
     throw InputError(file, std::string("is no run of a station: ") + error.what());
   }
@@ -177,7 +182,7 @@ SpooledRun read_run(const fs::path& file) {
 Spool::Spool(fs::path folder, std::string records)
     : folder_(std::move(folder)),
       where_(std::move(records)),
-      name_(printable(identity_of_database(where_))) {}
+      name_(printable_line(identity_of_database(where_))) {}
 
 Spool::~Spool() = default;
 
@@ -221,7 +226,8 @@ void Spool::put_off(const InputError& error) {
 }
 
 void Spool::prepare() {
-  check_room(folder_, kRoom_bytes);
+  make_folder(folder_);
+  check_room(SharedFolder(folder_), kRoom_bytes);
   remove_left_over(folder_);
   try {
     if (!records_) records_ = std::make_unique<Records>(where_);
@@ -235,9 +241,9 @@ void Spool::prepare() {
 void Spool::keep(const RunRecord& run) {
   try {
     make_folder(folder_);
-    const fs::path file = file_of_run(folder_, run);
-    known_.erase(file);  // another, maybe, of the same name
-    write_file(file, text_of_run({run, name_}));
+    const std::string name = file_name(run);
+    known_.erase(folder_ / name);  // another, maybe, of the same name
+    SharedFolder(folder_).replace(name, text_of_run({run, name_}));
   } catch (const InputError& error) {
     const std::string refused = ask([&](Records& records) { records.keep(run); });
     if (refused.empty()) return;

@@ -7,7 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
-#include "rig/file.h"
+#include "captures/shared_folder.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -23,12 +23,13 @@ std::filesystem::path FrameSource::save_next(const std::filesystem::path& folder
   cv::imencode(".png", frame->image, bytes);
   std::string content(bytes.begin(), bytes.end());
   // A run that goes on does not write over the frames that it has.
-  std::filesystem::path file;
+  const SharedFolder step(folder);
+  std::string name;
   do {
-    file = folder / fmt::format("frame-{:06}.png", frames_++);
-  } while (std::filesystem::exists(file));
-  write_file(file, content);
-  return file;
+    name = fmt::format("frame-{:06}.png", frames_++);
+  } while (step.has(name));
+  step.replace(name, content);
+  return folder / name;
 }
 
 }  // namespace vlp

@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <utility>
+#include <vector>
 
 #include "captures/digest.h"
 #include "rig/calibration_text.h"
@@ -19,7 +20,11 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
     record.calibration = calibration_text(*calibration);
   }
   record.figures = unit.figures();
-  record.judge(find_causes(unit));
+  std::vector<Cause> causes = find_causes(unit);
+  if (std::string problem = clock_problem(record); !problem.empty()) {
+    causes.insert(causes.begin(), {std::move(problem), false});
+  }
+  record.judge(causes);
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
       std::string refused = image.refusal();

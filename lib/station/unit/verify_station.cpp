@@ -118,6 +118,9 @@ class Verification {
     RunRecord record = new_record("golden", config_, golden_.camera_id, run, program);
     record.figures = figures;
     record.images = images_;
+    if (std::string problem = clock_problem(record); !problem.empty()) {
+      causes_.insert(causes_.begin(), {std::move(problem), false});
+    }
     record.judge(causes_);
     return record;
   }

@@ -9,7 +9,7 @@
 
 #include <algorithm>
 
-#include "rig/file.h"
+#include "captures/id.h"
 #include "rig/input_error.h"
 #include "station/records/publish_run.h"
 #include "station/station_folders.h"
@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kKept = "kept";
+constexpr const char *kKept = "kept", *kState = ".run";
 
 /// Changes when the tables that tell the captures' places do.
 std::string state_of_tables(const fs::path& folder) {
@@ -33,14 +33,21 @@ std::string state_of_tables(const fs::path& folder) {
   return state;
 }
 
+SharedFolder open_captures(const fs::path& captures, const std::string& camera) {
+  make_folder(captures);
+  return SharedFolder(captures).make_folder({camera, captures, "camera"});
+}
+
 }  // namespace
 
 WatchedRun::WatchedRun(Unit& unit, Spool& spool)
-    : unit_(unit), folder_(unit.config().captures / unit.camera_id()) {
+    : unit_(unit),
+      folder_(unit.config().captures / unit.camera_id()),
+      files_(open_captures(unit.config().captures, unit.camera_id())) {
   begin(spool);
   if (finished_) return;
   for (const StationStep step : kStationSteps) {
-    make_folder(folder_ / name_of(step));
+    files_.make_folder({name_of(step), folder_, "step"});
     steps_.emplace_back(folder_ / name_of(step));
   }
   waiting_.resize(steps_.size());
@@ -51,34 +58,49 @@ WatchedRun::~WatchedRun() {
   if (lock_ >= 0) ::close(lock_);
 }
 
+/// Reads the name of the run from `.run`. Returns true if the run is kept.
+bool WatchedRun::read_state() {
+  constexpr std::size_t max_bytes = 100;
+  const auto state = files_.read(kState, max_bytes);
+  if (!state) return false;
+  run_ = state->substr(0, state->find('\n'));
+  if (!is_name_of_run(run_)) {
+    throw InputError(folder_ / kState,
+                     "holds no name of a run: remove it, then its images are of a new run");
+  }
+  return state->ends_with(fmt::format("\n{}\n", kKept));
+}
+
 void WatchedRun::begin(Spool& spool) {
-  make_folder(folder_);
-  const fs::path lock = folder_ / ".lock", state = folder_ / ".run";
-  lock_ = ::open(lock.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
-  if (lock_ < 0) throw InputError(lock, "cannot be written");
+  constexpr const char* lock = ".lock";
+  lock_ = files_.open(lock, O_CREAT | O_RDWR);
+  if (lock_ < 0) throw InputError(folder_ / lock, "cannot be written");
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     throw InputError(folder_, "another vlp-station works on this camera");
   }
-  constexpr std::size_t longest = 100;
-  if (fs::exists(state)) {
-    run_ = read_text_file(state, longest);
-    const bool kept = run_.ends_with(fmt::format("\n{}\n", kKept));
-    run_.erase(std::find(run_.begin(), run_.end(), '\n'), run_.end());
-    finished_ = spool.find(run_);
-    if (!finished_ && kept) {
-      throw InputError(
-          folder_,
-          fmt::format("run {} is kept, but its record cannot be read ({}): "
-                      "begin again when it can, or move the folder away",
-                      run_, spool.away().empty() ? "the records do not have it" : spool.away()));
-    }
-    if (!finished_) return;  // goes on
-    publish_run(*finished_, {}, unit_.config().results);
-    put_away();
+  const bool is_kept = read_state();
+  if (run_.empty()) {
+    run_ = new_run();
+    files_.replace(kState, run_ + "\n");
     return;
   }
-  run_ = new_run();
-  write_file(state, run_ + "\n");
+  finished_ = spool.find(run_);
+  if (finished_ && finished_->camera != unit_.camera_id()) {
+    throw InputError(folder_ / kState,
+                     fmt::format("names run {} of camera {}: remove it, then its images are of a "
+                                 "new run",
+                                 run_, finished_->camera));
+  }
+  if (!finished_ && is_kept) {
+    throw InputError(
+        folder_,
+        fmt::format("run {} is kept, but its record cannot be read ({}): "
+                    "begin again when it can, or move the folder away",
+                    run_, spool.away().empty() ? "the records do not have it" : spool.away()));
+  }
+  if (!finished_) return;  // goes on
+  publish_run(*finished_, {}, unit_.config().results);
+  put_away();
 }
 
 std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
@@ -113,7 +135,7 @@ std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
 
 void WatchedRun::mark_kept() const {
   try {
-    write_file(folder_ / ".run", fmt::format("{}\n{}\n", run_, kKept));
+    files_.replace(kState, fmt::format("{}\n{}\n", run_, kKept));
   } catch (const InputError&) {  // put_away() will tell; records refuse a second verdict of a run
   }
 }

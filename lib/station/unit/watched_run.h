@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "captures/shared_folder.h"
 #include "station/records/run_record.h"
 #include "station/records/spool.h"
 #include "station/unit/unit.h"
@@ -26,7 +27,8 @@ void put_away(const std::filesystem::path& folder, const std::string& run);
 class WatchedRun {
  public:
   /// Makes the folders. Throws InputError: another program works on this camera, a folder cannot be
-  /// made, a run that is kept was not put away and its record cannot be read.
+  /// made or is a symbolic link, `.run` names no run or one of another camera, a run that is kept
+  /// was not put away and its record cannot be read.
   WatchedRun(Unit& unit, Spool& spool);
   ~WatchedRun();
   WatchedRun(const WatchedRun&) = delete;
@@ -56,9 +58,11 @@ class WatchedRun {
 
  private:
   void begin(Spool& spool);
+  bool read_state();
 
   Unit& unit_;
   std::filesystem::path folder_;
+  SharedFolder files_;
   std::string run_;
   std::optional<RunRecord> finished_;
   int lock_ = -1;

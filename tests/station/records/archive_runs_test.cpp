@@ -118,5 +118,24 @@ TEST_F(ArchiveRunsOf, OfWhatIsNotWrittenByReprocessingAreRefused) {
   EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("a/s1/session.json: cannot be opened"));
 }
 
+TEST_F(ArchiveRunsOf, OtherFoldersAreRefused) {
+  row("..,s1,pass,2026-03-19,,1.2.3,key");
+  EXPECT_THAT(refusal_of([&] { sessions_of_archive(folder / "archive"); }),
+              HasSubstr("summary.csv:8: '..' is no id of a camera"));
+}
+
+TEST_F(ArchiveRunsOf, LinksOutOfTheArchiveAreRefused) {
+  write("secret.yaml", "password: 1\n");
+  std::filesystem::remove(folder / "archive/sessions/a/s1/calibration.yaml");
+  std::filesystem::create_symlink(folder / "secret.yaml",
+                                  folder / "archive/sessions/a/s1/calibration.yaml");
+  EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("calibration.yaml: is a symbolic link"));
+}
+
+TEST_F(ArchiveRunsOf, NestedWithoutEndAreRefused) {
+  write("archive/sessions/a/s1/session.json", std::string(1'000'000, '['));
+  EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("it has more than 16 levels"));
+}
+
 }  // namespace
 }  // namespace vlp

@@ -173,6 +173,21 @@ TEST_F(GoldenDue, WhenItsNoteIsDamaged) {
   EXPECT_THAT(problem(), HasSubstr("what the golden unit said is not known"));
 }
 
+TEST_F(GoldenDue, WritesToNoFileThatALinkLeadsTo) {
+  note("golden", "PASS");
+  const auto file = std::filesystem::directory_iterator(config.spool)->path();
+  std::filesystem::remove(file);
+  const auto mine = folder.file("mine.txt", "mine\n");
+  std::filesystem::create_symlink(mine, file);
+  EXPECT_THAT(problem(), HasSubstr("is a symbolic link"));
+  EXPECT_THROW(note("unit", "PASS"), InputError);
+  std::filesystem::create_symlink(mine, file);
+  EXPECT_FALSE(forget_golden(config, "RUN"));
+  note("golden", "PASS");
+  EXPECT_EQ(problem(), "");
+  EXPECT_EQ(TemporaryFolder::content_of(mine), "mine\n");
+}
+
 TEST_F(GoldenDue, AfterItsRunWasVoided) {
   note("golden", "PASS");
   forget_golden(config, "another");

@@ -188,5 +188,14 @@ TEST_F(HookTest, OfARunIsRunByOneProgram) {
   EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
 }
 
+TEST(HookLock, MakesNoFileThatALinkLeadsTo) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "spool");
+  std::filesystem::create_symlink(folder / "elsewhere", folder / "spool/.hook-run");
+  EXPECT_LT(HookLock(folder / "spool", "run").descriptor(), 0);
+  EXPECT_LT(HookLock(folder / "spool", "/../../elsewhere").descriptor(), 0);
+  EXPECT_FALSE(std::filesystem::exists(folder / "elsewhere"));
+}
+
 }  // namespace
 }  // namespace vlp

@@ -44,6 +44,54 @@ TEST(PublishRun, WritesWhatIsMissing) {
   EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), report);
 }
 
+TEST(PublishRun, ReplacesAReportThatIsNotTheRecordsIfAskedTo) {
+  const TemporaryFolder folder;
+  const RunRecord record = passed();
+  const fs::path results = publish_run(record, {}, folder / "results");
+  const std::string report = TemporaryFolder::content_of(results / "report.html");
+  publish_run(record, {}, folder / "results", ExistingReport::replace);
+  EXPECT_FALSE(fs::exists(results / "replaced-report.html")) << "it was the record's";
+  folder.file((results / "report.html").string(), "planted");
+  publish_run(record, {}, folder / "results", ExistingReport::replace);
+  EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), report);
+  EXPECT_EQ(TemporaryFolder::content_of(results / "replaced-report.html"), "planted");
+}
+
+TEST(PublishRun, WritesNothingOutsideTheResults) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "elsewhere");
+  RunRecord record = passed();
+  record.camera = "..";
+  EXPECT_THAT(refusal_of([&] { publish_run(record, {}, folder / "results"); }),
+              HasSubstr("'..' is no id of a camera"));
+  record.camera = "0001";
+  record.run = "../../../x";
+  EXPECT_THAT(refusal_of([&] { publish_run(record, {}, folder / "results"); }),
+              HasSubstr("'../../../x' is no id of a run"));
+  EXPECT_THAT(refusal_of([&] { mark_files_voided(passed(), folder / "results"); }), "");
+  EXPECT_FALSE(fs::exists(folder / "results"));
+  record = passed();
+  fs::create_directory(folder / "results");
+  fs::create_directory_symlink(folder / "elsewhere", folder / "results/0001");
+  const auto expect_link = [&](const auto& action) {
+    EXPECT_THAT(refusal_of(action), HasSubstr("0001: is a symbolic link, which is not followed"));
+  };
+  expect_link([&] { publish_run(record, {}, folder / "results"); });
+  expect_link([&] { mark_files_voided(record, folder / "results"); });
+  expect_link([&] { check_results(folder / "results", "0001"); });
+  EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
+}
+
+TEST(CheckResults, OverwritesNoFileThatALinkLeadsTo) {
+  const TemporaryFolder folder;
+  const fs::path mine = folder.file("mine.txt", "mine");
+  fs::create_directories(folder / "results/0001");
+  fs::create_symlink(mine, folder / "results/0001/.writable");
+  EXPECT_EQ(refusal_of([&] { check_results(folder / "results", "0001"); }), "");
+  EXPECT_EQ(TemporaryFolder::content_of(mine), "mine");
+  EXPECT_FALSE(fs::is_symlink(folder / "results/0001/.writable"));
+}
+
 TEST(PublishRun, LeavesAnotherCalibrationAlone) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
@@ -89,7 +137,7 @@ TEST(CheckResults, RefusesAFolderThatCannotBeOne) {
   EXPECT_EQ(refusal_of([&] { check_results(folder / "results", "0001"); }), "");
   EXPECT_TRUE(fs::is_empty(folder / "results/0001"));
   EXPECT_THAT(refusal_of([&] { check_results(folder.file("file", ""), "0001"); }),
-              HasSubstr("file/0001: cannot be made"));
+              HasSubstr("file: cannot be made"));
 }
 
 }  // namespace

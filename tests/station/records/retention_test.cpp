@@ -4,8 +4,11 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+
 #include "rig/input_error.h"
 #include "station/records/spool.h"
+#include "support/refused.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -13,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
@@ -104,6 +108,43 @@ TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
   EXPECT_EQ(told->events[0].what, kImagesDeleted);
   EXPECT_EQ(told->events[0].text, "kept 90 days, 0.0 MB");
   EXPECT_THROW(delete_expired(found.expired[0], spool), InputError) << "it is not there";
+}
+
+/// A golden unit's calibration among the results of the run that measured it.
+TEST_F(RetentionTest, LeavesAFolderThatTheStationNeeds) {
+  keep(kOld, "a", "2020-01-01T01:00:00Z");
+  const fs::path results = with_file("results/a/" + kOld), images = with_file("captures/a." + kOld);
+  config.inputs = {folder.file("station.yaml", ""),
+                   folder.file("results/a/" + kOld + "/calibration.yaml", "")};
+  const Retained found = look_for_expired(config, records);
+  EXPECT_THAT(found.in_use, ElementsAre(results));
+  ASSERT_THAT(found.expired, SizeIs(1));
+  EXPECT_EQ(found.expired[0].folder, images);
+  // Through a link, and by another name.
+  fs::create_symlink(config.inputs[1], folder / "golden.yaml");
+  config.inputs[1] = folder / "golden.yaml";
+  EXPECT_THAT(look_for_expired(config, records).in_use, ElementsAre(results));
+  config.inputs = {};
+  config.spool = images / "spool";
+  EXPECT_THAT(look_for_expired(config, records).in_use, ElementsAre(images));
+}
+
+TEST_F(RetentionTest, TrustsNoClockYearsAhead) {
+  EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "") << "no run";
+  keep(kOld, "a", "2020-01-01T01:00:00Z");
+  config.file = folder.file("station.yaml", "");
+  config.records = (folder / "records.db").string();
+  fs::create_directories(config.captures);
+  EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "") << "files of now";
+  const auto before = fs::file_time_type::clock::now() - std::chrono::hours(24 * 400);
+  for (const fs::path& file : {config.file, fs::path(config.records), config.captures}) {
+    fs::last_write_time(file, before);
+  }
+  EXPECT_THAT(refusal_of([&] { check_clock(config, records); }),
+              HasSubstr("the newest run ended 2020-01-01T01:00:00Z, more than a year before"));
+  keep(new_run(), "a", now_utc());
+  fs::last_write_time(config.records, before);
+  EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "");
 }
 
 }  // namespace

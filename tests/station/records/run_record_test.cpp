@@ -32,6 +32,38 @@ TEST(RunName, TellsWhenTheRunBegan) {
   EXPECT_THAT(run, SizeIs(33));
   EXPECT_LE(begun_utc(run), now_utc());
   EXPECT_NE(run, new_run());
+  EXPECT_TRUE(is_name_of_run(run));
+  for (const std::string& other : {std::string(), run + "0", "../../../" + run, "x" + run.substr(1),
+                                   run.substr(0, 32) + "/"}) {
+    EXPECT_FALSE(is_name_of_run(other)) << other;
+  }
+}
+
+TEST(PrintableRun, HasLinesInCausesAndCalibrationOnly) {
+  RunRecord run;
+  run.operator_name = "J\xf6rg\n";
+  run.causes = "first\nsecond\n";
+  run.calibration = "camera:\n  id: 1\n";
+  run.images = {{"boards", "a\n.png", "", "\x1b"}};
+  run.events = {{"", "", "why\n", "who\n"}};
+  const RunRecord printed = printable_run(run);
+  EXPECT_EQ(printed.operator_name, "J\\xf6rg\\x0a");
+  EXPECT_EQ(printed.causes, run.causes);
+  EXPECT_EQ(printed.calibration, run.calibration);
+  EXPECT_EQ(printed.images[0].name, "a\\x0a.png");
+  EXPECT_EQ(printed.images[0].refused, "\\x1b");
+  EXPECT_EQ(printed.events[0].text, "why\\x0a");
+  EXPECT_EQ(printed.events[0].who, "who\\x0a");
+}
+
+TEST(ClockProblem, IsAnEndBeforeTheBegin) {
+  RunRecord run;
+  run.begun_utc = run.ended_utc = "2026-11-21T13:45:01Z";
+  EXPECT_EQ(clock_problem(run), "");
+  run.ended_utc = "2026-11-21T13:45:00Z";
+  EXPECT_EQ(clock_problem(run),
+            "the clock went back: the run ended 2026-11-21T13:45:00Z, before it began "
+            "2026-11-21T13:45:01Z: set the clock, and measure again");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -39,7 +40,8 @@ using testing::StartsWith;
 TEST(SpooledRun, IsReadAsItWasWritten) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
-  for (const RunField& field : run_fields()) run.*field.text += "\n\"\\ \xc3\xbc\t{}\n";
+  for (const RunField& field : run_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
+  for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
   run.images[1].refused = "too dark";
   const auto [read, records] = read_run(folder.file("run.json", text_of_run({run, "records.db"})));
   EXPECT_EQ(records, "records.db");
@@ -79,6 +81,34 @@ TEST(SpooledRun, IsRefusedWithItsFile) {
     EXPECT_THAT(refusal_of([&] { read_run(folder.file("bad.json", bad)); }),
                 HasSubstr("bad.json: is no run of a station"));
   }
+}
+
+TEST(SpooledRun, IsRefusedWithIdsThatNameOtherFolders) {
+  const TemporaryFolder folder;
+  RunRecord run = numbered_run(1);
+  run.camera = "../..";
+  const auto refusal = [&] {
+    return refusal_of([&] { read_run(folder.file("bad.json", text_of_run({run, "records.db"}))); });
+  };
+  EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
+  run = numbered_run(1);
+  run.run = "../x";
+  EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
+  run = numbered_run(1);
+  run.events.push_back({"../x", kHookDone, "", ""});
+  EXPECT_THAT(refusal(), HasSubstr("an event is no id"));
+}
+
+TEST(SpooledRun, IsARegularFileOfFewLevels) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "pipe.json").c_str(), 0600), 0);
+  EXPECT_THAT(refusal_of([&] { read_run(folder / "pipe.json"); }),
+              HasSubstr("pipe.json: is no regular file"));
+  std::filesystem::create_symlink("/dev/zero", folder / "link.json");
+  EXPECT_THAT(refusal_of([&] { read_run(folder / "link.json"); }),
+              HasSubstr("link.json: is a symbolic link"));
+  EXPECT_THAT(refusal_of([&] { read_run(folder.file("deep.json", std::string(1'000'000, '['))); }),
+              HasSubstr("it has more than 16 levels"));
 }
 
 TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {

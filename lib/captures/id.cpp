@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/id.h"
+
+#include <utility>
+
+#include "captures/printable.h"
+#include "rig/input_error.h"
+
+namespace vlp {
+namespace {
+
+/// 255 bytes of a file name, minus the run, event and ending that follow an id.
+constexpr std::size_t kMaxBytes = 200;
+
+}  // namespace
+
+bool Id::accepts(std::string_view text) {
+  return !text.empty() && text.size() <= kMaxBytes && text.front() != '.' &&
+         text.find('/') == std::string_view::npos && printable_line(text) == text;
+}
+
+Id::Id(std::string text, const std::filesystem::path& source, std::string_view kind)
+    : text_(std::move(text)) {
+  if (accepts(text_)) return;
+  constexpr std::size_t max_shown = 100;
+  std::string problem = first_characters(printable_line(text_), max_shown);
+  throw InputError(source, problem.insert(0, "'").append("' is no id of a ").append(kind) +
+                               ": it would name a file elsewhere, or forge a line");
+}
+
+}  // namespace vlp

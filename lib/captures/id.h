@@ -1,0 +1,30 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace vlp {
+
+/// Name of a camera, run, session or step that is checked when it is made, from whatever source.
+/// It is one part of a path and reads the same in a table, a report and a terminal: 1 to 200 bytes
+/// of UTF-8, without '/', control characters, marks of direction, and '.' as its first character.
+class Id {
+ public:
+  /// @param source  file or database from which the text was read, for the message
+  /// @param kind    "camera", "run", ...
+  /// @throws InputError if the text is no id
+  Id(std::string text, const std::filesystem::path& source, std::string_view kind);
+
+  /// Returns true if a text is an id.
+  static bool accepts(std::string_view text);
+
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "captures/id.h"
+
+namespace vlp {
+
+/// Folder into which others can write, such as the captures, results and spool of a station. Its
+/// files are reached from the open folder by names of one part, and no symbolic link is followed:
+/// nothing outside the folder is read, written or removed. All functions throw InputError.
+class SharedFolder {
+ public:
+  /// Opens an existing folder. Symbolic links in `path` are followed: the user named it.
+  explicit SharedFolder(const std::filesystem::path& path);
+  SharedFolder(SharedFolder&& other) noexcept;
+  SharedFolder& operator=(SharedFolder&&) = delete;
+  ~SharedFolder();
+
+  const std::filesystem::path& path() const { return path_; }
+
+  /// Opens a folder in this one. Returns std::nullopt if it does not exist.
+  std::optional<SharedFolder> find_folder(const Id& name) const;
+  /// Opens a folder in this one, and makes it first if it does not exist.
+  SharedFolder make_folder(const Id& name) const;
+
+  /// Returns true if there is anything of this name, including a symbolic link.
+  bool has(const std::string& name) const;
+  /// Reads a regular file. Returns std::nullopt if it does not exist. Throws if it is a link, a
+  /// pipe or a device, or longer than `max_bytes`.
+  std::optional<std::string> read(const std::string& name, std::size_t max_bytes) const;
+  /// Replaces a file as a whole, or makes it: a temporary file, fsync, rename. Mode and owner of a
+  /// replaced regular file are kept; a link is replaced and not followed.
+  void replace(const std::string& name, std::string_view content) const;
+  /// Opens a regular file with the flags of open(2). Returns -1 if it cannot be opened; throws if
+  /// it is a link, a pipe or a device.
+  int open(const std::string& name, int flags) const;
+  /// Renames a file within the folder. Returns false if it does not exist.
+  bool rename(const std::string& from, const std::string& to) const;
+  /// Removes a file if it exists.
+  void remove(const std::string& name) const;
+  /// Removes all that is in the folder, with its folders; of a link, the link.
+  void remove_content() const;
+
+ private:
+  SharedFolder(std::filesystem::path path, int descriptor);
+  std::filesystem::path checked(const std::string& name) const;
+
+  std::filesystem::path path_;
+  int descriptor_;
+};
+
+}  // namespace vlp

@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/id.h"
+
+#include <gmock/gmock.h>
+
+#include "support/refused.h"
+
+namespace vlp {
+namespace {
+
+TEST(Id, IsOnePartOfAPathThatReadsTheSameEverywhere) {
+  for (const std::string& text :
+       {std::string("0001"), std::string("a.b"), std::string("Kamera 7"), std::string("-x"),
+        std::string("\u00fc\u20ac"), std::string(200, 'a'), std::string("20261121T134501Z-01")}) {
+    EXPECT_TRUE(Id::accepts(text)) << text;
+    EXPECT_EQ(Id(text, "file", "camera").text(), text);
+  }
+}
+
+TEST(Id, IsNoWayToAnotherFolderAndNoForgedLine) {
+  for (const std::string& text :
+       {std::string(), std::string("."), std::string(".."), std::string(".run"),
+        std::string("../.."), std::string("a/b"), std::string("/etc"), std::string("a\nPASS"),
+        std::string("a\tb"), std::string("\x1b[2J"), std::string("a\0b", 3), std::string("\xff"),
+        std::string("\u202egnp"), std::string("a\u2028b"), std::string("\xed\xa0\x80"),
+        std::string(201, 'a')}) {
+    EXPECT_FALSE(Id::accepts(text)) << text;
+  }
+  EXPECT_EQ(refusal_of([] { Id("../x\n", "spool/a.json", "run"); }),
+            "spool/a.json: '../x\\x0a' is no id of a run: it would name a file elsewhere, or forge "
+            "a line");
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,142 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "captures/shared_folder.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+Id id(const std::string& text) { return {text, "test", "camera"}; }
+
+class SharedFolderTest : public testing::Test {
+ protected:
+  SharedFolderTest() { fs::create_directory(folder / "shared"); }
+
+  const TemporaryFolder folder;
+  const fs::path path = folder / "shared";
+  const fs::path outside = folder.file("outside.txt", "mine");
+};
+
+TEST_F(SharedFolderTest, WritesReadsRenamesAndRemoves) {
+  const SharedFolder shared(path);
+  EXPECT_FALSE(shared.has("a"));
+  EXPECT_EQ(shared.read("a", 10), std::nullopt);
+  shared.replace("a", "first");
+  shared.replace("a", "second");
+  EXPECT_EQ(shared.read("a", 6), "second");
+  EXPECT_THAT(refusal_of([&] { shared.read("a", 5); }), HasSubstr("a: is longer than 5 bytes"));
+  EXPECT_TRUE(shared.rename("a", "b"));
+  EXPECT_FALSE(shared.rename("a", "b"));
+  EXPECT_EQ(shared.read("b", 10), "second");
+  shared.remove("b");
+  shared.remove("b");
+  EXPECT_FALSE(shared.has("b"));
+  EXPECT_TRUE(fs::is_empty(path)) << "no temporary file is left";
+}
+
+TEST_F(SharedFolderTest, FoldersInItAreMadeAndFound) {
+  const SharedFolder shared(path);
+  EXPECT_FALSE(shared.find_folder(id("0001")));
+  shared.make_folder(id("0001")).replace("a", "a");
+  const auto found = shared.find_folder(id("0001"));
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->path(), path / "0001");
+  EXPECT_EQ(found->read("a", 1), "a");
+  shared.replace("file", "");
+  EXPECT_THAT(refusal_of([&] { shared.make_folder(id("file")); }), HasSubstr("file: cannot be"));
+  EXPECT_THAT(refusal_of([&] { SharedFolder(path / "file"); }), HasSubstr("cannot be opened"));
+}
+
+TEST_F(SharedFolderTest, FollowsNoLinkBelowIt) {
+  fs::create_symlink(outside, path / "link");
+  fs::create_directory_symlink(folder / "", path / "folder");
+  const SharedFolder shared(path);
+  const auto expect_refused = [](const auto& action) {
+    EXPECT_THAT(refusal_of(action), HasSubstr("is a symbolic link, which is not followed"));
+  };
+  expect_refused([&] { shared.read("link", 100); });
+  expect_refused([&] { shared.open("link", O_CREAT | O_RDWR); });
+  expect_refused([&] { shared.find_folder(id("folder")); });
+  expect_refused([&] { shared.make_folder(id("folder")); });
+  EXPECT_TRUE(shared.has("link"));
+  shared.replace("link", "ours");
+  EXPECT_EQ(shared.read("link", 100), "ours");
+  fs::remove(path / "link");
+  fs::create_symlink(outside, path / "link");
+  shared.remove("link");
+  EXPECT_EQ(TemporaryFolder::content_of(outside), "mine");
+}
+
+TEST_F(SharedFolderTest, NamesNothingOutside) {
+  const SharedFolder shared(path);
+  for (const std::string& name :
+       {std::string(), std::string("."), std::string(".."), std::string("../outside.txt"),
+        outside.string(), std::string("a\0b", 3)}) {
+    const auto expect_refused = [&](const auto& action) {
+      EXPECT_THAT(refusal_of(action), HasSubstr("is no name of a file in it")) << name;
+    };
+    expect_refused([&] { shared.has(name); });
+    expect_refused([&] { shared.read(name, 100); });
+    expect_refused([&] { shared.replace(name, "x"); });
+    expect_refused([&] { shared.open(name, O_RDONLY); });
+    expect_refused([&] { shared.rename(name, "a"); });
+    expect_refused([&] { shared.rename("a", name); });
+    expect_refused([&] { shared.remove(name); });
+  }
+  EXPECT_EQ(TemporaryFolder::content_of(outside), "mine");
+}
+
+TEST_F(SharedFolderTest, RemovesItsContentWhateverItsNameLeadsTo) {
+  fs::create_directories(folder / "elsewhere/kept");
+  fs::create_directories(path / "sub");
+  folder.file("shared/sub/file", "");
+  fs::create_directory_symlink(folder / "elsewhere", path / "link");
+  const SharedFolder shared(path);
+  fs::rename(path, folder / "moved");
+  fs::create_directory_symlink(folder / "elsewhere", path);
+  shared.remove_content();
+  EXPECT_TRUE(fs::is_empty(folder / "moved"));
+  EXPECT_TRUE(fs::exists(folder / "elsewhere/kept"));
+}
+
+TEST_F(SharedFolderTest, ReadsRegularFilesOnly) {
+  ASSERT_EQ(::mkfifo((path / "pipe").c_str(), 0600), 0);
+  const SharedFolder shared(path);
+  for (const int flags : {O_RDONLY, O_WRONLY, O_RDWR}) {
+    EXPECT_THAT(refusal_of([&] { shared.open("pipe", flags); }), HasSubstr("is no regular file"));
+  }
+  fs::create_directory(path / "folder");
+  EXPECT_THAT(refusal_of([&] { shared.read("folder", 10); }), HasSubstr("is no regular file"));
+}
+
+TEST_F(SharedFolderTest, KeepsModeAndOwnerOfWhatItReplaces) {
+  const SharedFolder shared(path);
+  shared.replace("a", "first");
+  ASSERT_EQ(::chmod((path / "a").c_str(), 0640), 0);
+  const bool is_root = ::geteuid() == 0;
+  constexpr uid_t other = 12345;
+  if (is_root) {
+    ASSERT_EQ(::chown((path / "a").c_str(), other, other), 0);
+  }
+  shared.replace("a", "second");
+  struct stat status {};
+  ASSERT_EQ(::stat((path / "a").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777U, 0640U);
+  if (is_root) {
+    EXPECT_EQ(status.st_uid, other);
+  }
+  EXPECT_EQ(shared.read("a", 10), "second");
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,336 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Random names through each place that takes an id or a name of a file: nothing outside the
+/// folder, nothing forged on a terminal, in a report, a table or a record.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "captures/csv_reader.h"
+#include "captures/id.h"
+#include "captures/printable.h"
+#include "captures/shared_folder.h"
+#include "rig/calibration_text.h"
+#include "rig/input_error.h"
+#include "station/records/export_runs.h"
+#include "station/records/records.h"
+#include "station/records/spool.h"
+#include "station/records/unit_report.h"
+#include "support/program.h"
+#include "support/random.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kNames = 100'000;
+constexpr std::size_t kMaxBytes = 4096;
+
+std::string utf8(std::size_t code) {
+  const auto byte = [](std::size_t value) { return static_cast<char>(value); };
+  if (code < 0x80) return {byte(code)};
+  if (code < 0x800) return {byte(0xc0 | code >> 6), byte(0x80 | (code & 0x3f))};
+  if (code < 0x10000) {
+    return {byte(0xe0 | code >> 12), byte(0x80 | (code >> 6 & 0x3f)), byte(0x80 | (code & 0x3f))};
+  }
+  return {byte(0xf0 | code >> 18), byte(0x80 | (code >> 12 & 0x3f)),
+          byte(0x80 | (code >> 6 & 0x3f)), byte(0x80 | (code & 0x3f))};
+}
+
+/// Returns a part of a name: a letter, a character of Unicode, a surrogate among them, a byte, or
+/// what separates, forges or escapes.
+std::string random_part(Random& random) {
+  static const std::array<std::string, 40> parts{"/",
+                                                 "..",
+                                                 "../",
+                                                 ".",
+                                                 "\\",
+                                                 std::string(1, '\0'),
+                                                 "\n",
+                                                 "\r",
+                                                 "\t",
+                                                 "\x1b[",
+                                                 "\x1b]0;",
+                                                 "\x7f",
+                                                 "\xc2\x9b",
+                                                 "\u202e",
+                                                 "\u2066",
+                                                 "\u2028",
+                                                 "\u200f",
+                                                 "\u061c",
+                                                 "\ufeff",
+                                                 "\"",
+                                                 "'",
+                                                 ",",
+                                                 ";",
+                                                 "=",
+                                                 "<script>",
+                                                 "<h1>PASS</h1>",
+                                                 "&lt;",
+                                                 "-->",
+                                                 "]]>",
+                                                 "%s",
+                                                 "{}",
+                                                 "${HOME}",
+                                                 "`id`",
+                                                 "\nPASS",
+                                                 "\n20261121T134501Z",
+                                                 ": ",
+                                                 "#",
+                                                 "|",
+                                                 "*",
+                                                 " "};
+  switch (random.index(8)) {
+    case 0:
+      return parts[random.index(parts.size())];
+    case 1:
+      return {static_cast<char>(random.index(256))};
+    case 2:
+      return utf8(random.index(0x110000));
+    default:
+      return {static_cast<char>('a' + random.index(26))};
+  }
+}
+
+/// Returns a name of 0 to 4096 bytes, of which short ones are as frequent as long ones.
+std::string random_name(Random& random) {
+  const auto bytes = static_cast<std::size_t>(std::exp2(random.uniform(0, 12.001))) - 1;
+  std::string name;
+  while (name.size() < bytes) name += random_part(random);
+  name.resize(std::min(name.size(), kMaxBytes));
+  return name;
+}
+
+/// Returns true if a text is UTF-8, by another program's judgement.
+bool is_utf8(const std::string& text) {
+  try {
+    return !nlohmann::json(text).dump().empty();
+  } catch (const nlohmann::json::exception&) {
+    return false;
+  }
+}
+
+/// Returns true if a terminal shows a text as one line, in the order of its characters.
+bool is_harmless(const std::string& text) {
+  static const std::array<std::string, 14> marks{"\u061c", "\u200e", "\u200f", "\u2028", "\u2029",
+                                                 "\u202a", "\u202b", "\u202c", "\u202d", "\u202e",
+                                                 "\u2066", "\u2067", "\u2068", "\u2069"};
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if (byte < 0x20 || byte == 0x7f) return false;
+    if (byte == 0xc2 && static_cast<unsigned char>(text[i + 1]) < 0xa0) return false;
+  }
+  return is_utf8(text) && std::ranges::none_of(marks, [&](const std::string& mark) {
+           return text.find(mark) != std::string::npos;
+         });
+}
+
+/// Returns a run whose texts are all such names.
+RunRecord run_with(const std::string& name, int number) {
+  RunRecord run;
+  run.run = "20261121T134501Z-" + std::to_string(1'000'000 + number);
+  run.kind = "unit";
+  run.station = run.camera = run.operator_name = run.shift = name;
+  run.begun_utc = run.ended_utc = "2026-11-21T13:45:01Z";
+  run.verdict = "FAIL";
+  run.causes = name.substr(0, name.find('\n')) + "\n";
+  run.program = "vlp-station 0";
+  run.libraries = "none";
+  run.config_sha256 = std::string(64, 'a');
+  run.images = {{"boards", name, std::string(64, 'b'), name}};
+  run.events = {{"20261121T134501.000001Z-" + std::to_string(number), kVoided, name, name}};
+  return run;
+}
+
+class HostileNames : public testing::Test {
+ protected:
+  Random random{20261121};
+  const TemporaryFolder folder;
+};
+
+TEST_F(HostileNames, AreShownInOneLine) {
+  int as_they_are = 0;
+  for (int i = 0; i < kNames; ++i) {
+    const std::string name = random_name(random);
+    const std::string line = printable_line(name);
+    ASSERT_TRUE(is_harmless(line)) << line;
+    ASSERT_EQ(printable_line(line), line);
+    if (line == name) ++as_they_are;
+    const std::string message = InputError(name, name).what();
+    ASSERT_EQ(message.find('\n'), std::string::npos);
+    ASSERT_TRUE(is_harmless(printable_line(message)));
+  }
+  EXPECT_GT(as_they_are, kNames / 100) << "some are good";
+}
+
+TEST_F(HostileNames, AreIdsOnlyIfTheyNameOnePartOfAPath) {
+  int accepted = 0;
+  const fs::path root = "/results";
+  for (int i = 0; i < kNames; ++i) {
+    const std::string name = random_name(random);
+    if (!Id::accepts(name)) {
+      const std::string refusal = refusal_of([&] { Id(name, "spool/a.json", "camera"); });
+      ASSERT_NE(refusal, "");
+      ASSERT_LT(refusal.size(), 200U);
+      ASSERT_TRUE(is_harmless(refusal));
+      continue;
+    }
+    ++accepted;
+    ASSERT_EQ((root / name).lexically_normal().parent_path(), root) << name;
+    ASSERT_EQ((root / name).filename(), name);
+    ASSERT_TRUE(is_harmless(name));
+  }
+  EXPECT_GT(accepted, kNames / 100);
+}
+
+TEST_F(HostileNames, NameNoFileOutsideAFolder) {
+  fs::create_directories(folder / "shared");
+  const fs::path canary = folder.file("canary", "mine");
+  const SharedFolder shared(folder / "shared");
+  int made = 0;
+  for (int i = 0; i < kNames; ++i) {
+    const std::string name = random_name(random);
+    try {
+      const int file = shared.open(name, O_CREAT | O_EXCL | O_WRONLY);
+      if (file < 0) continue;  // too long
+      ::close(file);
+      ++made;
+      ASSERT_TRUE(shared.has(name));
+      if (i % 1000 == 0) shared.replace(name, name);
+      if (i % 10 == 0) shared.rename(name, "renamed");
+      shared.remove(name);
+      if (Id::accepts(name)) shared.make_folder({name, "test", "camera"});
+    } catch (const InputError&) {
+      continue;
+    }
+  }
+  EXPECT_GT(made, kNames / 10);
+  std::vector<std::string> outside;
+  for (const auto& entry : fs::directory_iterator(folder / "")) {
+    outside.push_back(entry.path().filename().string());
+  }
+  EXPECT_THAT(outside, testing::UnorderedElementsAre("shared", "canary"));
+  EXPECT_EQ(TemporaryFolder::content_of(canary), "mine");
+}
+
+TEST_F(HostileNames, AreReadBackFromTheSpool) {
+  int refused = 0;
+  constexpr int every = 20;  // parsing takes long without optimisation
+  for (int i = 0; i < kNames; ++i) {
+    const std::string name = random_name(random);
+    const std::string text = text_of_run({run_with(name, i), name});
+    if (i % every != 0) continue;
+    const auto json = nlohmann::json::parse(text);
+    ASSERT_EQ(json.at("station"), printable_line(name));
+    ASSERT_EQ(json.at("images")[0].at("image"), printable_line(name));
+    const fs::path file = folder.file("run.json", text);
+    if (!Id::accepts(printable_line(name))) {
+      ASSERT_NE(refusal_of([&] { read_run(file); }), "");
+      ++refused;
+    } else {
+      ASSERT_EQ(read_run(file).run.operator_name, printable_line(name));
+    }
+  }
+  EXPECT_GT(refused, 0);
+}
+
+TEST_F(HostileNames, AreTextInReports) {
+  const auto tags_of = [](const std::string& page) {
+    std::string tags;
+    bool is_tag = false;
+    for (const char c : page) {
+      if (c == '<') is_tag = true;
+      if (is_tag) tags += c;
+      if (c == '>') is_tag = false;
+    }
+    return tags;
+  };
+  const auto report = [](const std::string& name) {
+    RunRecord run = run_with(name, 0);
+    run.events.clear();
+    return unit_report(printable_run(std::move(run)), {}, {});
+  };
+  const std::string plain = tags_of(report("a"));
+  ASSERT_GT(plain.size(), 100U);
+  constexpr int every = 10;
+  for (int i = 0; i < kNames / every; ++i) {
+    const std::string name = random_name(random) + "x";  // an empty fact has no row
+    const std::string page = report(name);
+    ASSERT_TRUE(is_utf8(page));
+    ASSERT_EQ(tags_of(page), plain) << printable_line(name);
+  }
+}
+
+TEST_F(HostileNames, AddNoRowToTables) {
+  constexpr int every = 10;
+  std::vector<RunRecord> runs;
+  runs.reserve(kNames / every);
+  for (int i = 0; i < kNames / every; ++i) runs.push_back(run_with(random_name(random), i));
+  write_runs(folder / "runs.json", runs);
+  const auto json = nlohmann::json::parse(TemporaryFolder::content_of(folder / "runs.json"));
+  ASSERT_EQ(json.size(), runs.size());
+  for (RunRecord& run : runs) run = printable_run(std::move(run));  // as records have them
+  write_runs(folder / "runs.csv", runs);
+  const CsvTable table(folder / "runs.csv");
+  ASSERT_EQ(table.rows(), runs.size());
+  const auto verdict = table.required("verdict"), name = table.required("run");
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    ASSERT_EQ(table.text(row, verdict), "FAIL");
+    ASSERT_EQ(table.text(row, name), runs[row].run);
+    ASSERT_EQ(json[row].at("verdict"), "FAIL");
+  }
+}
+
+TEST_F(HostileNames, AreTheCamerasOfCalibrations) {
+  const fs::path example = fs::path(VLP_SOURCE_DIR) / "datasets/example/calibration.yaml";
+  Calibration calibration = read_calibration(example);
+  constexpr int every = 50;
+  for (int i = 0; i < kNames / every; ++i) {
+    const std::string name = "a" + printable_line(random_name(random));
+    calibration.camera.id = name;
+    const auto file = folder.file("calibration.yaml", calibration_text(calibration));
+    const Calibration read = read_calibration(file);
+    ASSERT_EQ(read.camera.id, name);
+    ASSERT_EQ(read.camera.intrinsics, calibration.camera.intrinsics);
+  }
+}
+
+TEST_F(HostileNames, AddNoRunToRecordsAndLists) {
+  constexpr int every = 200;
+  const std::string where = (folder / "records.db").string();
+  {
+    Records records(where);
+    for (int i = 0; i < kNames / every; ++i) {
+      std::string name = random_name(random);
+      std::erase(name, '\0');  // of texts of databases
+      records.keep(printable_run(run_with(name, i)));
+    }
+    EXPECT_EQ(records.list({}).size(), std::size_t{kNames / every});
+    EXPECT_THAT(records.check("").problems, testing::IsEmpty());
+  }
+  const auto listed = run_program("vlp-station list --records " + where);
+  ASSERT_EQ(listed.exit_code, 0) << listed.errors;
+  std::istringstream lines(listed.output);
+  std::string line;
+  std::getline(lines, line);
+  int runs = 0;
+  for (; std::getline(lines, line) && !line.empty(); ++runs) {
+    ASSERT_TRUE(line.starts_with("20261121T134501Z-1")) << line;
+    ASSERT_TRUE(is_harmless(line)) << line;
+  }
+  EXPECT_EQ(runs, kNames / every);
+}
+
+}  // namespace
+}  // namespace vlp

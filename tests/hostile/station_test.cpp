@@ -1,0 +1,576 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// vlp-station and vlp-calibrate with folders into which others can write, and with texts that
+/// forge lines: nothing outside is changed, nothing that somebody else wrote is lost, and each is
+/// told in a line.
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <cstdio>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pipeline/small_station.h"
+#include "station/database_name.h"
+#include "station/records/spool.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+/// A station with files of somebody beside it.
+class HostileStation : public SmallStation {
+ public:
+  HostileStation() { fs::create_directory(elsewhere); }
+  using SmallStation::change;
+  using SmallStation::result;
+
+  /// Command of vlp-station for this station; one that hangs is killed after 30 s.
+  ProgramResult vlp_station(const std::string& command, const std::string& options = "") const {
+    return run_program("timeout 30 vlp-station " + command + " --station " +
+                       (home / "station.yaml").string() + " " + options);
+  }
+  /// A run without images, which is soon INVALID.
+  ProgramResult empty_run(const std::string& options = "",
+                          const std::string& camera = "0001") const {
+    return vlp_station("run", "--camera-id " + camera + " --idle-s 0.1 " + options);
+  }
+  /// The name of the one run of the records.
+  std::string name_of_run() const {
+    const std::string listed = vlp_station("list").output;
+    const auto at = listed.find("\n20");
+    return at == std::string::npos ? "" : listed.substr(at + 1, 33);
+  }
+  /// Makes a pipe, a link or a file, with its folder.
+  fs::path in_folder(const fs::path& name) const {
+    fs::create_directories((home / name).parent_path());
+    return home / name;
+  }
+  void link(const fs::path& name, const fs::path& target) const {
+    fs::create_symlink(target, in_folder(name));
+  }
+  void write(const fs::path& name, const std::string& text) const {
+    folder.file(in_folder(name).string(), text);
+  }
+  std::string content(const fs::path& name) const {
+    return TemporaryFolder::content_of(home / name);
+  }
+  /// Runs Python with the station's folder as its first argument.
+  void python(const std::string& script) const {
+    const auto done =
+        run_program("python3 " + folder.file("script.py", script).string() + " " + home.string());
+    ASSERT_EQ(done.exit_code, 0) << done.errors;
+    fs::remove(folder / "script.py");
+  }
+  /// Lets the one run end years ago, as records and folders have it.
+  void age_run() const {
+    python(
+        "import os, sqlite3, sys\n"
+        "db = sqlite3.connect(sys.argv[1] + '/records.db', isolation_level=None)\n"
+        "run = db.execute('SELECT run FROM runs').fetchone()[0]\n"
+        "old = '20200101T000000Z-0123456789abcdef'\n"
+        "db.execute('UPDATE runs SET run = ?, ended_utc = ?', (old, '2020-01-01T00:10:00Z'))\n"
+        "for place, name in (('captures', '0001.'), ('results/0001', '')):\n"
+        "    os.rename(f'{sys.argv[1]}/{place}/{name}{run}', "
+        "f'{sys.argv[1]}/{place}/{name}{old}')\n");
+  }
+  /// Puts a run into the spool with other texts.
+  void spool(const std::string& from, const std::string& to) const {
+    RunRecord run;
+    run.run = "20261121T134501Z-0123456789abcdef";
+    run.kind = "unit";
+    run.station = "station-1";
+    run.camera = "0001";
+    run.begun_utc = run.ended_utc = "2026-11-21T13:45:01Z";
+    run.verdict = "INVALID";
+    run.causes = "no images\n";
+    run.calibration = "format: vlp-calibration/1\n";
+    std::string text = text_of_run({run, identity_of_database((home / "records.db").string())});
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    write("spool/a.json", text.replace(at, from.size(), to));
+  }
+  /// Expects that the files of somebody, and all that is beside the station, are as they were.
+  void expect_nothing_outside() const {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder / "")) {
+      names.insert(entry.path().filename().string());
+    }
+    EXPECT_THAT(names, testing::ElementsAre("elsewhere", "mine.txt", "station"));
+    EXPECT_EQ(TemporaryFolder::content_of(mine), kMine);
+    EXPECT_TRUE(fs::is_empty(elsewhere));
+  }
+
+  const std::string kMine = "mine\n";
+  const fs::path home = folder / "station", elsewhere = folder / "elsewhere",
+                 mine = folder.file("mine.txt", kMine);
+};
+
+/// What is tried, and what is to come of it.
+struct Trial {
+  std::string name;
+  /// Prepares the folder, and runs the program.
+  std::function<ProgramResult(const HostileStation&)> run;
+  int exit_code;
+  /// Part of what is written to stderr.
+  std::string message;
+  /// Looks at what is there afterwards.
+  std::function<void(const HostileStation&, const ProgramResult&)> check = {};
+};
+
+void expect_run_goes_on(const HostileStation& station, const ProgramResult&) {
+  EXPECT_THAT(station.vlp_station("list").output,
+              HasSubstr("1 runs, 0 passed, 0 failed, 1 invalid"));
+}
+
+void expect_empty_records(const HostileStation& station, const ProgramResult&) {
+  EXPECT_THAT(station.vlp_station("list").output, Not(HasSubstr("INVALID")));
+}
+
+/// Each line of a list is the header, of a run as it is named, empty or the count.
+void expect_no_forged_line(const HostileStation&, const ProgramResult& result) {
+  std::istringstream lines(result.output);
+  std::size_t of_runs = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("20")) ++of_runs;
+    EXPECT_FALSE(line.starts_with("FORGED")) << line;
+  }
+  EXPECT_EQ(of_runs, 1U) << result.output;
+}
+
+const std::vector<Trial> kFolderTrials{
+    {"StateNamesAFolderOutside",
+     [](const HostileStation& s) {
+       s.write("captures/0001/.run", "../../../x\n");
+       return s.empty_run();
+     },
+     2, "captures/0001/.run: holds no name of a run: remove it", expect_empty_records},
+    {"StateIsALink",
+     [](const HostileStation& s) {
+       s.link("captures/0001/.run", s.mine);
+       return s.empty_run();
+     },
+     2, "captures/0001/.run: is a symbolic link"},
+    {"StateOfAnotherCamera",
+     [](const HostileStation& s) {
+       s.empty_run("", "0002");
+       s.write("captures/0001/.run", s.name_of_run() + "\n");
+       return s.empty_run();
+     },
+     2, "of camera 0002: remove it", expect_run_goes_on},
+    {"StateIsAPipe",
+     [](const HostileStation& s) {
+       ::mkfifo(s.in_folder("captures/0001/.run").c_str(), 0600);
+       return s.empty_run();
+     },
+     2, "captures/0001/.run: is no regular file"},
+    {"LockIsALink",
+     [](const HostileStation& s) {
+       s.link("captures/0001/.lock", s.elsewhere / "lock");
+       return s.empty_run();
+     },
+     2, "captures/0001/.lock: is a symbolic link"},
+    {"CapturesOfACameraAreALink",
+     [](const HostileStation& s) {
+       s.link("captures/0001", s.elsewhere);
+       return s.empty_run();
+     },
+     2, "captures/0001: is a symbolic link"},
+    {"CapturesOfAStepAreALink",
+     [](const HostileStation& s) {
+       s.link("captures/0001/boards", s.elsewhere);
+       return s.empty_run();
+     },
+     2, "captures/0001/boards: is a symbolic link"},
+    {"NextFrameOfASourceIsALink",
+     [](const HostileStation& s) {
+       s.link("captures/0001/boards/frame-000000.png", s.elsewhere / "frame.png");
+       const std::string video = (s.home / "boards.avi").string();
+       cv::VideoWriter(video, cv::CAP_OPENCV_MJPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10,
+                       {800, 600})
+           .write(cv::Mat::zeros(600, 800, CV_8UC3));
+       return s.empty_run("--source boards=" + video);
+     },
+     3, "is not judged",
+     [](const HostileStation& s, const ProgramResult&) {
+       EXPECT_THAT(s.vlp_station("show").output, HasSubstr("images     1, 0 used"));
+     }},
+    {"ResultsOfACameraAreALink",
+     [](const HostileStation& s) {
+       s.link("results/0001", s.elsewhere);
+       return s.empty_run();
+     },
+     2, "results/0001: is a symbolic link"},
+    {"ProbeOfTheResultsIsALink",
+     [](const HostileStation& s) {
+       s.link("results/0001/.writable", s.mine);
+       return s.empty_run();
+     },
+     3, "is not judged", expect_run_goes_on},
+    {"ProbeOfTheSpoolIsALink",
+     [](const HostileStation& s) {
+       s.link("spool/.writable", s.mine);
+       return s.empty_run();
+     },
+     3, "is not judged", expect_run_goes_on},
+    {"SpooledRunOfACameraOutside",
+     [](const HostileStation& s) {
+       s.empty_run();
+       s.spool("\"camera\": \"0001\"", "\"camera\": \"../..\"");
+       return s.vlp_station("restore 20261121T134501Z-0123456789abcdef");
+     },
+     2, "spool/a.json: is no run of a station: its run or camera is no id"},
+    {"SpooledRunIsAPipe",
+     [](const HostileStation& s) {
+       s.empty_run();
+       ::mkfifo(s.in_folder("spool/a.json").c_str(), 0600);
+       return s.vlp_station("list");
+     },
+     0, "spool/a.json: is no regular file", expect_no_forged_line},
+    {"SpooledRunIsALinkToADevice",
+     [](const HostileStation& s) {
+       s.empty_run();
+       s.link("spool/a.json", "/dev/zero");
+       return s.vlp_station("list");
+     },
+     0, "spool/a.json: is a symbolic link", expect_no_forged_line},
+    {"SpooledRunIsNestedWithoutEnd",
+     [](const HostileStation& s) {
+       s.empty_run();
+       s.write("spool/a.json", std::string(30'000'000, '[') + "\n");
+       return s.vlp_station("list");
+     },
+     0, "it has more than 16 levels", expect_no_forged_line},
+    {"PlantedReportIsReplaced",
+     [](const HostileStation& s) {
+       s.empty_run();
+       const std::string run = s.name_of_run();
+       s.write("results/0001/" + run + "/report.html", "<h1>PASS</h1>");
+       return s.vlp_station("restore " + run);
+     },
+     0, "",
+     [](const HostileStation& s, const ProgramResult&) {
+       EXPECT_THAT(s.result("0001", "report.html"),
+                   AllOf(HasSubstr("INVALID"), Not(HasSubstr("<h1>PASS</h1>"))));
+       EXPECT_EQ(s.result("0001", "replaced-report.html"), "<h1>PASS</h1>");
+     }},
+    {"PlantedReportIsALink",
+     [](const HostileStation& s) {
+       s.empty_run();
+       const std::string run = s.name_of_run();
+       fs::remove(s.home / "results/0001" / run / "report.html");
+       s.link("results/0001/" + run + "/report.html", s.mine);
+       return s.vlp_station("restore " + run);
+     },
+     0, "",
+     [](const HostileStation& s, const ProgramResult&) {
+       EXPECT_THAT(s.result("0001", "report.html"), HasSubstr("INVALID"));
+     }},
+    {"ArchiveOfACameraOutside",
+     [](const HostileStation& s) {
+       s.write("archive/summary.csv",
+               "camera,session,verdict,date,reason,version,key\n"
+               "../..,s1,pass,2026-03-15,,1.2.3,key\n");
+       return run_program("vlp-station import " + (s.home / "archive").string() + " --records " +
+                          (s.home / "records.db").string());
+     },
+     2, "summary.csv:2: '../..' is no id of a camera"},
+    {"ArchiveOfASessionOutside",
+     [](const HostileStation& s) {
+       s.write("archive/summary.csv",
+               "camera,session,verdict,date,reason,version,key\n"
+               "a,../../x,pass,2026-03-15,,1.2.3,key\n");
+       return run_program("vlp-station import " + (s.home / "archive").string() + " --records " +
+                          (s.home / "records.db").string());
+     },
+     2, "summary.csv:2: '../../x' is no id of a session"},
+    {"ExpiredFolderHoldsTheGoldenCalibration",
+     [](const HostileStation& s) {
+       s.empty_run();
+       s.age_run();
+       const std::string name =
+           "results/0001/20200101T000000Z-0123456789abcdef/invalid-calibration.yaml";
+       fs::copy_file(fs::path(VLP_SOURCE_DIR) / "datasets/paper-rig/rendered/true_calibration.yaml",
+                     s.home / name);
+       s.change("station.yaml", "records: records.db",
+                "records: records.db\nkeep: {images_days: 1, results_days: 1}\n"
+                "golden: {camera_id: golden, calibration: " +
+                    name + ", gates: {check_mean_mm: 20}}");
+       return s.vlp_station("clean --delete");
+     },
+     0, "has something that station.yaml names: left",
+     [](const HostileStation& s, const ProgramResult& result) {
+       EXPECT_THAT(result.output, HasSubstr("1 folders, 0.0 MB deleted")) << "its images";
+       EXPECT_EQ(s.vlp_station("list").exit_code, 0);
+     }},
+    {"ClockIsYearsAhead",
+     [](const HostileStation& s) {
+       s.empty_run();
+       s.age_run();
+       s.change("station.yaml", "records: records.db",
+                "records: records.db\nkeep: {images_days: 1, results_days: 1}");
+       const auto before = fs::file_time_type::clock::now() - std::chrono::hours(24 * 400);
+       for (const char* name : {"station.yaml", "records.db", "captures", "results", "spool"}) {
+         fs::last_write_time(s.home / name, before);
+       }
+       return s.vlp_station("clean --delete");
+     },
+     2, "more than a year before the clock",
+     [](const HostileStation& s, const ProgramResult&) {
+       EXPECT_NE(s.result("0001", "report.html"), "");
+     }},
+    {"ClockGoesBackDuringARun",
+     [](const HostileStation& s) {
+       s.write("captures/0001/.run", "29990101T000000Z-0123456789abcdef\n");
+       return s.empty_run();
+     },
+     3, "the clock went back"},
+};
+
+const std::vector<Trial> kTextTrials{
+    {"ReasonOfTwoLines",
+     [](const HostileStation& s) {
+       s.empty_run();
+       EXPECT_EQ(s.vlp_station("void " + s.name_of_run() +
+                               " --operator \"$(printf 'Ann\\nFORGED')\" --reason \"$(printf "
+                               "'x\\nFORGED 2026 PASS')\"")
+                     .exit_code,
+                 0);
+       return s.vlp_station("list");
+     },
+     0, "", expect_no_forged_line},
+    {"ReasonOfTwoLinesIsShown",
+     [](const HostileStation& s) {
+       s.empty_run();
+       s.vlp_station("void " + s.name_of_run() +
+                     " --operator Ann --reason \"$(printf 'x\\nFORGED')\"");
+       return s.vlp_station("show");
+     },
+     0, "",
+     [](const HostileStation&, const ProgramResult& result) {
+       EXPECT_THAT(result.output, AllOf(HasSubstr("x\\x0aFORGED"), Not(HasSubstr("\nFORGED"))));
+     }},
+    {"SpooledRunWithLinesInItsStation",
+     [](const HostileStation& s) {
+       s.change("station.yaml", "station: station-1", "station: any");
+       s.empty_run();
+       s.spool("\"station\": \"station-1\"", "\"station\": \"any\\nFORGED PASS\"");
+       return s.vlp_station("list --of-station any");
+     },
+     0, "",
+     [](const HostileStation&, const ProgramResult& result) {
+       EXPECT_THAT(result.output, AllOf(HasSubstr("any\\x0aFORGED"), Not(HasSubstr("\nFORGED"))));
+     }},
+    {"CameraOfACalibrationHasLines",
+     [](const HostileStation& s) {
+       std::string text = TemporaryFolder::content_of(fs::path(VLP_SOURCE_DIR) /
+                                                      "datasets/example/calibration.yaml");
+       const std::string id = "id: \"example\"";
+       s.write("calibration.yaml",
+               text.replace(text.find(id), id.size(), R"(id: "a\nFORGED\e[2J")"));
+       return run_program("vlp-convert " + (s.home / "calibration.yaml").string() +
+                          " --to ros -o " + (s.home / "ros.yaml").string());
+     },
+     0, "",
+     [](const HostileStation&, const ProgramResult& result) {
+       EXPECT_THAT(result.output, HasSubstr("camera        a\\x0aFORGED\\x1b[2J, "));
+     }},
+    {"ImagesOfATableHaveLines",
+     [](const HostileStation& s) {
+       const std::string example = VLP_SOURCE_DIR "/datasets/example/";
+       std::string text = TemporaryFolder::content_of(example + "turning.csv");
+       const std::string image = "turn_00.png";
+       for (auto at = text.find(image); at != std::string::npos; at = text.find(image)) {
+         text.replace(at, image.size(), "\"a\nFORGED.png\"");
+       }
+       s.write("turning.csv", text);
+       return run_program("vlp-rotation " + (s.home / "turning.csv").string() + " --lamps " +
+                          example + "lamps.yaml --calibration " + example + "calibration.yaml -o " +
+                          (s.home / "rotated.yaml").string());
+     },
+     0, "",
+     [](const HostileStation&, const ProgramResult& result) {
+       EXPECT_THAT(result.output, AllOf(HasSubstr("a\\x0aFORGED.png"), Not(HasSubstr("\nFORGED"))));
+     }},
+    {"OperatorIsNoUtf8",
+     [](const HostileStation& s) {
+       return s.empty_run("--operator \"$(printf 'J\\366rg')\" --shift \"$(printf '\\377')\"");
+     },
+     3, "is not judged",
+     [](const HostileStation& s, const ProgramResult&) {
+       const std::string report = s.result("0001", "report.html");
+       EXPECT_THAT(report, HasSubstr("J\\xf6rg"));
+       EXPECT_NO_THROW(nlohmann::json(report).dump()) << "not UTF-8";
+     }},
+    {"PatternWithExponentiallyManyWays",
+     [](const HostileStation& s) {
+       s.change("station.yaml", "records: records.db",
+                "records: records.db\nserial_pattern: '(a+)+b'");
+       return s.empty_run("", std::string(60, 'a'));
+     },
+     2, "serial_pattern: takes too long to be compared with"},
+    {"RecordsAreTheExport",
+     [](const HostileStation& s) {
+       s.change("station.yaml", "records: records.db", "records: rec.csv");
+       s.empty_run();
+       return run_program("vlp-station export --records " + (s.home / "rec.csv").string() + " -o " +
+                          (s.home / "rec.csv").string());
+     },
+     2, "rec.csv: is an input, too, and would be overwritten", expect_run_goes_on},
+    {"RecordsOfTheStationAreTheExport",
+     [](const HostileStation& s) {
+       s.change("station.yaml", "records: records.db", "records: rec.json");
+       s.empty_run();
+       return s.vlp_station("export", "-o " + (s.home / "rec.json").string());
+     },
+     2, "rec.json: is an input, too, and would be overwritten", expect_run_goes_on},
+    {"RecordsAreThePictureOfATrend",
+     [](const HostileStation& s) {
+       s.change("station.yaml", "records: records.db", "records: rec.svg");
+       s.empty_run();
+       return s.vlp_station("trend rms_px", "-o " + (s.home / "rec.svg").string());
+     },
+     2, "rec.svg: is an input, too, and would be overwritten", expect_run_goes_on},
+    {"RecordsInAFolderWithAQuote",
+     [](const HostileStation& s) {
+       const fs::path quoted = s.home / "a\" db=b.db x=\"";
+       fs::create_directory(quoted);
+       for (const char* name : {"station.yaml", "camera_type.yaml", "board.yaml", "lamps.yaml"}) {
+         fs::copy_file(s.home / name, quoted / name);
+       }
+       return run_program("cd " + s.elsewhere.string() + " && vlp-station run --station '" +
+                          (quoted / "station.yaml").string() + "' --camera-id 0001 --idle-s 0.1");
+     },
+     2, "the name of a database cannot have a quote"},
+};
+
+/// vlp-calibrate with a folder of results in which there are files of the user's own.
+const std::vector<Trial> kResultsTrials{
+    {"UnmarkedFolderWithFilesOfTheUser",
+     [](const HostileStation& s) {
+       s.write("results/steps/mine.json", "{}");
+       s.write("results/line-a-fixes.csv", "mine");
+       fs::create_directory(s.home / "session");
+       return run_program("vlp-calibrate " + (s.home / "session").string() + " -o " +
+                          (s.home / "results").string());
+     },
+     2, "lamps.yaml: is missing",
+     [](const HostileStation& s, const ProgramResult&) {
+       EXPECT_EQ(s.content("results/steps/mine.json"), "{}");
+       EXPECT_EQ(s.content("results/line-a-fixes.csv"), "mine");
+     }},
+    {"DriveOfTwoLines",
+     [](const HostileStation& s) {
+       fs::create_directories(s.home / "session/line-a\nFORGED");
+       for (const char* table : {"captures.csv", "truth.csv"}) {
+         s.write(fs::path("session/line-a\nFORGED") / table, "image,x_m,y_m\n");
+       }
+       for (const char* name : {"lamps.yaml", "board.yaml"})
+         s.write(fs::path("session") / name, "");
+       fs::create_directories(s.home / "session/boards");
+       fs::create_directories(s.home / "session/rotation");
+       return run_program("vlp-calibrate " + (s.home / "session").string() + " -o " +
+                          (s.home / "results").string());
+     },
+     2, "'line-a\\x0aFORGED' is no id of a drive"},
+    {"StepsAreALink",
+     [](const HostileStation& s) {
+       s.link("results/steps", s.elsewhere);
+       fs::create_directory(s.home / "session");
+       return run_program("vlp-calibrate " + (s.home / "session").string() + " -o " +
+                          (s.home / "results").string());
+     },
+     2, "results/steps: is a symbolic link"},
+    {"CornersOfTheStepsAreALink",
+     [](const HostileStation& s) {
+       s.link("results/steps/corners", s.elsewhere);
+       fs::create_directory(s.home / "session");
+       return run_program("vlp-calibrate " + (s.home / "session").string() + " -o " +
+                          (s.home / "results").string());
+     },
+     2, "steps/corners: is a symbolic link"},
+    {"LockOfTheStepsIsALink",
+     [](const HostileStation& s) {
+       s.link("results/steps/lock", s.elsewhere / "lock");
+       fs::create_directory(s.home / "session");
+       return run_program("vlp-calibrate " + (s.home / "session").string() + " -o " +
+                          (s.home / "results").string());
+     },
+     2, "steps/lock: is a symbolic link"},
+};
+
+/// Time and memory of a command with files of the spool that are as large as they may be, or
+/// larger.
+TEST_F(HostileStation, ReadsFilesOfTheSpoolWithinBounds) {
+  ASSERT_EQ(empty_run().exit_code, 3);
+  RunRecord large;
+  large.run = "20261121T134501Z-0123456789abcdef";
+  large.camera = "0001";
+  large.verdict = "FAIL";
+  constexpr std::size_t images = 199'000, limit_bytes = 64 << 20;
+  large.images.assign(images, {"boards", "0000.png", std::string(64, 'a'), ""});
+  RunRecord long_text = large;
+  long_text.images.clear();
+  long_text.calibration.assign(limit_bytes - 1000, 'x');
+  // Of other records, so that they are read and go nowhere.
+  const std::vector<std::pair<std::string, std::string>> files{
+      {"a million values", text_of_run({large, "elsewhere"})},
+      {"a text of 64 MiB", text_of_run({long_text, "elsewhere"})},
+      {"64 MiB of levels", std::string(limit_bytes - 1, '[') + "\n"},
+      {"more than 64 MiB", std::string(limit_bytes + 1, 'x')}};
+  const auto script =
+      folder.file("measure.py",
+                  "import os, subprocess, sys, time\n"
+                  "begun = time.monotonic()\n"
+                  "process = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL)\n"
+                  "usage = os.wait4(process.pid, 0)[2]\n"
+                  "print(time.monotonic() - begun, usage.ru_maxrss / 1024)\n");
+  for (const auto& [name, text] : files) {
+    write("spool/a.json", text);
+    const auto measured =
+        run_program("python3 " + script.string() + " vlp-station list --station " +
+                    (home / "station.yaml").string());
+    double seconds = 0, megabytes = 0;
+    std::istringstream(measured.output) >> seconds >> megabytes;
+    std::printf("%-18s %5.2f s %5.0f MB\n", name.c_str(), seconds, megabytes);
+    EXPECT_GT(seconds, 0) << measured.errors;
+    EXPECT_LT(seconds, 10);
+    EXPECT_LT(megabytes, 500);
+  }
+}
+
+class Hostile : public HostileStation, public testing::WithParamInterface<Trial> {};
+
+TEST_P(Hostile, IsRefusedOrWithoutEffect) {
+  const Trial& trial = GetParam();
+  const auto begun = std::chrono::steady_clock::now();
+  const ProgramResult result = trial.run(*this);
+  const auto taken = std::chrono::steady_clock::now() - begun;
+  EXPECT_EQ(result.exit_code, trial.exit_code) << result.output << result.errors;
+  EXPECT_THAT(result.errors, HasSubstr(trial.message));
+  constexpr std::chrono::seconds long_enough(20);
+  EXPECT_LT(taken, long_enough);
+  if (trial.check) trial.check(*this, result);
+  expect_nothing_outside();
+}
+
+std::string name_of_trial(const testing::TestParamInfo<Trial>& info) { return info.param.name; }
+
+INSTANTIATE_TEST_SUITE_P(Folder, Hostile, testing::ValuesIn(kFolderTrials), name_of_trial);
+INSTANTIATE_TEST_SUITE_P(Text, Hostile, testing::ValuesIn(kTextTrials), name_of_trial);
+INSTANTIATE_TEST_SUITE_P(Results, Hostile, testing::ValuesIn(kResultsTrials), name_of_trial);
+
+}  // namespace
+}  // namespace vlp
