@@ -6,14 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "codecs/codecs.h"
 #include "frontend/lights_table.h"
 #include "rig/file.h"
-#include "rig/input_error.h"
 
 namespace vlp {
 namespace {
@@ -111,10 +109,7 @@ void write_annotated(const std::filesystem::path& folder, const std::filesystem:
                      const cv::Mat& picture) {
   std::filesystem::path file = folder / image_file.filename();
   file += ".png";
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", picture, bytes)) throw InputError(file, "cannot be made a PNG");
-  const std::string content(bytes.begin(), bytes.end());
-  write_file(file, content);
+  write_file(file, codecs().encode(".png", picture, {}));
 }
 
 }  // namespace vlp

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
+#include "codecs/codecs.h"
 #include "frontend/image_header.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
@@ -67,9 +68,8 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   if (is_cut_png(bytes)) throw InputError(file, cut);
   cv::Mat image;
   try {
-    image =
-        cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, bytes.data()),
-                     cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+    image = codecs().decode(
+        bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception& failure) {
     throw InputError(file, "cannot be read as an image: " + failure.err);
   }

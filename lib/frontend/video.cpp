@@ -12,8 +12,8 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
-#include <opencv2/videoio/registry.hpp>
 
+#include "codecs/codecs.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 
@@ -44,7 +44,7 @@ std::optional<std::string> video_of_frame(const std::string& name) {
 }
 
 struct Video::Capture {
-  cv::VideoCapture video;
+  std::unique_ptr<VideoReader> reader = codecs().make_video_reader();
 };
 
 Video::Video(const std::string& source, const std::optional<std::array<int, 2>>& camera_px)
@@ -60,9 +60,9 @@ Video::Video(const std::string& source, const std::optional<std::array<int, 2>>&
   // FFmpeg would wait for the writer of a pipe.
   if (!is_url && !is_camera()) InputFile(source, std::numeric_limits<std::size_t>::max());
   // For a file OpenCV would try sequences of images, too.
-  const bool has_ffmpeg = cv::videoio_registry::hasBackend(cv::CAP_FFMPEG);
+  const bool has_ffmpeg = codecs().has_video_backend(cv::CAP_FFMPEG);
   const int file_api = !is_url && has_ffmpeg ? cv::CAP_FFMPEG : cv::CAP_ANY;
-  cv::VideoCapture& video = capture_->video;
+  VideoReader& video = *capture_->reader;
   if (!video.open(source, is_camera() ? cv::CAP_V4L2 : file_api)) {
     throw InputError(source, is_camera()
                                  ? "cannot be opened as a camera"
@@ -80,13 +80,13 @@ Video::~Video() = default;
 bool Video::is_camera() const { return source_.starts_with("/dev/"); }
 
 std::array<int, 2> Video::size_px() const {
-  const auto of = [&](int property) { return static_cast<int>(capture_->video.get(property)); };
+  const auto of = [&](int property) { return static_cast<int>(capture_->reader->get(property)); };
   return {of(cv::CAP_PROP_FRAME_WIDTH), of(cv::CAP_PROP_FRAME_HEIGHT)};
 }
 
 std::size_t Video::frames_stated() const {
   constexpr double most = 1e9;
-  const double stated = capture_->video.get(cv::CAP_PROP_FRAME_COUNT);
+  const double stated = capture_->reader->get(cv::CAP_PROP_FRAME_COUNT);
   return stated > 0 && stated < most ? static_cast<std::size_t>(stated) : 0;
 }
 
@@ -97,7 +97,7 @@ bool Video::grab() {
   const std::size_t stated = is_camera() ? 0 : frames_stated();
   const int tries = grabbed_ < stated ? most_tries : 1;
   for (int i = 0; i < tries; ++i) {
-    if (!capture_->video.grab()) continue;
+    if (!capture_->reader->grab()) continue;
     gap_ = gap_ || i > 0;
     ++grabbed_;
     return true;
@@ -110,15 +110,15 @@ std::optional<VideoFrame> Video::next() {
   cv::Mat frame;
   do {
     if (!grab()) return {};
-  } while (!capture_->video.retrieve(frame) || frame.empty());
-  VideoFrame next{{}, grabbed_ - 1, capture_->video.get(cv::CAP_PROP_POS_MSEC) / 1000};
+  } while (!capture_->reader->retrieve(frame) || frame.empty());
+  VideoFrame next{{}, grabbed_ - 1, capture_->reader->get(cv::CAP_PROP_POS_MSEC) / 1000};
   if (frame.channels() == 1) {
     next.image = frame.clone();  // OpenCV writes the next one over it
   } else {
     cv::cvtColor(frame, next.image, cv::COLOR_BGR2GRAY);
   }
   // Some decoders lose the stamps of the last frames.
-  const double rate = capture_->video.get(cv::CAP_PROP_FPS);
+  const double rate = capture_->reader->get(cv::CAP_PROP_FPS);
   if (!(next.time_s > last_s_) && last_ && rate > 0) {
     next.time_s = last_s_ + static_cast<double>(next.number - *last_) / rate;
   }

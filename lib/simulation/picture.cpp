@@ -7,6 +7,9 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "codecs/codecs.h"
 
 namespace vlp {
 
@@ -68,13 +71,11 @@ std::string image_ending(const std::optional<Picture>& picture) {
 }
 
 std::vector<unsigned char> encoded(const cv::Mat& image, const std::optional<Picture>& picture) {
-  std::vector<unsigned char> bytes;
-  if (picture && picture->jpeg_quality) {
-    cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, *picture->jpeg_quality});
-  } else {
-    cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
-  }
-  return bytes;
+  const std::string bytes =
+      picture && picture->jpeg_quality
+          ? codecs().encode(".jpg", image, {cv::IMWRITE_JPEG_QUALITY, *picture->jpeg_quality})
+          : codecs().encode(".png", image, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  return {bytes.begin(), bytes.end()};
 }
 
 }  // namespace vlp

@@ -84,6 +84,17 @@ TEST_P(Help, FitsIn80Columns) {
   }
 }
 
+/// The codecs of images, with all that they bring, are loaded at the first image.
+TEST_P(Help, LoadsNoCodecs) {
+  const auto libraries =
+      run_program(std::string("ldd " VLP_PROGRAMS_DIR "/") + GetParam() + " | sort");
+  ASSERT_EQ(libraries.exit_code, 0) << libraries.errors;
+  EXPECT_THAT(libraries.output, HasSubstr("libc.so"));
+  for (const char* codec : {"libopencv_imgcodecs", "libopencv_videoio", "libgdal", "libavcodec"}) {
+    EXPECT_THAT(libraries.output, testing::Not(HasSubstr(codec)));
+  }
+}
+
 TEST_P(Help, NamesTheVersion) {
   const auto result = run_program(std::string(GetParam()) + " --version");
   EXPECT_EQ(result.exit_code, 0);

@@ -4,10 +4,8 @@
 
 #include <fmt/core.h>
 
-#include <opencv2/imgcodecs.hpp>
-#include <vector>
-
 #include "captures/shared_folder.h"
+#include "codecs/codecs.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -19,9 +17,7 @@ std::filesystem::path FrameSource::save_next(const std::filesystem::path& folder
     ended_ = true;
     return {};
   }
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", frame->image, bytes);
-  std::string content(bytes.begin(), bytes.end());
+  const std::string content = codecs().encode(".png", frame->image, {});
   // A run that goes on does not write over the frames that it has.
   const SharedFolder step(folder);
   std::string name;

@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+#include <opencv2/videoio/registry.hpp>
+#include <stdexcept>
+
+#include "codecs/codecs.h"
+
+namespace vlp {
+namespace {
+
+class OpencvVideoReader : public VideoReader {
+ public:
+  bool open(const std::string& source, int api) override { return video_.open(source, api); }
+  bool grab() override { return video_.grab(); }
+  bool retrieve(cv::Mat& frame) override { return video_.retrieve(frame); }
+  double get(int property) const override { return video_.get(property); }
+  void set(int property, double value) override { video_.set(property, value); }
+
+ private:
+  cv::VideoCapture video_;
+};
+
+class OpencvCodecs : public Codecs {
+ public:
+  cv::Mat decode(std::string& bytes, int flags) const override {
+    return cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U, bytes.data()), flags);
+  }
+
+  std::string encode(const std::string& ending, const cv::Mat& image,
+                     const std::vector<int>& parameters) const override {
+    std::vector<unsigned char> bytes;
+    if (!cv::imencode(ending, image, bytes, parameters)) {
+      throw std::runtime_error("the image cannot be encoded as " + ending);
+    }
+    return {bytes.begin(), bytes.end()};
+  }
+
+  bool has_video_backend(int api) const override {
+    return cv::videoio_registry::hasBackend(static_cast<cv::VideoCaptureAPIs>(api));
+  }
+
+  std::unique_ptr<VideoReader> make_video_reader() const override {
+    return std::make_unique<OpencvVideoReader>();
+  }
+};
+
+}  // namespace
+}  // namespace vlp
+
+/// The function that codecs() calls.
+extern "C" __attribute__((visibility("default"))) const vlp::Codecs* vlp_codecs() {
+  static const vlp::OpencvCodecs codecs;
+  return &codecs;
+}

@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "codecs/codecs.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace vlp {
+namespace {
+
+/// cv::IMREAD_UNCHANGED, without the headers of imgcodecs.
+constexpr int kUnchanged = -1;
+
+cv::Mat1w gradient() {
+  cv::Mat1w image(3, 5);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
+      image(row, column) = static_cast<std::uint16_t>(1000 * row + 300 * column);
+    }
+  }
+  return image;
+}
+
+TEST(Codecs, DecodeAnImageAsItWasEncoded) {
+  const cv::Mat1w image = gradient();
+  for (const char* ending : {".png", ".tiff", ".pgm"}) {
+    std::string bytes = codecs().encode(ending, image, {});
+    const cv::Mat decoded = codecs().decode(bytes, kUnchanged);
+    ASSERT_EQ(decoded.type(), CV_16UC1) << ending;
+    ASSERT_EQ(decoded.size(), image.size()) << ending;
+    EXPECT_EQ(cv::norm(decoded, image, cv::NORM_INF), 0) << ending;
+  }
+}
+
+TEST(Codecs, DecodeNothingFromOtherBytes) {
+  std::string bytes = "no image";
+  EXPECT_TRUE(codecs().decode(bytes, kUnchanged).empty());
+}
+
+TEST(Codecs, RefuseAnUnknownEnding) {
+  EXPECT_ANY_THROW(codecs().encode(".unknown", gradient(), {}));
+}
+
+TEST(Codecs, OpenNoVideoThatIsNotThere) {
+  const auto reader = codecs().make_video_reader();
+  ASSERT_TRUE(reader);
+  EXPECT_FALSE(reader->open("/nonexistent.avi", 0));
+  cv::Mat frame;
+  EXPECT_FALSE(reader->grab() && reader->retrieve(frame));
+}
+
+}  // namespace
+}  // namespace vlp
