@@ -76,9 +76,9 @@ struct Trial {
 
 void PrintTo(const Trial& trial, std::ostream* out) { *out << trial.name; }
 
-class Hostile : public testing::TestWithParam<Trial> {};
+class HostileFile : public testing::TestWithParam<Trial> {};
 
-TEST_P(Hostile, EndsAsItShould) {
+TEST_P(HostileFile, EndsAsItShould) {
   const TemporaryFolder folder;
   add_example(folder);
   const Trial& trial = GetParam();
@@ -136,7 +136,7 @@ std::string make_camera(const std::string& width, const std::string& name) {
 
 std::string name_of_trial(const testing::TestParamInfo<Trial>& trial) { return trial.param.name; }
 
-INSTANTIATE_TEST_SUITE_P(Pictures, Hostile,
+INSTANTIATE_TEST_SUITE_P(Pictures, HostileFile,
                          testing::Values(Trial{"TemporaryFolderIsMissing", "true",
                                                "export TMPDIR=/does/not/exist; " + kReport, 0, "",
                                                30, 300, "grep -q image/svg report.html"},
@@ -150,7 +150,7 @@ INSTANTIATE_TEST_SUITE_P(Pictures, Hostile,
                          name_of_trial);
 
 INSTANTIATE_TEST_SUITE_P(
-    Outputs, Hostile,
+    Outputs, HostileFile,
     testing::Values(
         Trial{"PipeAsStdoutWhenQuiet", "true", kConvert + "-q -o /dev/stdout | cat >copy", 0, "", 5,
               300, "grep -q camera_matrix copy"},
@@ -179,7 +179,7 @@ INSTANTIATE_TEST_SUITE_P(
     name_of_trial);
 
 INSTANTIATE_TEST_SUITE_P(
-    LargeInputs, Hostile,
+    LargeInputs, HostileFile,
     testing::Values(
         Trial{"MapOfThousandLamps", make_lamps(1000), kLocate + "-q", 0, "", 2, 100},
         Trial{"MapOfNineThousandLamps", make_lamps(9000), kLocate + "-q", 0, "", 5, 400},
@@ -208,7 +208,7 @@ INSTANTIATE_TEST_SUITE_P(
     name_of_trial);
 
 INSTANTIATE_TEST_SUITE_P(
-    Values, Hostile,
+    Values, HostileFile,
     testing::Values(
         Trial{"ImagerOfTwoBillionPixels", make_camera("2147483647", "a"),
               "vlp-convert camera.yaml --to ros -o out", 2, "the image should be 1 to 1048576 px"},

@@ -119,7 +119,7 @@ class HostileStation : public SmallStation {
 };
 
 /// What is tried, and what is to come of it.
-struct Trial {
+struct StationTrial {
   std::string name;
   /// Prepares the folder, and runs the program.
   std::function<ProgramResult(const HostileStation&)> run;
@@ -150,7 +150,7 @@ void expect_no_forged_line(const HostileStation&, const ProgramResult& result) {
   EXPECT_EQ(of_runs, 1U) << result.output;
 }
 
-const std::vector<Trial> kFolderTrials{
+const std::vector<StationTrial> kFolderTrials{
     {"StateNamesAFolderOutside",
      [](const HostileStation& s) {
        s.write("captures/0001/.run", "../../../x\n");
@@ -339,7 +339,7 @@ const std::vector<Trial> kFolderTrials{
      3, "the clock went back"},
 };
 
-const std::vector<Trial> kTextTrials{
+const std::vector<StationTrial> kTextTrials{
     {"ReasonOfTwoLines",
      [](const HostileStation& s) {
        s.empty_run();
@@ -457,7 +457,7 @@ const std::vector<Trial> kTextTrials{
 };
 
 /// vlp-calibrate with a folder of results in which there are files of the user's own.
-const std::vector<Trial> kResultsTrials{
+const std::vector<StationTrial> kResultsTrials{
     {"UnmarkedFolderWithFilesOfTheUser",
      [](const HostileStation& s) {
        s.write("results/steps/mine.json", "{}");
@@ -551,10 +551,10 @@ TEST_F(HostileStation, ReadsFilesOfTheSpoolWithinBounds) {
   }
 }
 
-class Hostile : public HostileStation, public testing::WithParamInterface<Trial> {};
+class HostileFolder : public HostileStation, public testing::WithParamInterface<StationTrial> {};
 
-TEST_P(Hostile, IsRefusedOrWithoutEffect) {
-  const Trial& trial = GetParam();
+TEST_P(HostileFolder, IsRefusedOrWithoutEffect) {
+  const StationTrial& trial = GetParam();
   const auto begun = std::chrono::steady_clock::now();
   const ProgramResult result = trial.run(*this);
   const auto taken = std::chrono::steady_clock::now() - begun;
@@ -566,11 +566,16 @@ TEST_P(Hostile, IsRefusedOrWithoutEffect) {
   expect_nothing_outside();
 }
 
-std::string name_of_trial(const testing::TestParamInfo<Trial>& info) { return info.param.name; }
+std::string name_of_station_trial(const testing::TestParamInfo<StationTrial>& info) {
+  return info.param.name;
+}
 
-INSTANTIATE_TEST_SUITE_P(Folder, Hostile, testing::ValuesIn(kFolderTrials), name_of_trial);
-INSTANTIATE_TEST_SUITE_P(Text, Hostile, testing::ValuesIn(kTextTrials), name_of_trial);
-INSTANTIATE_TEST_SUITE_P(Results, Hostile, testing::ValuesIn(kResultsTrials), name_of_trial);
+INSTANTIATE_TEST_SUITE_P(Folder, HostileFolder, testing::ValuesIn(kFolderTrials),
+                         name_of_station_trial);
+INSTANTIATE_TEST_SUITE_P(Text, HostileFolder, testing::ValuesIn(kTextTrials),
+                         name_of_station_trial);
+INSTANTIATE_TEST_SUITE_P(Results, HostileFolder, testing::ValuesIn(kResultsTrials),
+                         name_of_station_trial);
 
 }  // namespace
 }  // namespace vlp
