@@ -24,6 +24,7 @@
 #include "evaluation/junit.h"
 #include "evaluation/proposed_gates.h"
 #include "program/app.h"
+#include "program/steps/capture_options.h"
 #include "program/steps/history.h"
 #include "program/steps/print_evaluation.h"
 #include "program/steps/step_outcome.h"
@@ -44,7 +45,7 @@ struct ReportOption {
 };
 
 struct Options {
-  std::string fixes, truth, path, compare, lamps, calibration, gates_file, json, junit,
+  std::string fixes, truth, path, compare, lamps, room, calibration, gates_file, json, junit,
       proposed_gates;
   std::vector<double> line_m;  // X0 Y0 X1 Y1
   std::vector<std::string> gates;
@@ -143,8 +144,8 @@ EvaluationInput input_of(const Options& options) {
   input.station_m = station_m(options);
   if (!options.compare.empty()) input.others = {options.compare, read_fixes(options.compare)};
   if (options.noise_px > 0) {
-    input.limit = {read_lamp_map(options.lamps), read_calibration(options.calibration).camera,
-                   options.noise_px};
+    input.limit = {read_lamps_of_room(options.lamps, options.room),
+                   read_calibration(options.calibration).camera, options.noise_px};
   }
   input.threads = options.threads;
   return input;
@@ -155,7 +156,7 @@ std::string report_of(const CLI::App& app, const Options& options, const Evaluat
   EvaluationReport report{input, found, {}, {}, {}};
   report.page.gates = found.gates;
   std::vector<std::string> inputs = inputs_of(options);
-  if (!options.lamps.empty()) report.lamps = read_lamp_map(options.lamps);
+  if (!options.lamps.empty()) report.lamps = read_lamps_of_room(options.lamps, options.room);
   if (!options.calibration.empty()) report.page.calibration = read_calibration(options.calibration);
   for (const auto& [fixes, x0_m, y0_m, x1_m, y1_m] : options.report.tracks) {
     report.drives.push_back(
@@ -296,6 +297,7 @@ void add_options(CLI::App& app, Options& options) {
   auto* lamps = app.add_option(
       "--lamps", options.lamps,
       "Lamp map, lamps.yaml, for the theoretical limit at the true places, and the report");
+  add_room_option(app, options.room);
   auto* calibration = app.add_option("--calibration", options.calibration,
                                      "... the camera; the limit is that of a level one; its "
                                      "lever arm is for --station-mm");

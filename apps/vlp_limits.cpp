@@ -27,7 +27,7 @@ namespace vlp {
 namespace {
 
 struct Options {
-  std::string lamps, calibration, map, picture;
+  std::string lamps, room, calibration, map, picture;
   double height_m = 0;
   double yaw_deg = 0;
   double noise_px = 0, center_px = 0, tilt_deg = 0, lamp_map_mm = 0;
@@ -102,7 +102,7 @@ FloorLimits limits_of(const Options& options, const LampMap& lamps, const FloorG
 void run(const Options& options) {
   check_outputs({{"--map", options.map}, {"--picture", options.picture}},
                 {options.lamps, options.calibration});
-  const LampMap lamps = read_lamp_map(options.lamps);
+  const LampMap lamps = read_lamps_of_room(options.lamps, options.room);
   FloorGrid grid = floor_under(lamps, options.step_m);
   if (const auto& floor = options.floor_m; !floor.empty()) {
     grid = {floor[0], floor[1], floor[2], floor[3], options.step_m};
@@ -133,6 +133,7 @@ void run(const Options& options) {
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
+  add_room_option(app, options.room);
   app.add_option("--calibration", options.calibration,
                  "Calibration; its camera part is used, with --stated all of it")
       ->required();

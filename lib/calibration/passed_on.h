@@ -21,7 +21,8 @@ using SolvedWith = std::function<std::optional<Eigen::VectorXd>(const Eigen::Vec
 ///   J = (f(L_1) - f(0), f(L_2) - f(0), ...) L^-1,
 /// so that errors are tried as large as they are, and those that are known only together, as
 /// coefficients of a lens are, move together. A column that has no solution is tried once more at a
-/// sixteenth of its size: a solve may select other data at a larger error. Returns std::nullopt if
+/// sixteenth of its size: a solve may select other data at a larger error (the noise of the solve
+/// counts 16 times there, and is far smaller). Returns std::nullopt if
 /// that has none either, or if the covariance is not positive definite.
 ///
 /// @param exact  f(0)

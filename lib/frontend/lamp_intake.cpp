@@ -203,14 +203,13 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
     return message + ": are lamps lit and in view, and the exposure long enough?";
   }
   const auto& [kind, reason, lights] = reasons.front();
+  message += fmt::format("; most often, {} times: {}", lights, explanation_of(reason));
   const std::string shared = list_shared_frequencies(map);
   if (reason == LightReason::unknown_period && !shared.empty()) {
-    return message + fmt::format(
-                         "; lamps {} of the map have one frequency each: if they hang in "
-                         "two rooms, add the key room to each lamp and use --room",
-                         shared);
+    message += "; lamps of the map that share a frequency: " + shared +
+               "; the key room of lamps and --room separate those of two rooms";
   }
-  return message + fmt::format("; most often, {} times: {}", lights, explanation_of(reason));
+  return message;
 }
 
 /// Creates the folder for pictures of the lights.

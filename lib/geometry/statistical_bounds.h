@@ -4,10 +4,12 @@
 
 #include <cmath>
 
-/// Bounds of chi-squared and Student's t in closed form, for libraries that do without Boost. They
-/// are stated by `sigmas`: a normal variable of unit variance exceeds it as rarely. Up to 4.5 sigmas
-/// they are exceeded as rarely as `sigmas` - 0.01 to + 0.03 (t, m >= 8) or + 0.3 (t, m >= 2,
-/// chi-squared), so that few degrees of freedom make a test less sensitive and no false alarms.
+/// Bounds of chi-squared and Student's t in closed form, for libraries that do without Boost. A
+/// bound is stated by `sigmas`: chi-squared exceeds its bound, and t the root of its bound, as
+/// rarely as a normal variable of unit variance exceeds `sigmas` on one side. Tested for sigmas
+/// of 1.96 to 4.5 and two degrees of freedom or more: the bounds are exceeded as rarely as sigmas -
+/// 0.01 to sigmas + 0.3, so that few degrees of freedom make a test less sensitive and no false
+/// alarms.
 namespace vlp {
 
 /// Number of standard deviations that a normal variable exceeds in one of ten thousand cases.

@@ -50,8 +50,8 @@ struct Board {
   /// OpenCV before version 4.6 drew ("legacy pattern"). Ids go along the rows of white squares,
   /// from the top left.
   bool top_left_white = false;
-  /// Relative standard deviation of printed lengths along the board's width and along its height,
-  /// each by itself; 0 if it is not stated.
+  /// Relative standard deviation of printed lengths, independent along the board's width and its
+  /// height; 0 if it is not stated.
   double print_sd = 0;
 
   bool has_squares() const { return kind != BoardKind::apriltags; }

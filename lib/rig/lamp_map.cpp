@@ -80,7 +80,11 @@ LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string&
     YamlMap keys = item.map();
     Lamp lamp = read_lamp(keys);
     const auto lamp_room = keys.optional("room");
-    const bool is_in_room = room.empty() || (lamp_room && lamp_room->text() == room);
+    if (!room.empty() && !lamp_room) {
+      throw item.error("has no key room, and lamps of room " + room +
+                       " are asked for: state the room of each lamp");
+    }
+    const bool is_in_room = room.empty() || lamp_room->text() == room;
     if (!lamp.sd_m) lamp.sd_m = sd_m;
     keys.finish();
     in_room.check(lamp, item);

@@ -45,7 +45,7 @@ LampMap read_lamp_map(const std::filesystem::path& file);
 /// Reads the lamps of one room of a map whose lamps state a `room`, such as
 ///   - {id: 1, room: hall, position_m: [0.5, -0.3, 2.1], diameter_m: 0.18, frequency_hz: 2000}
 /// The frequencies of two rooms may be equal. An empty `room` reads all lamps. Throws InputError as
-/// above, and if no lamp is in the room.
+/// above, if no lamp is in the room, and if a lamp does not state its room.
 LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string& room);
 
 /// Writes what read_lamp_map() reads, whole or not at all. Throws InputError.

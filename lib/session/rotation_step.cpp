@@ -77,15 +77,23 @@ void pass_on_lens(
       "vlp-adjust states them");
 }
 
+/// Returns true if two sets of captures have the same sightings in the same order.
+bool has_same_sightings(const SpotCaptures& a, const SpotCaptures& b) {
+  return a.heights.size() == b.heights.size() &&
+         std::equal(a.captures.begin(), a.captures.end(), b.captures.begin(), b.captures.end(),
+                    [](const auto& one, const auto& other) { return one.image == other.image; }) &&
+         std::equal(a.sightings.begin(), a.sightings.end(), b.sightings.begin(), b.sightings.end(),
+                    [](const auto& one, const auto& other) {
+                      return one.capture == other.capture && one.lamp == other.lamp;
+                    });
+}
+
 /// Passes on the lens's errors through a fit of the same sightings: a fit that leaves out others
 /// differs by more than the lens does.
 void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMethod method) {
   const auto center_with = [&](const Camera& camera) -> std::optional<RotationCenter> {
     const SpotCaptures spot = spot_captures(input.frames, input.lamps, camera);
-    if (spot.status != SpotStatus::ok || spot.heights.size() != result.spot.heights.size() ||
-        spot.left_out.size() != result.spot.left_out.size()) {
-      return {};
-    }
+    if (spot.status != SpotStatus::ok || !has_same_sightings(spot, result.spot)) return {};
     const RotationFit fit = fit_of(spot, camera, method);
     if (!fit.converged || fit.used_sightings != result.fit.used_sightings) return {};
     return fit.center;

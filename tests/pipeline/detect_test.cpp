@@ -59,10 +59,18 @@ TEST_F(Detect, IdentifiesTheLampsOfTheRoomThatIsNamed) {
   };
   const auto unknown = detect_in("");
   EXPECT_EQ(unknown.exit_code, 3);
-  EXPECT_THAT(unknown.errors, testing::AllOf(HasSubstr("lamps 1 and 901, "),
-                                             HasSubstr("add the key room to each lamp")));
-  EXPECT_EQ(detect_in(" --room hall").exit_code, 0);
-  EXPECT_EQ(detect_in(" --room attic").exit_code, 2);
+  EXPECT_THAT(unknown.errors,
+              testing::AllOf(HasSubstr("check"), HasSubstr("share a frequency: 1 and 901, "),
+                             HasSubstr("the key room of lamps and --room")));
+  ASSERT_EQ(detect_in(" --room hall").exit_code, 0);
+  const CsvTable found(folder / "rooms.csv");
+  ASSERT_GT(found.rows(), 0U);
+  for (std::size_t row = 0; row < found.rows(); ++row) {
+    EXPECT_LT(found.number(row, found.required("lamp")), 900);
+  }
+  const auto attic = detect_in(" --room attic");
+  EXPECT_EQ(attic.exit_code, 2);
+  EXPECT_THAT(attic.errors, HasSubstr("has no lamp with 'room: attic'"));
 }
 
 TEST_F(Detect, FindsWhatLocateTurnsIntoTheTruePlace) {

@@ -136,6 +136,7 @@ TEST(StepsInARow, CirclesMoveWithTheLensAsTheSameSightingsDo) {
       return std::sqrt((jacobian * covariance * jacobian.transpose()).trace());
     };
     EXPECT_LT(sd_of(circle.fit), 1.5 * sd_of(joint.fit)) << seed;
+    EXPECT_GT(sd_of(circle.fit), 0.5 * sd_of(joint.fit)) << seed;
   }
 }
 

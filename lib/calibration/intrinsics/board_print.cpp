@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "calibration/intrinsics/intrinsics_solver.h"
 #include "calibration/intrinsics/projection_difference.h"
 
 namespace vlp {
@@ -31,7 +32,7 @@ std::vector<Eigen::Vector3d> points_of_board(const BoardProblem& problem) {
 
 std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& solution,
                                                 double print_sd) {
-  const double wider = std::numbers::sqrt2 * print_sd;
+  const double aspect_error = std::numbers::sqrt2 * print_sd;
   const Lens lens = solution.lens();
   BoardProblem problem = solution.problem;
   const std::vector<Eigen::Vector3d> points = points_of_board(problem);
@@ -44,12 +45,12 @@ std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& soluti
       const Eigen::Vector3d in_camera = rotation * points[i] + problem.poses[pose].translation_m;
       const Eigen::Vector3d along = rotation * Eigen::Vector3d::UnitX();
       const auto stated = lens.project(in_camera);
-      const auto printed = lens.project(in_camera + wider * points[i].x() * along);
+      const auto printed = lens.project(in_camera + aspect_error * points[i].x() * along);
       if (!stated || !printed) return {};
       seen.head<2>() += *stated - *printed;
     }
   }
-  if (!solve(problem, solution.solved_for)) return {};
+  if (!solve_for_lens(problem, solution.solved_for)) return {};
   const auto difference =
       projection_difference(lens, Lens(problem.lens_model, problem.intrinsics), problem.imager_px,
                             [](const Eigen::Vector2d&) { return 1.0; });

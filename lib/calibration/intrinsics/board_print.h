@@ -18,13 +18,14 @@ struct PrintEffect {
   double rms_px;
 };
 
-/// Computes the effect of one standard deviation of the board's width over its height. A common
-/// scale of the board changes its distances alone, and not the lens.
+/// Computes the effect of one standard deviation of the ratio of the board's width to its height,
+/// sqrt(2) print_sd. A common scale of the board changes its distances alone, and not the lens.
 ///
 /// With the points x of the boards at the solution, D = diag(1 + sqrt(2) print_sd, 1, 1) and the
 /// projection p, the problem is solved again from the solution with each corner seen moved by
 ///   p(x) - p(D x),
-/// which is the same to first order as a solve with the points D x.
+/// which is the same to first order as a solve with the points D x. Shifts of edges, weights and
+/// outliers stay as they are.
 ///
 /// @param print_sd  Board::print_sd, > 0
 /// @return std::nullopt if that solve fails

@@ -53,7 +53,7 @@ struct LensEstimate {
   /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
   /// Change of projections by one standard deviation of the board's print (compute_print_effect()),
-  /// rms over the image, in px; std::nullopt if the board does not state it.
+  /// rms over the image, in px; std::nullopt if the board does not state it or the solve fails.
   std::optional<double> print_px = {};
   /// Lattice of the corners in `solution`. Covariance of the intrinsics, with the pull of the
   /// regularization and the board's print; std::nullopt for a splined lens or if it is not finite.

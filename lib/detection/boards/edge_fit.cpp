@@ -82,6 +82,8 @@ class Edge {
   double equivalent_blur(const Parameters& p) const {
     constexpr double kurtosis_sd = 0.5, min_noise = 0.3;  // in levels: that of rounding
     constexpr double min_kurtosis = -1.5, max_kurtosis = 3;
+    // Of the blur: beyond, the step is not linear, and the blur remains that of a Gaussian.
+    constexpr double max_change = 0.3;
     if (p != at_) evaluate(p);
     constexpr int count = NUM_PARAMETERS + 1;
     using Square = Eigen::Matrix<double, count, count>;
@@ -98,15 +100,23 @@ class Edge {
         by_kurtosis_.squaredNorm() + variance / (kurtosis_sd * kurtosis_sd);
     right.template head<count - 1>() = -jacobian_.transpose() * residuals_;
     right[count - 1] = -by_kurtosis_.dot(residuals_);
-    const Vector change = normal.ldlt().solve(right);
+    Vector change = normal.ldlt().solve(right);
     const double kurtosis = std::clamp(change[count - 1], min_kurtosis, max_kurtosis);
+    if (kurtosis != change[count - 1]) {
+      const auto head = normal.template topLeftCorner<count - 1, count - 1>();
+      const auto by_kurtosis = normal.template topRightCorner<count - 1, 1>();
+      change.template head<count - 1>() =
+          head.ldlt().solve(right.template head<count - 1>() - kurtosis * by_kurtosis);
+    }
+    const double blur = p[0] + change[0];
+    if (!(std::abs(change[0]) <= max_change * p[0])) return p[0];
     // The transfer exp(-s^2 / 2) (1 + kurtosis s^4 / 24) is 0.5 at s; without kurtosis at gaussian.
     const double gaussian = std::sqrt(2 * std::numbers::ln2);
     double s = gaussian;
     for (int i = 0; i < 20; ++i) {
       s = std::sqrt(2 * std::log(2 * (1 + kurtosis * s * s * s * s / 24)));
     }
-    return (p[0] + change[0]) * gaussian / s;
+    return blur * gaussian / s;
   }
   /// Of the ends, in the mean, when the terms of the bow are known.
   double end_variance(const Parameters& p) const {

@@ -24,6 +24,9 @@ struct Band {
   double inside_px, outside_px;
 };
 
+/// Blur of edges before it is known, and the least that is assumed of them.
+constexpr double kMinRoughBlur_px = 0.8;
+
 /// What follows upon the black stripe inside an edge: how wide that is, start + by_along w, and
 /// where along the edge white bits begin and end.
 struct Behind {
@@ -48,10 +51,15 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
                                      const std::array<EdgeCurve, 4>& roughly, std::size_t k,
                                      const Behind& behind, const Band& band) {
   // Of the edges beside it, which are as blurred; so the corners, which are round, are away.
-  constexpr double free_blurs = 3.125;
+  constexpr double free_blurs = 3.125, max_free_fraction = 0.3;
   const EdgeCurve &edge = roughly[k], &next = roughly[(k + 1) % 4],
                   &previous = roughly[(k + 3) % 4];
-  const double free_px = free_blurs * edge.blur_px;
+  const auto free_px = [&](const EdgeCurve& beside) {
+    return std::clamp(
+        free_blurs * beside.blur_px, free_blurs * kMinRoughBlur_px,
+        std::max(free_blurs * kMinRoughBlur_px, max_free_fraction * 2 * edge.half_px));
+  };
+  const double free_of_next_px = free_px(next), free_of_previous_px = free_px(previous);
   const double reach_px = std::max(band.inside_px, band.outside_px) + edge.coefficients.lpNorm<1>();
   const Eigen::Vector2d wide =
       edge.along.cwiseAbs() * edge.half_px + edge.across.cwiseAbs() * reach_px;
@@ -65,7 +73,7 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
       const double w = edge.along.dot(at - edge.middle) / edge.half_px;
       const double v = edge.across.dot(at - edge.middle), off = v - edge.value_at(w);
       if (off < -band.inside_px || off > band.outside_px) continue;
-      if (next.off(at) > -free_px || previous.off(at) > -free_px) continue;
+      if (next.off(at) > -free_of_next_px || previous.off(at) > -free_of_previous_px) continue;
       pixels.push_back({w, v, static_cast<double>(image(row, column)), behind.stripe_px(w),
                         behind.white_at(w, edge)});
     }
@@ -97,6 +105,8 @@ class TagEdges {
   SeenTag::Steps steps() const;
 
  private:
+  /// Takes the fit of a copy.
+  void restore(const TagEdges& fitted);
   void look_behind(const TagPrint& print);
   void look_beside(const cv::Mat1b& image, const Band& band);
 
@@ -150,9 +160,6 @@ double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCur
   return most_px;
 }
 
-/// Blur of edges before it is known, and the least that is assumed of them.
-constexpr double kMinRoughBlur_px = 0.8;
-
 /// Returns true if the edges are more blurred than is assumed at first, by a half or more.
 bool is_more_blurred(const std::array<EdgeCurve, 4>& edges) {
   return std::any_of(edges.begin(), edges.end(),
@@ -194,6 +201,7 @@ TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& p
     const bool is_bent =
         bow_px_ > bent_px && (round == 0 || difference_px(edges_, roughly_) >= settled_px);
     if (!is_bent && !(round == 0 && is_more_blurred(edges_))) break;
+    const TagEdges sharp = *this;
     for (EdgeCurve& edge : edges_) {
       edge.cubic = edge.cubic || std::abs(edge.coefficients[2]) > no_parabola_px;
       edge.blur_px = std::max(edge.blur_px, kMinRoughBlur_px);
@@ -201,7 +209,20 @@ TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& p
     roughly_ = edges_;
     look_beside(image, band);
     fit(without_curve);
+    if (!found_ && !is_bent) {  // too few pixels are left beside the blurred corners
+      restore(sharp);
+      break;
+    }
   }
+}
+
+void TagEdges::restore(const TagEdges& fitted) {
+  roughly_ = fitted.roughly_;
+  edges_ = fitted.edges_;
+  pixels_ = fitted.pixels_;
+  fits_ = fitted.fits_;
+  bow_px_ = fitted.bow_px_;
+  found_ = fitted.found_;
 }
 
 void TagEdges::look_behind(const TagPrint& print) {

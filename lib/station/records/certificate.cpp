@@ -71,13 +71,13 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
 }
 
 /// Describes the inputs that the uncertainty includes, and those that are taken as exact.
-std::string describe_inputs(const RunRecord& record) {
+std::string describe_inputs(const RunRecord& record, const Calibration& calibration) {
   const auto print = std::find_if(
       record.figures.begin(), record.figures.end(),
       [](const auto& figure) { return figure.name == "board_print_px" && figure.value; });
-  if (print == record.figures.end()) {
-    return "The board and the known points are taken as exact (print_sd of board.yaml states how "
-           "accurate the print is).";
+  const auto& report = calibration.intrinsics_report;
+  if (print == record.figures.end() || !report || !report->covariance) {
+    return "The board and the known points are taken as exact.";
   }
   return fmt::format(
       "That of the focal length and the principal point includes the print of the board, as far as "
@@ -100,7 +100,7 @@ std::string results_part(const RunRecord& record, const Calibration& calibration
                       "about 95 % of a normal distribution. It includes the scatter of the "
                       "captures, the lamp map as far as lamps.yaml states its sd_m, and for the "
                       "zenith and the dispersion the lens. " +
-                      describe_inputs(record));
+                      describe_inputs(record, calibration));
 }
 
 /// "rms_px: residuals of the board's corners, ..." for a reader who has only the certificate.

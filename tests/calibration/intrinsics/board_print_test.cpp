@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "calibration/intrinsics/projection_difference.h"
@@ -52,6 +53,19 @@ TEST_P(PrintEffects, IsInProportionToTheStandardDeviation) {
   const auto two = compute_print_effect(stated, 2 * kPrintSd);
   ASSERT_TRUE(one && two);
   EXPECT_NEAR(two->rms_px / one->rms_px, 2, 0.05);
+}
+
+TEST(PrintEffect, IsSmallForAnExactBoardAndALensWithoutDistortion) {
+  const std::array parameters{520.0, 521.0, 402.0, 297.0};
+  const SyntheticViews views{synthetic_board(false), Lens(LensModel::pinhole, parameters)};
+  Random random(4);
+  const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, 0.05));
+  ASSERT_TRUE(solution.ok());
+  const auto exact = compute_print_effect(solution, 1e-9);
+  const auto printed = compute_print_effect(solution, kPrintSd);
+  ASSERT_TRUE(exact && printed);
+  EXPECT_LT(exact->rms_px, 0.01 * printed->rms_px);
+  EXPECT_GT(printed->rms_px, 0.01);
 }
 
 INSTANTIATE_TEST_SUITE_P(Boards, PrintEffects, testing::Bool(),
