@@ -8,7 +8,7 @@ namespace vlp {
 
 bool keep_mode_and_owner(int descriptor, const struct stat& former) {
   constexpr auto same_owner = static_cast<uid_t>(-1);
-  constexpr mode_t permissions = 0777, of_group = 0070;
+  constexpr mode_t permissions = 0777, group_permissions = 0070;
   if (::fchown(descriptor, former.st_uid, former.st_gid) != 0) {
     [[maybe_unused]] const int kept = ::fchown(descriptor, same_owner, former.st_gid);
   }
@@ -16,7 +16,7 @@ bool keep_mode_and_owner(int descriptor, const struct stat& former) {
   if (::fstat(descriptor, &present) != 0) return false;
   // Another group must not get the permissions of the former one.
   const bool has_group = present.st_gid == former.st_gid;
-  const mode_t mode = former.st_mode & permissions & (has_group ? permissions : ~of_group);
+  const mode_t mode = former.st_mode & permissions & (has_group ? permissions : ~group_permissions);
   // A file system without modes, such as FAT, refuses to set them.
   return (present.st_mode & permissions) == mode || ::fchmod(descriptor, mode) == 0;
 }
