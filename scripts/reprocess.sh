@@ -119,18 +119,25 @@ case $(realpath -m "$results")/ in
 esac
 [ -d "${folders[0]}" ] || usage "${folders[0]}: is not a folder"
 # A .state that something else made is never written into or deleted: ours says so in "owner" and, once planned, in
-# run.json.
-made=''
-if [ ! -e "$results/.state" ]; then
-  made=1
-elif [ ! -e "$results/.state/owner" ] && ! grep -qs '^ "archive": ' "$results/.state/run.json"; then
-  refuse "$results: holds a .state that is not of reprocess.sh; give the results a folder of their own"
-fi
-mkdir -p "$results/.state" 2>/dev/null && : 2>/dev/null >>"$results/.state/lock" ||
+# run.json. A run that was killed at its very start leaves it empty, or with the lock alone.
+state=$results/.state made=''
+for file in "$state/lock" "$state/owner"; do
+  [ ! -L "$file" ] || refuse "$file: is a symbolic link, which is not followed: remove it"
+done
+case $(ls -A "$state" 2>/dev/null) in
+  '' | lock) made=1 ;;
+  *)
+    [ -e "$state/owner" ] || grep -qs '^ "archive": ' "$state/run.json" ||
+      refuse "$results: holds a .state that is not of reprocess.sh; give the results a folder of their own"
+    ;;
+esac
+mkdir -p "$state" 2>/dev/null && : 2>/dev/null >>"$state/lock" ||
   refuse "$results: cannot be written to"
-exec 9>>"$results/.state/lock"
+exec 9>>"$state/lock"
 flock --nonblock 9 || refuse "$results: another run is at work there"
-[ -e "$results/.state/owner" ] || echo 'scripts/reprocess.sh' >"$results/.state/owner"
+# noclobber (-C): a link that came meanwhile is not followed.
+[ -e "$state/owner" ] || (set -C; echo 'scripts/reprocess.sh' >"$state/owner") 2>/dev/null ||
+  refuse "$results: cannot be written to"
 code=0
 "$python" "$scripts/plan.py" "${folders[@]}" --bin "$bin" "${plan[@]}" || code=$?
 if [ "$code" != 0 ]; then

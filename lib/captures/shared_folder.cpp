@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "rig/file_mode.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -94,19 +95,6 @@ class TemporaryFile {
   std::string name_;
   bool is_renamed_ = false;
 };
-
-/// Gives a file the mode and the owner of the one that it replaces, or its group only without the
-/// right to give it the owner.
-void keep_mode_and_owner(int descriptor, const struct stat& former, const fs::path& file) {
-  constexpr auto same_owner = static_cast<uid_t>(-1);
-  constexpr mode_t rights = 0777;
-  const bool is_kept = ::fchown(descriptor, former.st_uid, former.st_gid) == 0 ||
-                       ::fchown(descriptor, same_owner, former.st_gid) == 0;
-  // Another group must not get the rights of the former one.
-  constexpr mode_t of_group = 0070;
-  const mode_t mode = former.st_mode & rights & (is_kept ? rights : ~of_group);
-  if (::fchmod(descriptor, mode) != 0) fail(file, "cannot be written");
-}
 
 }  // namespace
 
@@ -215,7 +203,9 @@ void SharedFolder::replace(const std::string& name, std::string_view content) co
   const auto former = status_of(descriptor_, name);
   TemporaryFile file(descriptor_, name);
   if (file.descriptor() < 0) fail(path, "cannot be written");
-  if (former && S_ISREG(former->st_mode)) keep_mode_and_owner(file.descriptor(), *former, path);
+  if (former && S_ISREG(former->st_mode) && !keep_mode_and_owner(file.descriptor(), *former)) {
+    fail(path, "cannot be written");
+  }
   write_all(file.descriptor(), content, path);
   if (::fsync(file.descriptor()) != 0) fail(path, "cannot be written");
   if (!file.rename_to(name)) fail(path, "cannot be written");

@@ -62,7 +62,10 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   // Other formats are not decoded: nothing states in advance how much memory they take.
   const auto size = size_in_header(bytes);
   if (!size) {
-    throw InputError(file, "cannot be read as an image: is no PNG, JPEG, BMP, TIFF or PGM");
+    throw InputError(file, has_image_signature(bytes)
+                               ? "cannot be read as an image: it is cut short or damaged"
+                               : "cannot be read as an image: is no PNG, JPEG, BMP, TIFF, PBM, PGM "
+                                 "or PPM");
   }
   check_size(file, (*size)[0], (*size)[1], max_mpx);
   if (is_cut_png(bytes)) throw InputError(file, cut);

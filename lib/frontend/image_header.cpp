@@ -53,8 +53,8 @@ Size bmp_size(std::string_view bytes) {
   return pair_of(signed_at(18), signed_at(22));
 }
 
-/// Segments follow each other by their lengths up to the frame header, SOF: FF C0 to FF CF but for
-/// C4, C8 and CC.
+/// Reads the frame header, SOF: FF C0 to FF CF but for C4, C8 and CC. The segments before it are
+/// skipped by their lengths, as libjpeg does.
 Size jpeg_size(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 4 <= bytes.size()) {
@@ -67,6 +67,11 @@ Size jpeg_size(std::string_view bytes) {
       ++at;
       continue;
     }
+    if (marker == 0x01 || (marker >= 0xd0 && marker <= 0xd7)) {  // TEM, RST: without a length
+      at += 2;
+      continue;
+    }
+    if (marker == 0xd8 || marker == 0xd9) return {};  // another start, or the end
     const auto length = number_at(bytes, at + 2, 2, ByteOrder::big);
     const bool frame =
         marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
@@ -89,7 +94,9 @@ struct TiffLayout {
 };
 constexpr TiffLayout kTiff{4, 4, 2, 12, 8}, kBigTiff{8, 8, 8, 20, 12};
 
-/// Of the first directory: tags 256 and 257, each a SHORT (3), a LONG (4) or as long as a place.
+/// Reads tags 256 and 257 of the first directory, each a SHORT (3), a LONG (4) or, in BigTIFF, a
+/// LONG8 (16). libtiff reads others, too, but no usual program writes them. Of a tag that occurs
+/// twice the first counts, as in libtiff.
 Size tiff_size(std::string_view bytes, const TiffLayout& layout) {
   const ByteOrder order = bytes[0] == 'M' ? ByteOrder::big : ByteOrder::little;
   const auto directory = number_at(bytes, layout.directory_at, layout.place_bytes, order);
@@ -103,12 +110,18 @@ Size tiff_size(std::string_view bytes, const TiffLayout& layout) {
     const auto tag = number_at(bytes, entry, 2, order),
                type = number_at(bytes, entry + 2, 2, order);
     if (!tag || !type) return {};
-    const std::size_t value_bytes = *type == 3 ? 2 : *type == 4 ? 4 : layout.place_bytes;
-    const auto value = number_at(bytes, entry + layout.value_at, value_bytes, order);
-    if (*tag == 256) width = value;
-    if (*tag == 257) height = value;
+    if (*tag != 256 && *tag != 257) continue;
+    const std::size_t value_bytes = *type == 3 ? 2 : *type == 4 ? 4 : *type == 16 ? 8 : 0;
+    if (value_bytes == 0 || value_bytes > layout.place_bytes) return {};
+    auto& size = *tag == 256 ? width : height;
+    if (!size) size = number_at(bytes, entry + layout.value_at, value_bytes, order);
+    if (!size) return {};
   }
   return pair_of(width, height);
+}
+
+bool is_pnm(std::string_view bytes) {
+  return bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6';
 }
 
 /// "P5", width and height with white space and comments between them.
@@ -133,6 +146,15 @@ Size pnm_size(std::string_view bytes) {
 
 }  // namespace
 
+bool has_image_signature(std::string_view bytes) {
+  using namespace std::string_view_literals;
+  static constexpr auto kSignatures = std::to_array<std::string_view>(
+      {"\x89PNG\r\n\x1a\n"sv, "\xff\xd8"sv, "BM"sv, "II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv});
+  return is_pnm(bytes) || std::ranges::any_of(kSignatures, [&](std::string_view signature) {
+           return bytes.starts_with(signature);
+         });
+}
+
 Size size_in_header(std::string_view bytes) {
   using namespace std::string_view_literals;
   if (bytes.starts_with("\x89PNG\r\n\x1a\n"sv)) return png_size(bytes);
@@ -141,9 +163,7 @@ Size size_in_header(std::string_view bytes) {
   if (bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv)) return tiff_size(bytes, kTiff);
   if (bytes.starts_with("II+\0"sv) || bytes.starts_with("MM\0+"sv))
     return tiff_size(bytes, kBigTiff);
-  if (bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6') {
-    return pnm_size(bytes);
-  }
+  if (is_pnm(bytes)) return pnm_size(bytes);
   return {};
 }
 

@@ -9,9 +9,12 @@
 
 namespace vlp {
 
-/// Width and height in pixels as the header of a PNG, JPEG, BMP, TIFF or PGM file states them, read
-/// without decoding the image: a file of a megabyte can hold gigapixels. Nothing for what is none
-/// of these, or is cut short before it says so.
+/// Returns true if a file begins as a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM does.
+bool has_image_signature(std::string_view bytes);
+
+/// Reads width and height in pixels from the header of a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM file
+/// without decoding the image: a file of a megabyte can hold gigapixels. Returns std::nullopt for
+/// any other file, or if it is cut short before its size.
 std::optional<std::array<std::int64_t, 2>> size_in_header(std::string_view bytes);
 
 }  // namespace vlp

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <optional>
 
+#include "rig/file_mode.h"
 #include "rig/input_error.h"
 
 namespace vlp {
@@ -44,10 +45,21 @@ struct Target {
   std::optional<int> descriptor;
 };
 
-/// Only a path that begins so names a descriptor: a link elsewhere, which others may have made,
-/// does not lead to one.
+bool is_number(const fs::path& name) {
+  return !name.empty() && std::ranges::all_of(name.native(), [](char character) {
+    return character >= '0' && character <= '9';
+  });
+}
+
+/// Returns true for the paths by which the system names the descriptors of a process. A link
+/// elsewhere, such as in /dev/shm, may be of another user, and does not lead to a descriptor.
 bool can_name_descriptor(const fs::path& path) {
-  return path.native().starts_with("/dev/") || path.native().starts_with("/proc/");
+  if (path == "/dev/stdin" || path == "/dev/stdout" || path == "/dev/stderr") return true;
+  if (!is_number(path.filename())) return false;
+  const fs::path folder = path.parent_path(), process = folder.parent_path();
+  if (folder == "/dev/fd") return true;
+  return folder.filename() == "fd" && process.parent_path() == "/proc" &&
+         (process.filename() == "self" || is_number(process.filename()));
 }
 
 Target find_target(const fs::path& path) {
@@ -104,16 +116,17 @@ int create_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
 /// Creates the file that will replace `target`, with its permissions, and its owner and group as
 /// far as the system allows. Nobody but the owner can read it before it has them.
 int create_replacement(const fs::path& target, fs::path& temporary) {
-  constexpr mode_t as_user_set = 0666, private_to_owner = 0600, permissions = 0777;
+  constexpr mode_t as_user_set = 0666, private_to_owner = 0600;
   struct stat old {};
   if (::stat(target.c_str(), &old) != 0) return create_beside(target, as_user_set, temporary);
   const int descriptor = create_beside(target, private_to_owner, temporary);
   if (descriptor < 0) return descriptor;
-  if (::fchown(descriptor, old.st_uid, old.st_gid) != 0) {
-    [[maybe_unused]] const int kept = ::fchown(descriptor, static_cast<uid_t>(-1), old.st_gid);
-  }
-  ::fchmod(descriptor, old.st_mode & permissions);
-  return descriptor;
+  if (keep_mode_and_owner(descriptor, old)) return descriptor;
+  const int reason = errno;
+  ::close(descriptor);
+  ::unlink(temporary.c_str());
+  errno = reason;
+  return -1;
 }
 
 /// Makes a rename last through a power cut. Not every file system can; the file is whole anyway.

@@ -8,6 +8,7 @@
 
 #include "frontend/image_file.h"
 #include "rig/input_error.h"
+#include "support/refused.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -67,6 +68,51 @@ TEST(SizeInHeaderOf, JpegIsFoundBehindBytesThatAreNoMarker) {
   EXPECT_EQ(size_in_header(bytes), (Size{33, 21}));
 }
 
+TEST(SizeInHeaderOf, JpegIsFoundBehindMarkersWithoutLength) {
+  // Read as lengths, the two bytes behind the marker lead to the frame header in the comment.
+  std::string comment("\xff\xe1\xff\xff", 4);
+  const std::string small("\xff\xc0\0\x0b\x08\0\x10\0\x10", 9);
+  comment.resize(0xffe1);
+  comment += small;
+  comment.resize(0xffff + 2);
+  for (const std::string marker : {"\xff\xd0", "\xff\xd7", "\xff\x01"}) {
+    std::string bytes = encoded_as(".jpg", 33, 21);
+    bytes.insert(2, marker + comment);
+    EXPECT_EQ(size_in_header(bytes), (Size{33, 21}));
+  }
+  for (const std::string marker : {"\xff\xd8", "\xff\xd9"}) {
+    std::string bytes = encoded_as(".jpg", 33, 21);
+    bytes.insert(2, marker);
+    EXPECT_FALSE(size_in_header(bytes));
+  }
+}
+
+/// Returns a TIFF file that ends with its directory.
+std::string tiff_of(const std::vector<std::string>& entries) {
+  std::string bytes("II*\0\x08\0\0\0", 8);
+  bytes += {static_cast<char>(entries.size()), '\0'};
+  for (const std::string& entry : entries) bytes += entry;
+  return bytes + std::string(4, '\0');
+}
+
+TEST(SizeInHeaderOf, TiffIsThatOfItsFirstTags) {
+  const std::string width("\0\x01\x04\0\x01\0\0\0\x30\x75\0\0", 12),
+      height("\x01\x01\x04\0\x01\0\0\0\x2c\x01\0\0", 12),
+      small_width("\0\x01\x04\0\x01\0\0\0\x02\0\0\0", 12),
+      elsewhere("\0\x01\x10\0\x01\0\0\0\x08\0\0\0", 12);  // a LONG8 at byte 8
+  EXPECT_EQ(size_in_header(tiff_of({width, height, small_width})), (Size{30000, 300}));
+  EXPECT_FALSE(size_in_header(tiff_of({elsewhere, height})));
+}
+
+TEST(ReadImage, NamesFilesThatAreCutShort) {
+  const TemporaryFolder folder;
+  const std::string tiff = encoded_as(".tif", 33, 21), jpeg("\xff\xd8\xff\xda\xff\xd9");
+  for (const std::string& content : {tiff.substr(0, 8), jpeg, std::string("BM12"), tiff_of({})}) {
+    EXPECT_THAT(refusal_of([&] { read_image(folder.file("a.png", content)); }),
+                HasSubstr("cannot be read as an image: it is cut short or damaged"));
+  }
+}
+
 TEST(ReadImage, RefusesOtherFormatsUndecoded) {
   const TemporaryFolder folder;
   const std::string webp("RIFF\x10\0\0\0WEBPVP8L\x04\0\0\0\x2f\xff\xff\xff", 24);
@@ -75,7 +121,7 @@ TEST(ReadImage, RefusesOtherFormatsUndecoded) {
       read_image(folder.file("a.png", content));
       ADD_FAILURE() << "is read";
     } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), HasSubstr("is no PNG, JPEG, BMP, TIFF or PGM"));
+      EXPECT_THAT(error.what(), HasSubstr("is no PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"));
     }
   }
 }

@@ -224,6 +224,40 @@ TEST_F(HostileNames, NameNoFileOutsideAFolder) {
   EXPECT_EQ(TemporaryFolder::content_of(canary), "mine");
 }
 
+TEST_F(HostileNames, FollowNoLinkOutOfAFolder) {
+  fs::create_directories(folder / "shared");
+  fs::create_directories(folder / "outside");
+  const fs::path canary = folder.file("outside/canary", "mine");
+  const SharedFolder shared(folder / "shared");
+  constexpr int every = 100;  // each is synchronised to disk
+  int files = 0, folders = 0;
+  for (int i = 0; i < kNames / every; ++i) {
+    const std::string name = random_name(random);
+    const bool is_one_part = name != "." && name != ".." &&
+                             name.find_first_of(std::string("/\0", 2)) == std::string::npos;
+    const std::string link = (folder / "shared").string() + "/" + name;
+    if (!is_one_part || ::symlink(canary.c_str(), link.c_str()) != 0) continue;
+    ++files;
+    ASSERT_NE(refusal_of([&] { ::close(shared.open(name, O_WRONLY | O_TRUNC)); }), "") << name;
+    ASSERT_NE(refusal_of([&] { (void)shared.read(name, kMaxBytes); }), "") << name;
+    shared.replace(name, name);
+    ASSERT_FALSE(fs::is_symlink(link)) << name;
+    shared.remove(name);
+    if (!Id::accepts(name)) continue;
+    ++folders;
+    ASSERT_EQ(::symlink((folder / "outside").c_str(), link.c_str()), 0);
+    const Id id{name, "test", "camera"};
+    ASSERT_NE(refusal_of([&] { (void)shared.make_folder(id); }), "") << name;
+    ASSERT_NE(refusal_of([&] { (void)shared.find_folder(id); }), "") << name;
+    shared.remove(name);
+    ASSERT_EQ(TemporaryFolder::content_of(canary), "mine") << name;
+  }
+  EXPECT_GT(files, kNames / every / 10);
+  EXPECT_GT(folders, kNames / every / 100);
+  EXPECT_EQ(TemporaryFolder::content_of(canary), "mine");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder / "outside"), {}), 1);
+}
+
 TEST_F(HostileNames, AreReadBackFromTheSpool) {
   int refused = 0;
   constexpr int every = 20;  // parsing takes long without optimisation

@@ -123,6 +123,26 @@ std::string make_wide_table(int columns) {
          "); echo; } >detections.csv";
 }
 
+const std::string kDetectImages =
+    "vlp-detect images --lamps lamps.yaml --calibration calibration.yaml -o d.csv -q";
+
+/// 30000 x 30000 px behind a marker without a length. Read as a length, the bytes behind the marker
+/// lead to a frame header of 16 x 16 px in a segment that is skipped.
+const std::string kJpegOfTwoSizes =
+    "mkdir images; { printf \"\\xff\\xd8\\xff\\xd0\\xff\\xe1\\xff\\xff\"; "
+    "head -c $((0xffe1 - 4)) /dev/zero; "
+    "printf \"\\xff\\xc0\\x00\\x0b\\x08\\x00\\x10\\x00\\x10\\x01\\x01\\x11\\x00\"; "
+    "head -c $((0xffff - 0xffe1 + 2 - 13)) /dev/zero; "
+    "printf \"\\xff\\xc0\\x00\\x0b\\x08\\x75\\x30\\x75\\x30\\x01\\x01\\x11\\x00\"; "
+    "printf \"\\xff\\xda\\x00\\x08\\x01\\x01\\x00\\x00\\x3f\\x00\\xff\\xd9\"; } >images/a.png";
+
+/// 30000 x 30000 px by the first tags, which libtiff reads, and 16 x 16 px by the last.
+const std::string kTiffOfTwoSizes =
+    "mkdir images; { printf \"II*\\x00\\x08\\x00\\x00\\x00\\x04\\x00\"; "
+    "for size in \"\\x30\\x75\" \"\\x10\\x00\"; do for tag in \"\\x00\" \"\\x01\"; do "
+    "printf \"$tag\\x01\\x04\\x00\\x01\\x00\\x00\\x00$size\\x00\\x00\"; done; done; "
+    "head -c 4 /dev/zero; } >images/a.png";
+
 const std::string kCamera =
     "camera_matrix: {rows: 3, cols: 3, data: [500, 0, 400, 0, 500, 300, 0, 0, 1]}\\n"
     "distortion_model: plumb_bob\\n"
@@ -193,6 +213,10 @@ INSTANTIATE_TEST_SUITE_P(
         Trial{"SparseImage", "mkdir images; truncate -s 3G images/a.png",
               "vlp-detect images --lamps lamps.yaml --calibration calibration.yaml -o d.csv -q", 2,
               "a.png: is longer than 1586 MiB", 2, 300},
+        Trial{"JpegOfTwoSizes", kJpegOfTwoSizes, kDetectImages, 2,
+              "a.png: is 30000 x 30000 px, more than the 200 million", 2, 300},
+        Trial{"TiffOfTwoSizes", kTiffOfTwoSizes, kDetectImages, 2,
+              "a.png: is 30000 x 30000 px, more than the 200 million", 2, 300},
         Trial{"PipeAsVideo", "mkfifo a.avi",
               "vlp-detect a.avi --lamps lamps.yaml --calibration calibration.yaml -o d.csv", 2,
               "a.avi: is a pipe or a device, not a file", 2, 300},
@@ -232,14 +256,15 @@ const std::vector<std::string> kReaders{
     "vlp-locate detections.csv --lamps BAD --calibration calibration.yaml -o out.csv",
     "vlp-locate detections.csv --lamps lamps.yaml --calibration BAD -o out.csv",
     "vlp-evaluate BAD --truth truth.csv",
-    "vlp-evaluate detections.csv --truth BAD",
+    kLocate + "-q && vlp-evaluate fixes.csv --truth BAD",
     "vlp-rotation BAD --lamps lamps.yaml --calibration calibration.yaml -o out.yaml",
     "vlp-dispersion BAD --lamps lamps.yaml --calibration calibration.yaml --station 0 0 -o "
     "out.yaml",
     "vlp-adjust BAD --lamps lamps.yaml --calibration calibration.yaml -o out.yaml",
-    "vlp-limits --lamps BAD --calibration calibration.yaml --height-m 0 --noise-px 0.05 -o out.csv",
-    "vlp-limits --lamps lamps.yaml --calibration BAD --height-m 0 --noise-px 0.05 -o out.csv",
-    "vlp-board --board BAD -o out.pdf",
+    "vlp-limits --lamps BAD --calibration calibration.yaml --height-m 0 --noise-px 0.05 "
+    "--tilt-deg 0.01 --lamp-map-mm 0.1 --picture out.svg",
+    "vlp-limits --lamps lamps.yaml --calibration BAD --height-m 0 --noise-px 0.05 "
+    "--tilt-deg 0.01 --lamp-map-mm 0.1 --picture out.svg",
     "vlp-simulate BAD -o out",
     "vlp-convert BAD -o out.yaml",
     "vlp-intrinsics BAD --board board.yaml --row-time-s 3e-5 --readout rows -o out.yaml",
@@ -266,8 +291,11 @@ TEST_P(EveryReader, RefusesAtOnce) {
       command.replace(command.find("BAD"), 3, name);
       const Ending ending_of = run_in(folder, "timeout 10 " + command);
       EXPECT_EQ(ending_of.exit_code, 2) << command << "\n" << ending_of.errors;
+      EXPECT_THAT(ending_of.errors, HasSubstr(name)) << command;
       EXPECT_LT(ending_of.max_mib, 200) << command;
-      EXPECT_FALSE(fs::exists(folder / "out.csv") || fs::exists(folder / "out.yaml")) << command;
+      for (const char* output : {"out.csv", "out.yaml", "out.svg"}) {
+        EXPECT_FALSE(fs::exists(folder / output)) << command;
+      }
       ++refused;
     }
   }
@@ -297,8 +325,9 @@ TEST(EveryProgram, ReportsThatItsHelpCannotBeWritten) {
   EXPECT_GT(programs, 10U);
 }
 
-/// Formats that no header states the size of in a way that is known here; none is decoded.
+/// Formats whose size is not read from their header; none is decoded.
 TEST(ForeignImages, AreNotDecoded) {
+  std::size_t formats = 0;
   for (const char* ending : {".webp", ".jp2", ".ras", ".hdr"}) {
     std::vector<unsigned char> bytes;
     const cv::Mat image(512, 512, CV_8UC3, cv::Scalar(90, 90, 90));
@@ -307,6 +336,7 @@ TEST(ForeignImages, AreNotDecoded) {
     } catch (const cv::Exception&) {  // this OpenCV has no such encoder
       continue;
     }
+    ++formats;
     const TemporaryFolder folder;
     add_example(folder);
     fs::create_directory(folder / "images");
@@ -317,10 +347,11 @@ TEST(ForeignImages, AreNotDecoded) {
           "vlp-intrinsics images --board board.yaml --row-time-s 3e-5 --readout rows -o c.yaml"}) {
       const Ending ending_of = run_in(folder, command);
       EXPECT_THAT(ending_of.exit_code, testing::AnyOf(2, 3)) << command << ending;
-      EXPECT_THAT(ending_of.errors, HasSubstr("is no PNG, JPEG, BMP, TIFF or PGM"))
+      EXPECT_THAT(ending_of.errors, HasSubstr("is no PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"))
           << command << ending;
     }
   }
+  EXPECT_GE(formats, 3U) << "too few encoders";
 }
 
 }  // namespace

@@ -33,6 +33,30 @@ for folder in "$scratch/layout-empty" "$archive"; do
 done
 rm -r "$results"
 
+# A run that was killed before it had its owner goes on, here as far as to the archive without input. Nobody's link is
+# followed.
+message='none of its 1 sessions has any input'
+for left in '' lock; do
+  mkdir -p "$results/.state"
+  [ -z "$left" ] || touch "$results/.state/$left"
+  incomplete 3 "$message" "$scratch/layout-empty" "$results"
+  [ ! -e "$results" ] || fail "something is left of an archive that has no session"
+done
+for name in lock owner; do
+  mkdir -p "$results/.state"
+  ln -s "$scratch/layout-target" "$results/.state/$name"
+  incomplete 2 "$results/.state/$name: is a symbolic link, which is not followed: remove it" "$archive" "$results"
+  [ ! -e "$scratch/layout-target" ] || fail "the target of a link was made"
+  rm -r "$results"
+done
+# Two starts at once: the first has the lock and no owner yet.
+mkdir -p "$results/.state"
+exec 8>>"$results/.state/lock"
+flock 8
+incomplete 2 'another run is at work there' "$archive" "$results"
+exec 8>&-
+rm -r "$results"
+
 # One of two has no rotation: that passes unless a fraction is given. With both, nothing could be done.
 rm -r "$archive/camera-00002/session-01/rotation"
 reprocess "$results" >"$said"

@@ -60,6 +60,23 @@ TEST(ReadFile, ReadsTheStreamThatTheProcessHas) {
   ::close(ends[0]);
 }
 
+TEST(ReadFile, RefusesALinkToAStreamAmongTheDevices) {
+  const fs::path link = "/dev/shm/vlp-test-" + std::to_string(::getpid());
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  ASSERT_EQ(::write(ends[1], "0123456789", 10), 10);
+  ::close(ends[1]);
+  const std::string stream = "/proc/self/fd/" + std::to_string(ends[0]);
+  std::error_code error;
+  fs::create_symlink(stream, link, error);
+  if (error) GTEST_SKIP() << link << ": " << error.message();
+  EXPECT_THAT(read_refusal(link), testing::HasSubstr("is a pipe or a device, not a file"));
+  fs::remove(link);
+  EXPECT_EQ(read_file("/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(ends[0]), 10),
+            "0123456789");
+  ::close(ends[0]);
+}
+
 TEST(ReadFile, RefusesAStreamThatIsTooLong) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);

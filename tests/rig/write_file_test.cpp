@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <grp.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "rig/file.h"
@@ -73,6 +75,42 @@ TEST(WriteFile, KeepsOwnerAndGroupOfTheFileItReplaces) {
   EXPECT_EQ(found.st_uid, owner);
   EXPECT_EQ(found.st_gid, group);
   EXPECT_EQ(fs::status(file).permissions(), fs::perms(0640));
+}
+
+/// Replaces a file of user 12345 and group 12346 as another user, a member of these groups, and
+/// returns its permissions.
+mode_t mode_after_another_user(const TemporaryFolder& folder, const std::vector<gid_t>& groups) {
+  constexpr uid_t owner = 12345, writer = 23456;
+  constexpr gid_t group = 12346;
+  fs::permissions(folder / "", fs::perms::all);
+  const auto file = folder.file("a.yaml", "old\n");
+  EXPECT_EQ(::chown(file.c_str(), owner, group), 0);
+  fs::permissions(file, fs::perms(0664));
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::chdir((folder / "").c_str()) != 0 || ::setgroups(groups.size(), groups.data()) != 0 ||
+        ::setgid(writer) != 0 || ::setuid(writer) != 0) {
+      ::_exit(1);
+    }
+    write_file("a.yaml", "new\n");
+    ::_exit(0);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(TemporaryFolder::content_of(file), "new\n");
+  struct stat found {};
+  EXPECT_EQ(::stat(file.c_str(), &found), 0);
+  EXPECT_EQ(found.st_uid, writer);
+  EXPECT_EQ(found.st_gid, groups.empty() ? writer : group);
+  return found.st_mode & 0777;
+}
+
+TEST(WriteFile, GivesNoPermissionsToAnotherGroup) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root acts as another user";
+  const TemporaryFolder folder;
+  EXPECT_EQ(mode_after_another_user(folder, {12346}), mode_t{0664});
+  EXPECT_EQ(mode_after_another_user(folder, {}), mode_t{0604});
 }
 
 TEST(WriteFile, WritesToTheStreamThatTheProcessHas) {

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstring>
 #include <iterator>
 #include <optional>
 #include <string_view>
@@ -41,13 +42,18 @@ class Descriptor {
   int number_;
 };
 
+[[noreturn]] void fail_without_script(const fs::path& picture) {
+  throw InputError(picture, std::string("cannot be drawn: gnuplot's script cannot be made: ") +
+                                std::strerror(errno));
+}
+
 /// Puts the script into memory that gnuplot reads as its stdin, so that no temporary file is
 /// needed.
 void write_script(const Descriptor& script, std::string_view text, const fs::path& picture) {
   while (!text.empty()) {
     const ssize_t count = ::write(script.number(), text.data(), text.size());
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) throw InputError(picture, "cannot be drawn: no room for gnuplot's script");
+    if (count < 0) fail_without_script(picture);
     text.remove_prefix(static_cast<std::size_t>(count));
   }
   ::lseek(script.number(), 0, SEEK_SET);
@@ -93,9 +99,7 @@ bool has_succeeded(pid_t process) {
 std::string drawn(const std::string& terminal, const Drawing& drawing, const fs::path& picture) {
   const Descriptor script(::memfd_create("vlp-plot", MFD_CLOEXEC));
   int ends[2] = {-1, -1};
-  if (script.number() < 0 || ::pipe2(ends, O_CLOEXEC) != 0) {
-    throw InputError(picture, "cannot be drawn: no room for gnuplot's script");
-  }
+  if (script.number() < 0 || ::pipe2(ends, O_CLOEXEC) != 0) fail_without_script(picture);
   const Descriptor output(ends[0]);
   Descriptor input(ends[1]);
   write_script(script,

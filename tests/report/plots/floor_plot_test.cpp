@@ -3,6 +3,7 @@
 #include "report/plots/floor_plot.h"
 
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include "report/plots/gnuplot.h"
 #include "report/plots/plot_parts.h"
@@ -53,6 +54,18 @@ TEST_F(FloorPlotTest, KeepsTheOldPictureWhenGnuplotFails) {
               }),
               HasSubstr("a.png: cannot be drawn"));
   EXPECT_EQ(TemporaryFolder::content_of(file), "old");
+}
+
+TEST_F(FloorPlotTest, NamesTheReasonWhyNoScriptIsMade) {
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit none = before;
+  none.rlim_cur = 0;
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const std::string refusal = refusal_of([&] { draw_floor_plot(folder / "a.png", plot, lamps); });
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_THAT(refusal, HasSubstr("a.png: cannot be drawn: gnuplot's script cannot be made: "
+                                 "Too many open files"));
 }
 
 TEST(GnuplotQuoted, LeavesNothingToInterpret) {
