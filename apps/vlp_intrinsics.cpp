@@ -191,6 +191,10 @@ void run(const CLI::App& app, const Options& options) {
   if (!options.plot.empty()) draw(options.plot, result.drawing());
   if (lens.choice) fmt::print("lens model    {}\n", words_of(*lens.choice));
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
+  if (lens.print_px) {
+    fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
+               *lens.print_px);
+  }
   const auto checked = check_gates(gates, result.metrics);
   const std::string failed = words_of_missed(checked);
   if (failed.empty()) return;

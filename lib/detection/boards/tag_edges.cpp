@@ -24,8 +24,8 @@ struct Band {
   double inside_px, outside_px;
 };
 
-/// Blur of edges before it is known, and the least that is assumed of them.
-constexpr double kMinRoughBlur_px = 0.8;
+/// Blur that is assumed of edges before it is known.
+constexpr double kRoughBlur_px = 0.8;
 
 /// What follows upon the black stripe inside an edge: how wide that is, start + by_along w, and
 /// where along the edge white bits begin and end.
@@ -35,31 +35,28 @@ struct Behind {
 
   double stripe_px(double w) const { return start_px + by_along_px * w; }
 
-  double white_at(double w, const EdgeCurve& edge) const {
-    const Blur along_edge(edge.blur_px);  // about; it is not solved for
+  double white_at(double w, double half_px, double blur_px) const {
+    const Blur along_edge(blur_px);  // about; it is not solved for
     double sum = 0;
     for (const auto& [from, to] : white) {
-      sum += BlurredStep((w - from) * edge.half_px, along_edge).value -
-             BlurredStep((w - to) * edge.half_px, along_edge).value;
+      sum += BlurredStep((w - from) * half_px, along_edge).value -
+             BlurredStep((w - to) * half_px, along_edge).value;
     }
     return sum / 2;
   }
 };
 
-/// The pixels along an edge of a tag, by where its edges are roughly.
+/// Returns the pixels along an edge of a tag, by where its edges are roughly, and how blurred.
 std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
                                      const std::array<EdgeCurve, 4>& roughly, std::size_t k,
-                                     const Behind& behind, const Band& band) {
+                                     const Behind& behind, const Band& band, double blur_px) {
   // Of the edges beside it, which are as blurred; so the corners, which are round, are away.
   constexpr double free_blurs = 3.125, max_free_fraction = 0.3;
   const EdgeCurve &edge = roughly[k], &next = roughly[(k + 1) % 4],
                   &previous = roughly[(k + 3) % 4];
-  const auto free_px = [&](const EdgeCurve& beside) {
-    return std::clamp(
-        free_blurs * beside.blur_px, free_blurs * kMinRoughBlur_px,
-        std::max(free_blurs * kMinRoughBlur_px, max_free_fraction * 2 * edge.half_px));
-  };
-  const double free_of_next_px = free_px(next), free_of_previous_px = free_px(previous);
+  const double free_px =
+      std::clamp(free_blurs * blur_px, free_blurs * kRoughBlur_px,
+                 std::max(free_blurs * kRoughBlur_px, max_free_fraction * 2 * edge.half_px));
   const double reach_px = std::max(band.inside_px, band.outside_px) + edge.coefficients.lpNorm<1>();
   const Eigen::Vector2d wide =
       edge.along.cwiseAbs() * edge.half_px + edge.across.cwiseAbs() * reach_px;
@@ -73,9 +70,9 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
       const double w = edge.along.dot(at - edge.middle) / edge.half_px;
       const double v = edge.across.dot(at - edge.middle), off = v - edge.value_at(w);
       if (off < -band.inside_px || off > band.outside_px) continue;
-      if (next.off(at) > -free_of_next_px || previous.off(at) > -free_of_previous_px) continue;
+      if (next.off(at) > -free_px || previous.off(at) > -free_px) continue;
       pixels.push_back({w, v, static_cast<double>(image(row, column)), behind.stripe_px(w),
-                        behind.white_at(w, edge)});
+                        behind.white_at(w, edge.half_px, blur_px)});
     }
   }
   return pixels;
@@ -101,19 +98,21 @@ class TagEdges {
   /// has gone too far.
   std::optional<SeenTag::Outline> crossed() const;
 
-  /// Returns the steps across the edges; unknown ones if an edge is missing or white runs over it.
-  SeenTag::Steps steps() const;
+  /// Returns the steps across the edges behind a tone curve; unknown ones if an edge is missing or
+  /// white runs over it. Edges that are more blurred than assumed are fitted again for them,
+  /// without the corners and bits that are as blurred. Corners remain as fitted: they lose by fewer
+  /// pixels.
+  SeenTag::Steps steps(const cv::Mat1b& image, double gamma) const;
 
  private:
-  /// Takes the fit of a copy.
-  void restore(const TagEdges& fitted);
   void look_behind(const TagPrint& print);
-  void look_beside(const cv::Mat1b& image, const Band& band);
+  void look_beside(const cv::Mat1b& image, double blur_px);
 
   const SeenTag& tag_;
   std::array<EdgeCurve, 4> roughly_, edges_;
   std::array<Behind, 4> behind_;
   std::array<std::vector<EdgePixel>, 4> pixels_;
+  Band band_{};
   double width_px_ = INFINITY;  // where it is narrowest
   double bow_px_ = 0;           // of the most bent
   std::array<EdgeFit, 4> fits_{};
@@ -160,12 +159,6 @@ double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCur
   return most_px;
 }
 
-/// Returns true if the edges are more blurred than is assumed at first, by a half or more.
-bool is_more_blurred(const std::array<EdgeCurve, 4>& edges) {
-  return std::any_of(edges.begin(), edges.end(),
-                     [](const EdgeCurve& edge) { return edge.blur_px > 1.5 * kMinRoughBlur_px; });
-}
-
 EdgePrior without_curve(const EdgeCurve&) { return {}; }
 
 /// From the sides of the quad, which libapriltag has.
@@ -191,38 +184,20 @@ TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& p
   edges_ = roughly_;
   look_behind(print);
   const double bit_px = width_px_ / print.width();
-  const Band band{std::clamp(print.inside() * bit_px - away_px, least_px, most_px),
-                  std::clamp(print.outside() * bit_px - away_px, least_px, most_px)};
-  look_beside(image, band);
+  band_ = {std::clamp(print.inside() * bit_px - away_px, least_px, most_px),
+           std::clamp(print.outside() * bit_px - away_px, least_px, most_px)};
+  look_beside(image, kRoughBlur_px);
   fit(without_curve);
   // A wide lens bends an edge out of a band along the quad's side, which ends beside the corners.
-  // A large blur rounds more of the corners.
-  for (int round = 0; round < most_rounds && found_; ++round) {
-    const bool is_bent =
-        bow_px_ > bent_px && (round == 0 || difference_px(edges_, roughly_) >= settled_px);
-    if (!is_bent && !(round == 0 && is_more_blurred(edges_))) break;
-    const TagEdges sharp = *this;
+  for (int round = 0; round < most_rounds && found_ && bow_px_ > bent_px; ++round) {
+    if (round > 0 && difference_px(edges_, roughly_) < settled_px) break;
     for (EdgeCurve& edge : edges_) {
       edge.cubic = edge.cubic || std::abs(edge.coefficients[2]) > no_parabola_px;
-      edge.blur_px = std::max(edge.blur_px, kMinRoughBlur_px);
     }
     roughly_ = edges_;
-    look_beside(image, band);
+    look_beside(image, kRoughBlur_px);
     fit(without_curve);
-    if (!found_ && !is_bent) {  // too few pixels are left beside the blurred corners
-      restore(sharp);
-      break;
-    }
   }
-}
-
-void TagEdges::restore(const TagEdges& fitted) {
-  roughly_ = fitted.roughly_;
-  edges_ = fitted.edges_;
-  pixels_ = fitted.pixels_;
-  fits_ = fitted.fits_;
-  bow_px_ = fitted.bow_px_;
-  found_ = fitted.found_;
 }
 
 void TagEdges::look_behind(const TagPrint& print) {
@@ -248,9 +223,9 @@ void TagEdges::look_behind(const TagPrint& print) {
   }
 }
 
-void TagEdges::look_beside(const cv::Mat1b& image, const Band& band) {
+void TagEdges::look_beside(const cv::Mat1b& image, double blur_px) {
   for (std::size_t k = 0; k < 4; ++k) {
-    pixels_[k] = pixels_beside(image, roughly_, k, behind_[k], band);
+    pixels_[k] = pixels_beside(image, roughly_, k, behind_[k], band_, blur_px);
   }
 }
 
@@ -290,10 +265,21 @@ std::optional<SeenTag::Outline> TagEdges::crossed() const {
   return outline;
 }
 
-SeenTag::Steps TagEdges::steps() const {
+SeenTag::Steps TagEdges::steps(const cv::Mat1b& image, double gamma) const {
   SeenTag::Steps steps;
-  for (std::size_t k = 0; found_ && k < steps.size(); ++k) {
-    const EdgeFit& fit = fits_[k];
+  if (!found_) return steps;
+  double blur_px = 0;
+  for (const EdgeCurve& edge : edges_) blur_px = std::max(blur_px, edge.blur_px);
+  std::optional<TagEdges> blurred;
+  if (blur_px > 1.5 * kRoughBlur_px) {
+    blurred.emplace(*this);
+    blurred->roughly_ = edges_;
+    blurred->look_beside(image, blur_px);
+    blurred->fit([&](const EdgeCurve&) { return EdgePrior{gamma}; });
+  }
+  const TagEdges& measured = blurred && blurred->found_ ? *blurred : *this;
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const EdgeFit& fit = measured.fits_[k];
     if (!fit.runs_over) steps[k] = {fit.equivalent_blur_px, fit.dark_light, fit.bright_light};
   }
   return steps;
@@ -449,7 +435,7 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
     };
     take();
     // The fits below share one blur, in which a blurred part of the image would be lost.
-    for (const std::size_t i : widest) outlines[i].steps = edges[i].steps();
+    for (const std::size_t i : widest) outlines[i].steps = edges[i].steps(image, gamma);
     const SomeTags found{edges, widest};
     const bool over = found.run_over();
     if (over || gamma != 1) {

@@ -36,10 +36,6 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("centre        {:.2f}, {:.2f} px\n", parameters[2], parameters[3]);
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst\n", report.uncertainty_mean_px,
              report.uncertainty_worst_px);
-  if (lens.print_px) {
-    fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
-               *lens.print_px);
-  }
   if (report.region_share > 0.999) {
     fmt::print("board seen    all over the image\n");
   } else {
