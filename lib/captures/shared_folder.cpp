@@ -227,6 +227,12 @@ void SharedFolder::remove(const std::string& name) const {
   }
 }
 
+void SharedFolder::remove_folder(const Id& name) const {
+  if (::unlinkat(descriptor_, name.text().c_str(), AT_REMOVEDIR) != 0) {
+    fail(path_ / name.text(), "cannot be deleted");
+  }
+}
+
 void SharedFolder::remove_content() const {
   // The open folder, though its name may lead elsewhere by now.
   const fs::path open = "/proc/self/fd/" + std::to_string(descriptor_);

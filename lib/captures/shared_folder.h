@@ -47,6 +47,8 @@ class SharedFolder {
   void remove(const std::string& name) const;
   /// Removes all that is in the folder, with its folders; of a link, the link.
   void remove_content() const;
+  /// Removes an empty folder in this one.
+  void remove_folder(const Id& name) const;
 
  private:
   SharedFolder(std::filesystem::path path, int descriptor);

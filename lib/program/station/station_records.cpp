@@ -302,7 +302,7 @@ void clean_up(const StationRecordsOptions& options) {
   for (const ExpiredFolder& expired : found.expired) {
     const double mb = double(expired.bytes) / megabyte;
     try {
-      if (options.remove) delete_expired(expired, *known->spool());
+      if (options.remove) delete_expired(expired, config, *known->spool());
     } catch (const InputError& error) {
       spdlog::warn("{}", printable(error.what()));
       continue;

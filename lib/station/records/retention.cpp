@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <deque>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -53,11 +55,37 @@ std::uintmax_t bytes_in(const fs::path& folder) {
   return bytes;
 }
 
-/// Returns true if a file or folder is the folder, or anywhere in it.
-bool is_within(const fs::path& file, const fs::path& folder) {
+/// Returns true if a file is opened through a folder: by its name, or by a link on the way. Returns
+/// true as well if a link cannot be followed, so that a folder in doubt is kept.
+bool leads_through(const fs::path& file, const fs::path& folder) {
+  constexpr int max_links = 40;  // as the system has it
   std::error_code error;
-  const fs::path from_folder = fs::relative(file, folder, error);  // with all links followed
-  return !error && !from_folder.empty() && *from_folder.begin() != "..";
+  const fs::path absolute = fs::absolute(file, error);
+  if (error) return true;
+  std::deque<fs::path> parts(absolute.begin(), absolute.end());
+  fs::path place;
+  for (int links = 0; !parts.empty();) {
+    const fs::path part = std::move(parts.front());
+    parts.pop_front();
+    if (part.empty() || part == ".") continue;
+    const fs::path next = part == ".." ? place.parent_path() : place / part;
+    const fs::file_status status = fs::symlink_status(next, error);
+    if (status.type() == fs::file_type::not_found || error == std::errc::filename_too_long) {
+      return false;
+    }
+    if (error) return true;
+    if (status.type() != fs::file_type::symlink) {
+      place = next;
+      if (fs::is_directory(status) && fs::equivalent(place, folder, error)) return true;
+      if (error) return true;
+      continue;
+    }
+    const fs::path target = fs::read_symlink(next, error);
+    if (error || ++links > max_links) return true;
+    if (target.is_absolute()) place.clear();
+    parts.insert(parts.begin(), target.begin(), target.end());
+  }
+  return false;
 }
 
 /// Returns true if the station needs something in a folder: a file that it reads, its records, its
@@ -66,9 +94,13 @@ bool is_in_use(const fs::path& folder, const StationConfig& config) {
   std::vector<fs::path> needed = config.inputs;
   needed.insert(needed.end(), {config.spool, config.captures, config.results});
   if (!is_server(config.records)) needed.emplace_back(config.records);
-  if (config.hook) needed.emplace_back(config.hook->command.front());
+  if (config.hook) {  // its arguments may be files, such as the script of an interpreter
+    for (const std::string& word : config.hook->command) {
+      if (!word.empty()) needed.push_back(config.hook->folder / word);
+    }
+  }
   return std::any_of(needed.begin(), needed.end(), [&](const fs::path& file) {
-    return !file.empty() && is_within(file, folder);
+    return !file.empty() && leads_through(file, folder);
   });
 }
 
@@ -89,18 +121,18 @@ void add_if_expired(Retained& found, Records& records, const StationConfig& conf
   }
 }
 
-/// Opens an expired folder from the one that it is in, so that no link is followed.
-SharedFolder open_expired(const fs::path& folder) {
-  auto found =
-      SharedFolder(folder.parent_path()).find_folder({folder.filename().string(), folder, "run"});
-  if (!found) throw InputError(folder, "cannot be deleted: it is not there");
+SharedFolder open_existing(const SharedFolder& parent, const Id& name) {
+  auto found = parent.find_folder(name);
+  if (!found) throw InputError(parent.path() / name.text(), "cannot be deleted: it is not there");
   return std::move(*found);
 }
 
-void delete_folder(const ExpiredFolder& expired) {
-  std::error_code error;
-  fs::remove(expired.folder, error);
-  if (error) throw InputError(expired.folder, "cannot be deleted: " + error.message());
+/// Opens the folder that an expired one is in, from the folder that station.yaml names, so that no
+/// link is followed.
+SharedFolder open_parent(const ExpiredFolder& expired, const StationConfig& config) {
+  if (expired.what == std::string_view(kImagesDeleted)) return SharedFolder(config.captures);
+  return open_existing(SharedFolder(config.results),
+                       {expired.run.camera, "the record of a run", "camera"});
 }
 
 }  // namespace
@@ -154,8 +186,10 @@ void check_clock(const StationConfig& config, Records& records) {
                   newest, now_utc()));
 }
 
-void delete_expired(const ExpiredFolder& expired, Spool& spool) {
-  open_expired(expired.folder).remove_content();
+void delete_expired(const ExpiredFolder& expired, const StationConfig& config, Spool& spool) {
+  const SharedFolder parent = open_parent(expired, config);
+  const Id name(expired.folder.filename().string(), expired.folder, "run");
+  open_existing(parent, name).remove_content();
   const auto& events = expired.run.events;
   const bool told = std::any_of(events.begin(), events.end(),
                                 [&](const RunEvent& event) { return event.what == expired.what; });
@@ -167,7 +201,7 @@ void delete_expired(const ExpiredFolder& expired, Spool& spool) {
         fmt::format("kept {} days, {:.1f} MB", expired.days, double(expired.bytes) / megabyte)));
     spool.keep(run);
   }
-  delete_folder(expired);
+  parent.remove_folder(name);
 }
 
 }  // namespace vlp

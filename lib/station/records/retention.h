@@ -43,9 +43,9 @@ Retained look_for_expired(const StationConfig& config, Records& records);
 /// recorded cannot be told from a right one.
 void check_clock(const StationConfig& config, Records& records);
 
-/// Deletes the folder of a run; links are not followed. Its record tells of it as soon as nothing
-/// is in the folder, which goes last, so that a program that is killed before it has told of it
-/// finds the folder again. Throws InputError.
-void delete_expired(const ExpiredFolder& expired, Spool& spool);
+/// Deletes the folder of a run; links below `config.captures` and `config.results` are not
+/// followed. Its record tells of it as soon as nothing is in the folder, which goes last, so that a
+/// program that is killed before it has told of it finds the folder again. Throws InputError.
+void delete_expired(const ExpiredFolder& expired, const StationConfig& config, Spool& spool);
 
 }  // namespace vlp

@@ -98,7 +98,7 @@ TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].bytes, 1000U);
   Spool spool(folder / "spool", (folder / "records.db").string());
-  delete_expired(found.expired[0], spool);
+  delete_expired(found.expired[0], config, spool);
   EXPECT_FALSE(fs::exists(images));
   EXPECT_TRUE(fs::exists(elsewhere / "check/0.png"));
   spool.deliver();
@@ -107,7 +107,7 @@ TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
   ASSERT_THAT(told->events, SizeIs(1));
   EXPECT_EQ(told->events[0].what, kImagesDeleted);
   EXPECT_EQ(told->events[0].text, "kept 90 days, 0.0 MB");
-  EXPECT_THROW(delete_expired(found.expired[0], spool), InputError) << "it is not there";
+  EXPECT_THROW(delete_expired(found.expired[0], config, spool), InputError) << "it is not there";
 }
 
 /// A golden unit's calibration among the results of the run that measured it.
@@ -127,6 +127,43 @@ TEST_F(RetentionTest, LeavesAFolderThatTheStationNeeds) {
   config.inputs = {};
   config.spool = images / "spool";
   EXPECT_THAT(look_for_expired(config, records).in_use, ElementsAre(images));
+}
+
+TEST_F(RetentionTest, LeavesAFolderThroughWhichALinkLeads) {
+  keep(kOld, "a", "2020-01-01T01:00:00Z");
+  const fs::path results = with_file("results/a/" + kOld);
+  const auto expect_in_use = [&](const std::string& why) {
+    EXPECT_THAT(look_for_expired(config, records).in_use, ElementsAre(results)) << why;
+  };
+  fs::create_symlink(folder.file("elsewhere.yaml", ""), results / "golden.yaml");
+  config.inputs = {results / "golden.yaml"};
+  expect_in_use("the link is in it");
+  fs::create_symlink(results / "golden.yaml", folder / "golden.yaml");
+  config.inputs = {folder / "golden.yaml"};
+  expect_in_use("a link to the link in it");
+  fs::create_symlink("loop", folder / "loop");
+  config.inputs = {folder / "loop"};
+  expect_in_use("cannot be followed");
+  config.inputs = {folder / "elsewhere.yaml", folder / "none"};
+  ASSERT_THAT(look_for_expired(config, records).in_use, IsEmpty());
+  const std::string script = "results/a/" + kOld + "/hook.py";
+  config.hook = Hook{{"python3", script, std::string(5000, 'x')}, folder / ""};
+  folder.file(script, "");
+  expect_in_use("a script of the hook");
+}
+
+TEST_F(RetentionTest, DeletesNothingBehindACameraThatBecameALink) {
+  keep(kOld, "a", "2020-01-01T01:00:00Z");
+  with_file("results/a/" + kOld);
+  const fs::path kept = with_file("elsewhere/" + kOld);
+  const Retained found = look_for_expired(config, records);
+  ASSERT_THAT(found.expired, SizeIs(1));
+  fs::remove_all(folder / "results/a");
+  fs::create_directory_symlink(folder / "elsewhere", folder / "results/a");
+  Spool spool(folder / "spool", (folder / "records.db").string());
+  EXPECT_THAT(refusal_of([&] { delete_expired(found.expired[0], config, spool); }),
+              HasSubstr("results/a: is a symbolic link"));
+  EXPECT_TRUE(fs::exists(kept / "check/0.png"));
 }
 
 TEST_F(RetentionTest, TrustsNoClockYearsAhead) {
