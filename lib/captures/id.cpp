@@ -26,7 +26,8 @@ Id::Id(std::string text, const std::filesystem::path& source, std::string_view k
   constexpr std::size_t max_shown = 100;
   std::string problem = first_characters(printable_line(text_), max_shown);
   throw InputError(source, problem.insert(0, "'").append("' is no id of a ").append(kind) +
-                               ": it would name a file elsewhere, or forge a line");
+                               ": 1 to 200 bytes of UTF-8 are one, without '/', without "
+                               "control characters, and without a '.' at the beginning");
 }
 
 }  // namespace vlp

@@ -28,8 +28,8 @@ TEST(Id, IsNoWayToAnotherFolderAndNoForgedLine) {
     EXPECT_FALSE(Id::accepts(text)) << text;
   }
   EXPECT_EQ(refusal_of([] { Id("../x\n", "spool/a.json", "run"); }),
-            "spool/a.json: '../x\\x0a' is no id of a run: it would name a file elsewhere, or forge "
-            "a line");
+            "spool/a.json: '../x\\x0a' is no id of a run: 1 to 200 bytes of UTF-8 are one, without "
+            "'/', without control characters, and without a '.' at the beginning");
 }
 
 }  // namespace

@@ -360,7 +360,7 @@ void export_runs(const StationRecordsOptions& options) {
 }
 
 void import_archive(const StationRecordsOptions& options) {
-  const auto [sessions, undated, crashed] = sessions_of_archive(options.archive);
+  auto [sessions, undated, crashed, refused] = sessions_of_archive(options.archive);
   if (undated > 0) {
     spdlog::warn(
         "{} sessions are left out: when they were taken stands neither in archive.csv "
@@ -368,23 +368,37 @@ void import_archive(const StationRecordsOptions& options) {
         undated);
   }
   if (crashed > 0) spdlog::warn("{} sessions are left out: their program crashed", crashed);
-  if (sessions.empty()) throw Undetermined(options.archive + ": no session with a date");
+  if (sessions.empty() && refused.empty()) {
+    throw Undetermined(options.archive + ": no session with a date");
+  }
   Records records(options.records);
   Progress progress("sessions");
-  std::size_t taken = 0;
+  std::size_t taken = 0, unread = 0;
   std::vector<std::string> other;
   for (std::size_t i = 0; i < sessions.size(); ++i) {
     const RunRecord& run = sessions[i].run;
     if (const auto kept = records.find(run.run)) {
       if (kept->config_sha256 != run.config_sha256) other.push_back(run.run);
     } else {
-      records.keep(run_of(sessions[i]));
-      ++taken;
+      std::optional<RunRecord> read;
+      try {
+        read = run_of(sessions[i]);
+      } catch (const InputError& error) {
+        refused.emplace_back(error.what());
+      }
+      if (read) records.keep(*read);
+      ++(read ? taken : unread);
     }
     progress.update(i + 1, sessions.size());
   }
-  say_line(fmt::format("station {}: {} runs taken, {} were there", sessions.front().run.station,
-                       taken, sessions.size() - taken - other.size()));
+  if (!sessions.empty()) {
+    say_line(fmt::format("station {}: {} runs taken, {} were there", sessions.front().run.station,
+                         taken, sessions.size() - taken - unread - other.size()));
+  }
+  if (!refused.empty()) {
+    throw std::invalid_argument(fmt::format("{} sessions are not taken, the first because of {}",
+                                            refused.size(), refused.front()));
+  }
   if (other.empty()) return;
   throw std::invalid_argument(fmt::format(
       "{} sessions, the first {}, have another result than these records have: take new records",

@@ -94,8 +94,14 @@ ReprocessedArchive sessions_of_archive(const fs::path& results) {
     run.station = last.string();
     const fs::path line =
         (results / "summary.csv").string() + ":" + std::to_string(summary.line(row));
-    run.camera = Id(text(row, "camera"), line, "camera").text();
-    const std::string session = run.camera + "/" + Id(text(row, "session"), line, "session").text();
+    std::string session;
+    try {
+      run.camera = Id(text(row, "camera"), line, "camera").text();
+      session = run.camera + "/" + Id(text(row, "session"), line, "session").text();
+    } catch (const InputError& error) {
+      archive.refused.emplace_back(error.what());
+      continue;
+    }
     run.begun_utc = run.ended_utc = utc_of_date(date);
     run.run = run_name(run.ended_utc, run.station + "/" + session);
     run.program = "vlp-calibrate " + text(row, "version");

@@ -62,7 +62,8 @@ bool mark_files_voided(const RunRecord& record, const fs::path& results) {
                              std::pair("failed-calibration.yaml", "voided-calibration.yaml"),
                              std::pair("invalid-calibration.yaml", "voided-calibration.yaml"),
                              std::pair("certificate.html", "voided-certificate.html"),
-                             std::pair("report.html", "voided-report.html")};
+                             std::pair("report.html", "voided-report.html"),
+                             std::pair("replaced-report.html", "voided-replaced-report.html")};
   std::error_code missing;
   if (!fs::is_directory(results, missing)) return false;
   const auto camera = SharedFolder(results).find_folder(camera_of(record));
@@ -91,7 +92,9 @@ fs::path publish_run(const RunRecord& record, const std::vector<ReportPicture>& 
   if (is_there && existing == ExistingReport::keep) return folder.path();
   const std::string report = unit_report(record, calibration, pictures);
   if (is_there && holds(folder, name, report)) return folder.path();
-  if (is_there) folder.rename(name, "replaced-" + name);
+  // The first one is kept: those that a restoring has drawn can be drawn again.
+  const std::string replaced = "replaced-" + name;
+  if (is_there && !folder.has(replaced)) folder.rename(name, replaced);
   folder.replace(name, report);
   return folder.path();
 }

@@ -55,6 +55,11 @@ TEST(PublishRun, ReplacesAReportThatIsNotTheRecordsIfAskedTo) {
   publish_run(record, {}, folder / "results", ExistingReport::replace);
   EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), report);
   EXPECT_EQ(TemporaryFolder::content_of(results / "replaced-report.html"), "planted");
+  folder.file((results / "report.html").string(), "again");
+  publish_run(record, {}, folder / "results", ExistingReport::replace);
+  EXPECT_EQ(TemporaryFolder::content_of(results / "replaced-report.html"), "planted");
+  EXPECT_TRUE(mark_files_voided(record, folder / "results"));
+  EXPECT_FALSE(fs::exists(results / "replaced-report.html"));
 }
 
 TEST(PublishRun, WritesNothingOutsideTheResults) {
