@@ -94,7 +94,8 @@ Json json_of(const StepResult& result) {
 
 std::optional<KeptStep> read_step(const std::filesystem::path& file) {
   try {
-    const auto text = SharedFolder(file.parent_path()).read(file.filename().string(), kMaxStepBytes);
+    const auto text =
+        SharedFolder(file.parent_path()).read(file.filename().string(), kMaxStepBytes);
     if (!text) return std::nullopt;
     check_json_bounds(*text);
     const Json json = Json::parse(*text, nullptr, false);

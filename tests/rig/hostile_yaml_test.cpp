@@ -76,8 +76,7 @@ TEST(HostileYaml, LongerThanAMebibyteIsRefused) {
 }
 
 TEST(HostileYaml, IsRefusedBeforeAllOfItIsRead) {
-  EXPECT_EQ(refusal(read_lamp_map, "/dev/zero"),
-            "zero: is a pipe or a device, not a file");
+  EXPECT_EQ(refusal(read_lamp_map, "/dev/zero"), "zero: is a pipe or a device, not a file");
 }
 
 TEST(HostileYaml, OfManySmallPiecesIsRefusedForWhatItIs) {

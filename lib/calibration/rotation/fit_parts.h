@@ -19,7 +19,8 @@ std::vector<double> yaws_of(const SpotCaptures& spot);
 
 std::vector<const double*> pointers_to(const std::vector<double>& values);
 
-/// Fills in residual_px, outliers and used_sightings of a fit whose residuals are the sightings in their order.
+/// Fills in residual_px, outliers and used_sightings of a fit whose residuals are the sightings in
+/// their order.
 void describe(RotationFit& result, const RobustFit& fit, const SpotCaptures& spot);
 
 }  // namespace vlp

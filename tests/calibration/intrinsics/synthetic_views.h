@@ -96,7 +96,8 @@ struct SyntheticViews {
       for (std::size_t k = 0; k < 4; ++k) {
         const Eigen::Array2d share = 2 * place.corners_m[k].array() / field_m.array() - 1;
         Eigen::Vector3d point;
-        point << stretch.cwiseProduct(place.corners_m[k] - field_m / 2), warp_m.dot((1 - share.square()).matrix());
+        point << stretch.cwiseProduct(place.corners_m[k] - field_m / 2),
+            warp_m.dot((1 - share.square()).matrix());
         const auto pixel = lens.project(rotation * point + middle_m);
         whole = whole && pixel && (pixel->array() > 3).all() && pixel->x() < imager_px[0] - 3 &&
                 pixel->y() < imager_px[1] - 3;

@@ -76,7 +76,8 @@ TEST(History, IsEmptyWithoutOptionsAndRefusesWhatCannotBeRead) {
   const TemporaryFolder folder;
   EXPECT_EQ(entry_of("images", {}).options, "");
   const std::string missing = (folder / "missing").string();
-  EXPECT_EQ(refusal_of([&] { entry_of("images", {missing}); }), missing + ": cannot be opened: No such file or directory");
+  EXPECT_EQ(refusal_of([&] { entry_of("images", {missing}); }),
+            missing + ": cannot be opened: No such file or directory");
 }
 
 }  // namespace
