@@ -22,8 +22,7 @@ const Codecs& load_codecs() {
   if (make == nullptr) {
     throw std::runtime_error(std::string("images cannot be read or written: ") +
                              VLP_CODECS_LIBRARY +
-                             " is of another version: install the programs "
-                             "again");
+                             " is of another version: install the programs again");
   }
   return *make();
 }

@@ -12,7 +12,8 @@
 /// their own, which is loaded at the first image, and used through these interfaces.
 namespace vlp {
 
-/// cv::VideoCapture, with its members.
+/// Reads the frames of a video: cv::VideoCapture behind an interface, with its members, backends
+/// (`api`, cv::CAP_FFMPEG) and properties (cv::CAP_PROP_FPS).
 class VideoReader {
  public:
   VideoReader() = default;
@@ -27,6 +28,7 @@ class VideoReader {
   virtual void set(int property, double value) = 0;
 };
 
+/// Decodes and encodes images, and opens videos. Its functions can be called from several threads.
 class Codecs {
  public:
   Codecs() = default;
@@ -34,8 +36,8 @@ class Codecs {
   Codecs(const Codecs&) = delete;
   Codecs& operator=(const Codecs&) = delete;
 
-  /// Decodes the bytes of an image file, with the flags of cv::imread. Returns an empty matrix if
-  /// it cannot be decoded. Throws cv::Exception as cv::imdecode does.
+  /// Decodes the bytes of an image file, which stay as they are, with the flags of cv::imread.
+  /// Returns an empty matrix if it cannot be decoded. Throws cv::Exception as cv::imdecode does.
   virtual cv::Mat decode(std::string& bytes, int flags) const = 0;
 
   /// Encodes an image as a file with this ending (".png"), with parameters of cv::imwrite. Throws

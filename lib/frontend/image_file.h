@@ -13,7 +13,8 @@ namespace vlp {
 void check_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
                 double max_mpx);
 
-/// Reads an image as grey levels of 8 or 16 bits: PNG, JPEG, BMP, TIFF or PGM by its content.
+/// Reads an image as grey levels of 8 or 16 bits: PNG, JPEG, BMP, TIFF, PBM, PGM or PPM by its
+/// content.
 /// Colour is converted. An orientation stated in the file is ignored, because the readout does not
 /// turn with it. Throws InputError for a file of another kind and, before decoding, for one with
 /// more than `max_mpx` megapixels or longer than such an image can be, at most 2 GiB.

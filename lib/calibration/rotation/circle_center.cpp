@@ -178,7 +178,7 @@ bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& poi
 /// Circles of all lamps at one height.
 struct HeightCircles {
   std::vector<LampCircle> circles;
-  /// Of each circle, without outliers.
+  /// Sightings of each circle, without outliers.
   std::vector<Trace> traces;
   std::vector<SpotOutlier> outliers;
   /// Lamps with three sightings or more and no circle.

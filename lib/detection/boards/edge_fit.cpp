@@ -82,7 +82,7 @@ class Edge {
   double equivalent_blur(const Parameters& p) const {
     constexpr double kurtosis_sd = 0.5, min_noise = 0.3;  // in levels: that of rounding
     constexpr double min_kurtosis = -1.5, max_kurtosis = 3;
-    // Of the blur: beyond, the step is not linear, and the blur remains that of a Gaussian.
+    // A larger change of the blur, as a fraction of it, is not linear: the Gaussian's blur remains.
     constexpr double max_change = 0.3;
     if (p != at_) evaluate(p);
     constexpr int count = NUM_PARAMETERS + 1;

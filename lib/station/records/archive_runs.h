@@ -24,7 +24,7 @@ struct ReprocessedArchive {
   /// Those that are none of these, because nobody says when they were taken, or because their
   /// program crashed, which says nothing of the session.
   std::size_t undated = 0, crashed = 0;
-  /// Why further rows are none: their names are no ids.
+  /// Reasons of the rows that are left out because their names are no ids.
   std::vector<std::string> refused;
 };
 
