@@ -7,7 +7,9 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <span>
 #include <sstream>
 #include <string_view>
 #include <utility>
@@ -29,6 +31,13 @@ constexpr std::array kResults{
     "lens.yaml",    "lens.cameramodel", "lens.svg",       "camera.yaml",     "rotated.yaml",
     "rotation.svg", "calibration.yaml", "dispersion.svg", "check-fixes.csv", "evaluation.json",
     "junit.xml",    "report.html",      "session.json"};
+
+/// Steps except the drives.
+constexpr std::array kNamedSteps{"lens", "row-time", "rotation", "dispersion", "check", "evaluate"};
+
+bool contains(std::span<const char* const> names, std::string_view name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
 
 /// Says whose results they are.
 fs::path mark_of(const fs::path& results) { return results / "steps/session"; }
@@ -57,10 +66,15 @@ void check_owner(const fs::path& results, const fs::path& session) {
 }
 
 constexpr const char* kOutputs = "outputs";
-constexpr std::string_view kSteps = "steps/";
+constexpr std::string_view kSteps = "steps/", kRecordEnd = ".json", kFixesEnd = "-fixes.csv";
 
 /// Returns the name of a step's record in the folder of results.
-std::string record_name(const std::string& step) { return std::string(kSteps) + step + ".json"; }
+std::string record_name(const std::string& step) {
+  return std::string(kSteps).append(step).append(kRecordEnd);
+}
+
+/// Returns true for the names of drives, which are folders of a session and steps.
+bool is_drive_name(std::string_view step) { return step.starts_with("line-") && Id::accepts(step); }
 
 SharedFolder steps_in(const fs::path& results) {
   return SharedFolder(results).make_folder({"steps", results, "step"});
@@ -80,24 +94,37 @@ bool is_there(const fs::path& file) {
 }
 
 /// Returns the outputs in a folder of results that an earlier version wrote, without their list:
-/// kResults, records of steps, and fixes of drives whose steps are recorded.
-std::set<std::string> unlisted_outputs(const fs::path& results) {
+/// kResults, records of steps, and fixes of drives that are recorded or `planned`. A run that was
+/// interrupted has fixes of a drive without its record.
+std::set<std::string> unlisted_outputs(const fs::path& results,
+                                       const std::vector<StepOutputs>& planned) {
   std::set<std::string> names(kResults.begin(), kResults.end());
-  for (const char* step : {"lens", "row-time", "rotation", "dispersion", "check", "evaluate"}) {
-    names.insert(record_name(step));
-  }
+  for (const char* step : kNamedSteps) names.insert(record_name(step));
+  const auto insert_drive = [&](const std::string& step) {
+    names.insert({record_name(step), std::string(step).append(kFixesEnd)});
+  };
   for (const auto& entry : fs::directory_iterator(results / "steps")) {
     const std::string step = entry.path().stem().string();
-    if (!step.starts_with("line-") || !read_step(entry.path())) continue;
-    names.insert({record_name(step), step + "-fixes.csv"});
+    if (is_drive_name(step) && read_step(entry.path())) insert_drive(step);
+  }
+  for (const auto& [step, files] : planned) {
+    if (is_drive_name(step)) insert_drive(step);
   }
   return names;
 }
 
-/// Returns true for the name of a file in the folder of results or in steps/, whoever wrote it.
+/// Returns true for names that runs can have written: kResults, records of steps, and fixes of
+/// drives. The list of outputs is in a folder that others may write to.
 bool is_output_name(std::string_view name) {
-  if (name.starts_with(kSteps)) name.remove_prefix(kSteps.size());
-  return Id::accepts(name);
+  const auto remove_end = [&](std::string_view end) {
+    const bool has_end = name.ends_with(end);
+    if (has_end) name.remove_suffix(end.size());
+    return has_end;
+  };
+  if (contains(kResults, name)) return true;
+  if (!name.starts_with(kSteps)) return remove_end(kFixesEnd) && is_drive_name(name);
+  name.remove_prefix(kSteps.size());
+  return remove_end(kRecordEnd) && (contains(kNamedSteps, name) || is_drive_name(name));
 }
 
 }  // namespace
@@ -126,7 +153,7 @@ fs::path SessionResults::record_of(const std::string& step) const {
 std::set<std::string> SessionResults::outputs() const {
   constexpr std::size_t max_bytes = 1 << 20;
   const auto list = steps_in(folder_).read(kOutputs, max_bytes);
-  if (!list) return unlisted_outputs(folder_);
+  if (!list) return unlisted_outputs(folder_, steps_);
   std::set<std::string> names;
   std::istringstream lines(*list);
   for (std::string name; std::getline(lines, name);) {
@@ -135,11 +162,15 @@ std::set<std::string> SessionResults::outputs() const {
   return names;
 }
 
-void SessionResults::remove_outputs(const std::set<std::string>& wanted) const {
+std::set<std::string> SessionResults::remove_outputs(const std::set<std::string>& wanted) const {
+  std::set<std::string> not_removed;
   for (const std::string& name : outputs()) {
-    std::error_code ignored;
-    if (!wanted.contains(name)) fs::remove(file(name), ignored);
+    if (wanted.contains(name)) continue;
+    std::error_code error;
+    fs::remove(file(name), error);
+    if (error) not_removed.insert(name);
   }
+  return not_removed;
 }
 
 void SessionResults::plan(std::vector<StepOutputs> steps) {
@@ -150,19 +181,20 @@ void SessionResults::plan(std::vector<StepOutputs> steps) {
     wanted.insert(record_name(step));
   }
   const std::set<std::string> written = outputs();
-  std::string list;
   for (const std::string& name : wanted) {
     if (is_there(file(name)) && (!written.contains(name) || fs::is_symlink(file(name)))) {
       throw InputError(folder_, fmt::format("holds {}, which is not of vlp-calibrate; give the "
                                             "results a folder of their own",
                                             name));
     }
-    list.append(name).append("\n");
   }
-  remove_outputs(wanted);
+  wanted.merge(remove_outputs(wanted));  // the next run tries again
   const SharedFolder records = steps_in(folder_);
   // The same list need not wait for the disk again.
-  if (wanted != written || !records.has(kOutputs)) records.replace(kOutputs, list);
+  if (wanted == written && records.has(kOutputs)) return;
+  std::string list;
+  for (const std::string& name : wanted) list.append(name).append("\n");
+  records.replace(kOutputs, list);
 }
 
 std::optional<StepResult> SessionResults::kept(const std::string& step,

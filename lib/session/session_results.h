@@ -65,7 +65,8 @@ class SessionResults {
  private:
   std::filesystem::path record_of(const std::string& step) const;
   std::set<std::string> outputs() const;
-  void remove_outputs(const std::set<std::string>& wanted) const;
+  /// Removes the outputs that are not wanted. Returns those that cannot be removed.
+  std::set<std::string> remove_outputs(const std::set<std::string>& wanted) const;
   std::string digest_of_outputs(const std::string& step) const;
 
   std::filesystem::path folder_;

@@ -111,6 +111,65 @@ TEST_F(SessionResultsTest, AListOfOthersRemovesNothingOutside) {
   EXPECT_TRUE(fs::exists(folder / "outside.txt"));
 }
 
+TEST_F(SessionResultsTest, AListOfOthersRemovesOnlyWhatRunsWrite) {
+  { const SessionResults taken(results, session); }
+  folder.file("results/mine.txt", "mine");
+  folder.file("results/line-x", "mine");
+  folder.file("results/report.html", "of a run");
+  const std::string end_of_name = std::string(1, '\0') + "-fixes.csv\n";
+  folder.file("results/steps/outputs",
+              "steps/lock\nsteps/session\nsteps/outputs\nmine.txt\nline-x\nreport.html\nline-x" +
+                  end_of_name);
+  const SessionResults taken(results, session);
+  taken.forget_all();
+  EXPECT_FALSE(fs::exists(results / "report.html"));
+  for (const char* name : {"steps/lock", "steps/session", "steps/outputs", "mine.txt", "line-x"}) {
+    EXPECT_TRUE(fs::exists(results / name)) << name;
+  }
+}
+
+TEST_F(SessionResultsTest, OutputsThatCannotBeRemovedStayInTheList) {
+  const std::vector<StepOutputs> with_picture{{"lens", {"lens.yaml", "lens.svg"}}};
+  {
+    SessionResults before(results, session);
+    before.plan(with_picture);
+    fs::create_directories(results / "lens.svg/full");  // cannot be removed, even by root
+    before.plan(kPlan);
+  }
+  fs::remove_all(results / "lens.svg");
+  folder.file("results/lens.svg", "of a run");
+  SessionResults now(results, session);
+  EXPECT_NO_THROW(now.plan(with_picture));
+  EXPECT_TRUE(fs::exists(results / "lens.svg"));
+  now.plan(kPlan);
+  EXPECT_FALSE(fs::exists(results / "lens.svg"));
+}
+
+TEST_F(SessionResultsTest, OfAnEarlierVersionThatWasInterruptedGoOn) {
+  { const SessionResults taken(results, session); }
+  fs::remove(results / "steps/outputs");
+  folder.file("results/line-x-fixes.csv", "of a drive whose step is not recorded");
+  folder.file("results/steps/line-x.json", "cannot be read");
+  folder.file("results/line-y-fixes.csv", "of no drive of the session");
+  SessionResults now(results, session);
+  EXPECT_NO_THROW(now.plan({{"line-x", {"line-x-fixes.csv"}}}));
+  EXPECT_TRUE(fs::exists(results / "line-x-fixes.csv"));
+  EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
+}
+
+TEST_F(SessionResultsTest, DrivesMayHaveTheLongestNames) {
+  const std::string drive = "line-" + std::string(195, 'x'), fixes = drive + "-fixes.csv";
+  {
+    SessionResults before(results, session);
+    before.plan({{drive, {fixes}}});
+    folder.file("results/" + fixes, "of a drive");
+  }
+  SessionResults now(results, session);
+  EXPECT_NO_THROW(now.plan({{drive, {fixes}}}));
+  now.plan(kPlan);
+  EXPECT_FALSE(fs::exists(results / fixes));
+}
+
 TEST_F(SessionResultsTest, OutputsThatAreLinksAreRefused) {
   { const SessionResults taken(results, session); }
   fs::create_symlink(folder.file("mine.txt", "mine"), results / "lens.yaml");
