@@ -114,6 +114,16 @@ SharedFolder::~SharedFolder() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
+void SharedFolder::check_place() const {
+  const auto present = status_of(AT_FDCWD, path_.string());
+  struct stat opened {};
+  if (present && ::fstat(descriptor_, &opened) == 0 && present->st_dev == opened.st_dev &&
+      present->st_ino == opened.st_ino) {
+    return;
+  }
+  throw InputError(path_, "was moved or replaced while it was in use: restore it, then run again");
+}
+
 fs::path SharedFolder::checked(const std::string& name) const {
   const bool is_one_part = !name.empty() && name != "." && name != ".." &&
                            name.find('/') == std::string::npos &&

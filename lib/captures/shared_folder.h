@@ -24,6 +24,9 @@ class SharedFolder {
   ~SharedFolder();
 
   const std::filesystem::path& path() const { return path_; }
+  /// Checks that the path of a folder, made or found in another one, still leads to it, and not by
+  /// a link.
+  void check_place() const;
 
   /// Opens a folder in this one. Returns std::nullopt if it does not exist.
   std::optional<SharedFolder> find_folder(const Id& name) const;

@@ -4,13 +4,13 @@
 
 #include <fmt/core.h>
 
-#include "captures/shared_folder.h"
 #include "codecs/codecs.h"
 #include "rig/input_error.h"
 
 namespace vlp {
 
-std::filesystem::path FrameSource::save_next(const std::filesystem::path& folder) {
+std::filesystem::path FrameSource::save_next(const SharedFolder& folder) {
+  folder.check_place();
   const auto frame = ended_ ? std::nullopt : video_.next();
   if (!frame) {
     if (video_.is_camera()) throw InputError(source_, "the camera gives no frame");
@@ -19,13 +19,12 @@ std::filesystem::path FrameSource::save_next(const std::filesystem::path& folder
   }
   const std::string content = codecs().encode(".png", frame->image, {});
   // A run that goes on does not write over the frames that it has.
-  const SharedFolder step(folder);
   std::string name;
   do {
     name = fmt::format("frame-{:06}.png", frames_++);
-  } while (step.has(name));
-  step.replace(name, content);
-  return folder / name;
+  } while (folder.has(name));
+  folder.replace(name, content);
+  return folder.path() / name;
 }
 
 }  // namespace vlp

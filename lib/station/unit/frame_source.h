@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 
+#include "captures/shared_folder.h"
 #include "frontend/video.h"
 
 namespace vlp {
@@ -17,10 +18,10 @@ class FrameSource {
   FrameSource(const std::string& source, const std::array<int, 2>& imager_px)
       : source_(source), video_(source, imager_px) {}
 
-  /// Saves the next frame, grey, as FOLDER/frame-000123.png, whole or not at all, and returns its
-  /// path; nothing at the end of a file. Throws InputError when it cannot be written, or when a
-  /// camera gives no frame.
-  std::filesystem::path save_next(const std::filesystem::path& folder);
+  /// Saves the next frame, grey, as FOLDER/frame-000123.png, whole or not at all. Returns its path,
+  /// which is empty at the end of a file. Throws InputError if it cannot be written, if the path of
+  /// the folder leads elsewhere by now, or if a camera gives no frame.
+  std::filesystem::path save_next(const SharedFolder& folder);
 
   bool ended() const { return ended_; }
 

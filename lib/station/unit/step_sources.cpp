@@ -32,7 +32,7 @@ void StepSources::feed(const Unit& unit, WatchedRun& run) {
   last_.clear();
   const auto step = unit.current();
   if (!step || !by_step_.contains(*step)) return;
-  last_ = by_step_.at(*step)->save_next(run.folder() / name_of(*step));
+  last_ = by_step_.at(*step)->save_next(run.step_folder(*step));
   last_step_ = *step;
 }
 

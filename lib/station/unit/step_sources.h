@@ -23,7 +23,8 @@ class StepSources {
   bool any() const { return !by_step_.empty(); }
   /// Puts the next frame into the folder of the present step, once the one before is judged. A
   /// frame that is refused is taken away: a camera that moves blurs, one that rests shows nothing
-  /// new. The record tells of those with a fault. Throws InputError: no room, a camera that fails.
+  /// new. The record tells of those with a fault. Throws InputError as FrameSource::save_next()
+  /// and WatchedRun::discard().
   void feed(const Unit& unit, WatchedRun& run);
   /// Whether the present step's video is at its end, and all of it is judged.
   bool ended(const Unit& unit) const;

@@ -46,9 +46,11 @@ WatchedRun::WatchedRun(Unit& unit, Spool& spool)
       files_(open_captures(unit.config().captures, unit.camera_id())) {
   begin(spool);
   if (finished_) return;
+  steps_.reserve(kStationSteps.size());
+  step_folders_.reserve(kStationSteps.size());
   for (const StationStep step : kStationSteps) {
-    files_.make_folder({name_of(step), folder_, "step"});
-    steps_.emplace_back(folder_ / name_of(step));
+    step_folders_.push_back(files_.make_folder({name_of(step), folder_, "step"}));
+    steps_.emplace_back(step_folders_.back().path());
   }
   waiting_.resize(steps_.size());
   tables_.resize(steps_.size());
@@ -142,10 +144,14 @@ void WatchedRun::mark_kept() const {
 
 void WatchedRun::discard(StationStep step, const std::string& image) {
   WatchedFolder& folder = steps_[static_cast<std::size_t>(step)];
-  std::error_code ignored;
-  fs::remove(folder.folder() / image, ignored);
+  step_folder(step).remove(image);
   folder.forget(image);
   unit_.discard(step, image);
+}
+
+void WatchedRun::put_away() const {
+  files_.check_place();
+  vlp::put_away(folder_, run_);
 }
 
 void put_away(const fs::path& folder, const std::string& run) {

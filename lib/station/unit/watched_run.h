@@ -46,15 +46,20 @@ class WatchedRun {
   /// Takes what changed, a few images at a time, and solves what has enough.
   std::vector<Arrival> look(std::size_t most);
 
-  /// Takes away the file of a refused image, not the refusal (Unit::discard).
+  /// Removes the file of a refused image, not the refusal (Unit::discard). Throws InputError if it
+  /// cannot be removed.
   void discard(StationStep step, const std::string& image);
 
   const std::string& run() const { return run_; }
   const std::filesystem::path& folder() const { return folder_; }
+  const SharedFolder& step_folder(StationStep step) const {
+    return step_folders_[static_cast<std::size_t>(step)];
+  }
 
   /// After the run is kept: from then on it is not judged again, though the records be away.
   void mark_kept() const;
-  void put_away() { vlp::put_away(folder_, run_); }
+  /// Renames the folder by put_away(). Throws InputError also if its path leads elsewhere by now.
+  void put_away() const;
 
  private:
   void begin(Spool& spool);
@@ -67,6 +72,7 @@ class WatchedRun {
   std::optional<RunRecord> finished_;
   int lock_ = -1;
   std::vector<WatchedFolder> steps_;
+  std::vector<SharedFolder> step_folders_;
   std::vector<std::vector<std::filesystem::path>> waiting_;
   std::vector<std::string> tables_;
 };

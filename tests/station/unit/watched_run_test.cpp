@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/unit/watched_run.h"
+
+#include <gmock/gmock.h>
+
+#include "station/unit/step_sources.h"
+#include "support/refused.h"
+#include "support/temporary_folder.h"
+#include "support/write_video.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// A run of a unit whose captures others can write to.
+class WatchedRunTest : public testing::Test {
+ protected:
+  WatchedRunTest() { fs::create_directory(folder / "elsewhere"); }
+
+  StationConfig make_config() const {
+    StationConfig made = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
+    made.captures = folder / "captures";
+    made.results = folder / "results";
+    return made;
+  }
+  /// Puts a link to another folder in the place of one of the captures.
+  void replace_by_link(const std::string& name) const {
+    fs::rename(folder / name, folder / "moved");
+    fs::create_directory_symlink(folder / "elsewhere", folder / name);
+  }
+
+  const TemporaryFolder folder;
+  StationConfig config = make_config();
+  Unit unit{config, "0001", {"test", "0"}, 1};
+  Spool spool{folder / "spool", (folder / "records.db").string()};
+};
+
+TEST_F(WatchedRunTest, WritesNoFrameThroughALinkThatCameLater) {
+  const fs::path video = folder / "black.avi";
+  const cv::Mat frame(600, 800, CV_8UC1, cv::Scalar(0));
+  if (!write_video(video, {frame, frame})) GTEST_SKIP() << "OpenCV writes no video here";
+  StepSources sources({video.string()}, {800, 600});
+  WatchedRun run(unit, spool);
+  sources.feed(unit, run);
+  ASSERT_TRUE(fs::exists(run.folder() / "boards/frame-000000.png"));
+  replace_by_link("captures/0001/boards");
+  EXPECT_THAT(refusal_of([&] { sources.feed(unit, run); }),
+              HasSubstr("boards: was moved or replaced while it was in use"));
+  EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
+}
+
+TEST_F(WatchedRunTest, RemovesNoFileThroughALinkThatCameLater) {
+  WatchedRun run(unit, spool);
+  for (const char* name : {"captures/0001/boards/a.png", "elsewhere/a.png"}) folder.file(name, "a");
+  replace_by_link("captures/0001/boards");
+  run.discard(StationStep::boards, "a.png");
+  EXPECT_FALSE(fs::exists(folder / "moved/a.png"));
+  EXPECT_TRUE(fs::exists(folder / "elsewhere/a.png"));
+}
+
+TEST_F(WatchedRunTest, PutsAwayItsOwnFolderOnly) {
+  {
+    const WatchedRun run(unit, spool);
+    replace_by_link("captures/0001");
+    EXPECT_THAT(refusal_of([&] { run.put_away(); }),
+                HasSubstr("0001: was moved or replaced while it was in use"));
+    EXPECT_TRUE(fs::is_symlink(run.folder()));
+  }
+  fs::remove(folder / "captures/0001");
+  fs::rename(folder / "moved", folder / "captures/0001");
+  const WatchedRun again(unit, spool);
+  again.put_away();
+  EXPECT_TRUE(fs::exists(folder / ("captures/0001." + again.run())));
+}
+
+}  // namespace
+}  // namespace vlp
