@@ -21,19 +21,6 @@ namespace fs = std::filesystem;
 Id camera_of(const RunRecord& record) { return {record.camera, "the record of a run", "camera"}; }
 Id run_of(const RunRecord& record) { return {record.run, "the record of a run", "run"}; }
 
-/// Writes the calibration of a record, or checks the one that is there. Returns its path.
-fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) {
-  const char* name = calibration_name(record);
-  fs::path file = folder.path() / name;
-  const auto existing = folder.read(name, 2 * record.calibration.size());
-  if (!existing) {
-    folder.replace(name, record.calibration);
-  } else if (*existing != record.calibration) {
-    throw InputError(file, "is not what the record has: move it away");
-  }
-  return file;
-}
-
 /// Returns true if a file has this content. A longer one, a link and a pipe do not.
 bool holds(const SharedFolder& folder, const std::string& name, const std::string& content) {
   try {
@@ -41,6 +28,18 @@ bool holds(const SharedFolder& folder, const std::string& name, const std::strin
   } catch (const InputError&) {
     return false;
   }
+}
+
+/// Writes the calibration of a record, or checks the existing one. Returns its path.
+fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) {
+  const char* name = calibration_name(record);
+  fs::path file = folder.path() / name;
+  if (!folder.has(name)) {
+    folder.replace(name, record.calibration);
+  } else if (!holds(folder, name, record.calibration)) {
+    throw InputError(file, "is not what the record has: move it away");
+  }
+  return file;
 }
 
 }  // namespace

@@ -101,9 +101,20 @@ TEST(PublishRun, LeavesAnotherCalibrationAlone) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
-  folder.file((results / "calibration.yaml").string(), "another\n");
-  EXPECT_THAT(refusal_of([&] { publish_run(record, {}, folder / "results"); }),
-              HasSubstr("calibration.yaml: is not what the record has"));
+  const auto expect_refused = [&] {
+    EXPECT_THAT(refusal_of([&] { publish_run(record, {}, folder / "results"); }),
+                HasSubstr("calibration.yaml: is not what the record has: move it away"));
+  };
+  const fs::path file = folder.file((results / "calibration.yaml").string(), "another\n");
+  expect_refused();
+  const std::string long_content(3 * record.calibration.size(), 'x');
+  folder.file(file.string(), long_content);
+  expect_refused();
+  EXPECT_EQ(TemporaryFolder::content_of(file), long_content);
+  fs::remove(file);
+  fs::create_symlink(folder / "mine.yaml", file);
+  expect_refused();
+  EXPECT_FALSE(fs::exists(folder / "mine.yaml"));
 }
 
 TEST(PublishRun, NamesACalibrationByItsVerdict) {
