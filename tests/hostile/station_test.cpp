@@ -74,14 +74,18 @@ class HostileStation : public SmallStation {
     ASSERT_EQ(done.exit_code, 0) << done.errors;
     fs::remove(folder / "script.py");
   }
-  /// Lets the one run end years ago, as records and folders have it.
-  void age_run() const {
+  /// Lets the one run begin and end this many days ago, as records and folders have it.
+  void age_run(int days) const {
     python(
-        "import os, sqlite3, sys\n"
+        "import os, sqlite3, sys, time\n"
         "db = sqlite3.connect(sys.argv[1] + '/records.db', isolation_level=None)\n"
         "run = db.execute('SELECT run FROM runs').fetchone()[0]\n"
-        "old = '20200101T000000Z-0123456789abcdef'\n"
-        "db.execute('UPDATE runs SET run = ?, ended_utc = ?', (old, '2020-01-01T00:10:00Z'))\n"
+        "past = time.gmtime(time.time() - 86400 * " +
+        std::to_string(days) +
+        ")\n"
+        "old = time.strftime('%Y%m%dT%H%M%SZ', past) + run[16:]\n"
+        "ended = time.strftime('%Y-%m-%dT%H:%M:%SZ', past)\n"
+        "db.execute('UPDATE runs SET run = ?, ended_utc = ?', (old, ended))\n"
         "for place, name in (('captures', '0001.'), ('results/0001', '')):\n"
         "    os.rename(f'{sys.argv[1]}/{place}/{name}{run}', "
         "f'{sys.argv[1]}/{place}/{name}{old}')\n");
@@ -299,9 +303,8 @@ const std::vector<StationTrial> kFolderTrials{
     {"ExpiredFolderHoldsTheGoldenCalibration",
      [](const HostileStation& s) {
        s.empty_run();
-       s.age_run();
-       const std::string name =
-           "results/0001/20200101T000000Z-0123456789abcdef/invalid-calibration.yaml";
+       s.age_run(100);
+       const std::string name = "results/0001/" + s.name_of_run() + "/invalid-calibration.yaml";
        fs::copy_file(fs::path(VLP_SOURCE_DIR) / "datasets/paper-rig/rendered/true_calibration.yaml",
                      s.home / name);
        s.change("station.yaml", "records: records.db",
@@ -318,16 +321,24 @@ const std::vector<StationTrial> kFolderTrials{
     {"ClockIsYearsAhead",
      [](const HostileStation& s) {
        s.empty_run();
-       s.age_run();
+       s.age_run(400);
        s.change("station.yaml", "records: records.db",
                 "records: records.db\nkeep: {images_days: 1, results_days: 1}");
-       const auto before = fs::file_time_type::clock::now() - std::chrono::hours(24 * 400);
-       for (const char* name : {"station.yaml", "records.db", "captures", "results", "spool"}) {
-         fs::last_write_time(s.home / name, before);
-       }
        return s.vlp_station("clean --delete");
      },
      2, "more than a year before the clock",
+     [](const HostileStation& s, const ProgramResult&) {
+       EXPECT_NE(s.result("0001", "report.html"), "");
+     }},
+    {"ClockWasYearsAheadDuringARun",
+     [](const HostileStation& s) {
+       s.empty_run();
+       s.age_run(-400);
+       s.change("station.yaml", "records: records.db",
+                "records: records.db\nkeep: {images_days: 1, results_days: 1}");
+       return s.vlp_station("clean --delete");
+     },
+     2, "after the clock",
      [](const HostileStation& s, const ProgramResult&) {
        EXPECT_NE(s.result("0001", "report.html"), "");
      }},

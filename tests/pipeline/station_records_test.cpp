@@ -26,13 +26,15 @@ TEST_F(StationRecords, DeletesWhatIsKeptNoLonger) {
   EXPECT_EQ(records("clean").exit_code, 2);
   change("station.yaml", "records: records.db", "records: records.db\nkeep: {images_days: 1}");
   EXPECT_THAT(records("clean").output, HasSubstr("0 folders, 0.0 MB"));
-  // Years ago, as the records and the folder have it.
+  // A hundred days ago, as the records and the folder have it.
   const std::string client =
-      "import os, sqlite3, sys\n"
+      "import os, sqlite3, sys, time\n"
       "db = sqlite3.connect(sys.argv[1] + '/records.db', isolation_level=None)\n"
       "run = db.execute('SELECT run FROM runs').fetchone()[0]\n"
-      "old = '20200101T000000Z' + run[16:]\n"
-      "db.execute('UPDATE runs SET run = ?, ended_utc = ?', (old, '2020-01-01T00:10:00Z'))\n"
+      "past = time.gmtime(time.time() - 100 * 86400)\n"
+      "old = time.strftime('%Y%m%dT%H%M%SZ', past) + run[16:]\n"
+      "ended = time.strftime('%Y-%m-%dT%H:%M:%SZ', past)\n"
+      "db.execute('UPDATE runs SET run = ?, ended_utc = ?', (old, ended))\n"
       "db.execute('UPDATE figures SET run = ?', (old,))\n"
       "db.execute('UPDATE images SET run = ?', (old,))\n"
       "os.rename(sys.argv[1] + '/captures/0001.' + run, sys.argv[1] + '/captures/0001.' + old)\n";
@@ -40,7 +42,7 @@ TEST_F(StationRecords, DeletesWhatIsKeptNoLonger) {
                                 (folder / "station").string());
   ASSERT_EQ(aged.exit_code, 0) << aged.errors;
   const auto dry = records("clean");
-  EXPECT_THAT(dry.output, AllOf(HasSubstr("captures/0001.20200101T000000Z-"),
+  EXPECT_THAT(dry.output, AllOf(HasSubstr("captures/0001."),
                                 HasSubstr("1 folders, 0.0 MB: --delete deletes them")));
   EXPECT_FALSE(fs::is_empty(folder / "station/captures"));
   EXPECT_THAT(records("clean --delete").output, HasSubstr("1 folders, 0.0 MB deleted"));

@@ -5,7 +5,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <chrono>
+#include <cmath>
 #include <deque>
 #include <optional>
 #include <string>
@@ -161,29 +161,45 @@ Retained look_for_expired(const StationConfig& config, Records& records) {
 }
 
 void check_clock(const StationConfig& config, Records& records) {
-  constexpr double max_idle_s = 366 * 86'400.0;  // longer than a plant is shut
-  std::string newest;
+  constexpr double day_s = 86'400;
+  constexpr double max_idle_s = 366 * day_s;  // longer than a plant is shut
+  constexpr double max_ahead_s = day_s;       // between computers that share records
+  constexpr int trusted_days = 7;             // within them a wrong clock is noticed
   RunFilter own;
   own.station = config.station;
-  for (const RunSummary& run : records.list(own)) {
-    newest = std::max(newest, run.ended_utc);
+  const std::vector<RunSummary> runs = records.list(own);
+  std::vector<std::string> ended;
+  ended.reserve(runs.size());
+  for (const RunSummary& run : runs) {
+    const bool is_time = !std::isnan(seconds_since(run.ended_utc));
+    if (run.voided.empty() && is_time) ended.push_back(run.ended_utc);
   }
-  if (newest.empty() || !(seconds_since(newest) > max_idle_s)) return;
-  // Runs of archives are old when they are taken into records: what was written shows use, too.
-  std::vector<fs::path> written{config.captures, config.results, config.spool, config.file};
-  if (!is_server(config.records)) written.emplace_back(config.records);
-  const auto now = fs::file_time_type::clock::now();
-  const bool is_used = std::any_of(written.begin(), written.end(), [&](const fs::path& file) {
-    std::error_code missing;
-    const auto time = fs::last_write_time(file, missing);
-    return !missing && std::chrono::duration<double>(now - time).count() < max_idle_s;
-  });
-  if (is_used) return;
-  throw InputError(
-      config.file,
-      fmt::format("the newest run ended {}, more than a year before the clock, {}: set "
-                  "the clock, or, if it is right, measure a unit first",
-                  newest, now_utc()));
+  std::sort(ended.begin(), ended.end());
+  if (ended.empty()) return;
+  const std::string& newest = ended.back();
+  if (seconds_since(newest) < -max_ahead_s) {
+    throw InputError(config.file,
+                     fmt::format("the newest run ended {}, after the clock, {}: set the clock, or, "
+                                 "if it is right, void the runs with wrong dates",
+                                 newest, now_utc()));
+  }
+  if (seconds_since(newest) > max_idle_s) {
+    throw InputError(
+        config.file,
+        fmt::format("the newest run ended {}, more than a year before the clock, {}: set "
+                    "the clock, or, if it is right, measure a unit first",
+                    newest, now_utc()));
+  }
+  for (std::size_t i = ended.size() - 1; i > 0; --i) {
+    const double age_s = seconds_since(ended[i]);
+    if (age_s > trusted_days * day_s) return;
+    if (seconds_since(ended[i - 1]) - age_s < max_idle_s) continue;
+    throw InputError(config.file,
+                     fmt::format("the runs since {} ended more than a year after those before: set "
+                                 "the clock and void them, or, if it is right, clean again when "
+                                 "they are {} days old",
+                                 ended[i], trusted_days));
+  }
 }
 
 void delete_expired(const ExpiredFolder& expired, const StationConfig& config, Spool& spool) {

@@ -38,9 +38,10 @@ struct Retained {
 /// nor are runs of other stations and symbolic links.
 Retained look_for_expired(const StationConfig& config, Records& records);
 
-/// Checks that the clock is not years ahead, by which all runs seem to be kept no longer: the
-/// station was used within the last year by it. Throws InputError. A clock by which a run was
-/// recorded cannot be told from a right one.
+/// Checks the clock, because by one that is years ahead all runs are expired. Throws InputError if
+/// the newest run of the station ended after the clock's time, or more than a year before it, and
+/// if the runs of less than seven days ended more than a year after those before. Ignores voided
+/// runs. Detects no clock by which runs were recorded for longer than these days.
 void check_clock(const StationConfig& config, Records& records);
 
 /// Deletes the folder of a run; links below `config.captures` and `config.results` are not

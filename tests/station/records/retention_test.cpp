@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include <chrono>
+#include <ctime>
 
 #include "rig/input_error.h"
 #include "station/records/spool.h"
@@ -19,6 +19,12 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
+
+std::string utc_days_ago(int days) {
+  const std::time_t time = std::time(nullptr) - days * std::time_t{86'400};
+  char text[32];
+  return {text, std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", std::gmtime(&time))};
+}
 
 const std::string kOld = "20200101T000000Z-0123456789abcdef";
 
@@ -167,20 +173,32 @@ TEST_F(RetentionTest, DeletesNothingBehindACameraThatBecameALink) {
 }
 
 TEST_F(RetentionTest, TrustsNoClockYearsAhead) {
-  EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "") << "no run";
+  const auto refusal = [&] { return refusal_of([&] { check_clock(config, records); }); };
+  EXPECT_EQ(refusal(), "") << "no run";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
-  config.file = folder.file("station.yaml", "");
-  config.records = (folder / "records.db").string();
-  fs::create_directories(config.captures);
-  EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "") << "files of now";
-  const auto before = fs::file_time_type::clock::now() - std::chrono::hours(24 * 400);
-  for (const fs::path& file : {config.file, fs::path(config.records), config.captures}) {
-    fs::last_write_time(file, before);
-  }
-  EXPECT_THAT(refusal_of([&] { check_clock(config, records); }),
+  keep(new_run(), "a", now_utc(), "another");
+  EXPECT_THAT(refusal(),
               HasSubstr("the newest run ended 2020-01-01T01:00:00Z, more than a year before"));
-  keep(new_run(), "a", now_utc());
-  fs::last_write_time(config.records, before);
+  // The first run by such a clock does not make it right.
+  const std::string today = now_utc();
+  keep(new_run(), "a", today);
+  EXPECT_THAT(refusal(), HasSubstr("the runs since " + today + " ended more than a year after"));
+  keep(new_run(), "a", utc_days_ago(6));
+  EXPECT_THAT(refusal(), HasSubstr("the runs since " + utc_days_ago(6)));
+  keep(new_run(), "a", utc_days_ago(8));
+  EXPECT_EQ(refusal(), "");
+}
+
+TEST_F(RetentionTest, TrustsNoClockBehindARun) {
+  keep(new_run(), "a", utc_days_ago(0));
+  EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "");
+  const std::string run = new_run(), coming = utc_days_ago(-20 * 366);
+  keep(run, "a", coming);
+  EXPECT_THAT(refusal_of([&] { check_clock(config, records); }),
+              HasSubstr("the newest run ended " + coming + ", after the clock"));
+  RunRecord voided_run = *records.find(run);
+  voided_run.events.push_back(new_event(kVoided, "wrong clock", "Ann"));
+  records.keep(voided_run);
   EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "");
 }
 
