@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-class YamlValue;
+class [[gnu::visibility("hidden")]] YamlValue;
 
 /// By how much more than its limit asks a metric has to be good, because it is measured with an
 /// uncertainty (guarded acceptance, JCGM 106:2012, section 8.3.2): it is accepted up to limit - k

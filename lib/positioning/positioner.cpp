@@ -83,7 +83,10 @@ Eigen::Vector3d center_of(const std::vector<Lamp>& lamps) {
 std::vector<double> distances_to_nearest(const std::vector<Lamp>& lamps) {
   std::vector<std::size_t> by_x(lamps.size());
   std::iota(by_x.begin(), by_x.end(), 0U);
-  std::ranges::sort(by_x, {}, [&](std::size_t i) { return lamps[i].position_m.x(); });
+  // Lamps of equal x by y, as in a grid: the nearest one is tried first.
+  std::ranges::sort(by_x, {}, [&](std::size_t i) {
+    return std::pair(lamps[i].position_m.x(), lamps[i].position_m.y());
+  });
   std::vector<double> nearest_m(lamps.size(), std::numeric_limits<double>::infinity());
   // Returns false once lamps are too far apart along x.
   const auto try_pair = [&](std::size_t i, std::size_t j) {

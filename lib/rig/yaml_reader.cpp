@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include <yaml-cpp/eventhandler.h>
 
@@ -17,13 +18,14 @@ namespace vlp {
 
 namespace {
 
-/// Looks through a file before anything is built of it. Aliases are refused because a few lines
-/// of them can stand for gigabytes, depth because yaml-cpp recurses.
-class Inspection : public YAML::EventHandler {
+/// Builds the tree of a file. Aliases are refused because a few lines of them can stand for
+/// gigabytes, depth because yaml-cpp recurses.
+class TreeBuilder : public YAML::EventHandler {
  public:
-  explicit Inspection(const std::filesystem::path& file) : file_(file) {}
+  explicit TreeBuilder(const std::filesystem::path& file) : file_(file) {}
 
   bool found_document() const { return found_document_; }
+  YamlNode take_root() { return std::move(root_); }
 
   void OnDocumentStart(const YAML::Mark& mark) override {
     if (found_document_) refuse(mark, "a second YAML document begins; the file should hold one");
@@ -34,48 +36,64 @@ class Inspection : public YAML::EventHandler {
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                        YAML::EmitterStyle::value) override {
-    go_deeper(mark);
+    open(YamlNode::Kind::list, mark);
   }
   void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                   YAML::EmitterStyle::value) override {
-    go_deeper(mark);
+    open(YamlNode::Kind::map, mark);
   }
-  void OnSequenceEnd() override { --depth_; }
-  void OnMapEnd() override { --depth_; }
+  void OnSequenceEnd() override { close(); }
+  void OnMapEnd() override { close(); }
   void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                const std::string&) override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override {
+    add({YamlNode::Kind::null, line_of(mark), {}, {}});
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                const std::string& text) override {
+    add({YamlNode::Kind::scalar, line_of(mark), text, {}});
+  }
 
  private:
-  void go_deeper(const YAML::Mark& mark) {
-    constexpr int deepest = 20;
-    if (++depth_ > deepest) refuse(mark, "is nested too deep: is it the right file?");
+  void open(YamlNode::Kind kind, const YAML::Mark& mark) {
+    constexpr std::size_t max_depth = 20;
+    open_.push_back({kind, line_of(mark), {}, {}});
+    if (open_.size() > max_depth) refuse(mark, "is nested too deep: is it the right file?");
+  }
+  void close() {
+    YamlNode node = std::move(open_.back());
+    open_.pop_back();
+    add(std::move(node));
+  }
+  void add(YamlNode node) {
+    if (open_.empty()) {
+      root_ = std::move(node);
+    } else {
+      open_.back().children.push_back(std::move(node));
+    }
   }
   [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& problem) const {
     throw InputError(file_, line_of(mark), "", problem);
   }
   const std::filesystem::path& file_;
   bool found_document_ = false;
-  int depth_ = 0;
+  YamlNode root_;
+  std::vector<YamlNode> open_;
 };
 
-}  // namespace
-
-YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text) {
+YamlNode build_tree(const std::filesystem::path& file, const std::string& text) {
   const std::size_t valid = utf8_length(text);
   if (valid < text.size()) {
     const auto line = std::count(text.begin(), text.begin() + std::ptrdiff_t(valid), '\n') + 1;
     throw InputError(file, std::size_t(line), "", "is not UTF-8 text: save it in that encoding");
   }
   try {
-    Inspection inspection(file);
+    TreeBuilder tree(file);
     std::istringstream stream(text);
     YAML::Parser parser(stream);
-    while (parser.HandleNextDocument(inspection)) {
+    while (parser.HandleNextDocument(tree)) {
     }
-    if (!inspection.found_document()) throw InputError(file, "holds no YAML document");
-    return YAML::Load(text);
+    if (!tree.found_document()) throw InputError(file, "holds no YAML document");
+    return tree.take_root();
   } catch (const YAML::Exception& failure) {
     const bool tabs = text.find('\t') != std::string::npos;
     throw InputError(file, line_of(failure.mark), "",
@@ -84,15 +102,39 @@ YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text
   }
 }
 
-YamlMap::YamlMap(const YAML::Node& node, const std::filesystem::path* file, std::string key)
-    : file_(file), prefix_(std::move(key)), line_(line_of(node.Mark())) {
-  std::set<std::string> seen;
-  for (const auto& pair : node) {
-    const std::size_t line = line_of(pair.first.Mark());
-    if (!pair.first.IsScalar()) throw error(line, "a key should be a word");
-    const std::string& name = pair.first.Scalar();
-    if (!seen.insert(name).second) throw error(line, "key " + in_quotes(name) + " stands twice");
-    entries_.push_back({name, line, pair.second});
+/// Describes a value for a message: 'text', a list, a mapping, nothing.
+std::string quote(const YamlNode& node) {
+  switch (node.kind) {
+    case YamlNode::Kind::scalar:
+      return in_quotes(node.text);
+    case YamlNode::Kind::list:
+      return "a list";
+    case YamlNode::Kind::map:
+      return "a mapping";
+    case YamlNode::Kind::null:
+      break;
+  }
+  return "nothing";
+}
+
+}  // namespace
+
+YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text) {
+  build_tree(file, text);  // refuses what yaml-cpp must not build
+  return YAML::Load(text);
+}
+
+YamlMap::YamlMap(const YamlPart& node, const std::filesystem::path* file, std::string key)
+    : file_(file), prefix_(std::move(key)), line_(node->line) {
+  std::set<std::string_view> seen;
+  entries_.reserve(node->children.size() / 2);
+  for (std::size_t i = 0; i + 1 < node->children.size(); i += 2) {
+    const YamlNode &name = node->children[i], &value = node->children[i + 1];
+    if (name.kind != YamlNode::Kind::scalar) throw error(name.line, "a key should be a word");
+    if (!seen.insert(name.text).second) {
+      throw error(name.line, "key " + in_quotes(name.text) + " stands twice");
+    }
+    entries_.push_back({name.text, name.line, YamlPart(node, &value)});
   }
 }
 
@@ -101,7 +143,8 @@ std::optional<YamlValue> YamlMap::optional(const std::string& key) {
   for (const Entry& entry : entries_) {
     if (entry.key != key) continue;
     // yaml-cpp takes the place of what comes next for the place of nothing.
-    const std::size_t line = entry.value.IsNull() ? entry.line : line_of(entry.value.Mark());
+    const bool is_null = entry.value->kind == YamlNode::Kind::null;
+    const std::size_t line = is_null ? entry.line : entry.value->line;
     return YamlValue(entry.value, file_, prefix_.empty() ? key : prefix_ + "." + key, line);
   }
   return std::nullopt;
@@ -136,8 +179,9 @@ InputError YamlMap::error(std::size_t line, const std::string& problem) const {
 }
 
 YamlMap read_yaml(const std::filesystem::path& file) {
-  const YAML::Node node = parse_yaml(file, read_text_file(file, kMaxYamlBytes));
-  return YamlValue(node, &file, "", line_of(node.Mark())).map();
+  const auto node =
+      std::make_shared<YamlNode>(build_tree(file, read_text_file(file, kMaxYamlBytes)));
+  return YamlValue(node, &file, "", node->line).map();
 }
 
 YamlMap read_yaml(const std::filesystem::path& file, const std::string& format) {
@@ -160,9 +204,9 @@ void require_format(YamlMap& map, const std::string& format) {
 namespace {
 
 template <typename Number>
-std::optional<Number> parsed(const YAML::Node& node) {
-  if (!node.IsScalar()) return std::nullopt;
-  const std::string& text = node.Scalar();
+std::optional<Number> parsed(const YamlNode& node) {
+  if (node.kind != YamlNode::Kind::scalar) return std::nullopt;
+  const std::string& text = node.text;
   const char* begin = text.data() + (text.starts_with('+') && !text.starts_with("+-") ? 1 : 0);
   Number value{};
   const auto [end, failure] = std::from_chars(begin, text.data() + text.size(), value);
@@ -172,14 +216,14 @@ std::optional<Number> parsed(const YAML::Node& node) {
 
 }  // namespace
 
-YamlValue::YamlValue(const YAML::Node& node, const std::filesystem::path* file, std::string key,
+YamlValue::YamlValue(YamlPart node, const std::filesystem::path* file, std::string key,
                      std::size_t line)
-    : node_(node), file_(file), key_(std::move(key)), line_(line) {}
+    : node_(std::move(node)), file_(file), key_(std::move(key)), line_(line) {}
 
 double YamlValue::number() const {
-  const auto value = parsed<double>(node_);
+  const auto value = parsed<double>(*node_);
   if (!value || !std::isfinite(*value)) {
-    throw error("should be a finite number, not " + quote(node_));
+    throw error("should be a finite number, not " + quote(*node_));
   }
   return *value;
 }
@@ -194,23 +238,23 @@ double YamlValue::number_within(double min, double max, std::string_view unit) c
 }
 
 int YamlValue::integer_within(int min, int max) const {
-  const auto value = parsed<int>(node_);
+  const auto value = parsed<int>(*node_);
   if (!value || *value < min || *value > max) {
     throw error("should be a whole number within " + std::to_string(min) + " and " +
-                std::to_string(max) + ", not " + quote(node_));
+                std::to_string(max) + ", not " + quote(*node_));
   }
   return *value;
 }
 
 bool YamlValue::boolean() const {
-  if (node_.IsScalar() && node_.Scalar() == "true") return true;
-  if (node_.IsScalar() && node_.Scalar() == "false") return false;
-  throw error("should be true or false, not " + quote(node_));
+  if (node_->kind == YamlNode::Kind::scalar && node_->text == "true") return true;
+  if (node_->kind == YamlNode::Kind::scalar && node_->text == "false") return false;
+  throw error("should be true or false, not " + quote(*node_));
 }
 
 std::string YamlValue::text() const {
-  if (!node_.IsScalar()) throw error("should be text, not " + quote(node_));
-  return node_.Scalar();
+  if (node_->kind != YamlNode::Kind::scalar) throw error("should be text, not " + quote(*node_));
+  return node_->text;
 }
 
 std::vector<double> YamlValue::numbers(std::size_t count) const {
@@ -224,17 +268,20 @@ std::vector<double> YamlValue::numbers(std::size_t count) const {
 }
 
 std::vector<YamlValue> YamlValue::list() const {
-  if (!node_.IsSequence()) throw error("should be a list, not " + quote(node_));
+  if (node_->kind != YamlNode::Kind::list) throw error("should be a list, not " + quote(*node_));
   std::vector<YamlValue> items;
-  for (const auto& item : node_) {
-    items.emplace_back(item, file_, key_ + "[" + std::to_string(items.size()) + "]",
-                       line_of(item.Mark()));
+  items.reserve(node_->children.size());
+  for (const YamlNode& item : node_->children) {
+    items.emplace_back(YamlPart(node_, &item), file_,
+                       key_ + "[" + std::to_string(items.size()) + "]", item.line);
   }
   return items;
 }
 
 YamlMap YamlValue::map() const {
-  if (!node_.IsMap()) throw error("should be a mapping of keys to values, not " + quote(node_));
+  if (node_->kind != YamlNode::Kind::map) {
+    throw error("should be a mapping of keys to values, not " + quote(*node_));
+  }
   return {node_, file_, key_};
 }
 
@@ -243,7 +290,7 @@ InputError YamlValue::error(const std::string& problem) const {
 }
 
 InputError YamlValue::unknown(const std::string& known) const {
-  return error(quote(node_) + " is unknown; " + known);
+  return error(quote(*node_) + " is unknown; " + known);
 }
 
 }  // namespace vlp

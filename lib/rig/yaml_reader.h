@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,12 +20,26 @@ namespace vlp {
 
 class YamlMap;
 
+/// Node of a YAML document. It takes a fifth of the memory of a YAML::Node.
+struct YamlNode {
+  enum class Kind { null, scalar, list, map };
+  Kind kind = Kind::null;
+  /// Counted from 1; 0 if it is unknown.
+  std::size_t line = 0;
+  /// Text of a scalar.
+  std::string text;
+  /// Items of a list; keys and values of a map, by turns.
+  std::vector<YamlNode> children;
+};
+
+/// Part of a document, which is kept in memory as long as one of its parts is used.
+using YamlPart = std::shared_ptr<const YamlNode>;
+
 /// One value of a YAML document that knows where it stands. Each reader throws InputError with
 /// file, line and key when the value is of another kind.
 class YamlValue {
  public:
-  YamlValue(const YAML::Node& node, const std::filesystem::path* file, std::string key,
-            std::size_t line);
+  YamlValue(YamlPart node, const std::filesystem::path* file, std::string key, std::size_t line);
 
   /// A finite number, in [min, max] when given; `unit` is for the message.
   double number() const;
@@ -42,7 +57,7 @@ class YamlValue {
   InputError unknown(const std::string& known) const;
 
  private:
-  YAML::Node node_;
+  YamlPart node_;
   const std::filesystem::path* file_;
   std::string key_;
   std::size_t line_;
@@ -51,7 +66,7 @@ class YamlValue {
 /// A mapping: ask for every key that it may have, then call finish(). `file` outlives it.
 class YamlMap {
  public:
-  YamlMap(const YAML::Node& node, const std::filesystem::path* file, std::string key);
+  YamlMap(const YamlPart& node, const std::filesystem::path* file, std::string key);
 
   bool has(const std::string& key) const;
   YamlValue required(const std::string& key);
@@ -68,7 +83,7 @@ class YamlMap {
   struct Entry {
     std::string key;
     std::size_t line;
-    YAML::Node value;
+    YamlPart value;
   };
   const std::filesystem::path* file_;
   std::string prefix_;
@@ -77,10 +92,11 @@ class YamlMap {
   std::vector<std::string> known_;
 };
 
-/// Parses the text of a YAML file. Throws InputError as read_yaml().
+/// Parses the text of a YAML file, which may be other than a mapping, by yaml-cpp. Throws
+/// InputError as read_yaml().
 YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text);
 
-/// Longest YAML file that is parsed: yaml-cpp needs 500 times as much memory.
+/// Longest YAML file that is parsed: yaml-cpp needs 500 times as much memory for a YAML::Node.
 inline constexpr std::size_t kMaxYamlBytes = std::size_t{1} << 20;
 
 /// A YAML file that is a mapping. Throws InputError when it cannot be read or parsed, is longer

@@ -45,11 +45,6 @@ std::string shortened(std::string_view text, std::size_t enough) {
 
 std::string in_quotes(std::string_view text) { return "'" + shortened(text, 40) + "'"; }
 
-std::string quote(const YAML::Node& node) {
-  if (node.IsScalar()) return in_quotes(node.Scalar());
-  return node.IsMap() ? "a mapping" : node.IsSequence() ? "a list" : "nothing";
-}
-
 std::size_t line_of(const YAML::Mark& mark) {
   return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;
 }

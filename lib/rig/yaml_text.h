@@ -20,9 +20,6 @@ std::string shortest(double value);
 std::string shortened(std::string_view text, std::size_t enough);
 std::string in_quotes(std::string_view text);
 
-/// What stands in the file, for a message: 'text', a list, a mapping, nothing.
-std::string quote(const YAML::Node& node);
-
 /// Counted from 1; 0 when it is not known.
 std::size_t line_of(const YAML::Mark& mark);
 
