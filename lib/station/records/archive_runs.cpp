@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -44,14 +45,15 @@ std::optional<double> number_in(const nlohmann::json& object, const char* key) {
   return found->get<double>();
 }
 
-/// Of `metrics` or `gates` of session.json; those that stand there already stay.
+/// Adds the metrics in `metrics` or `gates` of session.json whose names are not in `figures` yet.
 void add_figures(const nlohmann::json& metrics, std::vector<CheckedMetric>& figures) {
+  std::set<std::string> names;
+  for (const CheckedMetric& figure : figures) names.insert(figure.name);
+  figures.reserve(figures.size() + metrics.size());
   for (const nlohmann::json& metric : metrics) {
     CheckedMetric figure;
     figure.name = metric.at("name");
-    const bool known = std::any_of(figures.begin(), figures.end(),
-                                   [&](const auto& other) { return other.name == figure.name; });
-    if (known) continue;
+    if (!names.insert(figure.name).second) continue;
     figure.unit = metric.value("unit", "");
     figure.value = number_in(metric, "value");
     figure.limit = number_in(metric, "limit");

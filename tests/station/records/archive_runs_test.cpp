@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 
@@ -133,6 +135,25 @@ TEST_F(ArchiveRunsOf, LinksOutOfTheArchiveAreRefused) {
   std::filesystem::create_symlink(folder / "secret.yaml",
                                   folder / "archive/sessions/a/s1/calibration.yaml");
   EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("calibration.yaml: is a symbolic link"));
+}
+
+/// Comparing all pairs would take minutes.
+TEST_F(ArchiveRunsOf, OfManyMetricsAreReadAtOnce) {
+  constexpr std::size_t count = 400'000;
+  std::string metrics;
+  for (std::size_t i = 0; i < count; ++i) {
+    metrics.append(i == 0 ? "" : ",")
+        .append("{\"name\": \"m")
+        .append(std::to_string(i))
+        .append("\"}");
+  }
+  write("archive/sessions/a/s1/session.json", "{\"metrics\": [" + metrics + "]}\n");
+  const auto begun = std::chrono::steady_clock::now();
+  const std::vector<RunRecord> read = runs();
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begun;
+  EXPECT_TRUE(
+      std::ranges::any_of(read, [&](const RunRecord& run) { return run.figures.size() == count; }));
+  EXPECT_LT(taken.count(), 30);
 }
 
 TEST_F(ArchiveRunsOf, NestedWithoutEndAreRefused) {
