@@ -175,9 +175,7 @@ std::string list_shared_frequencies(const LampMap& map) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
       const Lamp &a = map.lamps[i], &b = map.lamps[j];
-      if (!a.frequency_hz || !b.frequency_hz) continue;
-      if (std::abs(std::log(*a.frequency_hz / *b.frequency_hz)) >= kLampDrift) continue;
-      if (a.duty && b.duty && std::abs(*a.duty - *b.duty) >= 2 * kDutyMargin) continue;
+      if (!share_frequency(a, b)) continue;
       std::string pair = fmt::format("{} and {}", a.id, b.id);
       pairs.push_back(std::move(pair));
     }

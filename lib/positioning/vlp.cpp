@@ -15,13 +15,17 @@
 #include <utility>
 
 #include "lamps/lamp_detector.h"
+#include "lamps/signal/lamp_map_check.h"
 #include "positioning/positioner.h"
 #include "rig/input_error.h"
+#include "rig/lamp_map_file.h"
 
 struct vlp_positioner {
   vlp::Positioner positioner;
   /// Empty if the calibration has no row time.
   std::optional<vlp::LampDetector> detector;
+  /// Reason why lamps of different rooms cannot be identified; empty if they can.
+  std::string room_error;
 };
 
 namespace vlp {
@@ -200,6 +204,11 @@ const char* vlp_version(void) { return VLP_VERSION; }
 
 int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp_options* options,
                  vlp_positioner** positioner) {
+  return vlp_open_room(lamps_yaml, nullptr, calibration_yaml, options, positioner);
+}
+
+int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* calibration_yaml,
+                      const vlp_options* options, vlp_positioner** positioner) {
   using namespace vlp;
   if (positioner == nullptr) return failed(VLP_BAD_ARGUMENT, "positioner is a null pointer");
   *positioner = nullptr;
@@ -207,13 +216,16 @@ int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp
     return failed(VLP_BAD_ARGUMENT, "the name of a file is a null pointer");
   }
   try {
-    const LampMap map = read_lamp_map(lamps_yaml);
+    const LampMapFile lamps = read_lamps_with_rooms(lamps_yaml, room != nullptr ? room : "");
     const Calibration calibration = read_calibration(calibration_yaml);
     const PositionerOptions chosen =
         options != nullptr ? options_of(*options) : PositionerOptions();
     std::optional<LampDetector> detector;
-    if (calibration.camera.row_time_s) detector.emplace(map, calibration);
-    *positioner = new vlp_positioner{Positioner(map, calibration, chosen), std::move(detector)};
+    if (calibration.camera.row_time_s) detector.emplace(lamps.map, calibration);
+    std::string room_error = explain_missing_room(lamps, "the argument room of vlp_open_room()");
+    if (!room_error.empty()) room_error = InputError(lamps_yaml, room_error).what();
+    *positioner = new vlp_positioner{Positioner(lamps.map, calibration, chosen),
+                                     std::move(detector), std::move(room_error)};
     return VLP_OK;
   } catch (...) {
     return failed_by_exception();
@@ -234,6 +246,7 @@ int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
     return failed(VLP_ROW_TIME_UNKNOWN,
                   "the calibration has no row_time_s, by which lamps are told apart");
   }
+  if (!positioner->room_error.empty()) return failed(VLP_BAD_FILE, positioner->room_error);
   try {
     const auto seen = positioner->detector->detect(view_of(*image));
     for (std::size_t i = 0; i < std::min(seen.size(), capacity); ++i) {

@@ -157,6 +157,13 @@ const char* vlp_version(void);
 int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp_options* options,
                  vlp_positioner** positioner);
 
+/* Does what vlp_open() does, with the lamps of one room of a map whose lamps state a `room`. Null
+ * or
+ * "" takes all lamps, as vlp_open() does. If lamps of two rooms then share a frequency,
+ * vlp_detect() returns VLP_BAD_FILE, and the names of the rooms are in vlp_last_error(). */
+int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* calibration_yaml,
+                      const vlp_options* options, vlp_positioner** positioner);
+
 /* Null is none. */
 void vlp_close(vlp_positioner* positioner);
 
@@ -184,8 +191,8 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
 /* What a status or an error means and what to do, in a line. Never null. */
 const char* vlp_explanation(int32_t code);
 
-/* What went wrong in the last vlp_open() or vlp_detect() of this thread that failed: file, line,
- * key, or what the image is; "" before. Valid until its next call. */
+/* What went wrong in the last vlp_open(), vlp_open_room() or vlp_detect() of this thread that
+ * failed: file, line, key, or what the image is; "" before. Valid until its next call. */
 const char* vlp_last_error(void);
 
 #ifdef __cplusplus

@@ -28,8 +28,10 @@
 #include "captures/truth_table.h"
 #include "lamps/light_detector.h"
 #include "lamps/signal/lamp_classifier.h"
+#include "lamps/signal/lamp_map_check.h"
 #include "positioning/positioner.h"
 #include "rig/input_error.h"
+#include "rig/lamp_map_file.h"
 
 namespace py = pybind11;
 
@@ -97,14 +99,20 @@ const Matrix4 kUnknown = Matrix4::Constant(kNone);
 
 // Lamp map, calibration, lens
 
-Doubles positions_of(const LampMap& map) {
+LampMapFile lamps_of(const std::filesystem::path& file, const std::optional<std::string>& room) {
+  return read_lamps_with_rooms(file, room.value_or(""));
+}
+
+Doubles positions_of(const LampMapFile& lamps) {
+  const LampMap& map = lamps.map;
   Doubles positions = doubles({static_cast<py::ssize_t>(map.lamps.size()), 3});
   double* next = positions.mutable_data();
   for (const Lamp& lamp : map.lamps) next = std::copy_n(lamp.position_m.data(), 3, next);
   return positions;
 }
 
-Integers ids_of(const LampMap& map) {
+Integers ids_of(const LampMapFile& lamps) {
+  const LampMap& map = lamps.map;
   Integers ids(static_cast<py::ssize_t>(map.lamps.size()));
   std::transform(map.lamps.begin(), map.lamps.end(), ids.mutable_data(),
                  [](const Lamp& lamp) { return lamp.id; });
@@ -154,7 +162,7 @@ Correction correction_of(const std::string& name) {
   throw std::invalid_argument("correction should be none, rotation, dispersion or all");
 }
 
-Positioner positioner_of(const LampMap& map, const Calibration& calibration,
+Positioner positioner_of(const LampMapFile& lamps, const Calibration& calibration,
                          const std::string& correction,
                          const std::optional<std::array<double, 4>>& mount,
                          double unstated_sigma_px, double max_residual_share) {
@@ -163,7 +171,7 @@ Positioner positioner_of(const LampMap& map, const Calibration& calibration,
   if (mount) options.mount = CameraMount{{(*mount)[0], (*mount)[1], (*mount)[2]}, (*mount)[3]};
   options.unstated_sigma_px = unstated_sigma_px;
   options.max_residual_share = max_residual_share;
-  return {map, calibration, options};
+  return {lamps.map, calibration, options};
 }
 
 Sensors sensors_of(const std::optional<Pair>& inclination_rad, double inclination_sigma_rad,
@@ -361,14 +369,20 @@ py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
   return arrays_of(detections);
 }
 
-ImageDetector detector_of(const LampMap& map, const Calibration& calibration,
+ImageDetector detector_of(const LampMapFile& lamps, const Calibration& calibration,
                           const std::optional<std::filesystem::path>& classifier) {
   if (!calibration.camera.row_time_s) {
     throw std::invalid_argument("the calibration has no row_time_s, by which lamps are told apart");
   }
   std::optional<LampClassifier> trained;
-  if (classifier) trained = read_lamp_classifier(*classifier);
-  return {{map, detector_camera(calibration), std::move(trained)}, calibration.camera.imager_px};
+  if (classifier) {
+    trained = read_lamp_classifier(*classifier);
+  } else if (const auto error = explain_missing_room(lamps, "the argument room of LampMap");
+             !error.empty()) {
+    throw InputError(lamps.file, error);
+  }
+  return {{lamps.map, detector_camera(calibration), std::move(trained)},
+          calibration.camera.imager_px};
 }
 
 // Tables
@@ -470,11 +484,12 @@ void define_statuses(py::module_& m) {
 /// Defines lamp map, lens and calibration.
 void define_calibration(py::module_& m) {
   using namespace pybind11::literals;
-  py::class_<LampMap>(m, "LampMap", "The lamps of a room, lamps.yaml.")
-      .def(py::init(&read_lamp_map), "file"_a)
+  py::class_<LampMapFile>(m, "LampMap", "The lamps of a room, lamps.yaml.")
+      .def(py::init(&lamps_of), "file"_a, "room"_a = py::none(),
+           "room: only the lamps that state this room; None: all lamps.")
       .def_property_readonly("ids", &ids_of)
       .def_property_readonly("positions_m", &positions_of, "(n, 3), in the world.")
-      .def("__len__", [](const LampMap& map) { return map.lamps.size(); });
+      .def("__len__", [](const LampMapFile& lamps) { return lamps.map.lamps.size(); });
 
   py::class_<Lens>(m, "Lens", "A lens: directions to pixels and back.")
       .def(py::init(&lens_of), "model"_a, "intrinsics"_a, "By mrcal's name, with its parameters.")

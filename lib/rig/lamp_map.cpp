@@ -8,6 +8,7 @@
 #include "rig/file.h"
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"
+#include "rig/lamp_map_file.h"
 #include "rig/yaml_parts.h"
 #include "rig/yaml_writer.h"
 
@@ -67,15 +68,21 @@ const Lamp* find_lamp(std::span<const Lamp> lamps, int id) {
 LampMap read_lamp_map(const std::filesystem::path& file) { return read_lamps_of_room(file, ""); }
 
 LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string& room) {
+  return read_lamps_with_rooms(file, room).map;
+}
+
+LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::string& room) {
   YamlMap document = read_yaml(file, kLampsFormat);
   const auto sd_m = optional_within(document, "sd_m", 0, kWorstSurvey_m, "m");
   const YamlValue list = document.required("lamps");
   document.finish();
-  LampMap map;
+  LampMapFile result{file, {}, {}};
   EarlierLamps in_room;
   std::unordered_set<int> ids_of_other_rooms;
   const auto items = list.list();
-  map.lamps.reserve(items.size());
+  std::vector<Lamp>& lamps = result.map.lamps;
+  lamps.reserve(items.size());
+  result.rooms.reserve(items.size());
   for (const YamlValue& item : items) {
     YamlMap keys = item.map();
     Lamp lamp = read_lamp(keys);
@@ -84,7 +91,8 @@ LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string&
       throw item.error("has no key room, and lamps of room " + room +
                        " are asked for: state the room of each lamp");
     }
-    const bool is_in_room = room.empty() || lamp_room->text() == room;
+    std::string room_name = lamp_room ? lamp_room->text() : "";
+    const bool is_in_room = room.empty() || room_name == room;
     if (!lamp.sd_m) lamp.sd_m = sd_m;
     keys.finish();
     in_room.check(lamp, item);
@@ -93,17 +101,18 @@ LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string&
     }
     if (is_in_room) {
       in_room.add(lamp);
-      map.lamps.push_back(std::move(lamp));
+      lamps.push_back(std::move(lamp));
+      result.rooms.push_back(std::move(room_name));
     } else {
       ids_of_other_rooms.insert(lamp.id);
     }
   }
-  if (map.lamps.empty() && !room.empty()) {
+  if (lamps.empty() && !room.empty()) {
     throw InputError(
         file, "has no lamp with 'room: " + room + "': name another room, or correct the map");
   }
-  if (map.lamps.empty()) throw list.error("holds no lamp");
-  return map;
+  if (lamps.empty()) throw list.error("holds no lamp");
+  return result;
 }
 
 void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {

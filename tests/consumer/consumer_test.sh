@@ -56,6 +56,19 @@ sed -n '/^```c$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/robot
 # shellcheck disable=SC2086 # several words each
 cc -std=c99 -Wall -Wextra -Wpedantic -Werror $flags "$scratch/robot.c" $libs -o "$scratch/robot-in-c"
 grep -F "\`$("$scratch/robot-in-c" <"$pixels")\`" "$source_dir/lib/README.md"  # as it says there
+# Two rooms with the same frequencies, the second one higher by 0.1 m.
+{
+  sed 's/{id: /{room: hall, id: /' lamps.yaml
+  sed -n 's/, 1.6\]/, 1.7]/; s/{id: /{room: office, id: 1/p' lamps.yaml
+} >rooms.yaml
+# shellcheck disable=SC2086 # several words each
+cc -std=c99 -Wall -Wextra -Wpedantic -Werror $flags "$source_dir/tests/consumer/rooms/rooms.c" $libs -o "$scratch/rooms"
+diff - <("$scratch/rooms" <"$pixels") <<'EOF'
+6 lamps, the first is 3
+6 lamps, the first is 13
+rooms.yaml: has no lamp with 'room: attic': name another room, or correct the map
+rooms.yaml: lamps 1 and 11 share a frequency in two rooms: choose a room by the argument room of vlp_open_room(); the map has: hall, office
+EOF
 sed -n '/^```c++$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/ros_node.cpp"
 # shellcheck disable=SC2086 # several words each
 c++ -std=c++17 -Wall -Wextra -Werror -fsyntax-only $flags $eigen -I"$scratch/installed/include" \

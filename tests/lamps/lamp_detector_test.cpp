@@ -11,6 +11,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "frontend/image_file.h"
@@ -184,6 +185,61 @@ TEST(VlpDetect, NeedsTheRowTime) {
             VLP_ROW_TIME_UNKNOWN);
   EXPECT_EQ(count, 0U);
   EXPECT_THAT(vlp_last_error(), HasSubstr("row_time_s"));
+}
+
+/// Lamps of the sample in the room hall, and lamps with the same frequencies in the room office.
+std::string two_rooms() {
+  std::string text = TemporaryFolder::content_of(kRendered + "lamps.yaml");
+  std::string office = text.substr(text.find("  - "));
+  for (std::size_t at = 0; (at = text.find("{id: ", at)) != text.npos;) {
+    text.insert(++at, "room: hall, ");
+  }
+  for (std::size_t at = 0; (at = office.find("id: ", at)) != office.npos; at += 4) {
+    office.insert(at + 4, "1");
+    office.insert(at, "room: office, ");
+    at += 14;
+  }
+  for (std::size_t at = 0; (at = office.find(", 1.6]", at)) != office.npos;) {
+    office.replace(at, 6, ", 1.7]");
+  }
+  return text + office;
+}
+
+TEST(VlpOpenRoom, IdentifiesLampsOfTheChosenRoom) {
+  const TemporaryFolder folder;
+  const std::string lamps = folder.file("lamps.yaml", two_rooms());
+  const std::string camera = kRendered + "true_calibration.yaml";
+  const cv::Mat image = sample();
+  const vlp_image given = c_image(image_view(image));
+  Detections seen;
+  const auto detect_in = [&](const char* room, std::size_t& count) {
+    vlp_positioner* opened = nullptr;
+    EXPECT_EQ(vlp_open_room(lamps.c_str(), room, camera.c_str(), nullptr, &opened), VLP_OK)
+        << vlp_last_error();
+    const Handle positioner{opened, &vlp_close};
+    return vlp_detect(opened, &given, seen.data(), seen.size(), &count);
+  };
+  std::size_t count = 0;
+  for (const auto& [room, first_id] : {std::pair{"hall", 1}, {"office", 11}}) {
+    ASSERT_EQ(detect_in(room, count), VLP_OK) << vlp_last_error();
+    ASSERT_EQ(count, 6U);
+    for (std::size_t i = 0; i < count; ++i) {
+      EXPECT_GE(seen[i].lamp, first_id);
+      EXPECT_LT(seen[i].lamp, first_id + 6);
+    }
+  }
+  for (const char* no_room : {static_cast<const char*>(nullptr), ""}) {
+    EXPECT_EQ(detect_in(no_room, count), VLP_BAD_FILE);
+    EXPECT_EQ(count, 0U);
+    EXPECT_THAT(vlp_last_error(),
+                HasSubstr("lamps.yaml: lamps 1 and 11 share a frequency in two "
+                          "rooms: choose a room by the argument room of vlp_open_room(); "
+                          "the map has: hall, office"));
+  }
+  vlp_positioner* none = nullptr;
+  EXPECT_EQ(vlp_open_room(lamps.c_str(), "attic", camera.c_str(), nullptr, &none), VLP_BAD_FILE);
+  EXPECT_EQ(none, nullptr);
+  EXPECT_THAT(vlp_last_error(), HasSubstr("has no lamp with 'room: attic'"));
 }
 
 /// Pixels of which every byte outside may be another's: rows have a gap, the last one has none.

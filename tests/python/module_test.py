@@ -9,6 +9,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import time
 import unittest
 
@@ -166,6 +167,27 @@ class Module(unittest.TestCase):
         for lamp, pixel, sigma in zip(lamps, pixels, sigma_px):
             row = (true["frames"] == 0) & (true["lamps"] == lamp)
             self.assertLess(np.linalg.norm(true["pixels"][row][0] - pixel), 6 * sigma + 0.05)
+
+    def test_detects_the_lamps_of_a_room(self):
+        text = (RENDERED / "lamps.yaml").read_text()
+        hall = text.replace("{id: ", "{room: hall, id: ")
+        office = re.sub(r"id: (\d)", r"room: office, id: 1\1", text).replace(", 1.6]", ", 1.7]")
+        calibration = vlp.Calibration(RENDERED / "true_calibration.yaml")
+        image = np.array(PIL.Image.open(RENDERED / "sample/0000.png"))
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "lamps.yaml"
+            file.write_text(hall + office[office.index("  - ") :])
+            whole = vlp.LampMap(file)
+            self.assertEqual(len(whole), 12)
+            with self.assertRaisesRegex(
+                vlp.InputError, "lamps.yaml: .* by the argument room of LampMap; the map has: hall, office"
+            ):
+                vlp.LampDetector(whole, calibration)
+            vlp.Positioner(whole, calibration)  # whose lamps are identified elsewhere
+            lamps, _, _ = vlp.LampDetector(vlp.LampMap(file, room="office"), calibration).detect(image)
+            self.assertEqual(sorted(lamps), [11, 12, 13, 14, 15, 16])
+            with self.assertRaisesRegex(vlp.InputError, "has no lamp with 'room: attic'"):
+                vlp.LampMap(file, "attic")
 
     def test_detects_in_any_array(self):
         detector = self.detector()

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "rig/lamp_map.h"
+#include "rig/lamp_map_file.h"
 
 #include <gmock/gmock.h>
 
@@ -53,6 +53,8 @@ lamps:
   ASSERT_EQ(hall.lamps.size(), 1U);
   EXPECT_EQ(hall.lamps[0].id, 1);
   EXPECT_EQ(read_lamp_map(file).lamps.size(), 2U);
+  EXPECT_EQ(read_lamps_with_rooms(file, "").rooms, (std::vector<std::string>{"hall", "office"}));
+  EXPECT_EQ(read_lamps_with_rooms(file, "office").rooms, std::vector<std::string>{"office"});
   EXPECT_THAT(refusal_of([&] { read_lamps_of_room(file, "attic"); }),
               HasSubstr("has no lamp with 'room: attic'"));
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "lamps/signal/lamp_rule.h"
 #include "lamps/signal/stripes.h"
@@ -25,7 +26,48 @@ double period_sd_of(const Lamp& lamp, const StripeConditions& conditions) {
   return period_sd(period, *lines, exposure_lines(conditions));
 }
 
+bool have_similar_duties(const Lamp& a, const Lamp& b) {
+  return !a.duty || !b.duty || std::abs(*a.duty - *b.duty) < 2 * kDutyMargin;
+}
+
+/// Lists the rooms in alphabetical order, such as "hall, office"; the first ten of more.
+std::string list_rooms(const std::vector<std::string>& rooms) {
+  constexpr std::size_t max_listed = 10;
+  std::set<std::string> names(rooms.begin(), rooms.end());
+  names.erase("");
+  std::string list;
+  std::size_t count = 0;
+  for (const std::string& name : names) {
+    if (count++ == max_listed) {
+      return list + " and " + std::to_string(names.size() - max_listed) + " more";
+    }
+    list += (list.empty() ? "" : ", ") + name;
+  }
+  return list;
+}
+
 }  // namespace
+
+bool share_frequency(const Lamp& a, const Lamp& b) {
+  return a.frequency_hz && b.frequency_hz &&
+         std::abs(std::log(*a.frequency_hz / *b.frequency_hz)) < kLampDrift &&
+         have_similar_duties(a, b);
+}
+
+std::string explain_missing_room(const LampMapFile& lamps, const std::string& argument) {
+  const auto& [file, map, rooms] = lamps;
+  for (std::size_t i = 0; i < map.lamps.size(); ++i) {
+    for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
+      if (rooms[i].empty() || rooms[j].empty() || rooms[i] == rooms[j]) continue;
+      if (!share_frequency(map.lamps[i], map.lamps[j])) continue;
+      return "lamps " + std::to_string(map.lamps[i].id) + " and " +
+             std::to_string(map.lamps[j].id) +
+             " share a frequency in two rooms: choose a room by " + argument +
+             "; the map has: " + list_rooms(rooms);
+    }
+  }
+  return "";
+}
 
 std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions) {
   const double above_m = lamp.position_m.z() - conditions.camera_height_m;
@@ -49,7 +91,7 @@ std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions
     for (std::size_t j = i + 1; j < lamps.lamps.size(); ++j) {
       const Lamp &a = lamps.lamps[i], &b = lamps.lamps[j];
       if (!a.frequency_hz || !b.frequency_hz) continue;
-      if (a.duty && b.duty && std::abs(*a.duty - *b.duty) >= 2 * kDutyMargin) continue;
+      if (!have_similar_duties(a, b)) continue;
       const double gap = std::abs(std::log(*a.frequency_hz / *b.frequency_hz));
       const double sd = std::max(period_sd_of(a, conditions), period_sd_of(b, conditions));
       const double needed = kLampDrift + 4 * sd;

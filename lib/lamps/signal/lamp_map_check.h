@@ -3,10 +3,11 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "rig/calibration.h"
-#include "rig/lamp_map.h"
+#include "rig/lamp_map_file.h"
 
 namespace vlp {
 
@@ -41,6 +42,17 @@ std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditi
 /// which bounds what is measured on square waves (where whole numbers of lines make a period, it is
 /// better). Infinity below kMinPeriods.
 double period_sd(double period_lines, double lines, double exposure_lines);
+
+/// Returns whether two lamps cannot be distinguished: their frequencies differ by less than
+/// kLampDrift, and their duties are unknown or differ by less than twice kDutyMargin. Returns false
+/// if a lamp has no frequency.
+bool share_frequency(const Lamp& a, const Lamp& b);
+
+/// Explains that a room has to be chosen, because two rooms have lamps with one frequency.
+///
+/// @param argument  where the room is chosen, such as "the argument room of vlp_open_room()"
+/// @return          the message with the names of the rooms; empty if no room is needed
+std::string explain_missing_room(const LampMapFile& lamps, const std::string& argument);
 
 /// Two lamps that cannot be told apart with certainty.
 struct LampsAlike {

@@ -86,6 +86,7 @@ struct Functions {
   int (Positioner::*elsewhere)() const noexcept = &Positioner::lamps_elsewhere;
   decltype(&vlp_version) c_version = &vlp_version;
   decltype(&vlp_open) c_open = &vlp_open;
+  decltype(&vlp_open_room) c_open_room = &vlp_open_room;
   decltype(&vlp_close) c_close = &vlp_close;
   decltype(&vlp_detect) c_detect = &vlp_detect;
   decltype(&vlp_locate) c_locate = &vlp_locate;

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/signal/lamp_map_check.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "lamps/signal/lamp_rule.h"
 #include "lamps/signal/square_wave.h"
@@ -90,6 +90,33 @@ TEST(LampMapCheck, AsksForMoreWhereLessIsSeen) {
   EXPECT_EQ(lamps_alike(map, sharp).size(), 1);
   far.camera_height_m = -1.5;
   EXPECT_EQ(lamps_alike(map, far).size(), 1);
+}
+
+TEST(ExplainMissingRoom, NamesTheRoomsOfLampsWithOneFrequency) {
+  LampMapFile lamps{"lamps.yaml", {{lamp(1, 2000), lamp(2, 2500), lamp(7, 2010)}}, {"b", "b", "a"}};
+  const std::string message = explain_missing_room(lamps, "--room");
+  EXPECT_EQ(message,
+            "lamps 1 and 7 share a frequency in two rooms: choose a room by --room; the map has: "
+            "a, b");
+  lamps.map.lamps[2].frequency_hz = 3000;
+  EXPECT_EQ(explain_missing_room(lamps, "--room"), "");
+}
+
+TEST(ExplainMissingRoom, IsEmptyWhereARoomWouldNotHelp) {
+  const LampMap map{{lamp(1, 2000), lamp(2, 2000)}};
+  EXPECT_EQ(explain_missing_room({"lamps.yaml", map, {"hall", "hall"}}, "--room"), "");
+  EXPECT_EQ(explain_missing_room({"lamps.yaml", map, {"", ""}}, "--room"), "");
+  const LampMap duties{{lamp(1, 2000, 0.3), lamp(2, 2000, 0.7)}};
+  EXPECT_EQ(explain_missing_room({"lamps.yaml", duties, {"hall", "office"}}, "--room"), "");
+}
+
+TEST(ExplainMissingRoom, ListsTenRoomsAtMost) {
+  LampMapFile lamps;
+  for (int i = 0; i < 12; ++i) {
+    lamps.map.lamps.push_back(lamp(i, 2000));
+    lamps.rooms.push_back("r" + std::to_string(10 + i));
+  }
+  EXPECT_THAT(explain_missing_room(lamps, "--room"), testing::EndsWith("r18, r19 and 2 more"));
 }
 
 /// What it says is what happens: of lamps that are just far enough apart nearly all are identified.

@@ -1,0 +1,24 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "lamp_map.h"
+
+namespace vlp {
+
+/// Lamp map with the rooms that its file states.
+struct LampMapFile {
+  std::filesystem::path file;
+  LampMap map;
+  /// Room of each lamp of `map`; empty if it is not stated.
+  std::vector<std::string> rooms;
+};
+
+/// Reads what read_lamps_of_room() reads, with the room of each lamp. Throws InputError.
+LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::string& room);
+
+}  // namespace vlp
