@@ -12,8 +12,8 @@
 #   tests/benchmarks/station_trials.sh sharpness [COUNT [FIRST_SEED]]  of each seed a good unit and 15
 #                                    with a veil, smear, dust, defocus or tilt, boards only; 1 seed
 #   tests/benchmarks/station_trials.sh timing [COUNT [FIRST_SEED]]   1 unit
-# A line for each; exit code 1 when one did not end as it should. A good unit takes 9 s of processor
-# time, six faulty ones 30 s. kinds needs /usr/bin/python3 with OpenCV (python3-opencv). timing: the
+# A line for each, and the capability of good ones; exit code 1 when one did not end as it should. A good
+# unit takes 9 s of processor time, six faulty ones 30 s. kinds needs /usr/bin/python3 with OpenCV (python3-opencv). timing: the
 # processor time, pictures included, and how long the verdict takes after the last image, others
 # coming every 50 ms before.
 set -euo pipefail
@@ -457,5 +457,6 @@ timing() {
 }
 
 for ((seed = first; seed < first + count; ++seed)); do "$what" "$seed"; done
+[ "$what" != good ] || vlp-station capability --station "$work/station/station.yaml"
 echo "$what: seeds $first to $((first + count - 1)), $wrong not as they should"
 [ "$wrong" = 0 ]

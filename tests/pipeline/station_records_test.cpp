@@ -232,7 +232,7 @@ TEST_F(StationRecords, WatchesATrend) {
   EXPECT_EQ(records("list --since 2026-11-21T23:59:59Z").exit_code, 0);
 
   // Failed units count in the capability; those that were not judged do not.
-  EXPECT_THAT(records("capability rms_px").output, ContainsRegex("rms_px +13 .*<= 0.3 +-"));
+  EXPECT_THAT(records("capability rms_px").output, ContainsRegex("rms_px +13 .*<= 0.014 +-"));
   EXPECT_EQ(records("capability tilt_deg").exit_code, 3);
   for (const int which : {0, 1}) {
     const std::string camera = which == 0 ? "m1" : "m2";
@@ -247,7 +247,7 @@ TEST_F(StationRecords, WatchesATrend) {
                     ContainsRegex("\\(EV\\) +0.12649"), ContainsRegex("\\(AV\\) +0.031623"),
                     ContainsRegex("\\(GRR\\) +0.13038"), ContainsRegex("\\(PV\\) +0.70427"),
                     ContainsRegex("ndc\\) +7\n")));
-  EXPECT_THAT(study.output, HasSubstr("no P/T: the mean is not within the gate, at most 0.3\n"));
+  EXPECT_THAT(study.output, HasSubstr("no P/T: the mean is not within the gate, at most 0.014\n"));
   // By hand: of station-1 alone, 1 and 1.2, 2 and 2.2.
   const auto bias =
       records("study rms_px --reference m1=1 m2=2.1 -o " + (folder / "bias.svg").string());

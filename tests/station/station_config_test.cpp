@@ -71,7 +71,7 @@ TEST_F(StationYaml, ShowsWhatAShiftMayWant) {
 }
 
 TEST_F(StationYaml, RefusesAnUnknownGateWithItsLine) {
-  change("station.yaml", "  rms_px: 0.3", "  rms_mm: 0.3");
+  change("station.yaml", "  rms_px: 0.014", "  rms_mm: 0.014");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("station.yaml:"), HasSubstr("rms_mm")));
 }
 
