@@ -60,10 +60,12 @@ constexpr std::array kMetricKinds{
                "change of projections by one standard deviation of the board's print (print_sd of "
                "board.yaml), rms over the image",
                "the board is not printed accurately enough"},
-    MetricKind{"uncertainty_px", "px", MetricSource::lens,
-               "worst standard deviation of a projection over the region where the lens is known",
-               "the lens is not known well enough: other board views", Direction::at_most, kLargest,
-               false},
+    MetricKind{
+        "uncertainty_px", "px", MetricSource::lens,
+        "expected largest error of a projection over the region where the lens is known, from "
+        "the noise of the corners and from the board's print (board_print_px)",
+        "the lens is not known well enough: other board views, or a more accurate board",
+        Direction::at_most, kLargest, false},
     MetricKind{"halves_px", "px", MetricSource::lens,
                "difference of the lenses of every other view, rms per axis",
                "two halves of the board views give two lenses"},

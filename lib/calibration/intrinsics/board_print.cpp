@@ -4,11 +4,13 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
 #include "calibration/intrinsics/intrinsics_solver.h"
 #include "calibration/intrinsics/projection_difference.h"
+#include "geometry/polygon.h"
 
 namespace vlp {
 namespace {
@@ -30,8 +32,8 @@ std::vector<Eigen::Vector3d> points_of_board(const BoardProblem& problem) {
 
 }  // namespace
 
-std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& solution,
-                                                double print_sd) {
+std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& solution, double print_sd,
+                                                const ImageRegion& region) {
   const double aspect_error = std::numbers::sqrt2 * print_sd;
   const Lens lens = solution.lens();
   BoardProblem problem = solution.problem;
@@ -51,15 +53,21 @@ std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& soluti
     }
   }
   if (!solve_for_lens(problem, solution.solved_for)) return {};
-  const auto difference =
-      projection_difference(lens, Lens(problem.lens_model, problem.intrinsics), problem.imager_px,
-                            [](const Eigen::Vector2d&) { return 1.0; });
-  if (!difference) return {};
+  const Lens printed(problem.lens_model, problem.intrinsics);
+  const auto everywhere = projection_difference(lens, printed, problem.imager_px,
+                                                [](const Eigen::Vector2d&) { return 1.0; });
+  const auto in_region =
+      projection_difference(lens, printed, problem.imager_px, [&](const Eigen::Vector2d& pixel) {
+        return region.empty() || polygon_contains(region, pixel)
+                   ? 1.0
+                   : std::numeric_limits<double>::infinity();
+      });
+  if (!everywhere || !in_region) return {};
   const auto count = static_cast<Eigen::Index>(problem.intrinsics.size());
   return PrintEffect{
       Eigen::Map<const Eigen::VectorXd>(problem.intrinsics.data(), count) -
           Eigen::Map<const Eigen::VectorXd>(solution.problem.intrinsics.data(), count),
-      difference->rms_px};
+      everywhere->rms_px, in_region->mean_px, in_region->worst_px};
 }
 
 }  // namespace vlp

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/known_region.h"
 
 namespace vlp {
 
@@ -16,6 +17,8 @@ struct PrintEffect {
   Eigen::VectorXd intrinsics;
   /// Change of projections over the image, rms per axis, in px.
   double rms_px;
+  /// Change of projections over the region where the lens is known, mean and largest, in px.
+  double mean_in_region_px, worst_in_region_px;
 };
 
 /// Computes the effect of one standard deviation of the ratio of the board's width to its height,
@@ -28,8 +31,9 @@ struct PrintEffect {
 /// outliers stay as they are.
 ///
 /// @param print_sd  Board::print_sd, > 0
+/// @param region    region where the lens is known (CalibrationReport::region)
 /// @return std::nullopt if that solve fails
-std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& solution,
-                                                double print_sd);
+std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& solution, double print_sd,
+                                                const ImageRegion& region = {});
 
 }  // namespace vlp

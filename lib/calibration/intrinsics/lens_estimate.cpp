@@ -267,8 +267,14 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
   result.lattice = views.solved.lattice;
   result.sharpness = measure_sharpness(result.views, views.solved.imager_px);
   std::optional<PrintEffect> print;
-  if (print_sd > 0) print = compute_print_effect(solution, print_sd);
-  if (print) result.print_px = print->rms_px;
+  if (print_sd > 0) print = compute_print_effect(solution, print_sd, result.report.region);
+  if (print) {
+    CalibrationReport& report = result.report;
+    result.print_px = print->rms_px;
+    report.uncertainty_mean_px = std::hypot(report.uncertainty_mean_px, print->mean_in_region_px);
+    report.uncertainty_worst_px =
+        std::hypot(report.uncertainty_worst_px, print->worst_in_region_px);
+  }
   if (print_sd > 0 && !print) {
     result.warnings.emplace_back(
         "the effect of print_sd of board.yaml cannot be computed, and the lens's uncertainty lacks "

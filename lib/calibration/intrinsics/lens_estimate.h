@@ -42,6 +42,7 @@ struct LensEstimate {
   std::string problem = {};
 
   IntrinsicsSolution solution{};
+  /// With the board's print in `uncertainty_mean_px` and `uncertainty_worst_px`.
   CalibrationReport report{};
   ViewCoverage coverage{};
   HeldOut held_out{};

@@ -6,7 +6,9 @@
 
 #include <array>
 #include <cmath>
+#include <string>
 
+#include "calibration/intrinsics/lens_estimate.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
 
@@ -66,6 +68,41 @@ TEST(PrintEffect, IsSmallForAnExactBoardAndALensWithoutDistortion) {
   ASSERT_TRUE(exact && printed);
   EXPECT_LT(exact->rms_px, 0.01 * printed->rms_px);
   EXPECT_GT(printed->rms_px, 0.01);
+}
+
+/// Monte Carlo: errors of lenses from boards with random print and random noise, against the
+/// uncertainty that one of them states.
+TEST(PrintEffect, IsInTheUncertainty) {
+  constexpr double noise_px = 0.02;
+  constexpr int draws = 40;
+  SyntheticViews views{synthetic_board(false), synthetic_lens()};
+  views.board.print_sd = kPrintSd;
+  Random random(11);
+  double squares = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    views.stretch = {1 + kPrintSd * random.normal(), 1 + kPrintSd * random.normal()};
+    const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, noise_px));
+    ASSERT_TRUE(solution.ok());
+    const auto error = projection_difference(solution.lens(), views.lens, {800, 600}, even);
+    ASSERT_TRUE(error);
+    squares += error->worst_px * error->worst_px / draws;
+  }
+  views.stretch = {1, 1};
+  LensViews stated{{}, views.board};
+  stated.views.reserve(20);
+  for (int i = 0; i < 20; ++i) {
+    stated.views.push_back(
+        {std::to_string(i), views.imager_px, views.random_view(random, noise_px)});
+  }
+  const LensEstimate with_print = estimate_lens(stated);
+  stated.board.print_sd = 0;
+  const LensEstimate exact = estimate_lens(stated);
+  ASSERT_TRUE(with_print.ok() && exact.ok());
+  const double ratio = std::sqrt(squares) / with_print.report.uncertainty_worst_px;
+  EXPECT_GT(ratio, 0.6);
+  EXPECT_LT(ratio, 1.1);
+  EXPECT_GT(std::sqrt(squares) / exact.report.uncertainty_worst_px, 1.5);
+  EXPECT_GT(with_print.report.uncertainty_mean_px, exact.report.uncertainty_mean_px);
 }
 
 INSTANTIATE_TEST_SUITE_P(Boards, PrintEffects, testing::Bool(),
