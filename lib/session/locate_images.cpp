@@ -199,7 +199,8 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
     result.located = locate_frames(input);
   }
   add_remarks(seen, result.located);
-  if (options.classifier.empty()) {
+  // A classifier identifies lamps without the row time: it is no reason why there is no result.
+  if (options.classifier.empty() || result.located.ok()) {
     add_row_time_error(seen.images, input, images.calibration_file, result.located);
   }
   return result;

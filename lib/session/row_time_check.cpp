@@ -16,20 +16,21 @@ namespace {
 constexpr int kMinRowTimeLamps = 3;
 constexpr double kMicrosecondsPerSecond = 1e6;
 
-bool contradicts(const RowTime& measured, double stated_s) {
-  constexpr double max_sds = 3;
-  return measured.lamps >= kMinRowTimeLamps &&
-         std::abs(std::log(measured.row_time_s / stated_s)) >
-             kLampDrift + max_sds * measured.sd_s / measured.row_time_s;
-}
+}  // namespace
 
-std::string describe_contradiction(const RowTime& measured, const StatedRowTime& stated) {
+std::string compare_row_times(const RowTime& measured, const StatedRowTime& stated) {
+  constexpr double max_sds = 3;
+  const double max_deviation = kLampDrift + max_sds * measured.sd_s / measured.row_time_s;
+  const double deviation = std::abs(std::log(measured.row_time_s / stated.row_time_s));
+  if (measured.lamps < kMinRowTimeLamps || deviation <= max_deviation) return "";
   return fmt::format(
       "row time is {:.6g} us in {}, but the stripes of {} lamps measure {:.2f} +- {:.2f} us; "
       "correct it, or, if it is right, all frequencies of the lamp map by this ratio",
       kMicrosecondsPerSecond * stated.row_time_s, stated.source, measured.lamps,
       kMicrosecondsPerSecond * measured.row_time_s, kMicrosecondsPerSecond * measured.sd_s);
 }
+
+namespace {
 
 /// Collects the periods of identified lamps. A period found by modulation is excluded: its search
 /// begins at the stated row time.
@@ -55,15 +56,13 @@ RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMa
   if (found.candidates.empty()) return {};
   const RowTime& measured = found.candidates.front().row_time;
   if (measured.lamps < kMinRowTimeLamps) return {};
-  if (!contradicts(measured, stated.row_time_s)) return {measured};
-  return {measured, describe_contradiction(measured, stated)};
+  return {measured, compare_row_times(measured, stated)};
 }
 
 std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
                                 const std::optional<Lens>& lens, const StatedRowTime& stated) {
   const auto found = choose_row_time_by_places({&images}, {{}}, lamps, lens).found;
-  if (!found || !contradicts(*found, stated.row_time_s)) return "";
-  return describe_contradiction(*found, stated);
+  return found ? compare_row_times(*found, stated) : "";
 }
 
 std::string describe_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
@@ -71,7 +70,10 @@ std::string describe_row_time_error(const std::vector<Observation>& images, cons
                                     bool has_result) {
   if (!camera.row_time_s) return "";
   const StatedRowTime stated{*camera.row_time_s, source};
-  if (has_result) return check_row_time(images, lamps, stated).error;
+  if (has_result) {
+    std::string error = check_row_time(images, lamps, stated).error;
+    if (!error.empty()) return error;
+  }
   return find_row_time_error(images, lamps, Lens(camera.lens_model, camera.intrinsics), stated);
 }
 

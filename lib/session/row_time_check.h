@@ -29,6 +29,12 @@ struct RowTimeCheck {
   std::string error = {};
 };
 
+/// Compares a measured row time with the stated one, as check_row_time() does.
+///
+/// @return  the contradiction in one line; empty if there is none or fewer than three lamps were
+///          measured
+std::string compare_row_times(const RowTime& measured, const StatedRowTime& stated);
+
 /// Estimates the row time from the identified lamps of the kept images (estimate_row_time()) and
 /// compares it with the stated one. They contradict each other if
 ///
@@ -41,16 +47,18 @@ RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMa
                             const StatedRowTime& stated);
 
 /// Finds another row time that makes the lights of the images lamps of the map, by their periods
-/// and places, however they were identified (choose_row_time()). Requires captures that are of no
-/// use with the stated row time: a wrong one leaves lights unknown or exchanges lamps.
+/// and places, however they were identified (choose_row_time()): a wrong row time leaves lights
+/// unknown or exchanges lamps.
 ///
 /// @return  the contradiction in one line; empty without at least three lamps that contradict the
 ///          stated row time as in check_row_time()
 std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
                                 const std::optional<Lens>& lens, const StatedRowTime& stated);
 
-/// Returns the error of check_row_time() with the row time of `camera`, or, without a result of the
-/// images, that of find_row_time_error(). Returns an empty string if the row time is unknown.
+/// Returns the error of check_row_time() with the row time of `camera`, if there is a result of the
+/// images. Otherwise, and if identified lamps do not contradict it because each was taken for its
+/// neighbour, returns that of find_row_time_error(). Returns an empty string if the row time is
+/// unknown.
 std::string describe_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
                                     const Camera& camera, const std::string& source,
                                     bool has_result);

@@ -11,6 +11,7 @@
 #include "frontend/image_folder.h"
 #include "frontend/lamp_intake.h"
 #include "session/position_cost.h"
+#include "session/row_time_check.h"
 #include "session/skipped_images.h"
 
 namespace vlp {
@@ -144,6 +145,10 @@ RowTimeStepResult find_row_time(const SeenLights& seen,
   result.metrics = {{"row_time_us", 1e6 * result.found.row_time_s},
                     {"row_time_sd_us", 1e6 * result.found.sd_s}};
   if (!calibration) return result;
+  if (const auto& stated_s = calibration->camera.row_time_s) {
+    std::string error = compare_row_times(result.found, {*stated_s, "the calibration"});
+    if (!error.empty()) result.warnings.push_back(std::move(error));
+  }
   result.calibration = *calibration;
   result.calibration.camera.row_time_s = result.found.row_time_s;
   result.calibration.camera.readout = seen.camera.readout;

@@ -47,7 +47,8 @@ struct RowTimeStepResult : StepResult {
 
 /// Finds the row time from lamps whose frequencies the map knows (estimate_row_time()) and, where
 /// several row times explain their periods, from their places (compute_position_costs()). It
-/// completes the camera of `calibration`, where there is one.
+/// completes the camera of `calibration`, where there is one, and warns if it states another row
+/// time (compare_row_times()).
 /// Throws InputError when no lamp has a frequency. undetermined.
 RowTimeStepResult find_row_time(const SeenLights& seen,
                                 const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,

@@ -9,8 +9,10 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "rig/input_error.h"
+#include "session/row_time_check.h"
 
 namespace vlp {
 namespace {
@@ -75,6 +77,19 @@ void warn_of_inseparable(const LampClassifier& classifier, TrainStepResult& resu
   }
 }
 
+/// Warns if the labelled lamps contradict the row time of the calibration.
+void warn_of_row_time(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels,
+                      const LampMap& lamps, TrainStepResult& result) {
+  if (!seen.camera.row_time_s) return;
+  std::vector<const std::vector<Observation>*> folders;
+  folders.reserve(seen.folders.size());
+  for (const Observations& folder : seen.folders) folders.push_back(&folder.images);
+  const auto measured = choose_row_time_by_places(folders, labels, lamps, seen.camera.lens).found;
+  if (!measured) return;
+  std::string error = compare_row_times(*measured, {*seen.camera.row_time_s, "the calibration"});
+  if (!error.empty()) result.warnings.push_back(std::move(error));
+}
+
 }  // namespace
 
 TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels,
@@ -95,6 +110,7 @@ TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vecto
   if (!kept_enough(result.classifier, result)) return result;
   result.confusion = cross_validated(labelled.lights, train_classifier);
   warn_of_inseparable(result.classifier, result);
+  warn_of_row_time(seen, labels, lamps, result);
   return result;
 }
 

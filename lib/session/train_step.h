@@ -19,9 +19,10 @@ struct TrainStepResult : StepResult {
 };
 
 /// The lamp classifier from lights whose lamps the labels of each folder name. Warns of lamps that
-/// look alike. undetermined: one lamp, or too few lights of a lamp, or lights of a lamp that have
-/// too little in common. Throws InputError, of the first folder, when the labels name none of its
-/// images; std::invalid_argument when they name a lamp that is not in the map.
+/// look alike, and if lamps with known frequencies contradict the row time of the calibration
+/// (compare_row_times()). undetermined: one lamp, or too few lights of a lamp, or lights of a lamp
+/// that have too little in common. Throws InputError, of the first folder, when the labels name
+/// none of its images; std::invalid_argument when they name a lamp that is not in the map.
 TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels,
                             const LampMap& lamps, const std::filesystem::path& first_folder);
 

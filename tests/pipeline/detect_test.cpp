@@ -37,6 +37,36 @@ class Detect : public testing::Test {
   const TemporaryFolder folder;
 };
 
+/// A row time that leaves lamps identified, and one with which each is taken for its neighbour.
+TEST_F(Detect, NamesBothRowTimesIfTheStatedOneIsWrong) {
+  const std::string images = kRig + "/sample' --lamps " + kRig + "/lamps.yaml";
+  const std::string output = " -o " + (folder / "out.csv").string();
+  std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+  std::string stated = "row_time_s: 0.00003";
+  for (const std::string wrong_us : {"28.5", "37.5"}) {
+    const std::string wrong = "row_time_s: " + wrong_us + "e-06";
+    ASSERT_NE(calibration.find(stated), std::string::npos);
+    calibration.replace(calibration.find(stated), stated.size(), wrong);
+    stated = wrong;
+    const std::string file = folder.file("wrong.yaml", calibration).string();
+    for (const std::string program : {"vlp-detect '", "vlp-locate '"}) {
+      const auto result = run_program(program + images + " --calibration " + file + output);
+      EXPECT_THAT(result.errors, testing::ContainsRegex(
+                                     "row time is " + wrong_us +
+                                     " us in wrong.yaml, but the stripes of [0-9] lamps measure "
+                                     "(29[.]9|30[.]0)"))
+          << program << wrong_us;
+    }
+    const auto option =
+        run_program("vlp-detect '" + images + " --row-time-s " + wrong_us + "e-6" + output);
+    EXPECT_THAT(option.errors, HasSubstr("row time is " + wrong_us + " us in --row-time-s, but"));
+  }
+  const auto right = run_program("vlp-detect '" + images + " --calibration " + kRig +
+                                 "/true_calibration.yaml" + output);
+  EXPECT_EQ(right.exit_code, 0);
+  EXPECT_THAT(right.errors, testing::Not(HasSubstr("row time")));
+}
+
 /// Two rooms with the same frequencies in one map.
 TEST_F(Detect, IdentifiesTheLampsOfTheRoomThatIsNamed) {
   std::istringstream lines(TemporaryFolder::content_of(kRig + "/lamps.yaml"));

@@ -268,6 +268,27 @@ TEST_F(Station, NamesAWrongRowTimeOfTheType) {
   EXPECT_THAT(records("show").output, HasSubstr("row_time_sd_us"));
 }
 
+TEST_F(Station, NamesAWrongRowTimeOfTheGoldenUnit) {
+  render("check");
+  const std::string right = TemporaryFolder::content_of(folder / "unit/true_calibration.yaml");
+  const std::string stated = "row_time_s: 0.00003";
+  ASSERT_NE(right.find(stated), std::string::npos);
+  change("station.yaml", "# The images of a unit",
+         "golden: {camera_id: golden, calibration: golden.yaml, gates: {check_mean_mm: 0.5}}\n"
+         "# The images of a unit");
+  for (const std::string wrong_us : {"28.5", "37.5"}) {
+    std::string wrong = right;
+    wrong.replace(wrong.find(stated), stated.size(), "row_time_s: " + wrong_us + "e-06");
+    folder.file("station/golden.yaml", wrong);
+    const auto verified = records("verify --batch " + (folder / "unit").string());
+    EXPECT_EQ(verified.exit_code, 3);
+    EXPECT_THAT(verified.errors,
+                ContainsRegex("not judged: row time is " + wrong_us +
+                              " us in the calibration of the golden unit, but the stripes of 6 "
+                              "lamps measure (29[.]9|30[.]0)"));
+  }
+}
+
 /// One unit's images, as another's.
 TEST_F(Station, TakesNoImagesOfAnotherUnit) {
   render_four_boards();

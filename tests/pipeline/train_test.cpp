@@ -161,6 +161,35 @@ TEST_F(Train, FindsTheRowTimeByThePlacesOfTheLamps) {
   EXPECT_THAT(swapped.errors, HasSubstr("neither the duties nor the places of the lamps decide"));
 }
 
+/// A classifier is trained all the same: it identifies lamps without the row time.
+TEST_F(Train, NamesBothRowTimesIfTheStatedOneIsWrong) {
+  const std::string images = captures();
+  const std::string right = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+  const std::string stated = "row_time_s: 0.00003";
+  ASSERT_NE(right.find(stated), std::string::npos);
+  for (const std::string wrong_us : {"28.5", "37.5"}) {
+    std::string wrong = right;
+    wrong.replace(wrong.find(stated), stated.size(), "row_time_s: " + wrong_us + "e-06");
+    const std::string calibration =
+        " --calibration " + folder.file("wrong.yaml", wrong).string() + kLamps;
+    const auto both = testing::ContainsRegex("row time is " + wrong_us +
+                                             " us in the calibration, but the stripes of 6 lamps "
+                                             "measure (29[.]9|30[.]0)");
+    const auto trained = train(images + calibration);
+    EXPECT_EQ(trained.exit_code, 0);
+    EXPECT_THAT(trained.errors, both);
+    const auto located =
+        run_program("vlp-locate " + kRig + "/sample" + calibration + " --classifier " +
+                    output.string() + " -o " + (folder / "fixes.csv").string());
+    EXPECT_EQ(located.exit_code, 0);
+    EXPECT_THAT(located.errors, HasSubstr("row time is " + wrong_us + " us in wrong.yaml, but"));
+    const auto row_time = train("--row-time " + images + calibration);
+    EXPECT_EQ(row_time.exit_code, 0);
+    EXPECT_THAT(row_time.errors, both);
+  }
+  EXPECT_THAT(train(images + kLamps + kCalibration).errors, testing::Not(HasSubstr("row time")));
+}
+
 TEST_F(Train, DoesNotGuessTheRowTime) {
   std::string map = "format: vlp-lamps/1\nlamps:\n";
   for (int id = 1; id <= 9; ++id) {

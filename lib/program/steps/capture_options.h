@@ -99,8 +99,9 @@ void check_image_outputs(const CaptureOptions& options);
 /// Prints each light if --verbose is given.
 void print_lights(const Observations& seen);
 
-/// Detects the lamps in a folder of images or a video, with progress, and prints the remarks.
-/// Throws as observe_lamps(), and if no lamp is identified.
+/// Detects the lamps in a folder of images or a video, with progress, and prints the remarks, a
+/// contradiction between the lamps and the stated row time included. Throws as observe_lamps(), and
+/// if no lamp is identified.
 Observations observe_captures(const CaptureOptions& options, ImageUse use, const LampMap& lamps,
                               const std::optional<Calibration>& calibration);
 
